@@ -1,0 +1,126 @@
+"""Everything photostrip can refuse, and with which exit code.
+
+The tree::
+
+    PhotostripError                exit 70  an internal error, a bug, unless a branch below says otherwise
+    ├── InputError                 exit  2  wrong usage, project file or data; carries every fault found
+    └── GeometryError              exit  3  too weak, singular or not converging; names photos and points
+
+A :class:`Fault` says what is wrong, where, what was expected and what would fix it. Readers collect
+faults and raise one :class:`InputError` for all of them; mathematics raises :class:`GeometryError`
+with the ids of the photos and points concerned.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+EXIT_DONE = 0
+EXIT_TOLERANCE = 1
+EXIT_INPUT = 2
+EXIT_GEOMETRY = 3
+EXIT_INTERNAL = 70
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """One thing that is wrong with an input, and where.
+
+    Parameters
+    ----------
+    message : str
+        What is wrong, in the surveyor's words, with ids of photos and points.
+    code : str
+        Stable short name of the kind of fault, for example ``"unknown-key"``.
+    file : str
+        File as the user named it; empty when the fault is not in a file.
+    line, column : int
+        Position, counted from 1; 0 when unknown.
+    key : str
+        Path of the key in the project file (``cameras.RC30.format``) or name of the table column.
+    expected : str
+        What was expected instead.
+    fix : str
+        What would put it right.
+    """
+
+    message: str
+    code: str = "input"
+    file: str = ""
+    line: int = 0
+    column: int = 0
+    key: str = ""
+    expected: str = ""
+    fix: str = ""
+
+    def __str__(self) -> str:
+        """Give the one-line form ``file:line:column: key: what, expected, fix``."""
+        place = self.file
+        if self.line:
+            place += f":{self.line}"
+            if self.column:
+                place += f":{self.column}"
+        head = [part for part in (place, self.key) if part]
+        text = self.message
+        if self.expected:
+            text += f"; expected {self.expected}"
+        if self.fix:
+            text += f"; {self.fix}"
+        return ": ".join([*head, text])
+
+
+class PhotostripError(Exception):
+    """Root of all errors photostrip raises on purpose."""
+
+    exit_code = EXIT_INTERNAL
+
+
+class InputError(PhotostripError):
+    """Wrong usage, project file or data.
+
+    Parameters
+    ----------
+    faults : Fault or iterable of Fault or str
+        Every fault found; a plain text becomes a fault without a place.
+    """
+
+    exit_code = EXIT_INPUT
+
+    def __init__(self, faults: Fault | str | Iterable[Fault]) -> None:
+        if isinstance(faults, str):
+            faults = Fault(faults)
+        self.faults: tuple[Fault, ...] = (faults,) if isinstance(faults, Fault) else tuple(faults)
+        super().__init__("\n".join(map(str, self.faults)))
+
+
+class GeometryError(PhotostripError):
+    """The geometry is too weak, singular, or the solution did not converge.
+
+    Parameters
+    ----------
+    message : str
+        What cannot be determined and why.
+    photos, points : tuple of str
+        Ids of the photos and points concerned.
+    code : str
+        Stable short name of the kind of failure.
+    """
+
+    exit_code = EXIT_GEOMETRY
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        photos: Iterable[str] = (),
+        points: Iterable[str] = (),
+        code: str = "geometry",
+    ) -> None:
+        super().__init__(message)
+        self.photos = tuple(photos)
+        self.points = tuple(points)
+        self.code = code

@@ -1,0 +1,1 @@
+"""Rotations, similarities and plane transformations."""

@@ -1,0 +1,248 @@
+"""Rotations in the angles of the field: alpha-omega-kappa, omega-phi-kappa, phi-omega-kappa.
+
+All matrices map photo vectors (x, y, -f) to object vectors, ``X = A r``. Arrays of angles give arrays of
+matrices: the functions work on leading axes of any shape.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import GeometryError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+SYSTEMS = ("alpha-omega-kappa", "omega-phi-kappa", "phi-omega-kappa")
+GIMBAL_LIMIT = 1e-12  # 1 - |sine of the middle angle| below which the other two are not separable
+
+
+def rotation_x(angle: ArrayLike) -> NDArray[np.float64]:
+    """Rotation about the x axis, right-hand rule.
+
+    Parameters
+    ----------
+    angle : array_like, shape (...)
+        Angle in radians.
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+        Rotation matrices.
+    """
+    return _elementary(angle, 1, 2)
+
+
+def rotation_y(angle: ArrayLike) -> NDArray[np.float64]:
+    """Rotation about the y axis, right-hand rule; see :func:`rotation_x`."""
+    return _elementary(angle, 2, 0)
+
+
+def rotation_z(angle: ArrayLike) -> NDArray[np.float64]:
+    """Rotation about the z axis, right-hand rule; see :func:`rotation_x`."""
+    return _elementary(angle, 0, 1)
+
+
+def _elementary(angle: ArrayLike, first: int, second: int) -> NDArray[np.float64]:
+    t = np.asarray(angle, float)
+    matrix = np.zeros((*t.shape, 3, 3))
+    matrix[..., range(3), range(3)] = 1.0
+    matrix[..., first, first] = matrix[..., second, second] = np.cos(t)
+    matrix[..., second, first] = np.sin(t)
+    matrix[..., first, second] = -matrix[..., second, first]
+    return matrix
+
+
+def from_alpha_omega_kappa(alpha: ArrayLike, omega: ArrayLike, kappa: ArrayLike) -> NDArray[np.float64]:
+    """Rotation ``A = Ry(-alpha) Rx(omega) Rz(kappa)``.
+
+    Parameters
+    ----------
+    alpha, omega, kappa : array_like, shape (...)
+        Angles in radians: alpha positive looks forward (+X), omega positive looks left (+Y), kappa
+        positive turns the x axis counter-clockwise seen from above.
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+        Rotation matrices, photo to object.
+
+    Notes
+    -----
+    Source: [001] eq. 127, 132, 133.
+    """
+    al, om, ka = np.broadcast_arrays(*(np.asarray(a, float) for a in (alpha, omega, kappa)))
+    sa, ca, so, co, sk, ck = np.sin(al), np.cos(al), np.sin(om), np.cos(om), np.sin(ka), np.cos(ka)
+    matrix = np.empty((*al.shape, 3, 3))
+    matrix[..., 0, 0] = ca * ck - sa * so * sk
+    matrix[..., 0, 1] = -ca * sk - sa * so * ck
+    matrix[..., 0, 2] = -sa * co
+    matrix[..., 1, 0] = co * sk
+    matrix[..., 1, 1] = co * ck
+    matrix[..., 1, 2] = -so
+    matrix[..., 2, 0] = sa * ck + ca * so * sk
+    matrix[..., 2, 1] = -sa * sk + ca * so * ck
+    matrix[..., 2, 2] = ca * co
+    return matrix
+
+
+def alpha_omega_kappa(matrix: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Angles alpha, omega, kappa of a rotation.
+
+    Parameters
+    ----------
+    matrix : array_like, shape (..., 3, 3)
+        Rotation matrices, photo to object.
+
+    Returns
+    -------
+    alpha, omega, kappa : ndarray, shape (...)
+        Angles in radians.
+
+    Raises
+    ------
+    GeometryError
+        When omega is +-90 degrees: alpha and kappa cannot be separated.
+
+    Notes
+    -----
+    Source: [001] eq. 129 and 135, there misprinted as sin(omega) = -b3/c3; it is -b3.
+    """
+    a = np.asarray(matrix, float)
+    _refuse_gimbal(a[..., 1, 2], "omega", "alpha")
+    return (
+        np.arctan2(-a[..., 0, 2], a[..., 2, 2]),
+        np.arcsin(np.clip(-a[..., 1, 2], -1, 1)),
+        np.arctan2(a[..., 1, 0], a[..., 1, 1]),
+    )
+
+
+def _refuse_gimbal(sine: NDArray[np.float64], middle: str, first: str) -> None:
+    if np.any(1 - np.abs(sine) < GIMBAL_LIMIT):
+        msg = f"{middle} is 90 degrees: {first} and kappa cannot be separated; choose another system of angles"
+        raise GeometryError(msg, code="gimbal")
+
+
+def angles(matrix: ArrayLike, system: str) -> NDArray[np.float64]:
+    """Angles of a rotation in the named system.
+
+    Parameters
+    ----------
+    matrix : array_like, shape (..., 3, 3)
+        Rotation matrices, photo to object.
+    system : str
+        One of :data:`SYSTEMS`; the angles come in the order of the name.
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+        Angles in radians.
+
+    Raises
+    ------
+    GeometryError
+        When the middle angle is +-90 degrees.
+    ValueError
+        When the system is not known.
+    """
+    a = np.asarray(matrix, float)
+    if system == "omega-phi-kappa":
+        _refuse_gimbal(a[..., 0, 2], "phi", "omega")
+        omega = np.arctan2(-a[..., 1, 2], a[..., 2, 2])
+        phi = np.arcsin(np.clip(a[..., 0, 2], -1, 1))
+        return np.stack([omega, phi, np.arctan2(-a[..., 0, 1], a[..., 0, 0])], axis=-1)
+    if system not in SYSTEMS:
+        msg = f"unknown system of angles {system!r}"
+        raise ValueError(msg)
+    alpha, omega, kappa = alpha_omega_kappa(a)
+    return np.stack([-alpha if system == "phi-omega-kappa" else alpha, omega, kappa], axis=-1)
+
+
+def from_angles(values: ArrayLike, system: str) -> NDArray[np.float64]:
+    """Rotation from angles in the named system; the inverse of :func:`angles`.
+
+    Parameters
+    ----------
+    values : array_like, shape (..., 3)
+        Angles in radians, in the order of the system's name.
+    system : str
+        One of :data:`SYSTEMS`.
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+        Rotation matrices, photo to object.
+    """
+    first, second, kappa = np.moveaxis(np.asarray(values, float), -1, 0)
+    if system == "omega-phi-kappa":
+        return rotation_x(first) @ rotation_y(second) @ rotation_z(kappa)
+    if system not in SYSTEMS:
+        msg = f"unknown system of angles {system!r}"
+        raise ValueError(msg)
+    return from_alpha_omega_kappa(-first if system == "phi-omega-kappa" else first, second, kappa)
+
+
+def from_vector(vector: ArrayLike) -> NDArray[np.float64]:
+    """Rotation about a vector by its length (Rodrigues' formula).
+
+    Parameters
+    ----------
+    vector : array_like, shape (..., 3)
+        Rotation vectors in radians.
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+        Rotation matrices; the identity for a zero vector.
+    """
+    v = np.asarray(vector, float)
+    angle = np.linalg.norm(v, axis=-1)[..., None, None]
+    k = cross_matrix(v)
+    safe = np.where(angle < 1e-9, 1.0, angle)  # noqa: PLR2004  below it the series' first terms are exact
+    first = np.where(angle < 1e-9, 1.0, np.sin(safe) / safe)  # noqa: PLR2004
+    second = np.where(angle < 1e-9, 0.5, (1 - np.cos(safe)) / safe**2)  # noqa: PLR2004
+    return np.eye(3) + first * k + second * (k @ k)
+
+
+def cross_matrix(vector: ArrayLike) -> NDArray[np.float64]:
+    """Matrix [v] with ``[v] w = v x w``.
+
+    Parameters
+    ----------
+    vector : array_like, shape (..., 3)
+        Vectors.
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+        Skew-symmetric matrices.
+    """
+    v = np.asarray(vector, float)
+    matrix = np.zeros((*v.shape[:-1], 3, 3))
+    matrix[..., 2, 1] = v[..., 0]
+    matrix[..., 0, 2] = v[..., 1]
+    matrix[..., 1, 0] = v[..., 2]
+    matrix[..., 1, 2] = -v[..., 0]
+    matrix[..., 2, 0] = -v[..., 1]
+    matrix[..., 0, 1] = -v[..., 2]
+    return matrix
+
+
+def angle_between(first: ArrayLike, second: ArrayLike) -> NDArray[np.float64]:
+    """Angle of the rotation from one attitude to another.
+
+    Parameters
+    ----------
+    first, second : array_like, shape (..., 3, 3)
+        Rotation matrices.
+
+    Returns
+    -------
+    ndarray, shape (...)
+        Angle in radians, 0 to pi, exact also when it is tiny.
+    """
+    a, b = np.asarray(first, float), np.asarray(second, float)
+    chord = np.linalg.norm(a - b, axis=(-2, -1)) / np.sqrt(8.0)
+    return 2 * np.arcsin(np.clip(chord, 0, 1))

@@ -1,0 +1,210 @@
+"""Points and what is measured of them: frozen columns over read-only arrays, keyed by id.
+
+A point is a thing; its coordinates exist only in a frame. Mixing frames raises.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike, NDArray
+
+
+class Frame(StrEnum):
+    """Frames in which ground coordinates of a strip exist."""
+
+    MODEL = "model"  # one stereo model, free scale
+    STRIP = "strip"  # the formed strip, frame and scale of its first model
+    INTERMEDIATE = "intermediate"  # at the control's centre of gravity, X along the strip, metres
+    CARTESIAN = "cartesian"  # geocentric, or the project's own local Cartesian frame, metres
+    GROUND = "ground"  # east, north, height in the units of a CRS
+
+
+def frozen(values: ArrayLike, dtype: type = float, shape: tuple[int, ...] | None = None) -> NDArray[np.float64]:
+    """Give a read-only array, copied only when needed.
+
+    Parameters
+    ----------
+    values : array_like
+        Values of any shape.
+    dtype : type
+        Type of the elements.
+    shape : tuple of int, optional
+        Shape to bring an empty or flat input into.
+
+    Returns
+    -------
+    numpy.ndarray
+        The values; writing to it raises.
+    """
+    array = np.ascontiguousarray(values, dtype=dtype)
+    if shape is not None:
+        array = array.reshape(shape)
+    if array.flags.writeable:
+        array = array.view()
+        array.flags.writeable = False
+    return array
+
+
+@dataclass(frozen=True, eq=False)
+class PointTable:
+    """Coordinates of points in one named frame.
+
+    Parameters
+    ----------
+    ids : tuple of str
+        Point ids, unique.
+    xyz : ndarray, shape (n, 3)
+        Coordinates in the unit of the frame.
+    frame : Frame
+        The frame in which they exist.
+    """
+
+    ids: tuple[str, ...]
+    xyz: NDArray[np.float64]
+    frame: Frame
+
+    def __post_init__(self) -> None:
+        """Freeze the array."""
+        object.__setattr__(self, "xyz", frozen(self.xyz, shape=(len(self.ids), 3)))
+
+    @cached_property
+    def index(self) -> dict[str, int]:
+        """Row of each id."""
+        return {name: row for row, name in enumerate(self.ids)}
+
+    def __len__(self) -> int:
+        """Give the number of points."""
+        return len(self.ids)
+
+    def shared(self, other: PointTable) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Rows of the points that both tables hold, in this table's order.
+
+        Parameters
+        ----------
+        other : PointTable
+            Table in the same frame.
+
+        Returns
+        -------
+        rows_self, rows_other : ndarray of int, shape (m,)
+            Rows of the common points in either table.
+
+        Raises
+        ------
+        ValueError
+            When the frames differ.
+        """
+        if self.frame is not other.frame:
+            msg = f"points in the {self.frame} frame cannot be joined with points in the {other.frame} frame"
+            raise ValueError(msg)
+        index = other.index
+        pairs = [(row, index[name]) for row, name in enumerate(self.ids) if name in index]
+        rows = np.array(pairs, dtype=np.intp).reshape(-1, 2)
+        return rows[:, 0], rows[:, 1]
+
+
+@dataclass(frozen=True, eq=False)
+class PhotoPoints:
+    """Points measured on photos, one row for each image point.
+
+    Parameters
+    ----------
+    photo_ids, point_ids : tuple of str
+        Ids in order of first appearance; rows refer to them by number.
+    photo, point : ndarray of int, shape (n,)
+        Numbers of the photo and of the point of each row.
+    xy : ndarray, shape (n, 2)
+        Image coordinates in mm; x to the right, y up.
+    sigma : ndarray, shape (n, 2)
+        Their standard deviations in mm.
+    """
+
+    photo_ids: tuple[str, ...]
+    point_ids: tuple[str, ...]
+    photo: NDArray[np.intp]
+    point: NDArray[np.intp]
+    xy: NDArray[np.float64]
+    sigma: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        """Freeze the columns."""
+        for name in ("photo", "point"):
+            object.__setattr__(self, name, frozen(getattr(self, name), dtype=np.intp))
+        n = len(self.photo)
+        for name in ("xy", "sigma"):
+            object.__setattr__(self, name, frozen(getattr(self, name), shape=(n, 2)))
+
+    def __len__(self) -> int:
+        """Give the number of image points."""
+        return len(self.photo)
+
+
+@dataclass(frozen=True, eq=False)
+class ControlPoints:
+    """Given ground coordinates: what they are, which of them count, how good they are.
+
+    Parameters
+    ----------
+    ids : tuple of str
+        Point ids, unique.
+    enu : ndarray, shape (n, 3)
+        Given coordinates in the units of each point's own ground frame, in the internal order east,
+        north, up (geocentric: X, Y, Z). A coordinate that is not given is NaN.
+    use : ndarray of bool, shape (n, 3)
+        Which coordinates count, in the same order.
+    check : ndarray of bool, shape (n,)
+        True for check points, which never influence a result.
+    sigma : ndarray, shape (n, 3)
+        Standard deviations in metres, in the same order.
+    frame : ndarray of int, shape (n,)
+        Number of each point's ground frame in the project's list of frames.
+    """
+
+    ids: tuple[str, ...]
+    enu: NDArray[np.float64]
+    use: NDArray[np.bool_]
+    check: NDArray[np.bool_]
+    sigma: NDArray[np.float64]
+    frame: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp))
+
+    def __post_init__(self) -> None:
+        """Freeze the columns."""
+        n = len(self.ids)
+        object.__setattr__(self, "enu", frozen(self.enu, shape=(n, 3)))
+        object.__setattr__(self, "use", frozen(self.use, dtype=np.bool_, shape=(n, 3)))
+        object.__setattr__(self, "check", frozen(self.check, dtype=np.bool_, shape=(n,)))
+        object.__setattr__(self, "sigma", frozen(self.sigma, shape=(n, 3)))
+        frame = self.frame if len(self.frame) else np.zeros(n, np.intp)
+        object.__setattr__(self, "frame", frozen(frame, dtype=np.intp, shape=(n,)))
+
+    def __len__(self) -> int:
+        """Give the number of points."""
+        return len(self.ids)
+
+    def take(self, rows: Sequence[int] | NDArray[np.intp] | NDArray[np.bool_]) -> ControlPoints:
+        """Give the points of some rows.
+
+        Parameters
+        ----------
+        rows : array of int or bool
+            Rows to keep, in their order.
+
+        Returns
+        -------
+        ControlPoints
+            A table of those points.
+        """
+        numbers = np.arange(len(self))[np.asarray(rows)] if len(self) else np.zeros(0, np.intp)
+        ids = tuple(self.ids[i] for i in numbers)
+        return ControlPoints(
+            ids, self.enu[numbers], self.use[numbers], self.check[numbers], self.sigma[numbers], self.frame[numbers]
+        )

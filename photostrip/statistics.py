@@ -1,0 +1,146 @@
+"""Quantiles and critical values of the tests, and nothing else.
+
+scipy's special functions do the work; they are imported when first asked for, because the import costs more
+than all the quantiles of a project.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from math import sqrt
+
+
+@lru_cache(maxsize=4096)
+def t_quantile(probability: float, dof: float) -> float:
+    """Quantile of Student's t.
+
+    Parameters
+    ----------
+    probability : float
+        Probability below the quantile.
+    dof : float
+        Degrees of freedom.
+
+    Returns
+    -------
+    float
+        The quantile.
+    """
+    from scipy.special import stdtrit
+
+    return float(stdtrit(dof, probability))
+
+
+def t_p_value(t: float, dof: float) -> float:
+    """Two-sided p value of a t ratio.
+
+    Parameters
+    ----------
+    t : float
+        Estimate divided by its standard deviation.
+    dof : float
+        Degrees of freedom.
+
+    Returns
+    -------
+    float
+        Probability of a ratio at least as large by chance.
+    """
+    from scipy.special import stdtr
+
+    return float(2 * stdtr(dof, -abs(t)))
+
+
+def f_p_value(f: float, dof_numerator: float, dof_denominator: float) -> float:
+    """Upper tail of the F distribution.
+
+    Parameters
+    ----------
+    f : float
+        Ratio of two variances.
+    dof_numerator, dof_denominator : float
+        Their degrees of freedom.
+
+    Returns
+    -------
+    float
+        Probability of a ratio at least as large by chance.
+    """
+    from scipy.special import fdtrc
+
+    return float(fdtrc(dof_numerator, dof_denominator, f))
+
+
+@lru_cache(maxsize=4096)
+def chi2_quantile(probability: float, dof: float) -> float:
+    """Quantile of chi-square.
+
+    Parameters
+    ----------
+    probability : float
+        Probability below the quantile.
+    dof : float
+        Degrees of freedom.
+
+    Returns
+    -------
+    float
+        The quantile.
+    """
+    from scipy.special import chdtri
+
+    return float(chdtri(dof, 1 - probability))
+
+
+@lru_cache(maxsize=4096)
+def grubbs_limit(n: int, alpha: float, *, two_sided: bool = True) -> float:
+    """Critical value of Grubbs' test for one outlier.
+
+    Parameters
+    ----------
+    n : int
+        Number of values, at least 3.
+    alpha : float
+        Probability of rejecting a value of a clean sample.
+    two_sided : bool
+        Whether the sign of the outlier is unknown.
+
+    Returns
+    -------
+    float
+        Limit of max |value - mean| / s.
+
+    Notes
+    -----
+    Source: [004a]; Grubbs 1969 as a function of Student's t.
+    """
+    tail = alpha / (2 * n if two_sided else n)
+    t2 = t_quantile(1 - tail, n - 2) ** 2
+    return (n - 1) / sqrt(n) * sqrt(t2 / (n - 2 + t2))
+
+
+@lru_cache(maxsize=4096)
+def tau_limit(n: int, unknowns: int, alpha: float) -> float:
+    """Critical value of the largest studentised residual (Pope's tau, Bonferroni).
+
+    Parameters
+    ----------
+    n : int
+        Number of observations.
+    unknowns : int
+        Number of parameters of the adjustment; n - unknowns must be at least 2.
+    alpha : float
+        Probability of rejecting an observation of a clean adjustment.
+
+    Returns
+    -------
+    float
+        Limit of |v| / (sigma0 sqrt(r)).
+
+    Notes
+    -----
+    Source: Pope 1976; for one unknown it is Grubbs' two-sided limit for the largest |v| / (s sqrt((n-1)/n)).
+    """
+    nu = n - unknowns
+    t = t_quantile(1 - alpha / (2 * n), nu - 1)
+    return t * sqrt(nu) / sqrt(nu - 1 + t * t)
