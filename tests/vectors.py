@@ -1,0 +1,53 @@
+"""Numeric examples of the formulas, computed apart from this program (``tests/data/test_vectors.yaml``)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+DATA = Path(__file__).parent / "data"
+
+
+@dataclass(frozen=True, slots=True)
+class Vector:
+    """One example: what goes in, what must come out, and how closely.
+
+    Units are millimetres for photo coordinates and metres on the ground; angles are radians unless the key ends in
+    ``_deg``; matrices are lists of rows.
+    """
+
+    id: str
+    source: str
+    about: str
+    input: dict[str, Any]
+    expected: dict[str, Any]
+    tol: dict[str, Any]
+
+
+@cache
+def _sections() -> dict[str, list[dict[str, Any]]]:
+    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    text = (DATA / "test_vectors.yaml").read_text(encoding="utf-8")
+    document: dict[str, Any] = yaml.load(text, Loader=loader)  # noqa: S506 (both loaders are the safe one)
+    sections: dict[str, list[dict[str, Any]]] = document["sections"]
+    return sections
+
+
+def section(name: str) -> list[Vector]:
+    """Give every example of one section, in order."""
+    return [Vector(**entry) for entry in _sections()[name]]
+
+
+def vector(id_: str) -> Vector:
+    """Give the one example with this id, whatever its section."""
+    return next(Vector(**entry) for entries in _sections().values() for entry in entries if entry["id"] == id_)
+
+
+def cases(name: str, prefix: str = "") -> list[Any]:
+    """Give the examples of one section whose id begins with `prefix` as parameters for ``pytest.mark.parametrize``."""
+    return [pytest.param(each, id=each.id) for each in section(name) if each.id.startswith(prefix)]
