@@ -1,0 +1,375 @@
+"""Forming the strip: orientation handed on from photo to photo, models brought to one scale.
+
+Every photo takes its orientation from its left neighbour, so that all models are parallel to the frame of the
+first photo; only their scales are free ("partially dependent models"). The ratio of the scales of two neighbouring models does
+not depend on the chain before them, so all ratios are found in one batch, in the frame of the photo that joins them.
+
+Source: [001] eq. 125-141.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import GeometryError
+from photostrip.triangulation import relative
+from photostrip.triangulation.intersection import intersect
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.triangulation.relative import Orientation
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+    Flags = NDArray[np.bool_]
+
+SCALE_TRANSFERS = ("least_squares", "distances")
+REJECTION_FACTOR = 3.0  # standard deviations of a single scale ratio
+REJECTION_FLOOR = 1 / 500  # relative; smaller deviations are never rejected
+STEEPEST_BASE = 1e-6  # cosine of the base inclination
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How models are brought to one scale.
+
+    Parameters
+    ----------
+    scale_transfer : str
+        ``"least_squares"``: all pass points with their precision; ``"distances"``: the textbook's mean of the
+        ratios of distances from the common centre.
+    """
+
+    scale_transfer: str = "least_squares"
+
+
+@dataclass(frozen=True, eq=False)
+class Junctions:
+    """Pass points that join neighbouring models; joint i lies between models i and i+1, at photo i+1.
+
+    Parameters
+    ----------
+    joint : ndarray of int, shape (t,)
+        Joint of each row.
+    before, after : ndarray of int, shape (t,)
+        Rows of the point in the pairs' table, in the model before and after the joint.
+    point : ndarray of int, shape (t,)
+        Point of each row.
+    ratio : ndarray, shape (t,)
+        Distance from the common centre in the model before, divided by that in the model after.
+    used : ndarray of bool, shape (t,)
+        Whether the point took part in the scale transfer.
+    limit : ndarray, shape (j,)
+        Largest relative deviation of a ratio that was not rejected.
+    factor : ndarray, shape (j,)
+        Ratio of the scales of the models, after over before.
+    spread : ndarray, shape (j,)
+        Relative standard deviation of a single ratio; NaN with one point.
+    """
+
+    joint: Numbers
+    before: Numbers
+    after: Numbers
+    point: Numbers
+    ratio: Floats
+    used: Flags
+    limit: Floats
+    factor: Floats
+    spread: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class FormedStrip:
+    """A strip in the frame and scale of its first model.
+
+    Parameters
+    ----------
+    centers : ndarray, shape (n, 3)
+        Perspective centres.
+    rotations : ndarray, shape (n, 3, 3)
+        Photo to strip.
+    scale : ndarray, shape (n-1,)
+        Scale factor k of each model.
+    base_direction, base_inclination : ndarray, shape (n-1,)
+        tau and nu of each base in radians.
+    model_xyz : ndarray, shape (m, 3)
+        Strip coordinates of every row of the pairs' table, from its own model; NaN where rays do not meet.
+    gap : ndarray, shape (m,)
+        Y gap of the two rays at photo scale, mm.
+    point : ndarray of int, shape (q,)
+        Numbers of the points of the strip, ascending.
+    xyz : ndarray, shape (q, 3)
+        Strip coordinates, mean over the models that hold the point.
+    models : ndarray of int, shape (q,)
+        Number of those models.
+    junctions : Junctions
+        Scale transfer.
+    """
+
+    centers: Floats
+    rotations: Floats
+    scale: Floats
+    base_direction: Floats
+    base_inclination: Floats
+    model_xyz: Floats
+    gap: Floats
+    point: Numbers
+    xyz: Floats
+    models: Numbers
+    junctions: Junctions
+
+
+def hand_on(rotations: Floats) -> Floats:
+    """Orientation chain: each photo from its left neighbour.
+
+    Parameters
+    ----------
+    rotations : ndarray, shape (p, 3, 3)
+        Right photo to left photo, of every pair.
+
+    Returns
+    -------
+    ndarray, shape (p + 1, 3, 3)
+        Photo to strip; the first photo is the frame.
+
+    Notes
+    -----
+    Source: [001] eq. 131-134, ``A2 = A1 R`` with R = A1'^T A2'.
+    """
+    chain = np.empty((len(rotations) + 1, 3, 3))
+    chain[0] = np.eye(3)
+    for number, rotation in enumerate(rotations):
+        chain[number + 1] = chain[number] @ rotation
+    return chain
+
+
+def model_points(orientation: Orientation) -> tuple[Floats, Floats, Flags]:
+    """Points of every model in the frame of its left photo, base length 1.
+
+    Parameters
+    ----------
+    orientation : Orientation
+        Oriented pairs.
+
+    Returns
+    -------
+    vectors : ndarray, shape (m, 3)
+        From the left perspective centre; NaN where rays do not meet in front.
+    gap : ndarray, shape (m,)
+        Y gap of the rays at photo scale in mm.
+    sound : ndarray of bool, shape (m,)
+        Whether the rays meet.
+    """
+    pairs = orientation.pairs
+    left, right = relative.rays(orientation.elements, pairs)
+    # In the base frame the x parallax is the whole parallax at any kappa; along the strip's X it may vanish.
+    found = intersect(np.array([1.0, 0.0, 0.0]), left, right, pairs.focal)
+    al1, ka1 = orientation.elements[:, 0], orientation.elements[:, 1]
+    to_base = relative.from_alpha_omega_kappa(al1, 0.0, ka1)
+    vectors = np.einsum("mji,mj->mi", to_base[pairs.pair], found.xyz)
+    return vectors, found.gap / found.ray_factor, found.sound
+
+
+def _junction_rows(orientation: Orientation, sound: Flags) -> tuple[Numbers, Numbers, Numbers]:
+    """Rows of points that stand in two neighbouring models: joint, row before, row after."""
+    usable = np.flatnonzero(orientation.used & sound)
+    pair, point = orientation.pairs.pair[usable], orientation.point[usable]
+    order = np.lexsort((pair, point))
+    usable, pair, point = usable[order], pair[order], point[order]
+    both = np.flatnonzero((point[1:] == point[:-1]) & (pair[1:] == pair[:-1] + 1))
+    before, after, joint = usable[both], usable[both + 1], pair[both]
+    order = np.argsort(joint, kind="stable")
+    return joint[order], before[order], after[order]
+
+
+def transfer_scale(
+    orientation: Orientation, vectors: Floats, sound: Flags, settings: Settings, photos: Sequence[str]
+) -> Junctions:
+    """Scale of every model from the one before it, through the pass points at their common photo.
+
+    Parameters
+    ----------
+    orientation : Orientation
+        Oriented pairs.
+    vectors : ndarray, shape (m, 3)
+        Model points as :func:`model_points` gives them.
+    sound : ndarray of bool, shape (m,)
+        Which of them exist.
+    settings : Settings
+        Form of the transfer.
+    photos : sequence of str
+        Photos of the strip, to name a broken joint.
+
+    Returns
+    -------
+    Junctions
+        Ratios, which of them were used, factors.
+
+    Raises
+    ------
+    GeometryError
+        When no point is common to three photos in a row.
+
+    Notes
+    -----
+    Source: [001] eq. 139-141.
+    """
+    joint, before, after = _junction_rows(orientation, sound)
+    joints = orientation.pairs.size - 1
+    _require_joints(joint, joints, photos)
+    base, _ = orientation.relative
+    distance_before = np.linalg.norm(vectors[before] - base[joint], axis=1)
+    distance_after = np.linalg.norm(vectors[after], axis=1)
+    ratio = distance_before / distance_after
+    weight = _weights(orientation, vectors, before, after, joint, settings)
+    used, limit = _reject_ratios(ratio, weight, joint, joints)
+    factor, spread = _factors(ratio, weight * used, joint, joints, settings)
+    return Junctions(joint, before, after, orientation.point[before], ratio, used, limit, factor, spread)
+
+
+def _require_joints(joint: Numbers, joints: int, photos: Sequence[str]) -> None:
+    counts = np.bincount(joint, minlength=joints) if joints else np.zeros(0, np.intp)
+    for number in np.flatnonzero(counts == 0):
+        names = photos[number : number + 3]
+        msg = (
+            f"no point is common to photos {names[0]}, {names[1]} and {names[2]}: the models on either side of photo "
+            f"{names[1]} cannot be brought to one scale; measure at least one pass point on all three (three or more are recommended)"
+        )
+        raise GeometryError(msg, photos=names, code="broken-joint")
+
+
+def _weights(
+    orientation: Orientation, vectors: Floats, before: Numbers, after: Numbers, joint: Numbers, settings: Settings
+) -> Floats:
+    """Weights of the ratios: 1 in the textbook form, otherwise by the parallaxes that made the distances."""
+    if settings.scale_transfer == "distances":
+        return np.ones(len(before))
+    base, _ = orientation.relative
+    # A distance from the centre is known to sigma_p / p of itself, and p is inverse to the depth along the base.
+    depth_before = np.linalg.norm(np.cross(vectors[before], base[joint]), axis=1)
+    depth_after = np.linalg.norm(np.cross(vectors[after], base[joint + 1]), axis=1)
+    quality = np.minimum(orientation.pairs.weight[before], orientation.pairs.weight[after])
+    return quality / (depth_before**2 + depth_after**2)
+
+
+def _factors(
+    ratio: Floats, weight: Floats, joint: Numbers, joints: int, settings: Settings
+) -> tuple[Floats, Floats]:
+    """Weighted mean ratio of each joint and the relative spread of a single one."""
+    del settings
+    total = np.bincount(joint, weight, joints)
+    factor = np.bincount(joint, weight * ratio, joints) / total
+    deviation = ratio / factor[joint] - 1
+    count = np.bincount(joint, weight > 0, joints)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        spread = np.sqrt(np.bincount(joint, weight * deviation**2, joints) / total * count / (count - 1))
+    return factor, np.where(count > 1, spread, np.nan)
+
+
+def _reject_ratios(ratio: Floats, weight: Floats, joint: Numbers, joints: int) -> tuple[Flags, Floats]:
+    """Take out ratios that do not belong, the worst of each joint first, until none is left."""
+    used = np.ones(len(ratio), bool)
+    while True:
+        factor, spread = _factors(ratio, weight * used, joint, joints, Settings())
+        count = np.bincount(joint, used, joints)
+        limit = np.maximum(REJECTION_FACTOR * np.nan_to_num(spread), REJECTION_FLOOR)
+        # With few points one bad ratio raises the spread itself; it is compared with what the others say.
+        deviation = np.where(used, np.abs(ratio / factor[joint] - 1), 0.0)
+        peak = np.zeros(joints)
+        np.maximum.at(peak, joint, deviation)
+        bad = (deviation == peak[joint]) & (deviation > limit[joint]) & (count[joint] > 3)  # noqa: PLR2004
+        if not bad.any():
+            return used, limit
+        rows = np.flatnonzero(bad)
+        _, first = np.unique(joint[rows], return_index=True)
+        used[rows[first]] = False
+
+
+def form(orientation: Orientation, settings: Settings, photos: Sequence[str]) -> FormedStrip:
+    """Form the strip from its oriented pairs.
+
+    Parameters
+    ----------
+    orientation : Orientation
+        Oriented pairs in flight order.
+    settings : Settings
+        Form of the scale transfer.
+    photos : sequence of str
+        Photos of the strip in flight order.
+
+    Returns
+    -------
+    FormedStrip
+        Centres, rotations, scales and points in the frame of the first photo.
+
+    Raises
+    ------
+    GeometryError
+        When a joint is broken or a base is parallel to the strip's Z axis.
+    """
+    vectors, gap, sound = model_points(orientation)
+    base, rotation = orientation.relative
+    junctions = transfer_scale(orientation, vectors, sound, settings, photos)
+    rotations = hand_on(rotation)
+    scale = np.concatenate([[1.0], np.cumprod(junctions.factor)])
+    bases = scale[:, None] * np.einsum("pij,pj->pi", rotations[:-1], base)
+    centers = np.concatenate([np.zeros((1, 3)), np.cumsum(bases, axis=0)])
+    _refuse_vertical_base(bases / scale[:, None], photos)
+    pair = orientation.pairs.pair
+    xyz = centers[pair] + scale[pair, None] * np.einsum("mij,mj->mi", rotations[pair], vectors)
+    point, mean, models = mean_points(orientation.point, xyz, orientation.used & sound)
+    return FormedStrip(
+        centers,
+        rotations,
+        scale,
+        np.arctan2(bases[:, 1], bases[:, 0]),
+        np.arcsin(np.clip(bases[:, 2] / scale, -1, 1)),
+        xyz,
+        gap,
+        point,
+        mean,
+        models,
+        junctions,
+    )
+
+
+def _refuse_vertical_base(directions: Floats, photos: Sequence[str]) -> None:
+    steep = np.flatnonzero(np.hypot(directions[:, 0], directions[:, 1]) < STEEPEST_BASE)
+    for number in steep:
+        names = photos[number : number + 2]
+        msg = f"the base from photo {names[0]} to {names[1]} is parallel to the viewing direction"
+        raise GeometryError(msg, photos=names, code="vertical-base")
+
+
+def mean_points(point: Numbers, xyz: Floats, use: Flags) -> tuple[Numbers, Floats, Numbers]:
+    """Mean coordinates of points that stand in several models.
+
+    Parameters
+    ----------
+    point : ndarray of int, shape (m,)
+        Point of each row.
+    xyz : ndarray, shape (m, 3)
+        Coordinates of each row.
+    use : ndarray of bool, shape (m,)
+        Rows that count.
+
+    Returns
+    -------
+    numbers : ndarray of int, shape (q,)
+        Points with at least one row, ascending.
+    mean : ndarray, shape (q, 3)
+        Their mean coordinates.
+    count : ndarray of int, shape (q,)
+        Rows that made each mean.
+    """
+    rows = np.flatnonzero(use)
+    numbers, inverse = np.unique(point[rows], return_inverse=True)
+    count = np.bincount(inverse, minlength=len(numbers))
+    sums = np.column_stack([np.bincount(inverse, xyz[rows, axis], len(numbers)) for axis in range(3)])
+    return numbers, sums / np.maximum(count, 1)[:, None], count

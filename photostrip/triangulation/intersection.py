@@ -1,0 +1,73 @@
+"""Points where rays meet: of two photos in a model, and of all photos that saw a point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+PARALLEL = 1e-6  # of the principal distance: a smaller x parallax intersects nothing
+
+
+@dataclass(frozen=True, eq=False)
+class Intersection:
+    """Model points from two photos.
+
+    Parameters
+    ----------
+    xyz : ndarray, shape (m, 3)
+        Coordinates relative to the left perspective centre, in the unit of the base.
+    ray_factor : ndarray, shape (m,)
+        Ray factor N of the left ray (model unit per mm).
+    gap : ndarray, shape (m,)
+        Left minus right Y of the two rays, in the unit of the base.
+    sound : ndarray of bool, shape (m,)
+        False where the rays are parallel or meet behind a camera; the coordinates are NaN there.
+    """
+
+    xyz: Floats
+    ray_factor: Floats
+    gap: Floats
+    sound: NDArray[np.bool_]
+
+
+def intersect(base: Floats, left: Floats, right: Floats, focal: float) -> Intersection:
+    """Forward intersection of the rays of two photos.
+
+    Parameters
+    ----------
+    base : ndarray, shape (3,) or (3, m)
+        Base components BX, BY, BZ; BX is the longest.
+    left, right : ndarray, shape (3, m)
+        Rays of the left and right photo, turned into the frame of the base, mm.
+    focal : float
+        Principal distance in mm, the scale to which the rays are brought.
+
+    Returns
+    -------
+    Intersection
+        Points with Y the mean of both rays.
+
+    Notes
+    -----
+    Source: [001] eq. 137 (second line corrected to y2) and 138; [001] takes Y from the left ray, here it
+    is the mean of both, which the theory of errors of [000] assumes too.
+    """
+    bx, by, bz = base
+    with np.errstate(divide="ignore", invalid="ignore"):
+        x1, y1 = -focal * left[0] / left[2], -focal * left[1] / left[2]
+        x2, y2 = -focal * right[0] / right[2], -focal * right[1] / right[2]
+        parallax = x1 - x2
+        n1 = (bx + x2 * bz / focal) / parallax  # eq. 138
+        n2 = n1 + bz / focal
+        y_left, y_right = n1 * y1, by + n2 * y2
+        sound = (np.abs(parallax) > PARALLEL * focal) & (n1 > 0) & (n2 > 0) & (left[2] < 0) & (right[2] < 0)
+        xyz = np.column_stack([n1 * x1, (y_left + y_right) / 2, -n1 * focal])
+    xyz[~sound] = np.nan
+    return Intersection(xyz, n1, y_left - y_right, sound)
