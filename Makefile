@@ -1,0 +1,62 @@
+# Everything a developer types. Needs Python 3.11 or newer with venv and pip, git and make; the rest goes into .venv.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+SOURCES := photostrip tests $(wildcard benchmarks)
+DEMO_PROJECTS ?= $(wildcard sample_data/*/project.yaml)
+WORKERS ?= 2
+
+.PHONY: demo test check lint types lowest bench docs clean
+.DELETE_ON_ERROR:
+
+demo: $(VENV)/photostrip.installed ## run the main job on every sample project and print its accuracy report
+	@test -n "$(DEMO_PROJECTS)" || { echo "no project.yaml in sample_data/" >&2; exit 2; }
+	@for project in $(DEMO_PROJECTS); do \
+	    name=$$(basename "$$(dirname "$$project")"); \
+	    printf '\n==> photostrip run %s -o build/demo/%s\n' "$$project" "$$name"; \
+	    $(BIN)/photostrip run "$$project" -o "build/demo/$$name" || exit $$?; \
+	done
+
+test: lint types ## lint, format, types and all tests
+	$(BIN)/python -m pytest -n $(WORKERS)
+
+check: lint types ## the fast gates
+	$(BIN)/python -m pytest -n $(WORKERS) -q -m "not slow"
+
+lint: $(VENV)/dev.installed
+	$(BIN)/ruff check $(SOURCES)
+	$(BIN)/ruff format --check $(SOURCES)
+
+types: $(VENV)/dev.installed
+	$(BIN)/mypy $(SOURCES)
+
+lowest: ## all tests on exactly the lower bounds of pyproject.toml, in a venv of their own
+	rm -rf .venv-lowest
+	$(PYTHON) -m venv .venv-lowest
+	$(PYTHON) -c "import tomllib; print(*(d.replace('>=', '==') for d in tomllib.load(open('pyproject.toml', 'rb'))['project']['dependencies']), sep='\n')" > .venv-lowest/constraints.txt
+	.venv-lowest/bin/python -m pip install --quiet --only-binary :all: --constraint .venv-lowest/constraints.txt ".[test]"
+	.venv-lowest/bin/python -m pytest -n $(WORKERS)
+
+bench: $(VENV)/dev.installed ## tables of seconds, memory and accuracy
+	@for program in benchmarks/*.py; do printf '\n==> %s\n' "$$program"; $(BIN)/python "$$program" || exit $$?; done
+
+docs: $(VENV)/dev.installed ## rewrite the printed output in README.md and docs/ by running the commands there
+	$(BIN)/python -m tests.renew_docs
+
+clean: ## remove everything that make has made
+	rm -rf $(VENV) .venv-lowest build dist .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# One install per change of pyproject.toml; the package itself is installed editable and follows every change.
+$(VENV)/bin/python:
+	@$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 11))" || { echo "photostrip needs Python 3.11 or newer: make PYTHON=python3.12 ..." >&2; exit 2; }
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/photostrip.installed: pyproject.toml | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	@touch $@
+
+$(VENV)/dev.installed: pyproject.toml | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable ".[dev]"
+	@touch $@ $(VENV)/photostrip.installed

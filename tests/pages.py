@@ -1,0 +1,219 @@
+"""README.md and docs/ as programs: their fenced blocks, run in order in a scratch copy of what a user has.
+
+What stands behind the three backticks says what a block is::
+
+    console             lines "$ command", each followed by what it prints; "..." alone on a line stands for any lines
+    console exit=2      the same for commands that must end with this code
+    console no-run      shown, not run; the line above is a comment <!-- ... --> that says why
+    python              a program of its own; it must run
+    yaml project        a project file; it must be valid
+    ANY file=NAME       the block is written to NAME in the scratch folder before it is treated further
+    sh                  shown only: make, pip, git, which belong to a fresh clone
+
+stdout is compared; stderr only where the command says ``2>&1``.
+"""
+
+from __future__ import annotations
+
+import difflib
+import os
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from tests.source_tree import ROOT
+
+FENCE = "```"
+FRESH_CLONE = re.compile(r"(^|[|;&]\s*)(make|pip|git|python\S* -m (pip|venv))\b")
+COPIED = ("sample_data", "configs")
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """One fenced block: its page, the line of its first content line, the words behind the fence, its lines."""
+
+    page: Path
+    line: int
+    words: tuple[str, ...]
+    lines: tuple[str, ...]
+    above: str
+
+    @property
+    def kind(self) -> str:
+        return self.words[0] if self.words else ""
+
+    @property
+    def runs(self) -> bool:
+        return self.kind == "console" and "no-run" not in self.words
+
+    @property
+    def exit_code(self) -> int:
+        return int(self.option("exit") or 0)
+
+    @property
+    def place(self) -> str:
+        return f"{self.page.name}:{self.line}"
+
+    def option(self, name: str) -> str:
+        """Give the value of the word ``name=value``; empty when it is not there."""
+        return next((word.partition("=")[2] for word in self.words if word.startswith(f"{name}=")), "")
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One command of a console block and the lines that it should print."""
+
+    command: str
+    shown: tuple[str, ...]
+    expected: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What a command did."""
+
+    code: int
+    out: tuple[str, ...]
+    err: str
+
+
+def pages(root: Path = ROOT) -> list[Path]:
+    """Give README.md and every page of docs/."""
+    return [root / "README.md", *sorted((root / "docs").rglob("*.md"))]
+
+
+def blocks(page: Path) -> list[Block]:
+    """Give the fenced blocks of a page in order."""
+    found = []
+    lines = page.read_text(encoding="utf-8").splitlines()
+    number = 0
+    while number < len(lines):
+        if lines[number].startswith(FENCE):
+            start = number + 1
+            number = next(i for i in range(start, len(lines)) if lines[i] == FENCE)
+            above = next((line for line in reversed(lines[: start - 1]) if line.strip()), "")
+            words = tuple(lines[start - 1].removeprefix(FENCE).split())
+            found.append(Block(page, start + 1, words, tuple(lines[start:number]), above))
+        number += 1
+    return found
+
+
+def steps(block: Block) -> list[Step]:
+    """Split a console block into commands and what each should print."""
+    found: list[tuple[list[str], list[str]]] = []
+    for line in block.lines:
+        if line.startswith("$ "):
+            found.append(([line], []))
+        elif found and not found[-1][1] and found[-1][0][-1].endswith("\\"):
+            found[-1][0].append(line)
+        elif found:
+            found[-1][1].append(line)
+        else:
+            message = f"{block.place}: a console block begins with '$ command'"
+            raise ValueError(message)
+    return [Step("\n".join(shown).removeprefix("$ "), tuple(shown), tuple(out)) for shown, out in found]
+
+
+def matches(expected: tuple[str, ...], actual: tuple[str, ...]) -> bool:
+    """Compare line by line; ``...`` alone on a line of `expected` stands for any number of lines."""
+    if "..." not in expected:
+        return expected == actual
+    gap = expected.index("...")
+    head, tail = expected[:gap], expected[gap + 1 :]
+    if actual[:gap] != head:
+        return False
+    return any(matches(tail, actual[start:]) for start in range(gap, len(actual) + 1))
+
+
+class Scratch:
+    """A folder with what a user has, in which the blocks of one page run one after the other."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder / "project"
+        self.folder.mkdir()
+        for name in COPIED:
+            if (ROOT / name).is_dir():
+                shutil.copytree(ROOT / name, self.folder / name)
+        self.environment = os.environ | {"COLUMNS": "100", "NO_COLOR": "1", "PYTHONUTF8": "1"}
+        path = [str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)]
+        if not (Path(sys.executable).parent / "photostrip").exists():
+            self.environment["PYTHONPATH"] = str(ROOT)
+            path.insert(0, str(self._stand_in(folder / "bin")))
+        self.environment["PATH"] = os.pathsep.join(path)
+
+    @staticmethod
+    def _stand_in(folder: Path) -> Path:
+        """Put a ``photostrip`` command into `folder`, for an environment where the package is not installed."""
+        folder.mkdir()
+        script = folder / "photostrip"
+        script.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m photostrip "$@"\n', encoding="utf-8")
+        script.chmod(0o755)
+        return folder
+
+    def write(self, name: str, lines: tuple[str, ...]) -> Path:
+        path = self.folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        return path
+
+    def run(self, command: list[str]) -> Outcome:
+        done = subprocess.run(
+            command, cwd=self.folder, env=self.environment, capture_output=True, encoding="utf-8", check=False
+        )
+        return Outcome(done.returncode, tuple(line.rstrip() for line in done.stdout.splitlines()), done.stderr)
+
+    def shell(self, command: str) -> Outcome:
+        return self.run(["bash", "-c", command])
+
+
+def faults_of_page(page: Path, folder: Path) -> list[str]:
+    """Run every block of `page` and give what does not do what the page says."""
+    scratch = Scratch(folder)
+    found = []
+    for block in blocks(page):
+        if name := block.option("file"):
+            scratch.write(name, block.lines)
+        if block.runs:
+            found += [fault for step in steps(block) for fault in _faults_of_step(block, step, scratch)]
+        elif block.kind == "python":
+            outcome = scratch.run([sys.executable, str(scratch.write("block.py", block.lines))])
+            if outcome.code:
+                found.append(f"{block.place}: {outcome.err}")
+    return found
+
+
+def _faults_of_step(block: Block, step: Step, scratch: Scratch) -> list[str]:
+    outcome = scratch.shell(step.command)
+    found = []
+    if outcome.code != block.exit_code:
+        found.append(f"{block.place}: $ {step.command}: exit code {outcome.code}, not {block.exit_code}\n{outcome.err}")
+    if not matches(step.expected, outcome.out):
+        diff = "\n".join(difflib.unified_diff(step.expected, outcome.out, "the page", "the command", lineterm=""))
+        found.append(f"{block.place}: $ {step.command}: prints something else (renew with `make docs`)\n{diff}")
+    return found
+
+
+def renewed(page: Path, folder: Path) -> str:
+    """Give the text of `page` with the output of its commands as it is now.
+
+    Output that still matches, ``...`` included, stays as it is.
+    """
+    scratch = Scratch(folder)
+    lines = page.read_text(encoding="utf-8").splitlines()
+    shift = 0
+    for block in blocks(page):
+        if name := block.option("file"):
+            scratch.write(name, block.lines)
+        if not block.runs:
+            continue
+        fresh: list[str] = []
+        for step in steps(block):
+            out = scratch.shell(step.command).out
+            fresh += [*step.shown, *(step.expected if matches(step.expected, out) else out)]
+        first = block.line - 1 + shift
+        lines[first : first + len(block.lines)] = fresh
+        shift += len(fresh) - len(block.lines)
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,119 @@
+"""What README.md and docs/ show is what the program does."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tests.pages import FRESH_CLONE, blocks, faults_of_page, matches, pages, renewed, steps
+from tests.source_tree import ROOT
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+PAGES = [pytest.param(page, id=page.relative_to(ROOT).as_posix()) for page in pages()]
+LINK = re.compile(r"\]\((?!https?:|mailto:|#)([^)#\s]+)")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", PAGES)
+def test_the_page_does_what_it_shows(page: Path, tmp_path: Path) -> None:
+    assert "\n".join(faults_of_page(page, tmp_path)) == ""
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_links_lead_somewhere(page: Path) -> None:
+    targets = LINK.findall(page.read_text(encoding="utf-8"))
+    assert [target for target in targets if not (page.parent / target).exists()] == []
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_console_blocks_are_run_or_say_why_not(page: Path) -> None:
+    for block in blocks(page):
+        assert block.kind, f"{block.place}: say what the block is (text, console, yaml, ...)"
+        if block.runs:
+            for step in steps(block):
+                assert not FRESH_CLONE.search(step.command), f"{block.place}: `{step.command}` belongs into a sh block"
+        elif block.kind == "console":
+            assert block.above.startswith("<!--"), f"{block.place}: a comment above must say why it is not run"
+
+
+# ------------------------------------------------------------------------------------------- the tool can fail
+
+
+@pytest.mark.parametrize(
+    ("expected", "actual", "same"),
+    [
+        ("a b", "a b", True),
+        ("a b", "a c", False),
+        ("a ...", "a", True),
+        ("a ... z", "a b c z", True),
+        ("a ... z", "a b c", False),
+        ("... m ... z", "a m b m z", True),
+        ("a ... b", "x a b", False),
+        ("", "a", False),
+    ],
+)
+def test_three_dots_stand_for_any_lines(expected: str, actual: str, *, same: bool) -> None:
+    assert matches(tuple(expected.split()), tuple(actual.split())) is same
+
+
+BAD_PAGE = """\
+# A page
+
+```console
+$ photostrip --version
+photostrip of another age
+$ photostrip --help
+Usage: photostrip [--debug] COMMAND [ARGUMENTS]...
+...
+```
+
+```console
+$ cat notes.txt
+```
+
+```text file=notes.txt
+kept
+```
+
+```console
+$ cat notes.txt
+kept
+$ printf '%s\\n' \\
+  one two
+one
+two
+```
+
+```console exit=2
+$ photostrip rnu 2>&1
+error: no such command: 'rnu'; did you mean 'run'?; 'photostrip --help' lists what there is
+```
+
+```python
+raise SystemExit("no")
+```
+"""
+
+
+def test_a_wrong_page_is_found(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text(BAD_PAGE, encoding="utf-8")
+    found = faults_of_page(page, tmp_path)
+    assert [fault.split(": ", maxsplit=2)[:2] for fault in found[:2]] == [
+        ["page.md:4", "$ photostrip --version"],
+        ["page.md:12", "$ cat notes.txt"],
+    ]
+    assert found[2:] == ["page.md:34: no\n"]
+
+
+def test_renewing_a_page_mends_what_is_printed_and_keeps_the_rest(tmp_path: Path) -> None:
+    import photostrip
+
+    page = tmp_path / "page.md"
+    page.write_text(BAD_PAGE, encoding="utf-8")
+    mended = BAD_PAGE.replace("photostrip of another age", f"photostrip {photostrip.__version__}")
+    assert renewed(page, tmp_path) == mended

@@ -1,0 +1,72 @@
+"""A library that shapes a program stays behind the door of its room: what is listed here is imported nowhere else."""
+
+from __future__ import annotations
+
+import tomllib
+from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tests.source_tree import PACKAGE, ROOT, imports, modules
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+FILES = ("formats/*", "project/*", "report/*", "cli/*")
+# Library: the files below photostrip/ that may import it.
+FENCES = {
+    "csv": FILES,
+    "dask": ("batch.py", "batch/*"),
+    "gzip": FILES,
+    "jinja2": ("report/*",),
+    "json": FILES,
+    "matplotlib": ("report/*",),
+    "pydantic": ("project/*",),
+    "pyproj": ("geodesy/crs.py",),
+    "rich": ("report/console.py", "report/progress.py"),
+    "typer": ("cli/*",),
+    "yaml": ("project/*",),
+}
+
+
+def trespasses(root: Path) -> list[str]:
+    """Give every import below `root` that climbs over a fence."""
+    known = modules(root)
+    found = []
+    for each in imports(root):
+        library = each.target.partition(".")[0]
+        file = known[each.module].relative_to(root / PACKAGE).as_posix()
+        if not any(fnmatchcase(file, pattern) for pattern in FENCES.get(library, ("*",))):
+            found.append(str(each))
+    return found
+
+
+def test_the_package_keeps_its_fences() -> None:
+    assert trespasses(ROOT) == []
+
+
+def test_the_linter_knows_the_same_fences() -> None:
+    ruff = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["ruff"]
+    assert ruff["lint"]["flake8-tidy-imports"]["banned-api"].keys() == FENCES.keys()
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "found"),
+    [
+        ("geodesy/crs.py", "from pyproj import CRS", False),
+        ("geodesy/curvature.py", "from pyproj import CRS", True),
+        ("pipeline.py", "def f():\n    import yaml", True),
+        ("report/text.py", "import rich.table", True),
+        ("report/console.py", "import rich.table", False),
+        ("formats/tables.py", "import csv", False),
+        ("simulate.py", "import json as j", True),
+        ("batch.py", "from dask import distributed", False),
+        ("pipeline.py", "import richer", False),
+    ],
+)
+def test_a_trespass_is_found(tmp_path: Path, file: str, text: str, *, found: bool) -> None:
+    path = tmp_path / PACKAGE / file
+    path.parent.mkdir(parents=True)
+    path.write_text(text, encoding="utf-8")
+    assert bool(trespasses(tmp_path)) is found

@@ -1,0 +1,115 @@
+"""The house stands on its layers: a module imports from its own layer or from below, never in a circle."""
+
+from __future__ import annotations
+
+from graphlib import CycleError, TopologicalSorter
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tests.source_tree import PACKAGE, ROOT, imports, modules, resolve
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
+
+# Bottom to top. A room is a module or a folder directly below photostrip/.
+LAYERS = (
+    {"errors", "notes", "threads"},
+    {"points", "camera", "adjustment", "statistics", "geometry", "geodesy"},
+    {"triangulation", "planning", "terrestrial", "simulate"},
+    {"pipeline"},
+    {"project", "formats", "report", "compare", "batch"},
+    {"cli"},
+    {"__main__"},
+)
+# Rooms of one layer may use each other, except these: (who, not whom).
+APART = {("formats", "project"), ("report", "project")}
+
+
+def room(module: str) -> str:
+    """Give the room a module stands in; empty for the package itself."""
+    return module.partition(".")[2].partition(".")[0]
+
+
+def violations(root: Path) -> list[str]:
+    """Give every import below `root` that the layers forbid, and every module without a layer."""
+    level = {name: number for number, names in enumerate(LAYERS) for name in names}
+    level[""] = level["threads"]  # photostrip/__init__.py only sets up the process
+    known = modules(root)
+    homeless = sorted({room(module) for module in known} - level.keys())
+    found = [f"photostrip/{name} belongs to no layer" for name in homeless]
+    module_edges: set[tuple[str, str]] = set()
+    for each in imports(root):
+        target = resolve(each.target, known)
+        if not target or {room(each.module), room(target)} & set(homeless):
+            continue
+        here, there = room(each.module), room(target)
+        if level[there] > level[here]:
+            found.append(f"upward: {each}")
+        if (here, there) in APART:
+            found.append(f"apart: {each}")
+        if target not in {each.module, PACKAGE}:
+            module_edges.add((each.module, target))
+    found += _circles(module_edges)
+    found += _circles((room(here), room(there)) for here, there in module_edges if room(here) != room(there))
+    return found
+
+
+def _circles(edges: Iterable[tuple[str, str]]) -> list[str]:
+    graph: dict[str, set[str]] = {}
+    for here, there in edges:
+        graph.setdefault(here, set()).add(there)
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        return [f"circle: {' <- '.join(error.args[1])}"]
+    return []
+
+
+def test_the_package_keeps_its_layers() -> None:
+    assert len(modules()) > len(LAYERS)
+    assert violations(ROOT) == []
+
+
+@pytest.mark.parametrize(
+    ("files", "expected"),
+    [
+        ({"camera.py": "from photostrip.pipeline import triangulate"}, ["upward: photostrip.camera:1"]),
+        ({"camera.py": "def f():\n    import photostrip.pipeline"}, ["upward: photostrip.camera:2"]),
+        (
+            {"camera.py": "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from photostrip import pipeline"},
+            ["upward: photostrip.camera:3"],
+        ),
+        ({"geometry/plane.py": "from ..pipeline import triangulate"}, ["upward: photostrip.geometry.plane:1"]),
+        ({"camera.py": "import importlib\nimportlib.import_module('photostrip.cli')"}, ["upward: photostrip.camera:2"]),
+        ({"formats/tables.py": "import photostrip.project.schema"}, ["apart: photostrip.formats.tables:1"]),
+        ({"report/text.py": "from photostrip.project import schema"}, ["apart: photostrip.report.text:1"]),
+        ({"project/schema.py": "from photostrip.formats import tables"}, []),
+        ({"utils.py": ""}, ["photostrip/utils belongs to no layer"]),
+        (
+            {"geometry/plane.py": "import photostrip.geometry.rotation", "geometry/rotation.py": "from . import plane"},
+            ["circle: photostrip.geometry."],
+        ),
+        (
+            {"points.py": "import photostrip.camera", "camera.py": "from photostrip.points import PointTable"},
+            ["circle: photostrip.", "circle: "],
+        ),
+        (
+            {"geometry/plane.py": "import photostrip.points", "points.py": "import photostrip.geometry.rotation"},
+            ["circle: "],
+        ),
+    ],
+)
+def test_a_bad_house_is_found(tmp_path: Path, files: dict[str, str], expected: list[str]) -> None:
+    rooms = ("geometry", "formats", "report", "project", "cli")
+    plan = dict.fromkeys(["__init__.py", "camera.py", "points.py", "pipeline.py", "geometry/rotation.py"], "")
+    plan |= {f"{folder}/__init__.py": "" for folder in rooms}
+    plan |= {"geometry/plane.py": "", "project/schema.py": "", "formats/tables.py": ""}
+    for name, text in (plan | files).items():
+        path = tmp_path / PACKAGE / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    found = violations(tmp_path)
+    assert len(found) == len(expected), found
+    assert all(text.startswith(start) for text, start in zip(found, expected, strict=True)), found

@@ -1,0 +1,249 @@
+"""The command line itself: what answers at once, what is loaded when, and how failures end."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+import pytest
+
+import photostrip
+from photostrip.cli import main as cli
+from photostrip.errors import Fault, GeometryError, InputError
+from photostrip.threads import THREAD_VARIABLES, limit_threads
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+HEAVY = ("numpy", "scipy", "pyproj", "pydantic", "yaml", "rich")
+
+
+def python(code: str, **environment: str) -> str:
+    """Run `code` in an interpreter of its own and give what it prints."""
+    bare = {name: value for name, value in os.environ.items() if name not in THREAD_VARIABLES}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=bare | environment, capture_output=True, text=True, check=True
+    )
+    return done.stdout.strip()
+
+
+def loaded_after(code: str, names: tuple[str, ...]) -> set[str]:
+    """Give which of the packages `names` are in memory after `code`."""
+    printed = python(f"import sys\n{code}\nprint(*sorted({{name.partition('.')[0] for name in sys.modules}}))")
+    return set(printed.splitlines()[-1].split()) & set(names)
+
+
+def add_command(monkeypatch: pytest.MonkeyPatch, function: Callable[..., int | None]) -> None:
+    """Put `function` into the table as the command ``probe``."""
+    module = ModuleType("probe_module")
+    module.__dict__["probe"] = function
+    monkeypatch.setitem(sys.modules, "probe_module", module)
+    monkeypatch.setitem(cli.COMMANDS, "probe", cli.Entry("probe_module", "Try the wrapper.", "photostrip probe"))
+
+
+def failing(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
+    def probe() -> None:
+        raise error
+
+    add_command(monkeypatch, probe)
+
+
+# ------------------------------------------------------------------------------------------ what answers at once
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["--version"]) == 0
+    assert capsys.readouterr().out == f"photostrip {photostrip.__version__}\n"
+    assert [part.isdecimal() for part in photostrip.__version__.split(".")] == [True, True, True]
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["-h"], ["--debug", "--help"]])
+def test_help_lists_every_command(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(arguments) == 0
+    out = capsys.readouterr().out
+    for name, entry in cli.COMMANDS.items():
+        assert f"  {name}" in out
+        assert entry.help in out
+    assert "Example:" in out
+    assert max(map(len, out.splitlines())) <= 88
+
+
+def test_no_command_shows_the_help_and_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main([]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err == cli.usage()
+
+
+def test_python_m_photostrip_is_the_same_command() -> None:
+    done = subprocess.run([sys.executable, "-m", "photostrip", "--version"], capture_output=True, text=True, check=True)
+    assert done.stdout == f"photostrip {photostrip.__version__}\n"
+
+
+@pytest.mark.parametrize("option", ["--version", "--help"])
+def test_version_and_help_load_nothing_but_the_table(option: str) -> None:
+    code = f"from photostrip.cli.main import main\nmain([{option!r}])"
+    assert loaded_after(code, (*HEAVY, "typer", "click", "dataclasses")) == set()
+
+
+def test_the_probe_of_loaded_packages_can_see_one() -> None:
+    assert loaded_after("import photostrip, yaml", HEAVY) == {"yaml"}
+
+
+# ---------------------------------------------------------------------------------------------------- the table
+
+
+@pytest.mark.parametrize("name", cli.COMMANDS)
+def test_every_command_explains_itself_without_loading_the_mathematics(name: str) -> None:
+    code = f"from photostrip.cli.main import main\nassert main([{name!r}, '--help']) == 0"
+    assert loaded_after(code, ("numpy", "scipy", "pyproj", "pydantic")) == set()
+
+
+@pytest.mark.parametrize("name", cli.COMMANDS)
+def test_the_help_of_every_command_is_plain_and_has_an_example(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main([name, "--help"]) == 0
+    out = capsys.readouterr().out
+    assert f"photostrip {name}" in out
+    assert f"Example:\n    {cli.COMMANDS[name].example}\n" in out
+    assert cli.COMMANDS[name].example.startswith(f"photostrip {name} ")
+    assert "\x1b" not in out
+
+
+# -------------------------------------------------------------------------------------------------- exit codes
+
+
+@pytest.mark.parametrize(("answer", "code"), [(None, 0), (0, 0), (1, 1), (3, 3)])
+def test_a_command_gives_its_exit_code(monkeypatch: pytest.MonkeyPatch, answer: int | None, code: int) -> None:
+    def probe(project: str, scale: float = 1.0) -> int | None:
+        assert (project, scale) == ("strip.yaml", 2.5)
+        return answer
+
+    add_command(monkeypatch, probe)
+    assert cli.main(["probe", "strip.yaml", "--scale", "2.5"]) == code
+
+
+def test_typer_exit_is_respected(monkeypatch: pytest.MonkeyPatch) -> None:
+    import typer
+
+    failing(monkeypatch, typer.Exit(1))
+    assert cli.main(["probe"]) == 1
+
+
+def test_a_command_may_have_subcommands(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    import typer
+
+    probe = typer.Typer(rich_markup_mode=None, add_completion=False)
+
+    @probe.command()
+    def first(number: int) -> None:
+        typer.echo(number + 1)
+
+    @probe.command()
+    def second() -> int:
+        return 3
+
+    add_command(monkeypatch, probe)
+    assert cli.main(["probe", "first", "41"]) == 0
+    assert capsys.readouterr().out == "42\n"
+    assert cli.main(["probe", "second"]) == 3
+
+
+FAULTS = InputError([Fault("no such photo", file="a.csv", line=3, column=7), Fault("empty", key="cameras")])
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "message"),
+    [
+        (FAULTS, 2, "error: a.csv:3:7: no such photo\nerror: cameras: empty\n"),
+        (GeometryError("pair 1-2: fewer than 5 points"), 3, "error: pair 1-2: fewer than 5 points\n"),
+        (KeyboardInterrupt(), 130, "error: interrupted\n"),
+        (FileNotFoundError(2, "No such file", "b.csv"), 2, "error: b.csv: No such file\n"),
+        (OSError(28, "No space left on device"), 2, "error: No space left on device\n"),
+        (KeyError("x"), 70, "internal error (a bug): KeyError: 'x'; --debug shows where\n"),
+    ],
+)
+def test_failures_become_messages_and_codes(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    error: BaseException,
+    code: int,
+    message: str,
+) -> None:
+    failing(monkeypatch, error)
+    assert cli.main(["probe"]) == code
+    captured = capsys.readouterr()
+    assert captured.err == message
+    assert captured.out == ""
+
+
+@pytest.mark.parametrize("arguments", [["--debug", "probe"], ["probe", "--debug"]])
+def test_debug_shows_the_traceback(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], arguments: list[str]
+) -> None:
+    failing(monkeypatch, ValueError("odd"))
+    assert cli.main(arguments) == 70
+    err = capsys.readouterr().err
+    assert err.startswith("Traceback (most recent call last)")
+    assert err.endswith("internal error (a bug): ValueError: odd\n")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["rnu"], "no such command: 'rnu'; did you mean 'run'?; 'photostrip --help' lists what there is"),
+        (["--versoin"], "no such option: '--versoin'; did you mean '--version'?; 'photostrip --help'"),
+        (["probe"], "'photostrip probe --help' shows how it is called."),
+        (["probe", "4", "--bad"], "--bad"),
+        (["probe", "four"], "Invalid value"),
+    ],
+)
+def test_wrong_usage_is_one_line_and_exit_2(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
+) -> None:
+    def probe(number: int) -> None:
+        raise AssertionError(number)
+
+    add_command(monkeypatch, probe)
+    assert cli.main(arguments) == 2
+    err = capsys.readouterr().err
+    assert err.startswith("error: ")
+    assert message in err
+    assert err.count("\n") == 1
+
+
+def test_a_closed_pipe_is_no_drama() -> None:
+    code = "import sys; from photostrip.cli.main import main; sys.stdin.readline(); sys.exit(main(['--help']))"
+    with subprocess.Popen(
+        [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdin
+        assert process.stdout
+        assert process.stderr
+        process.stdout.close()
+        process.stdin.write("go\n")
+        process.stdin.close()
+        assert process.stderr.read() == ""
+        assert process.wait() == 141
+
+
+def test_a_terminal_without_the_characters_gets_question_marks() -> None:
+    code = "import photostrip.cli.main as m; m.usage = lambda: 'σ0\\n'; m.main(['--help'])"
+    assert python(code, PYTHONIOENCODING="ascii", PYTHONUTF8="0") == "?0"
+
+
+# ----------------------------------------------------------------------------------------------------- threads
+
+
+def test_one_thread_unless_the_user_says_otherwise() -> None:
+    code = "import os, photostrip; print(os.environ['OPENBLAS_NUM_THREADS'], os.environ['OMP_NUM_THREADS'])"
+    assert python(code) == "1 1"
+    assert python(code, OPENBLAS_NUM_THREADS="2") == "2 1"
+
+
+def test_limit_threads_leaves_other_variables_alone() -> None:
+    environment = {"MKL_NUM_THREADS": "8", "HOME": "/"}
+    limit_threads(environment)
+    assert environment == dict.fromkeys(THREAD_VARIABLES, "1") | {"MKL_NUM_THREADS": "8", "HOME": "/"}
