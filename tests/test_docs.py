@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tests.pages import FRESH_CLONE, blocks, faults_of_page, matches, pages, renewed, steps
-from tests.source_tree import ROOT
+from tests.source_tree import ROOT, modules
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -38,6 +38,46 @@ def test_console_blocks_are_run_or_say_why_not(page: Path) -> None:
                 assert not FRESH_CLONE.search(step.command), f"{block.place}: `{step.command}` belongs into a sh block"
         elif block.kind == "console":
             assert block.above.startswith("<!--"), f"{block.place}: a comment above must say why it is not run"
+
+
+def tags_listed() -> set[str]:
+    return set(re.findall(r"^\| \[([^\]]+)\] \|", (ROOT / "docs/sources.md").read_text(encoding="utf-8"), re.MULTILINE))
+
+
+def source_lines(text: str) -> list[str]:
+    """Give the paragraphs of a module that begin with ``Source:``."""
+    return [" ".join(found.split()) for found in re.findall(r"Source: (.*?)(?:\n\s*\n|\"\"\")", text, re.DOTALL)]
+
+
+def unlisted(source: str, listed: set[str]) -> bool:
+    """Tell whether a ``Source:`` names nothing that docs/sources.md lists, or a number that is not listed."""
+    named = {tag for tag in listed if re.search(rf"\b{re.escape(tag)}\b", source)}
+    numbers = set(re.findall(r"\[(\d\w*)\]", source))
+    return not (named or "derived" in source.lower()) or not numbers <= listed
+
+
+@pytest.mark.parametrize("module", modules())
+def test_every_source_in_the_code_is_listed(module: str) -> None:
+    listed = tags_listed()
+    assert len(listed) > 7
+    text = modules()[module].read_text(encoding="utf-8")
+    assert [source for source in source_lines(text) if unlisted(source, listed)] == []
+
+
+@pytest.mark.parametrize(
+    ("source", "wrong"),
+    [
+        ("[001] eq. 138.", False),
+        ("derived; checked against differences.", False),
+        ("Pope 1976, for one unknown.", False),
+        ("[005] eq. 1.", True),
+        ("[001] eq. 3 and [099].", True),
+        ("a book.", True),
+    ],
+)
+def test_an_unlisted_source_is_found(source: str, *, wrong: bool) -> None:
+    assert source_lines(f'"""A.\n\n    Source: {source}\n    """') == [source]
+    assert unlisted(source, tags_listed()) is wrong
 
 
 # ------------------------------------------------------------------------------------------- the tool can fail
