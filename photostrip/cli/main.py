@@ -157,7 +157,7 @@ def _call(name: str, arguments: list[str]) -> int:
         app.command(name, context_settings={"help_option_names": ["--help", "-h"]})(target)
     command = typer.main.get_command(app)
     command.epilog = f"\b\nExample:\n  {entry.example}"  # \b: typer keeps the line breaks
-    # typer names this class differently from version to version, but always derives BadParameter from it
+    # the class of every usage error; typer does not export it, but derives BadParameter from it
     usage_error = cast("type[Exception]", typer.BadParameter.__base__)
     try:
         # not command.main(), which has exit codes of its own for interrupts and closed pipes
