@@ -1,22 +1,358 @@
-"""Absolute orientation (being written)."""
+"""Absolute orientation: the formed strip brought to the control, in the intermediate frame.
+
+A control point gives up to three coordinates in its own ground frame. Each given coordinate is one observation: the
+strip point must agree with it along that axis of the ground frame at that place. So plan-only and
+height-only points, grids whose axes turn along the strip, and points given in several zones all come in by one rule:
+the *target* of a strip point is the point itself with the given coordinates put in place of its own.
+
+Source: [001] eq. 142-149; mixed control and its weights are derived.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import Fault, GeometryError, InputError
+from photostrip.geometry.rotation import from_vector
+from photostrip.geometry.similarity import Similarity, collinearity
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.geodesy.crs import GroundFrame
+    from photostrip.geodesy.local_frame import IntermediateFrame
+    from photostrip.points import ControlPoints
+
+    Floats = NDArray[np.float64]
+
+ITERATIONS = 50
+CONVERGED = 1e-12  # of the strip's half length
+RANK_LIMIT = 1e-3  # smallest over largest singular value: control on a line to a thousandth of its length
+WEAK_LIMIT = 1e-2
+PARAMETERS = 7
+PLAN, HEIGHT = slice(0, 2), 2
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How the strip is brought to the ground.
+    """How the Earth's shape enters.
 
     Parameters
     ----------
     earth_curvature : str
-        ``"auto"`` or ``"none"``: the frames carry it; ``"model"``: eq. 153, for plane map coordinates of unknown
-        projection given as ``local``; ``"image"``: in image space.
+        ``"auto"`` or ``"none"``: the frames carry it (``local`` is truly Cartesian); ``"model"``: eq. 153, for plane
+        map coordinates of unknown projection given as ``local``; ``"image"``: in image space.
     earth_radius : float
         Radius in metres for ``"model"``.
     """
 
     earth_curvature: str = "auto"
     earth_radius: float = 6_371_000.0
+
+
+@dataclass(frozen=True, eq=False)
+class Targets:
+    """Control points seen from an intermediate frame.
+
+    Parameters
+    ----------
+    control : ControlPoints
+        The points, none of them a check point.
+    frames : sequence of GroundFrame
+        Ground frames the points refer to.
+    intermediate : IntermediateFrame
+        The frame in which the strip is oriented.
+    """
+
+    control: ControlPoints
+    frames: Sequence[GroundFrame]
+    intermediate: IntermediateFrame
+
+    def of(self, xyz: Floats) -> Floats:
+        """Targets of the control points.
+
+        Parameters
+        ----------
+        xyz : ndarray, shape (n, 3)
+            Present positions of the points in the intermediate frame, metres.
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            The same positions with all given coordinates put in, intermediate frame, metres.
+        """
+        cartesian = self.intermediate.cartesian_from_intermediate(xyz)
+        result = np.empty_like(cartesian)
+        for number, frame in enumerate(self.frames):
+            rows = self.control.frame == number
+            if rows.any():
+                ground = frame.ground_from_cartesian(cartesian[rows])
+                ground = np.where(self.control.use[rows], self.control.enu[rows], ground)
+                result[rows] = frame.cartesian_from_ground(ground)
+        return self.intermediate.intermediate_from_cartesian(result)
+
+    def axes(self, xyz: Floats) -> Floats:
+        """Directions along which the coordinates of the control points are given.
+
+        Parameters
+        ----------
+        xyz : ndarray, shape (n, 3)
+            Positions in the intermediate frame, metres.
+
+        Returns
+        -------
+        ndarray, shape (n, 3, 3)
+            Rows are the unit vectors of the point's ground axes in the intermediate frame.
+        """
+        cartesian = self.intermediate.cartesian_from_intermediate(xyz)
+        result = np.empty((len(cartesian), 3, 3))
+        for number, frame in enumerate(self.frames):
+            rows = self.control.frame == number
+            if rows.any():
+                result[rows] = frame.axes_at(cartesian[rows])
+        return result @ self.intermediate.axes
+
+    def misclosures(self, xyz: Floats) -> Floats:
+        """Present minus given coordinates, along the ground axes.
+
+        Parameters
+        ----------
+        xyz : ndarray, shape (n, 3)
+            Positions in the intermediate frame, metres.
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            Differences in metres; 0 where a coordinate does not count.
+        """
+        difference = np.einsum("nij,nj->ni", self.axes(xyz), xyz - self.of(xyz))
+        return np.where(self.control.use, difference, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class AbsoluteOrientation:
+    """The similarity from the strip to the intermediate frame, and how well it fits.
+
+    Parameters
+    ----------
+    similarity : Similarity
+        Strip to intermediate frame.
+    misclosures : ndarray, shape (n, 3)
+        Strip minus control along the ground axes in metres, after the similarity; 0 where a coordinate does not count.
+    sigma0 : float
+        Standard deviation of unit weight, without unit (1 when the strip fits within the sigmas of the control and the
+        a-priori precision of its points); NaN without redundancy.
+    redundancy : int
+        Control coordinates minus seven.
+    condition : float
+        Largest over smallest singular value of the column-scaled design.
+    iterations : int
+        Steps of the least-squares iteration.
+    """
+
+    similarity: Similarity
+    misclosures: Floats
+    sigma0: float
+    redundancy: int
+    condition: float
+    iterations: int
+
+
+def weights(control: ControlPoints, precision: tuple[float, float]) -> Floats:
+    """Weights of the control coordinates against the strip.
+
+    Parameters
+    ----------
+    control : ControlPoints
+        Control points with the standard deviations of their coordinates.
+    precision : tuple of float
+        A-priori standard deviation of a strip point in plan and in height, metres.
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+        1/(sigma_control^2 + sigma_point^2) in metres^-2; 0 where a coordinate does not count.
+    """
+    point = np.array([precision[0], precision[0], precision[1]])
+    return np.where(control.use, 1 / (control.sigma**2 + point**2), 0.0)
+
+
+def orient(strip: Floats, targets: Targets, weight: Floats) -> AbsoluteOrientation:
+    """Similarity of the strip on its control.
+
+    Parameters
+    ----------
+    strip : ndarray, shape (n, 3)
+        Strip coordinates of the control points.
+    targets : Targets
+        The control points.
+    weight : ndarray, shape (n, 3)
+        Weights of their coordinates, metres^-2.
+
+    Returns
+    -------
+    AbsoluteOrientation
+        The similarity and its fit.
+
+    Raises
+    ------
+    GeometryError
+        When the control does not determine seven parameters; the free motion is named.
+    InputError
+        When the strip comes out upside down: the control is left-handed.
+
+    Notes
+    -----
+    Source: [001] eq. 145-149; start from the closed form of the full points, or from plan and height apart.
+    """
+    _refuse_too_few(targets.control)
+    similarity = _start(strip, targets, weight)
+    half = max(float(np.ptp(similarity(strip), axis=0).max()) / 2, 1e-6)
+    for iteration in range(1, ITERATIONS + 1):  # noqa: B007
+        xyz = similarity(strip)
+        design, free = _design(xyz, targets, weight, half)
+        _refuse_deficient(design, xyz, targets, half)
+        step, *_ = np.linalg.lstsq(design, free, rcond=None)
+        similarity = _corrected(similarity, step, xyz.mean(axis=0), half)
+        if np.abs(step).max() < CONVERGED * half:
+            break
+    if similarity.rotation[2, 2] < 0:
+        raise InputError(
+            Fault(
+                "the strip fits the control only upside down: the control coordinates are left-handed",
+                code="left-handed-control",
+                key="control.axes",
+                expected="axes in the order of the columns, for example [north, east, up] for grids with X to the north",
+            )
+        )
+    misclosures = targets.misclosures(similarity(strip))
+    values = np.linalg.svd(design, compute_uv=False)
+    redundancy = int(targets.control.use.sum()) - PARAMETERS
+    squares = float((weight * misclosures**2).sum())
+    sigma0 = float(np.sqrt(squares / redundancy)) if redundancy > 0 else float("nan")
+    return AbsoluteOrientation(similarity, misclosures, sigma0, redundancy, float(values[0] / values[-1]), iteration)
+
+
+def _refuse_too_few(control: ControlPoints) -> None:
+    plan, height = int(control.use[:, 0].sum()), int(control.use[:, HEIGHT].sum())
+    if plan >= 2 and height >= 3:  # noqa: PLR2004
+        return
+    msg = (
+        f"absolute orientation needs at least 2 control points in plan and 3 in height on the strip, not on one line; there are "
+        f"{plan} in plan and {height} in height"
+    )
+    if plan == height == 2:  # noqa: PLR2004
+        msg += f": the rotation about the line of control points {control.ids[0]} and {control.ids[1]} stays free"
+    raise GeometryError(msg, points=control.ids, code="too-little-control")
+
+
+def _start(strip: Floats, targets: Targets, weight: Floats) -> Similarity:
+    """Similarity to start from: closed form of the full points, else plan and height apart."""
+    full = targets.control.use.all(axis=1)
+    if full.sum() >= 3 and collinearity(strip[full]) > RANK_LIMIT**2:  # noqa: PLR2004
+        return Similarity.from_points(strip[full], targets.of(strip)[full], weight[full].mean(axis=1))
+    return _start_apart(strip, targets)
+
+
+def _start_apart(strip: Floats, targets: Targets) -> Similarity:
+    """Four parameters from the plan, then three from the heights, for a strip that is nearly level."""
+    plan, height = targets.control.use[:, 0], targets.control.use[:, HEIGHT]
+    at_sea = np.zeros_like(strip)
+    target = targets.of(at_sea)[plan]
+    z = strip[plan, 0] + 1j * strip[plan, 1]
+    t = target[:, 0] + 1j * target[:, 1]
+    dz = z - z.mean()
+    turn = (dz.conj() @ (t - t.mean())) / (dz.conj() @ dz).real
+    scale, angle = abs(turn), np.angle(turn)
+    shift = t.mean() - turn * z.mean()
+    level = Similarity(scale, from_vector([0.0, 0.0, angle]), np.array([shift.real, shift.imag, 0.0]))
+    xyz = level(strip)
+    rise = targets.of(xyz)[height, 2] - xyz[height, 2]
+    x, y = (xyz[height, axis] - xyz[height, axis].mean() for axis in (0, 1))
+    (up, along, across), *_ = np.linalg.lstsq(np.column_stack([np.ones(len(x)), x, y]), rise, rcond=1e-6)
+    tilt = from_vector([np.arctan(across), -np.arctan(along), 0.0])
+    center = np.array([xyz[height, 0].mean(), xyz[height, 1].mean(), 0.0])
+    rotation = tilt @ level.rotation
+    middle = level.inverse(center[None, :])[0]
+    return Similarity(scale, rotation, center + [0.0, 0.0, up] - scale * rotation @ middle)
+
+
+def _design(xyz: Floats, targets: Targets, weight: Floats, half: float) -> tuple[Floats, Floats]:
+    """Weighted design and free terms of one step: three shifts, three rotations, scale, all in metres at the strip's end."""
+    axes = targets.axes(xyz)
+    arm = (xyz - xyz.mean(axis=0)) / half
+    columns = np.empty((len(xyz), 3, PARAMETERS))
+    columns[:, :, :3] = axes
+    # axes . (theta x arm) = theta . (arm x axes)
+    columns[:, :, 3:6] = np.cross(arm[:, None, :], axes)
+    columns[:, :, 6] = np.einsum("nij,nj->ni", axes, arm)
+    root = np.sqrt(weight)
+    free = -np.einsum("nij,nj->ni", axes, xyz - targets.of(xyz)) * root
+    used = targets.control.use
+    return (columns * root[:, :, None])[used], free[used]
+
+
+def _corrected(similarity: Similarity, step: Floats, center: Floats, half: float) -> Similarity:
+    """Compose the similarity with a small one about a centre."""
+    turn = from_vector(step[3:6] / half)
+    growth = float(np.exp(step[6] / half))
+    shift = center + step[:3] + growth * turn @ (similarity.shift - center)
+    return Similarity(similarity.scale * growth, _orthonormal(turn @ similarity.rotation), shift)
+
+
+def _orthonormal(matrix: Floats) -> Floats:
+    """Remove the rounding that many small rotations leave."""
+    u, _, vt = np.linalg.svd(matrix)
+    result: Floats = u @ vt
+    return result
+
+
+def _refuse_deficient(design: Floats, xyz: Floats, targets: Targets, half: float) -> None:
+    """Raise when the control leaves a motion free, and name that motion."""
+    _, values, vt = np.linalg.svd(design / np.linalg.norm(design), full_matrices=True)
+    if len(values) == PARAMETERS and values[-1] > RANK_LIMIT * values[0]:
+        return
+    points = targets.control.ids
+    msg = f"absolute orientation: the control does not determine {free_motion(vt[-1], xyz, targets.control, half)}"
+    raise GeometryError(msg, points=points, code="control-deficient")
+
+
+def free_motion(direction: Floats, xyz: Floats, control: ControlPoints, half: float) -> str:
+    """Name a motion of the strip that the control leaves free.
+
+    Parameters
+    ----------
+    direction : ndarray, shape (7,)
+        Shifts, rotations and scale of the motion, as in the design of the orientation.
+    xyz : ndarray, shape (n, 3)
+        Control points in the intermediate frame, metres.
+    control : ControlPoints
+        The control points.
+    half : float
+        Half length of the strip in metres.
+
+    Returns
+    -------
+    str
+        For example ``"the rotation about the line of control points A1, A4"``.
+    """
+    shift, turn, growth = direction[:3], direction[3:6], direction[6]
+    sizes = np.array([np.linalg.norm(shift), np.linalg.norm(turn), abs(growth)])
+    if sizes[2] > 0.7 * np.linalg.norm(sizes):  # noqa: PLR2004
+        return "the scale"
+    if sizes[1] < 0.3 * np.linalg.norm(sizes):  # noqa: PLR2004
+        return "the height" if abs(shift[2]) > np.hypot(shift[0], shift[1]) else "the plan position"
+    axis = turn / sizes[1]
+    foot = np.cross(turn, shift) / sizes[1] ** 2  # a point of the axis, from the centre, in half lengths
+    offset = np.linalg.norm(np.cross((xyz - xyz.mean(axis=0)) / half - foot, axis), axis=1)
+    near = [name for name, distance in zip(control.ids, offset, strict=True) if distance < 0.02]  # noqa: PLR2004
+    if len(near) >= 2:  # noqa: PLR2004
+        return f"the rotation about the line of control points {', '.join(near)}"
+    if abs(axis[2]) > 0.7:  # noqa: PLR2004
+        return "the azimuth (rotation about the vertical)"
+    return "the rotation about the flight line" if abs(axis[0]) > abs(axis[1]) else "the tilt along the flight line"

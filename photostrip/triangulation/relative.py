@@ -602,16 +602,20 @@ def refine(orientation: Orientation, weight: Floats, todo: Numbers) -> Orientati
         All pairs; those not named keep their numbers.
     """
     pairs = replace(orientation.pairs, weight=weight)
-    part, _ = pairs.take(todo)
+    part, rows = pairs.take(todo)
     solved, converged, steps = iterate(orientation.elements[todo], part)
-    elements, iterations = orientation.elements.copy(), orientation.iterations.copy()
-    lost = ~converged
-    if lost.any():
-        again, _ = part.take(np.flatnonzero(lost))
+    if not converged.all():
+        lost = np.flatnonzero(~converged)
+        again, _ = part.take(lost)
         solved[lost], _, steps[lost] = solve(again)
-    elements[todo] = solved
-    iterations[todo] += steps
-    return assess(elements, pairs, orientation.point, orientation.rows, iterations)
+    fresh = assess(solved, part, orientation.point[rows], orientation.rows[rows], orientation.iterations[todo] + steps)
+    by_pair, by_row = ("elements", "sigmas", "sigma0", "condition", "iterations"), ("parallax", "redundancy")
+    changed: dict[str, Floats] = {}
+    for names, place in ((by_pair, todo), (by_row, rows)):
+        for name in names:
+            changed[name] = getattr(orientation, name).copy()
+            changed[name][place] = getattr(fresh, name)
+    return replace(orientation, pairs=pairs, **changed)
 
 
 def _refuse(result: Orientation, number: int, photos: Sequence[str], *, converged: bool) -> None:

@@ -1,4 +1,4 @@
-"""The method from measured coordinates to the result, as a table of contents: no disk, no YAML, no printing."""
+"""What goes into a run: everything a project file and its tables say, without how they say it."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ from photostrip.triangulation import absolute, formation, interior, polynomial, 
 
 if TYPE_CHECKING:
     from photostrip.camera import Camera
-    from photostrip.geodesy.crs import FrameSpec
+    from photostrip.geodesy.frame_spec import FrameSpec
     from photostrip.points import ControlPoints, PhotoPoints
+
+ADJUSTMENTS = ("similarity", "polynomial")
 
 
 @dataclass(frozen=True)

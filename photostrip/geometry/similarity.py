@@ -1,0 +1,130 @@
+"""The similarity in space: rotation, one scale, shift."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+
+from photostrip.points import frozen
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Similarity:
+    """Similarity ``target = scale * rotation @ source + shift``.
+
+    Parameters
+    ----------
+    scale : float
+        Scale, positive.
+    rotation : ndarray, shape (3, 3)
+        Rotation, determinant +1.
+    shift : ndarray, shape (3,)
+        Shift in the unit of the target.
+    """
+
+    scale: float
+    rotation: Floats
+    shift: Floats
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays."""
+        object.__setattr__(self, "rotation", frozen(self.rotation, shape=(3, 3)))
+        object.__setattr__(self, "shift", frozen(self.shift, shape=(3,)))
+
+    def __call__(self, points: ArrayLike) -> Floats:
+        """Transform points.
+
+        Parameters
+        ----------
+        points : array_like, shape (n, 3)
+            Source coordinates.
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            Target coordinates.
+        """
+        return self.scale * np.asarray(points, float) @ self.rotation.T + self.shift
+
+    @property
+    def inverse(self) -> Similarity:
+        """The similarity from target to source."""
+        back = self.rotation.T
+        return Similarity(1 / self.scale, back, -back @ self.shift / self.scale)
+
+    def residuals(self, source: ArrayLike, target: ArrayLike) -> Floats:
+        """Transformed source minus target.
+
+        Parameters
+        ----------
+        source, target : array_like, shape (n, 3)
+            Corresponding points.
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            Differences in the unit of the target.
+        """
+        return self(source) - np.asarray(target, float)
+
+    @classmethod
+    def from_points(cls, source: ArrayLike, target: ArrayLike, weights: ArrayLike | None = None) -> Self:
+        """Least-squares similarity of corresponding points, in closed form.
+
+        Parameters
+        ----------
+        source, target : array_like, shape (n, 3)
+            Corresponding points, at least three that are not on one line.
+        weights : array_like, shape (n,), optional
+            One weight for each point, the same for its three coordinates.
+
+        Returns
+        -------
+        Similarity
+            The similarity that makes the weighted sum of squared residuals smallest. With points on a line
+            the rotation about that line is arbitrary; :func:`collinearity` tells.
+
+        Notes
+        -----
+        Source: [001] eq. 145-149; closed form by singular values. The determinant factor keeps a reflection out.
+        """
+        a, b = np.asarray(source, float), np.asarray(target, float)
+        w = np.ones(len(a)) if weights is None else np.asarray(weights, float)
+        center_a, center_b = (np.average(points, axis=0, weights=w) for points in (a, b))
+        da, db = a - center_a, b - center_b
+        u, values, vt = np.linalg.svd((db * w[:, None]).T @ da)
+        sign = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
+        rotation = (u * sign) @ vt
+        scale = float((values * sign).sum() / (w[:, None] * da**2).sum())
+        return cls(scale, rotation, center_b - scale * rotation @ center_a)
+
+
+def collinearity(points: ArrayLike, weights: ArrayLike | None = None) -> float:
+    """How far points are from a line: second over first singular value of their scatter.
+
+    Parameters
+    ----------
+    points : array_like, shape (n, 3)
+        Points.
+    weights : array_like, shape (n,), optional
+        Weights.
+
+    Returns
+    -------
+    float
+        0 for points on a line, 1 for points spread alike in two directions; 0 for fewer than three points.
+    """
+    p = np.asarray(points, float)
+    if len(p) < 3:  # noqa: PLR2004
+        return 0.0
+    w = np.ones(len(p)) if weights is None else np.asarray(weights, float)
+    d = p - np.average(p, axis=0, weights=w)
+    values = np.linalg.svd((d * w[:, None]).T @ d, compute_uv=False)
+    return float(values[1] / values[0]) if values[0] > 0 else 0.0

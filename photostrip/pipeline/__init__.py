@@ -1,0 +1,20 @@
+"""The method from measured coordinates to the result: no disk, no YAML, no printing."""
+
+from photostrip.pipeline.inputs import ADJUSTMENTS, Inputs, Settings, Strip
+from photostrip.pipeline.results import CHECK, CONTROL, NEW, Adjusted, Result, StripResult, Ties
+from photostrip.pipeline.triangulate import triangulate
+
+__all__ = [
+    "ADJUSTMENTS",
+    "CHECK",
+    "CONTROL",
+    "NEW",
+    "Adjusted",
+    "Inputs",
+    "Result",
+    "Settings",
+    "Strip",
+    "StripResult",
+    "Ties",
+    "triangulate",
+]

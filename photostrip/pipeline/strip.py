@@ -1,0 +1,333 @@
+"""One strip from its image coordinates to adjusted points and oriented photos."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import GeometryError
+from photostrip.geodesy.local_frame import IntermediateFrame, mean_position, strip_azimuth
+from photostrip.notes import Note
+from photostrip.pipeline.results import StripResult
+from photostrip.triangulation import absolute, exterior, formation, polynomial, relative, screening
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.geodesy.crs import GroundFrame
+    from photostrip.pipeline.inputs import Settings, Strip
+    from photostrip.points import ControlPoints, PhotoPoints
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+LONG_STRIP = 25  # models; beyond it polynomials fall far behind a rigorous adjustment
+
+
+def adjust_strip(
+    strip: Strip, observations: PhotoPoints, control: ControlPoints, frames: Sequence[GroundFrame], settings: Settings
+) -> StripResult:
+    """Take one strip through the method.
+
+    Parameters
+    ----------
+    strip : Strip
+        Photos in flight order and their camera.
+    observations : PhotoPoints
+        Ideal image coordinates of the whole project.
+    control : ControlPoints
+        Measured control of the project, no check points.
+    frames : sequence of GroundFrame
+        Ground frames of the control.
+    settings : Settings
+        What is to be done.
+
+    Returns
+    -------
+    StripResult
+        Every stage.
+
+    Raises
+    ------
+    GeometryError, InputError
+        When a pair, a joint or the absolute orientation cannot be determined; the strip is named.
+    """
+    sigma = _sigma(strip, observations)
+    pairs, point, pair_rows = relative.collect_pairs(observations, strip.photos, strip.camera.principal_distance)
+    oriented = relative.orient(pairs, point, pair_rows, strip.photos)
+    oriented, rejections = screening.screen(oriented, settings.relative, sigma)
+    formed = formation.form(oriented, settings.formation, strip.photos)
+
+    here, rows = _control_of(formed, control, observations)
+    intermediate, orientation, precision = _to_ground(strip, formed, here, rows, frames, oriented, sigma)
+    xyz = orientation.similarity(formed.xyz)
+    centers = orientation.similarity(formed.centers)
+    correction = None
+    if settings.adjustment == "polynomial":
+        targets = absolute.Targets(here, frames, intermediate)
+        problem = polynomial.Problem(
+            xyz[rows],
+            targets,
+            absolute.weights(here, precision),
+            spacing=float(np.linalg.norm(np.diff(centers, axis=0), axis=1).mean()),
+            breadth=max(float(np.quantile(np.abs(xyz[:, 1]), 0.95)), 1e-6),
+        )
+        correction = polynomial.fit(problem, settings.polynomial, precision)
+    adjusted = xyz if correction is None else correction(xyz)
+    resection, image_rows = _orient_photos(strip, observations, oriented, formed, adjusted, orientation)
+    return StripResult(
+        strip,
+        oriented,
+        rejections,
+        formed,
+        precision,
+        intermediate,
+        here,
+        rows,
+        orientation,
+        correction,
+        adjusted,
+        intermediate.cartesian_from_intermediate(adjusted),
+        resection,
+        image_rows,
+        _depth(strip, observations, image_rows, formed, adjusted, resection),
+        _notes(strip, oriented, formed, orientation, correction, adjusted, resection),
+    )
+
+
+def _sigma(strip: Strip, observations: PhotoPoints) -> float:
+    """Median standard deviation of the strip's image coordinates, mm."""
+    members = set(strip.photos)
+    inside = np.array([photo in members for photo in observations.photo_ids])
+    return float(np.median(observations.sigma[inside[observations.photo]]))
+
+
+def _control_of(
+    formed: formation.FormedStrip, control: ControlPoints, observations: PhotoPoints
+) -> tuple[ControlPoints, Numbers]:
+    """Control points that have strip coordinates, and their rows there."""
+    number = {name: n for n, name in enumerate(observations.point_ids)}
+    row_of = {int(n): row for row, n in enumerate(formed.point)}
+    found = [(row, row_of.get(number[name], -1)) for row, name in enumerate(control.ids)]
+    kept = np.array([pair for pair in found if pair[1] >= 0], np.intp).reshape(-1, 2)
+    return control.take(kept[:, 0]), kept[:, 1]
+
+
+def _to_ground(
+    strip: Strip,
+    formed: formation.FormedStrip,
+    control: ControlPoints,
+    rows: Numbers,
+    frames: Sequence[GroundFrame],
+    oriented: relative.Orientation,
+    sigma: float,
+) -> tuple[IntermediateFrame, absolute.AbsoluteOrientation, tuple[float, float]]:
+    """Intermediate frame with X along the strip, and the similarity into it.
+
+    A provisional similarity in the frame of azimuth 0 gives the direction of the strip and its scale, hence the
+    weights; the final one is made in the frame turned along the strip.
+    """
+    if not len(control):
+        msg = f"strip {strip.id}: none of its points is a control point"
+        raise GeometryError(msg, photos=strip.photos, code="no-control")
+    try:
+        provisional_frame = _intermediate(control, frames)
+        provisional = absolute.orient(
+            formed.xyz[rows], absolute.Targets(control, frames, provisional_frame), control.use.astype(float)
+        )
+        ends = provisional.similarity(formed.centers[[0, -1]])
+        intermediate = provisional_frame.with_azimuth(strip_azimuth(ends[0], ends[1]))
+        precision = _precision(formed, oriented, sigma, provisional.similarity.scale)
+        targets = absolute.Targets(control, frames, intermediate)
+        final = absolute.orient(formed.xyz[rows], targets, absolute.weights(control, precision))
+    except GeometryError as error:
+        msg = f"strip {strip.id}: {error}"
+        raise GeometryError(msg, photos=strip.photos, points=error.points, code=error.code) from error
+    return intermediate, final, precision
+
+
+def _intermediate(control: ControlPoints, frames: Sequence[GroundFrame]) -> IntermediateFrame:
+    """Frame at the control's centre of gravity, X to the north.
+
+    Points without plan position do not count; a missing height is taken from the others.
+    """
+    known = ~np.isnan(control.enu[:, :2]).any(axis=1) & control.use[:, 0]
+    chosen = control.take(known)
+    heights = np.where(control.use[:, 2], control.enu[:, 2], np.nan)
+    mean = float(np.nanmean(heights)) if np.isfinite(heights).any() else 0.0
+    cartesian = np.empty((len(chosen), 3))
+    for number, frame in enumerate(frames):
+        rows = chosen.frame == number
+        if rows.any():
+            enu = chosen.enu[rows].copy()
+            enu[~chosen.use[rows, 2], 2] = mean
+            cartesian[rows] = frame.cartesian_from_ground(enu, ids=[chosen.ids[i] for i in np.flatnonzero(rows)])
+    if not len(chosen):
+        msg = "no control point gives a plan position"
+        raise GeometryError(msg, points=control.ids, code="too-little-control")
+    if frames[0].kind == "local":
+        return IntermediateFrame.at_local_centre(cartesian, 0.0)
+    lon, lat, height = frames[0].geodetic(cartesian).T
+    lat0, lon0, _ = mean_position(lat, lon, height)
+    return IntermediateFrame.at_centre(cartesian, lat0, lon0, 0.0)
+
+
+def _precision(
+    formed: formation.FormedStrip, oriented: relative.Orientation, sigma: float, scale: float
+) -> tuple[float, float]:
+    """A-priori standard deviation of a point of one model in plan and height, metres.
+
+    Plan: that of an image coordinate at photo scale; height: that of an x parallax times the ratio of depth to base.
+    """
+    arm = formed.model_xyz - formed.centers[oriented.pairs.pair]
+    base = np.diff(formed.centers, axis=0)[oriented.pairs.pair]
+    length = np.linalg.norm(base, axis=1)
+    depth = np.linalg.norm(np.cross(arm, base), axis=1) / length
+    good = np.isfinite(depth)
+    depth_mean = float(depth[good].mean())
+    plan = sigma * depth_mean / oriented.pairs.focal * scale
+    return plan, plan * float(np.sqrt(2.0)) * depth_mean / float(length[good].mean())
+
+
+def _orient_photos(
+    strip: Strip,
+    observations: PhotoPoints,
+    oriented: relative.Orientation,
+    formed: formation.FormedStrip,
+    adjusted: Floats,
+    orientation: absolute.AbsoluteOrientation,
+) -> tuple[exterior.Resection, Numbers]:
+    """Orient every photo on its adjusted points, so that orientations and points belong together."""
+    used = np.unique(oriented.rows[oriented.used & np.isfinite(formed.model_xyz).all(axis=1)])
+    place = {photo: n for n, photo in enumerate(strip.photos)}
+    position = np.array([place.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo[used]]
+    order = np.argsort(position, kind="stable")
+    used, position = used[order], position[order]
+    points = adjusted[np.searchsorted(formed.point, observations.point[used])]
+    similarity = orientation.similarity
+    start = similarity(formed.centers), similarity.rotation @ formed.rotations
+    focal = np.full(len(strip.photos), strip.camera.principal_distance)
+    return exterior.resect(observations.xy[used], points, position, focal, start), used
+
+
+def _depth(
+    strip: Strip,
+    observations: PhotoPoints,
+    rows: Numbers,
+    formed: formation.FormedStrip,
+    adjusted: Floats,
+    resection: exterior.Resection,
+) -> float:
+    place = {photo: n for n, photo in enumerate(strip.photos)}
+    position = np.array([place.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo[rows]]
+    arm = adjusted[np.searchsorted(formed.point, observations.point[rows])] - resection.centers[position]
+    return float(-(arm * resection.rotations[position][:, :, 2]).sum(axis=1).mean())
+
+
+def _notes(
+    strip: Strip,
+    oriented: relative.Orientation,
+    formed: formation.FormedStrip,
+    orientation: absolute.AbsoluteOrientation,
+    correction: polynomial.Polynomial | None,
+    adjusted: Floats,
+    resection: exterior.Resection,
+) -> tuple[Note, ...]:
+    """What this strip's numbers say that a surveyor should know."""
+    return (
+        *_pair_notes(strip, oriented),
+        *_joint_notes(strip, formed),
+        *_control_notes(strip, orientation),
+        *_polynomial_notes(strip, correction, adjusted),
+        *_photo_notes(strip, resection),
+    )
+
+
+def _pair_notes(strip: Strip, oriented: relative.Orientation) -> list[Note]:
+    notes = []
+    for number, count in enumerate(oriented.points_used):
+        names = strip.photos[number : number + 2]
+        if count == relative.MINIMUM_POINTS:
+            text = f"photos {names[0]} and {names[1]} are oriented on 5 points: no check"
+            notes.append(Note("no-check", text, strip=strip.id, photos=names))
+        if oriented.condition[number] > relative.CONDITION_WARNING:
+            text = (
+                f"photos {names[0]} and {names[1]}: weak relative orientation (condition number {oriented.condition[number]:.0f}); "
+                "the points stand in a narrow band"
+            )
+            notes.append(Note("weak-pair", text, strip=strip.id, photos=names))
+    return notes
+
+
+def _joint_notes(strip: Strip, formed: formation.FormedStrip) -> list[Note]:
+    junctions = formed.junctions
+    count = np.bincount(junctions.joint, junctions.used, len(junctions.factor))
+    return [
+        Note(
+            "weak-joint",
+            f"photo {strip.photos[number + 1]}: the models on either side are joined by a single pass point: its error "
+            "goes into the scale unseen",
+            strip=strip.id,
+            photos=(strip.photos[number + 1],),
+        )
+        for number in np.flatnonzero(count == 1)
+    ]
+
+
+def _control_notes(strip: Strip, orientation: absolute.AbsoluteOrientation) -> list[Note]:
+    notes = []
+    if orientation.redundancy < 3:  # noqa: PLR2004
+        text = f"strip {strip.id}: the absolute orientation has a redundancy of {orientation.redundancy}: errors of the control hardly show"
+        notes.append(Note("little-control", text, strip=strip.id))
+    if orientation.condition > 1 / absolute.WEAK_LIMIT:
+        text = f"strip {strip.id}: the control is nearly on one line (condition number {orientation.condition:.0f})"
+        notes.append(Note("weak-control", text, strip=strip.id))
+    return notes
+
+
+def _polynomial_notes(strip: Strip, correction: polynomial.Polynomial | None, adjusted: Floats) -> list[Note]:
+    if correction is None:
+        return []
+    notes = []
+    asked = correction.asked
+    if asked != "auto" and correction.degree < int(asked):
+        text = (
+            f"strip {strip.id}: degree {asked} was asked for; the control, {len(correction.axes[0].residuals)} points at "
+            f"{correction.stations[0]} stations in plan and {correction.stations[1]} in height, carries degree {correction.degree}"
+        )
+        notes.append(Note("degree-reduced", text, strip=strip.id))
+    if correction.degree:
+        low, high = correction.reach
+        outside = int(((adjusted[:, 0] < low) | (adjusted[:, 0] > high)).sum())
+        reach = max(low - float(adjusted[:, 0].min()), float(adjusted[:, 0].max()) - high)
+        if outside and reach > 0.1 * (high - low):  # noqa: PLR2004  the polynomial's own points scatter about its ends
+            text = (
+                f"strip {strip.id}: {outside} points lie up to {reach:.0f} m beyond the control along the strip, where "
+                f"the polynomial of degree {correction.degree} is extrapolated"
+            )
+            notes.append(Note("extrapolation", text, strip=strip.id))
+        if min(axis.redundancy for axis in correction.axes) < 3:  # noqa: PLR2004
+            text = f"strip {strip.id}: the polynomial has a redundancy below 3 in an axis: its residuals say little"
+            notes.append(Note("little-redundancy", text, strip=strip.id))
+    if len(strip.photos) - 1 > LONG_STRIP:
+        text = (
+            f"strip {strip.id}: {len(strip.photos) - 1} models; beyond about {LONG_STRIP} a polynomial falls far behind a rigorous "
+            "adjustment (errors 2.5 times larger at 30 models, 12 times at 100)"
+        )
+        notes.append(Note("long-strip", text, strip=strip.id))
+    return notes
+
+
+def _photo_notes(strip: Strip, resection: exterior.Resection) -> list[Note]:
+    return [
+        Note(
+            "not-resected",
+            f"photo {strip.photos[number]} could not be oriented on its adjusted points; it keeps its orientation in the strip",
+            strip=strip.id,
+            photos=(strip.photos[number],),
+        )
+        for number in np.flatnonzero(~resection.solved)
+    ]

@@ -1,0 +1,225 @@
+"""The whole walk, as a table of contents: image coordinates, strips, all points together."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import Fault, InputError
+from photostrip.geodesy.crs import tie_frames
+from photostrip.notes import Note
+from photostrip.pipeline.inputs import ADJUSTMENTS
+from photostrip.pipeline.results import Adjusted, Result, Ties
+from photostrip.pipeline.strip import adjust_strip
+from photostrip.triangulation import interior, refinement
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from photostrip.camera import Camera
+    from photostrip.geodesy.crs import GroundFrame
+    from photostrip.pipeline.inputs import Inputs, Settings
+    from photostrip.pipeline.results import StripResult
+    from photostrip.points import ControlPoints, PhotoPoints
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+
+def triangulate(inputs: Inputs, settings: Settings, *, directory: Path | None = None) -> Result:
+    """Take a project through the whole strip method.
+
+    Parameters
+    ----------
+    inputs : Inputs
+        What is given.
+    settings : Settings
+        What is to be done.
+    directory : Path, optional
+        Where geoid grids named in a CRS are looked for first.
+
+    Returns
+    -------
+    Result
+        Every stage, adjusted points, orientations, residuals, notes.
+
+    Raises
+    ------
+    InputError
+        When the settings or frames contradict each other or the control is left-handed.
+    GeometryError
+        When a pair, a joint or the absolute orientation cannot be determined.
+    """
+    _require(settings)
+    frames, output = _frames(inputs, settings, directory)
+    observations, fiducial = _photo_coordinates(inputs, settings)
+    refined = _ideal_coordinates(observations, inputs, settings, frames)
+    control = _measured_control(inputs, refined.observations)
+    strips = tuple(adjust_strip(strip, refined.observations, control, frames, settings) for strip in inputs.strips)
+    points, ties = _join(strips, refined.observations, output)
+    rows, differences = _at_given_points(inputs, frames, points, refined.observations)
+    missing = _not_determined(refined.observations, points, inputs)
+    notes = _notes(inputs, settings, strips, fiducial)
+    return Result(
+        inputs, settings, tuple(frames), output, fiducial, refined, strips, points, rows, differences, ties, missing, notes
+    )
+
+
+def _require(settings: Settings) -> None:
+    """Refuse what does not exist, by name."""
+    if settings.adjustment not in ADJUSTMENTS:
+        fault = Fault(
+            f"adjustment {settings.adjustment!r} is not available",
+            code="not-available",
+            key="processing.adjustment",
+            expected=" or ".join(ADJUSTMENTS),
+        )
+        raise InputError(fault)
+
+
+def _frames(inputs: Inputs, settings: Settings, directory: Path | None) -> tuple[list[GroundFrame], GroundFrame]:
+    """Ground frames tied together; with curvature by eq. 153 all share the control's centre of gravity as origin."""
+    radius = settings.absolute.earth_radius if settings.absolute.earth_curvature == "model" else None
+    specs = [replace(spec, curvature_radius=radius) for spec in inputs.frames]
+    output = None if inputs.output is None else replace(inputs.output, curvature_radius=radius)
+    frames, target = tie_frames(specs, output, directory=directory)
+    if radius is None:
+        return frames, target
+    plan = inputs.control.use[:, 0] & ~inputs.control.check
+    origin = inputs.control.enu[plan, :2].mean(axis=0)
+    return [frame.with_origin(origin) for frame in frames], target.with_origin(origin)
+
+
+def _photo_coordinates(
+    inputs: Inputs, settings: Settings
+) -> tuple[PhotoPoints, interior.InteriorOrientation | None]:
+    """Interior orientation, when fiducial marks were measured."""
+    if inputs.fiducials is None:
+        return inputs.observations, None
+    cameras = _cameras(inputs)
+    orientation = interior.orient(inputs.fiducials, cameras, settings.interior)
+    return interior.transform(inputs.observations, orientation), orientation
+
+
+def _cameras(inputs: Inputs) -> dict[str, Camera]:
+    return {photo: strip.camera for strip in inputs.strips for photo in strip.photos}
+
+
+def _ideal_coordinates(
+    observations: PhotoPoints, inputs: Inputs, settings: Settings, frames: Sequence[GroundFrame]
+) -> refinement.Refined:
+    """Image coordinates reduced to the principal point, free of distortion and refraction."""
+    wanted = settings.refinement
+    if wanted.refraction and (wanted.flying_height is None or wanted.ground_height is None):
+        # The heights come from a first run without refraction; metres do not matter to it.
+        first = triangulate(inputs, replace(settings, refinement=replace(wanted, refraction=False)))
+        wanted = replace(wanted, **_heights(first, frames))
+    return refinement.refine(observations, _cameras(inputs), wanted)
+
+
+def _heights(first: Result, frames: Sequence[GroundFrame]) -> dict[str, float]:
+    """Mean height of the ground and of the cameras above the ellipsoid, metres."""
+    frame = frames[0]
+    centers = np.concatenate([s.intermediate.cartesian_from_intermediate(s.resection.centers) for s in first.strips])
+    ground = first.points.cartesian
+    heights = [points[:, 2] if frame.kind == "local" else frame.geodetic(points)[:, 2] for points in (centers, ground)]
+    return {"flying_height": float(heights[0].mean()), "ground_height": float(heights[1].mean())}
+
+
+def _measured_control(inputs: Inputs, observations: PhotoPoints) -> ControlPoints:
+    """Control that may influence the result: neither check points nor unmeasured ones ever get past here."""
+    measured = set(observations.point_ids)
+    control = inputs.control
+    kept = [
+        row
+        for row, name in enumerate(control.ids)
+        if name in measured and not control.check[row] and control.use[row].any()
+    ]
+    return control.take(np.array(kept, np.intp))
+
+
+def _join(strips: Sequence[StripResult], observations: PhotoPoints, output: GroundFrame) -> tuple[Adjusted, Ties]:
+    """Points of all strips: the mean where strips share a point, and their differences there."""
+    strip = np.concatenate([np.full(len(s.formed.point), number) for number, s in enumerate(strips)])
+    point = np.concatenate([s.formed.point for s in strips])
+    cartesian = np.concatenate([s.cartesian for s in strips])
+    number, inverse = np.unique(point, return_inverse=True)
+    count = np.bincount(inverse)
+    sums = np.column_stack([np.bincount(inverse, cartesian[:, axis]) for axis in range(3)])
+    mean = sums / count[:, None]
+    rays = np.zeros(len(number), np.intp)
+    for s in strips:
+        np.add.at(rays, np.searchsorted(number, observations.point[s.rows]), 1)
+    ids = [observations.point_ids[n] for n in number]
+    joined = Adjusted(number, mean, output.ground_from_cartesian(mean, ids=ids), rays)
+    return joined, _ties(strip, point, cartesian, output)
+
+
+def _ties(strip: Numbers, point: Numbers, cartesian: Floats, output: GroundFrame) -> Ties:
+    order = np.lexsort((strip, point))
+    strip, point, cartesian = strip[order], point[order], cartesian[order]
+    second = np.flatnonzero(point[1:] == point[:-1]) + 1
+    difference = cartesian[second] - cartesian[second - 1]
+    if len(second):
+        difference = np.einsum("nij,nj->ni", output.axes_at(cartesian[second]), difference)
+    return Ties(point[second], np.column_stack([strip[second - 1], strip[second]]), difference)
+
+
+def _at_given_points(
+    inputs: Inputs, frames: Sequence[GroundFrame], points: Adjusted, observations: PhotoPoints
+) -> tuple[Numbers, Floats]:
+    """Adjusted minus given at control and check points, each in its own ground frame."""
+    control = inputs.control
+    number = {name: n for n, name in enumerate(observations.point_ids)}
+    row_of = {int(n): row for row, n in enumerate(points.number)}
+    rows = np.array([row_of.get(number.get(name, -1), -1) for name in control.ids], np.intp)
+    differences = np.full((len(control), 3), np.nan)
+    for index, frame in enumerate(frames):
+        here = np.flatnonzero((control.frame == index) & (rows >= 0))
+        if len(here):
+            adjusted = frame.ground_from_cartesian(points.cartesian[rows[here]])
+            given = np.where(np.isnan(control.enu[here]), adjusted, control.enu[here])
+            differences[here] = frame.difference(adjusted, given)
+    return rows, np.where(control.use, differences, np.nan)
+
+
+def _not_determined(observations: PhotoPoints, points: Adjusted, inputs: Inputs) -> dict[str, str]:
+    """Points that were measured and have no coordinates, with the reason."""
+    placed = {photo: (n, k) for n, strip in enumerate(inputs.strips) for k, photo in enumerate(strip.photos)}
+    done = np.zeros(len(observations.point_ids), bool)
+    done[points.number] = True
+    seen: dict[int, list[tuple[int, int]]] = {}
+    for row in np.flatnonzero(~done[observations.point]):
+        photo = observations.photo_ids[observations.photo[row]]
+        if photo in placed:
+            seen.setdefault(int(observations.point[row]), []).append(placed[photo])
+    return {observations.point_ids[point]: _reason(places) for point, places in sorted(seen.items())}
+
+
+def _reason(places: list[tuple[int, int]]) -> str:
+    if len(places) == 1:
+        return "measured on one photo"
+    neighbours = any((n, k + 1) in places for n, k in places)
+    return "rejected in every pair" if neighbours else "on no two neighbouring photos of one strip"
+
+
+def _notes(
+    inputs: Inputs, settings: Settings, strips: Sequence[StripResult], fiducial: interior.InteriorOrientation | None
+) -> tuple[Note, ...]:
+    notes: list[Note] = list(fiducial.notes) if fiducial is not None else []
+    for strip in strips:
+        notes += strip.notes
+    if settings.absolute.earth_curvature == "none" and inputs.frames and inputs.frames[0].crs != "local":
+        notes.append(
+            Note(
+                "curvature-in-frames",
+                "earth_curvature: none changes nothing here: the coordinates go through geocentric space, which is curved",
+                severity="note",
+            )
+        )
+    return tuple(notes)
