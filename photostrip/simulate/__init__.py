@@ -1,0 +1,45 @@
+"""Strips of photos with known truth: what would be measured, and what it should give.
+
+>>> from photostrip.simulate import Flight, Spec, simulate
+>>> simulation = simulate(Spec(flight=Flight(photos=5)))
+>>> simulation.strips[0]
+('A', ('1001', '1002', '1003', '1004', '1005'))
+"""
+
+from photostrip.simulate.gross import InjectedError
+from photostrip.simulate.simulation import Simulation, Truth, simulate
+from photostrip.simulate.spec import (
+    DIGITAL,
+    FILM,
+    PRESETS,
+    Control,
+    Film,
+    Flight,
+    Gnss,
+    GrossError,
+    Ground,
+    Image,
+    Points,
+    Spec,
+    Terrain,
+)
+
+__all__ = [
+    "DIGITAL",
+    "FILM",
+    "PRESETS",
+    "Control",
+    "Film",
+    "Flight",
+    "Gnss",
+    "GrossError",
+    "Ground",
+    "Image",
+    "InjectedError",
+    "Points",
+    "Simulation",
+    "Spec",
+    "Terrain",
+    "Truth",
+    "simulate",
+]

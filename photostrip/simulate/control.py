@@ -1,0 +1,209 @@
+"""Control and check points: which of the pass points are given on the ground, and with what errors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import Fault, InputError
+from photostrip.points import ControlPoints
+from photostrip.simulate.draws import Draws, Purpose
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.geodesy.crs import GroundFrame
+    from photostrip.points import PointTable
+    from photostrip.simulate.placement import Placed
+    from photostrip.simulate.spec import Spec
+
+    Array = NDArray[np.float64]
+    Rows = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Roles:
+    """Numbers of the points that are given.
+
+    Parameters
+    ----------
+    control : ndarray of int, shape (c,)
+        Control points, by strip, along it, then from left to right.
+    use : ndarray of bool, shape (c, 3)
+        Which of their coordinates are given: east, north, up (X, Y, Z).
+    check : ndarray of int, shape (k,)
+        Check points, by number.
+    """
+
+    control: Rows
+    use: NDArray[np.bool_]
+    check: Rows
+
+
+def roles(spec: Spec, placed: Placed, rays: Rows) -> Roles:
+    """Choose control and check points.
+
+    Parameters
+    ----------
+    spec : Spec
+        Layout and numbers.
+    placed : Placed
+        All points.
+    rays : ndarray of int, shape (n,)
+        On how many photos of its own strip each point lies.
+
+    Returns
+    -------
+    Roles
+        The choice.
+
+    Raises
+    ------
+    InputError
+        When there are not enough points on two photos.
+
+    Notes
+    -----
+    Draws (`Purpose.ROLES`): an order of all points for the layout ``random``; an order of the control points for the
+    shares of ``use``; an order of all points for the check points.
+    """
+    draws = Draws(spec.seed, Purpose.ROLES)
+    order = draws.order(len(rays))
+    pick = _random if spec.control.layout == "random" else _designed
+    control = pick(spec, placed, rays, order)
+    use = _shares(spec.control.use, draws.order(len(control)))
+    order = draws.order(len(rays))
+    free = order[(rays[order] >= 2) & ~np.isin(order, control)]
+    if len(free) < spec.control.check:
+        message = f"{spec.control.check} check points are asked for, but only {len(free)} points are left for them"
+        raise InputError(Fault(message, code="simulation-points", key="control.check", fix="add extra_per_model"))
+    return Roles(control, use, np.sort(free[: spec.control.check]))
+
+
+def band_photos(spec: Spec) -> list[int]:
+    """Photos of a strip, counted from 0, at whose nadir a band of control points lies.
+
+    Parameters
+    ----------
+    spec : Spec
+        Number of bands, or models between them.
+
+    Returns
+    -------
+    list of int
+        The photos; the first and the last are always among them, except that a single band lies in the middle.
+    """
+    last, bands, every = spec.flight.photos - 1, spec.control.bands, spec.control.every
+    if every is not None:
+        return [*range(0, last, every), last]
+    if bands == 1:
+        return [last // 2]
+    return [(2 * k * last + bands - 1) // (2 * (bands - 1)) for k in range(bands)]
+
+
+def _designed(spec: Spec, placed: Placed, rays: Rows, order: Rows) -> Rows:  # noqa: ARG001 (one form with _random)
+    """Gruber points at the places of the layout, in every strip."""
+    n, rows = spec.flight.photos, spec.points.rows
+    if spec.control.layout == "bands":
+        k = spec.control.per_band
+        chosen_rows = [rows // 2] if k == 1 else [(2 * i * (rows - 1) + k - 1) // (2 * (k - 1)) for i in range(k)]
+        wanted = [(photo, row) for photo in band_photos(spec) for row in chosen_rows]
+    else:
+        wanted = [(photo, row) for photo in (0, n - 1) for row in (0, rows - 1)]
+        if spec.control.layout == "corners+centre":
+            wanted.insert(2, (n // 2, rows // 2))
+    first = np.full((len(rays) and int(placed.home.max()) + 1, rows), -1)
+    gruber = np.flatnonzero(placed.row >= 0)
+    first[placed.home[gruber], placed.row[gruber]] = gruber
+    control = np.array([first[j * n + photo, row] for j in range(spec.flight.strips) for photo, row in wanted])
+    unseen = [placed.ids[i] for i in control[rays[control] < 2].tolist()]
+    if unseen:
+        message = f"control points {', '.join(unseen)} lie on fewer than two photos"
+        raise InputError(Fault(message, code="simulation-overlap", key="flight", fix="less attitude scatter or relief"))
+    return control
+
+
+def _random(spec: Spec, placed: Placed, rays: Rows, order: Rows) -> Rows:
+    """Points anywhere, in every strip."""
+    chosen = []
+    for j in range(spec.flight.strips):
+        own = order[(placed.home[order] // spec.flight.photos == j) & (rays[order] >= 2)]
+        if len(own) < spec.control.count:
+            message = f"{spec.control.count} control points are asked for, but a strip has only {len(own)} points"
+            raise InputError(Fault(message, code="simulation-points", key="control.count"))
+        chosen.append(np.sort(own[: spec.control.count]))
+    return np.concatenate(chosen)
+
+
+def _shares(use: dict[str, float], order: Rows) -> NDArray[np.bool_]:
+    """Deal the shares of given coordinates out to the points, the largest remainders rounded up."""
+    count, total = len(order), sum(use.values())
+    exact = np.array([share / total * count for share in use.values()])
+    number = np.floor(exact + 1e-9).astype(int)
+    number[np.argsort(number - exact, kind="stable")[: count - number.sum()]] += 1
+    kinds = np.array([["x" in name, "y" in name, "z" in name] for name in use])
+    given = np.empty((count, 3), dtype=bool)
+    given[order] = np.repeat(kinds, number, axis=0)
+    return given
+
+
+def given_coordinates(
+    spec: Spec, chosen: Roles, points: PointTable, offset: Array, frames: list[GroundFrame]
+) -> ControlPoints:
+    """Make the control list: true coordinates with errors, each in its frame.
+
+    Parameters
+    ----------
+    spec : Spec
+        Standard deviations, and where the second frame begins.
+    chosen : Roles
+        Control and check points.
+    points : PointTable
+        True Cartesian coordinates of all points, metres.
+    offset : ndarray, shape (c, 3)
+        Gross errors of the control points east, north, up (X, Y, Z), metres.
+    frames : list of GroundFrame
+        The frame of the first list and, if there is one, of the second.
+
+    Returns
+    -------
+    ControlPoints
+        Control points, then check points; coordinates that are not given are NaN.
+
+    Notes
+    -----
+    Draws (`Purpose.CONTROL`): for each control point, then for each check point east, north, up.
+    """
+    rows = np.concatenate([chosen.control, chosen.check])
+    n, given = len(rows), len(chosen.control)
+    true = points.xyz[rows]
+    noise = spec.control.sigma if spec.control.noise is None else spec.control.noise
+    error = Draws(spec.seed, Purpose.CONTROL).normal(n, 3) * noise
+    error[:given] += offset
+    moved = true + np.einsum("ni,nij->nj", error, frames[0].axes_at(true))
+    number = _frame_numbers(spec, true, frames)
+    enu = np.empty((n, 3))
+    for k, frame in enumerate(frames):
+        enu[number == k] = frame.ground_from_cartesian(moved[number == k])
+    use = np.concatenate([chosen.use, np.ones((n - given, 3), dtype=bool)])
+    return ControlPoints(
+        tuple(points.ids[i] for i in rows.tolist()),
+        np.where(use, enu, np.nan),
+        use,
+        np.arange(n) >= given,
+        np.broadcast_to(np.asarray(spec.control.sigma), (n, 3)),
+        number,
+    )
+
+
+def _frame_numbers(spec: Spec, xyz: Array, frames: list[GroundFrame]) -> Rows:
+    """Which of the frames each point is given in: the second east of the boundary."""
+    if len(frames) == 1:
+        return np.zeros(len(xyz), dtype=np.intp)
+    boundary = spec.control.boundary_longitude_deg
+    if boundary is None:
+        boundary = spec.ground.center_deg[0]
+    east = np.degrees(frames[0].geodetic(xyz)[:, 0]) - boundary
+    return (((east + 180.0) % 360.0) >= 180.0).astype(np.intp)  # noqa: PLR2004  half a turn: the short way round

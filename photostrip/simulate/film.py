@@ -1,0 +1,105 @@
+"""Film in a comparator: every photo has its own deformation and lies in its own place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.geometry.rotation import rotation_z
+from photostrip.simulate.draws import Draws, Purpose
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.simulate.spec import Spec
+
+    Array = NDArray[np.float64]
+    Rows = NDArray[np.intp]
+
+LENGTHS = (1.0, 0.7, 0.5)  # wavelengths of the irregular deformation, parts of the larger side of the photo
+
+
+@dataclass(frozen=True, eq=False)
+class Sheets:
+    """What happens to the film of each photo.
+
+    Parameters
+    ----------
+    matrix : ndarray, shape (m, 2, 2)
+        Affine part: comparator axes from photo axes, with the turn of the film.
+    offset : ndarray, shape (m, 2)
+        Place of the photo's origin in the comparator, mm.
+    wave : ndarray, shape (m, 2, w, 2)
+        Wave numbers of the irregular part of each coordinate, radians per mm.
+    phase : ndarray, shape (m, 2, w)
+        Their phases, radians.
+    amplitude : float
+        Their amplitude, mm.
+    """
+
+    matrix: Array
+    offset: Array
+    wave: Array
+    phase: Array
+    amplitude: float
+
+    def comparator_from_photo(self, photo: Rows, xy: Array) -> Array:
+        """Give comparator coordinates of points on the film, one for each row.
+
+        Parameters
+        ----------
+        photo : ndarray of int, shape (n,)
+            Number of the photo of each row.
+        xy : ndarray, shape (n, 2)
+            Coordinates in the system of the fiducial marks, mm.
+
+        Returns
+        -------
+        ndarray, shape (n, 2)
+            Comparator coordinates, mm.
+        """
+        angle = np.einsum("ncwk,nk->ncw", self.wave[photo], xy) + self.phase[photo]
+        moved = xy + self.amplitude * np.sin(angle).sum(axis=2)
+        return np.asarray(np.einsum("nij,nj->ni", self.matrix[photo], moved) + self.offset[photo])
+
+
+def sheets(spec: Spec, count: int) -> Sheets | None:
+    """Deform the film of all photos.
+
+    Parameters
+    ----------
+    spec : Spec
+        How much.
+    count : int
+        Number of photos.
+
+    Returns
+    -------
+    Sheets or None
+        None when the specification has no film.
+
+    Notes
+    -----
+    Draws (`Purpose.FILM`): for each photo the normal numbers scale x, scale y, shear, turn, offset x, offset y; then
+    for each photo, coordinate and wave a direction and a phase.
+    """
+    film = spec.film
+    if film is None:
+        return None
+    draws = Draws(spec.seed, Purpose.FILM)
+    normal, uniform = draws.normal(count, 6), 2.0 * np.pi * draws.uniform(count, 2, len(LENGTHS), 2)
+    stretch = np.zeros((count, 2, 2))
+    stretch[:, 0, 0], stretch[:, 1, 1] = 1.0 + film.scale_ppm * 1e-6 * normal[:, :2].T
+    stretch[:, 0, 1] = film.shear_ppm * 1e-6 * normal[:, 2]
+    turn = rotation_z(np.radians(film.rotation_deg) * normal[:, 3])[:, :2, :2]
+    number = 2.0 * np.pi / (max(spec.format) * np.asarray(LENGTHS))
+    direction = np.stack([np.cos(uniform[..., 0]), np.sin(uniform[..., 0])], axis=-1)
+    return Sheets(
+        turn @ stretch,
+        film.offset_mm * normal[:, 4:],
+        number[:, None] * direction,
+        uniform[..., 1],
+        film.irregular_um / 1000.0 * np.sqrt(2.0 / len(LENGTHS)),  # sine waves of this amplitude add up to the rms
+    )

@@ -1,0 +1,128 @@
+"""The photos: where they are taken and in which attitude."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.geometry.rotation import from_alpha_omega_kappa
+from photostrip.simulate.draws import Draws, Purpose
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.simulate.ground import World
+    from photostrip.simulate.spec import Spec
+
+    Array = NDArray[np.float64]
+
+CUT = 3.0  # standard deviations beyond which no photo is displaced or tilted: a pilot would fly again
+BASE_SCATTER = (0.02, 0.02, 0.01)  # of the base: along, across, height
+
+
+@dataclass(frozen=True, eq=False)
+class Photos:
+    """The true exterior orientations, strip after strip, each in flight order.
+
+    Parameters
+    ----------
+    ids : tuple of str
+        Photo ids.
+    strips : tuple of tuple (str, tuple of str)
+        Each strip's id and its photos in flight order.
+    along, across : ndarray, shape (n,)
+        Places of the perspective centres from the middle of the strips, metres.
+    centers : ndarray, shape (n, 3)
+        Perspective centres in the Cartesian frame, metres.
+    rotations : ndarray, shape (n, 3, 3)
+        Rotations that take image axes to the Cartesian frame.
+    """
+
+    ids: tuple[str, ...]
+    strips: tuple[tuple[str, tuple[str, ...]], ...]
+    along: Array
+    across: Array
+    centers: Array
+    rotations: Array
+
+
+def strip_id(number: int) -> str:
+    """Letter or letters of a strip: A to Z, then AA, AB and so on.
+
+    Parameters
+    ----------
+    number : int
+        Number of the strip, from 0.
+
+    Returns
+    -------
+    str
+        Its id.
+    """
+    head, last = divmod(number, 26)
+    return (strip_id(head - 1) if head else "") + chr(ord("A") + last)
+
+
+def position_sigma(spec: Spec) -> tuple[float, float, float]:
+    """Scatter of the perspective centres.
+
+    Parameters
+    ----------
+    spec : Spec
+        The flight.
+
+    Returns
+    -------
+    tuple of float
+        Standard deviations along, across and in height, metres.
+    """
+    if spec.flight.position_sigma is not None:
+        return spec.flight.position_sigma
+    along, across, height = (part * spec.base for part in BASE_SCATTER)
+    return along, across, height
+
+
+def fly(spec: Spec, space: World) -> Photos:
+    """Take the photos.
+
+    Parameters
+    ----------
+    spec : Spec
+        What is flown.
+    space : World
+        The world.
+
+    Returns
+    -------
+    Photos
+        Photos of all strips. The ids are the number of the strip and the number of the photo in flight order.
+
+    Notes
+    -----
+    Draws (`Purpose.FLIGHT`): for each photo along, across, height, alpha, omega, kappa.
+    """
+    flight = spec.flight
+    n, strips = flight.photos, flight.strips
+    scatter = np.clip(Draws(spec.seed, Purpose.FLIGHT).normal(strips, n, 6), -CUT, CUT)
+    sigma = position_sigma(spec)
+    back = np.arange(strips) % 2 == 1 if flight.alternate else np.zeros(strips, dtype=bool)
+    sign = np.where(back, -1.0, 1.0)[:, None]
+    along = sign * (np.arange(n) - (n - 1) / 2) * spec.base + sigma[0] * scatter[..., 0]
+    across = (np.arange(strips)[:, None] - (strips - 1) / 2) * spec.strip_distance + sigma[1] * scatter[..., 1]
+    height = spec.terrain.height + spec.flying_height + sigma[2] * scatter[..., 2]
+    tilt = np.radians(flight.attitude_sigma_deg) * scatter[..., 3:]
+    kappa = tilt[..., 2] + np.radians(flight.photo_rotation_deg) + np.pi * back[:, None]
+    attitude = from_alpha_omega_kappa(sign * tilt[..., 0], sign * tilt[..., 1], kappa).reshape(-1, 3, 3)
+    along, across = along.ravel(), across.ravel()
+    digits = max(3, len(str(n)))
+    names = tuple((strip_id(j), tuple(f"{j + 1}{i + 1:0{digits}d}" for i in range(n))) for j in range(strips))
+    return Photos(
+        tuple(photo for _, photos in names for photo in photos),
+        names,
+        along,
+        across,
+        space.cartesian(along, across, height.ravel()),
+        space.frames(along, across) @ attitude,
+    )

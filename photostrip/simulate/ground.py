@@ -1,0 +1,189 @@
+"""The world the photos are taken of: from distances along and across the flight to points in space.
+
+On an ellipsoid the flight follows the normals' great circle through the middle of the strips: the unit normal turns
+evenly with the distance flown. Points and perspective centres lie on these normals at their heights, and everything
+after that happens in geocentric Cartesian space, where rays are straight. In a flat world distances are coordinates.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.geodesy.curvature import meridian_radius, prime_vertical_radius
+from photostrip.geodesy.local_frame import geocentric_from_geodetic
+from photostrip.simulate.draws import Draws, Purpose
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.simulate.spec import Spec
+
+    Array = NDArray[np.float64]
+
+WAVES = 5  # sine waves that make up the relief
+
+
+@dataclass(frozen=True, eq=False)
+class World:
+    """Space around the strips.
+
+    Parameters
+    ----------
+    axes : ndarray, shape (3, 3)
+        Rows: the direction of flight, its left and the vertical in the middle of the strips, in the Cartesian frame.
+    ellipsoid : tuple of float or None
+        Semi-axes (a, b), metres; None: the world is flat and the middle is the origin.
+    radius : float
+        Mean radius of the surface in the middle, metres.
+    """
+
+    axes: Array
+    ellipsoid: tuple[float, float] | None = None
+    radius: float = np.inf
+
+    def cartesian(self, along: Array, across: Array, height: Array) -> Array:
+        """Points in the Cartesian frame.
+
+        Parameters
+        ----------
+        along, across : ndarray, shape (n,)
+            Distances from the middle of the strips in the direction of flight and to its left, metres.
+        height : ndarray, shape (n,)
+            Heights above the ellipsoid (above the plane), metres.
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            Geocentric X, Y, Z, or east, north, up in a flat world, metres.
+        """
+        if self.ellipsoid is None:
+            return np.asarray(np.stack([along, across, height], axis=-1) @ self.axes)
+        normal = self.frames(along, across)[:, :, 2]
+        x, y, z = normal.T
+        lon, lat = np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))
+        return geocentric_from_geodetic(np.stack([lon, lat, height], axis=-1), self.ellipsoid)
+
+    def frames(self, along: Array, across: Array) -> Array:
+        """Direction of flight, left and vertical at places.
+
+        Parameters
+        ----------
+        along, across : ndarray, shape (n,)
+            Distances from the middle of the strips, metres.
+
+        Returns
+        -------
+        ndarray, shape (n, 3, 3)
+            Columns are the three directions in the Cartesian frame; the vertical is the ellipsoid's normal.
+        """
+        s, t = np.asarray(along) / self.radius, np.asarray(across) / self.radius
+        forward, left, up = self.axes
+        (sin_s, cos_s), (sin_t, cos_t) = ((np.sin(x)[:, None], np.cos(x)[:, None]) for x in (s, t))
+        ahead = cos_s * forward - sin_s * up
+        inward = cos_s * up + sin_s * forward
+        return np.stack([ahead, cos_t * left - sin_t * inward, cos_t * inward + sin_t * left], axis=-1)
+
+
+def world(spec: Spec, ellipsoid: tuple[float, float] | None) -> World:
+    """Lay the world out around the middle of the strips.
+
+    Parameters
+    ----------
+    spec : Spec
+        Heading and middle of the strips.
+    ellipsoid : tuple of float or None
+        Semi-axes of the frame's datum, metres; None for a flat world.
+
+    Returns
+    -------
+    World
+        The world.
+    """
+    heading = np.radians(spec.flight.heading_deg)
+    sin, cos = np.sin(heading), np.cos(heading)
+    turn = np.array([[sin, cos, 0.0], [-cos, sin, 0.0], [0.0, 0.0, 1.0]])  # rows forward, left, up in east, north, up
+    if ellipsoid is None:
+        return World(turn)
+    lon, lat = np.radians(spec.ground.center_deg)
+    (sin_l, cos_l), (sin_b, cos_b) = ((np.sin(angle), np.cos(angle)) for angle in (lon, lat))
+    east_north_up = np.array(
+        [[-sin_l, cos_l, 0.0], [-sin_b * cos_l, -sin_b * sin_l, cos_b], [cos_b * cos_l, cos_b * sin_l, sin_b]]
+    )
+    radius = np.sqrt(meridian_radius(lat, ellipsoid) * prime_vertical_radius(lat, ellipsoid)) + spec.terrain.height
+    return World(turn @ east_north_up, ellipsoid, float(radius))
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Heights of the terrain: a plane and sine waves of random directions and phases.
+
+    Parameters
+    ----------
+    height : float
+        Mean height, metres.
+    slope : tuple of float
+        Rise along and across, metres per metre.
+    amplitude : ndarray, shape (m,)
+        Amplitudes of the waves, metres.
+    wave : ndarray, shape (m, 2)
+        Wave numbers along and across, radians per metre.
+    phase : ndarray, shape (m,)
+        Phases, radians.
+    """
+
+    height: float
+    slope: tuple[float, float]
+    amplitude: Array
+    wave: Array
+    phase: Array
+
+    def __call__(self, along: Array, across: Array) -> Array:
+        """Give the heights at places.
+
+        Parameters
+        ----------
+        along, across : ndarray, shape (n,)
+            Distances from the middle of the strips, metres.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            Heights above the ellipsoid, metres.
+        """
+        plane = self.height + self.slope[0] * along + self.slope[1] * across
+        angle = np.multiply.outer(along, self.wave[:, 0]) + np.multiply.outer(across, self.wave[:, 1]) + self.phase
+        return np.asarray(plane + np.sin(angle) @ self.amplitude)
+
+
+def surface(spec: Spec) -> Surface:
+    """Make the terrain of a simulation.
+
+    Parameters
+    ----------
+    spec : Spec
+        Relief, wavelength and slope.
+
+    Returns
+    -------
+    Surface
+        The terrain. The amplitudes of its waves add up to the relief, so that no hill is higher.
+
+    Notes
+    -----
+    Draws (`Purpose.TERRAIN`): direction, wavelength, phase of each wave.
+    """
+    drawn = Draws(spec.seed, Purpose.TERRAIN).uniform(WAVES, 3)
+    direction, phase = 2.0 * np.pi * drawn[:, 0], 2.0 * np.pi * drawn[:, 2]
+    wavelength = (spec.terrain.wavelength or 3.0 * spec.base) * (0.6 + 0.8 * drawn[:, 1])
+    number = 2.0 * np.pi / wavelength
+    along, across = spec.terrain.slope_percent
+    return Surface(
+        spec.terrain.height,
+        (along / 100.0, across / 100.0),
+        np.full(WAVES, spec.terrain.relief / WAVES),
+        np.stack([number * np.cos(direction), number * np.sin(direction)], axis=-1),
+        phase,
+    )

@@ -1,0 +1,178 @@
+"""Pass points: Gruber points at the nadir of each photo, further points at random in each model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.simulate.draws import Draws, Purpose
+from photostrip.simulate.imaging import sees
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from numpy.typing import NDArray
+
+    from photostrip.simulate.flight import Photos
+    from photostrip.simulate.ground import Surface, World
+    from photostrip.simulate.spec import Spec
+
+    Array = NDArray[np.float64]
+    Rows = NDArray[np.intp]
+
+# Where a point is tried when its photos do not all show it at first: shift along, in half widths of the zone on three
+# photos, and part of the distance from the flight line.
+GRUBER_TRIES = tuple(
+    (shift, part) for part in (1.0, 0.9, 0.8, 0.65, 0.5, 0.35) for shift in (0.0, 0.5, -0.5, 1.0, -1.0)
+)
+EXTRA_TRIES = tuple((shift, part) for part in (1.0, 0.85, 0.7, 0.5, 0.3) for shift in (1.0, 0.5, 0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """Points on the terrain.
+
+    Parameters
+    ----------
+    ids : tuple of str
+        Point ids: the photo and a number. The Gruber points of a photo have the numbers from 1 on, from left to
+        right; further points of the model that begins with it have the next numbers.
+    home : ndarray of int, shape (n,)
+        Number of that photo.
+    row : ndarray of int, shape (n,)
+        Number of the row of a Gruber point, -1 for other points.
+    along, across, height : ndarray, shape (n,)
+        Places from the middle of the strips and heights above the ellipsoid, metres.
+    xyz : ndarray, shape (n, 3)
+        Points in the Cartesian frame, metres.
+    """
+
+    ids: tuple[str, ...]
+    home: Rows
+    row: Rows
+    along: Array
+    across: Array
+    height: Array
+    xyz: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Slots:
+    """Points to be placed, all in the same manner: where they may lie and which photos must show them."""
+
+    photos: Rows  # (n, m), -1 where there is none
+    along: Array  # (n,) middle
+    across: Array  # (n,) flight line
+    drawn: Array  # (n, 2) scatter, metres, left out where a point is tried again
+    shift: Array  # (n,) metres along for a shift of 1
+    aside: Array  # (n,) metres from the flight line
+
+
+def place(spec: Spec, space: World, terrain: Surface, photos: Photos) -> Placed:
+    """Place all pass points.
+
+    Parameters
+    ----------
+    spec : Spec
+        How many and where.
+    space : World
+        The world.
+    terrain : Surface
+        Heights.
+    photos : Photos
+        Exterior orientations: every point is moved towards the middle until the photos it is meant for show it.
+
+    Returns
+    -------
+    Placed
+        The points, by photo, the Gruber points of a photo before the further ones of its model.
+
+    Notes
+    -----
+    Draws (`Purpose.POINTS`): for each photo and row along, across; then for each model and further point along, across.
+    """
+    rows, extra, n = spec.points.rows, spec.points.extra_per_model, spec.flight.photos
+    draws = Draws(spec.seed, Purpose.POINTS)
+    everyone = np.arange(len(photos.ids))
+    gruber = np.repeat(everyone, rows)
+    further = np.repeat(everyone[everyone % n < n - 1], extra)
+    slots = [
+        (_gruber_slots(spec, photos, gruber, draws.between(len(gruber), 2)), GRUBER_TRIES),
+        (_extra_slots(spec, photos, further, draws.between(len(further), 2)), EXTRA_TRIES),
+    ]
+    found = [_settle(spec, space, terrain, photos, each, tries) for each, tries in slots]
+    home = np.concatenate([gruber, further])
+    number = np.concatenate([np.arange(len(gruber)) % rows, rows + np.arange(len(further)) % max(extra, 1)])
+    along, across = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    order = np.lexsort((number, home))
+    home, number, along, across = home[order], number[order], along[order], across[order]
+    height = terrain(along, across)
+    return Placed(
+        tuple(f"{photos.ids[k]}-{i + 1}" for k, i in zip(home.tolist(), number.tolist(), strict=True)),
+        home,
+        np.where(number < rows, number, -1),
+        along,
+        across,
+        height,
+        space.cartesian(along, across, height),
+    )
+
+
+def _gruber_slots(spec: Spec, photos: Photos, home: Rows, drawn: Array) -> _Slots:
+    n, rows = spec.flight.photos, spec.points.rows
+    length, width = spec.footprint
+    zone = min(max(length / 2.0 - spec.base, 0.0), spec.base / 2.0)  # half the width of what lies on three photos
+    inside = home % n
+    neighbours = np.stack([np.where(inside > 0, home - 1, -1), home, np.where(inside < n - 1, home + 1, -1)], axis=1)
+    side = 1.0 - 2.0 * (np.arange(len(home)) % rows) / (rows - 1)  # 1 on the left, -1 on the right
+    return _Slots(
+        photos=neighbours,
+        along=photos.along[home],
+        across=photos.across[home],
+        drawn=drawn * (spec.points.scatter_percent / 100.0 * zone),
+        shift=np.full(len(home), zone),
+        aside=_leftwards(photos, n)[home] * side * (spec.points.reach_percent / 200.0 * width),
+    )
+
+
+def _extra_slots(spec: Spec, photos: Photos, home: Rows, drawn: Array) -> _Slots:
+    half = np.stack([photos.along[home + 1] - photos.along[home], photos.across[home + 1] - photos.across[home]]) / 2.0
+    return _Slots(
+        photos=np.stack([home, home + 1], axis=1),
+        along=photos.along[home] + half[0],
+        across=photos.across[home] + half[1],
+        drawn=np.zeros((len(home), 2)),
+        shift=drawn[:, 0] * half[0],
+        aside=drawn[:, 1] * (spec.points.reach_percent / 200.0 * spec.footprint[1]),
+    )
+
+
+def _leftwards(photos: Photos, n: int) -> Array:
+    """1 for photos of strips flown forwards, -1 for those flown back: the sign of the left-hand side."""
+    ends = photos.along.reshape(-1, n)
+    return np.repeat(np.where(ends[:, -1] < ends[:, 0], -1.0, 1.0), n)
+
+
+def _settle(
+    spec: Spec, space: World, terrain: Surface, photos: Photos, slots: _Slots, tries: Iterable[tuple[float, float]]
+) -> tuple[Array, Array]:
+    """Try places until the photos meant for a point show it; keep the first try where they never do."""
+    along, across = np.empty_like(slots.along), np.empty_like(slots.across)
+    open_ = np.arange(len(along))
+    for number, (shift, part) in enumerate(tries):
+        drawn = slots.drawn[open_] if number == 0 else np.zeros((len(open_), 2))
+        s = slots.along[open_] + shift * slots.shift[open_] + drawn[:, 0]
+        t = slots.across[open_] + part * slots.aside[open_] + drawn[:, 1]
+        xyz = space.cartesian(s, t, terrain(s, t))
+        wanted = slots.photos[open_]
+        good = np.ones(len(open_), dtype=bool)
+        for column in wanted.T:
+            good &= (column < 0) | sees(spec, photos, np.maximum(column, 0), xyz)
+        settled = good if number else np.ones_like(good)
+        along[open_[settled]], across[open_[settled]] = s[settled], t[settled]
+        open_ = open_[~good]
+        if not len(open_):
+            break
+    return along, across

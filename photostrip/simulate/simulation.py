@@ -1,0 +1,313 @@
+"""The walk through a simulation: world, flight, points, image coordinates, control, errors; and what is true."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import Fault, InputError
+from photostrip.geodesy.crs import tie_frames
+from photostrip.geodesy.frame_spec import FrameSpec
+from photostrip.points import Frame, PhotoPoints, PointTable
+from photostrip.simulate.control import given_coordinates, roles
+from photostrip.simulate.draws import Draws, Purpose
+from photostrip.simulate.film import sheets
+from photostrip.simulate.flight import fly
+from photostrip.simulate.gross import spoil_control, spoil_images
+from photostrip.simulate.ground import surface, world
+from photostrip.simulate.imaging import project, shown
+from photostrip.simulate.placement import place
+from photostrip.simulate.validation import LARGEST_ARC, faults_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.camera import Camera
+    from photostrip.geodesy.crs import GroundFrame
+    from photostrip.points import ControlPoints
+    from photostrip.simulate.control import Roles
+    from photostrip.simulate.film import Sheets
+    from photostrip.simulate.flight import Photos
+    from photostrip.simulate.gross import InjectedError
+    from photostrip.simulate.ground import World
+    from photostrip.simulate.placement import Placed
+    from photostrip.simulate.spec import Spec
+
+    Array = NDArray[np.float64]
+    Rows = NDArray[np.intp]
+
+STATED_SIGMA = 0.001  # mm: what is stated of image coordinates that have no errors
+NEEDED = 5  # points common to two photos that relative orientation needs
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """What only a simulation knows.
+
+    Parameters
+    ----------
+    points : PointTable
+        True coordinates of all points in the Cartesian frame, in the order of the observations' points.
+    ground : PointTable
+        The same east, north, up in the output frame, in its units.
+    photo_ids : tuple of str
+        Photos, in the order of the observations' photos.
+    centers : ndarray, shape (m, 3)
+        Perspective centres in the Cartesian frame, metres.
+    centers_ground : ndarray, shape (m, 3)
+        The same east, north, up in the output frame, in its units.
+    rotations : ndarray, shape (m, 3, 3)
+        Rotations that take image axes to the Cartesian frame.
+    rotations_local : ndarray, shape (m, 3, 3)
+        Rotations that take image axes to the output frame's east, north, up at the perspective centre.
+    image : ndarray, shape (n, 2)
+        What would be measured without any error of measurement, in the system and order of the observations, mm.
+    errors : tuple of InjectedError
+        Gross errors.
+    """
+
+    points: PointTable
+    ground: PointTable
+    photo_ids: tuple[str, ...]
+    centers: Array
+    centers_ground: Array
+    rotations: Array
+    rotations_local: Array
+    image: Array
+    errors: tuple[InjectedError, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """A simulated project: everything that would be given, and the truth.
+
+    Parameters
+    ----------
+    spec : Spec
+        What was asked for.
+    strips : tuple of tuple (str, tuple of str)
+        Id and photos, in flight order, of each strip.
+    camera : Camera
+        The camera of all photos.
+    observations : PhotoPoints
+        Measured image points in mm, y up: in the comparator when there are fiducial measurements, otherwise in the
+        camera's image system (its principal point is not subtracted).
+    control : ControlPoints
+        Control and check points; ``frame`` counts in `frames`.
+    frames : tuple of FrameSpec
+        Frame of each control list; the first is that of the output.
+    fiducials : PhotoPoints or None
+        Measured fiducial marks, mm.
+    gnss : ndarray, shape (m, 3), or None
+        Measured perspective centres east, north, up in the first frame, in its units.
+    truth : Truth
+        What is true.
+    """
+
+    spec: Spec
+    strips: tuple[tuple[str, tuple[str, ...]], ...]
+    camera: Camera
+    observations: PhotoPoints
+    control: ControlPoints
+    frames: tuple[FrameSpec, ...]
+    fiducials: PhotoPoints | None
+    gnss: Array | None
+    truth: Truth
+
+
+def simulate(spec: Spec) -> Simulation:
+    """Simulate strips of photos.
+
+    Parameters
+    ----------
+    spec : Spec
+        What to simulate.
+
+    Returns
+    -------
+    Simulation
+        Observations, control and truth. Numbers are not rounded.
+
+    Raises
+    ------
+    InputError
+        With everything that cannot be simulated; also when neighbouring photos turn out to share too few points.
+
+    Notes
+    -----
+    Random numbers are drawn as :mod:`photostrip.simulate.draws` says; each function below names its draws. Image
+    noise (`Purpose.IMAGE`): for each row of the observations, by photo and point, x, y.
+    """
+    if faults := faults_of(spec):
+        raise InputError(faults)
+    specs = frame_specs(spec)
+    frames, output = tie_frames(specs)
+    space = world(spec, output.ellipsoid)
+    _check_extent(spec, space)
+    photos = fly(spec, space)
+    placed = place(spec, space, surface(spec), photos)
+    photo, point = shown(spec, photos, placed)
+    _check_overlap(spec, photos, photo, point)
+    chosen = roles(spec, placed, _rays(spec, placed, photo, point))
+    names = _names(placed, chosen)
+    film = sheets(spec, len(photos.ids))
+    image = _image(spec, photos, placed, film, photo, point)
+    observations, keep = _observations(spec, photos, names, photo, point, image)
+    observations, image_errors = spoil_images(spec, observations)
+    offset, control_errors = spoil_control(spec, tuple(names[i] for i in chosen.control.tolist()), chosen.use)
+    every = PointTable(names, placed.xyz, Frame.CARTESIAN)
+    points = PointTable(observations.point_ids, placed.xyz[keep], Frame.CARTESIAN)
+    return Simulation(
+        spec,
+        photos.strips,
+        spec.camera,
+        observations,
+        given_coordinates(spec, chosen, every, offset, frames),
+        tuple(specs),
+        _fiducials(spec, photos, film),
+        _gnss(spec, photos, output),
+        _truth(output, points, photos, image, image_errors + control_errors),
+    )
+
+
+def frame_specs(spec: Spec) -> list[FrameSpec]:
+    """Frames of the control lists.
+
+    Parameters
+    ----------
+    spec : Spec
+        The specification.
+
+    Returns
+    -------
+    list of FrameSpec
+        One frame, or two when there is a second CRS.
+    """
+    g = spec.ground
+    frames = [FrameSpec(g.crs, g.axes, g.height, g.geoid_undulation, g.ellipsoid)]
+    if spec.control.second_crs is not None:
+        frames.append(FrameSpec(spec.control.second_crs, g.axes, g.height, g.geoid_undulation))
+    return frames
+
+
+def _check_extent(spec: Spec, space: World) -> None:
+    """Refuse strips that would go round the body."""
+    length = np.hypot(spec.flight.photos * spec.base, spec.flight.strips * spec.strip_distance)
+    if length > LARGEST_ARC * space.radius:
+        message = f"strips of {length / 1000.0:.0f} km are too long for a body of {space.radius / 1000.0:.0f} km radius"
+        raise InputError(Fault(message, code="simulation-extent", key="flight.photos", fix="fewer photos"))
+
+
+def _check_overlap(spec: Spec, photos: Photos, photo: Rows, point: Rows) -> None:
+    """Refuse a strip that could not be formed, naming the photos."""
+    from itertools import pairwise
+
+    n = spec.flight.photos
+    on = [np.zeros(0, dtype=np.intp)] * len(photos.ids)
+    starts = np.searchsorted(photo, np.arange(len(photos.ids) + 1))
+    on = [point[a:b] for a, b in pairwise(starts.tolist())]
+    faults = []
+    for k in range(len(photos.ids) - 1):
+        if k % n == n - 1:
+            continue
+        common = np.intersect1d(on[k], on[k + 1], assume_unique=True)
+        names = f"{photos.ids[k]} and {photos.ids[k + 1]}"
+        if len(common) < NEEDED:
+            faults.append(f"photos {names} show only {len(common)} common points, {NEEDED} are needed")
+        elif k % n < n - 2 and not np.isin(common, on[k + 2], assume_unique=True).any():
+            faults.append(f"no point lies on photos {photos.ids[k]}, {photos.ids[k + 1]} and {photos.ids[k + 2]}")
+    if faults:
+        fix = "raise end_lap_percent or extra_per_model, or lower attitude_sigma_deg, photo_rotation_deg or relief"
+        raise InputError([Fault(text, code="simulation-overlap", key="flight", fix=fix) for text in faults])
+
+
+def _rays(spec: Spec, placed: Placed, photo: Rows, point: Rows) -> Rows:
+    """On how many photos of its own strip each point lies."""
+    n = spec.flight.photos
+    own = photo // n == placed.home[point] // n
+    return np.bincount(point[own], minlength=len(placed.ids))
+
+
+def _names(placed: Placed, chosen: Roles) -> tuple[str, ...]:
+    """Ids of all points: control points G, check points K, the others as they were placed."""
+    names = list(placed.ids)
+    for letter, rows in (("G", chosen.control.tolist()), ("K", chosen.check.tolist())):
+        digits = max(2, len(str(len(rows))))
+        for number, row in enumerate(rows):
+            names[row] = f"{letter}{number + 1:0{digits}d}"
+    return tuple(names)
+
+
+def _image(spec: Spec, photos: Photos, placed: Placed, film: Sheets | None, photo: Rows, point: Rows) -> Array:
+    """Image coordinates without errors of measurement, mm."""
+    camera = spec.camera
+    ideal, _ = project(photos, photo, placed.xyz[point], camera.principal_distance)
+    xy = ideal + camera.principal_point
+    return xy if film is None else film.comparator_from_photo(photo, xy)
+
+
+def _observations(
+    spec: Spec, photos: Photos, names: tuple[str, ...], photo: Rows, point: Rows, image: Array
+) -> tuple[PhotoPoints, Rows]:
+    """Measure: add the noise. Gives also the numbers of the points that are measured at all."""
+    _, first, inverse = np.unique(point, return_index=True, return_inverse=True)
+    rank = np.argsort(np.argsort(first))  # points are numbered as they appear
+    keep = point[np.sort(first)]
+    sigma = spec.image.sigma_um / 1000.0
+    noise = Draws(spec.seed, Purpose.IMAGE).normal(len(point), 2)
+    observations = PhotoPoints(
+        photos.ids,
+        tuple(names[i] for i in keep.tolist()),
+        photo,
+        rank[inverse.ravel()],
+        image + sigma * noise,
+        np.full(image.shape, sigma or STATED_SIGMA),
+    )
+    return observations, keep
+
+
+def _fiducials(spec: Spec, photos: Photos, film: Sheets | None) -> PhotoPoints | None:
+    """Measure the fiducial marks of every photo.
+
+    Draws (`Purpose.FIDUCIALS`): for each photo and mark x, y.
+    """
+    if film is None:
+        return None
+    marks, n = spec.camera.fiducials, len(photos.ids)
+    photo, mark = np.repeat(np.arange(n), len(marks)), np.tile(np.arange(len(marks)), n)
+    true = film.comparator_from_photo(photo, np.array(list(marks.values()))[mark])
+    sigma = spec.image.sigma_um / 1000.0
+    noise = Draws(spec.seed, Purpose.FIDUCIALS).normal(len(mark), 2)
+    return PhotoPoints(
+        photos.ids, tuple(marks), photo, mark, true + sigma * noise, np.full(true.shape, sigma or STATED_SIGMA)
+    )
+
+
+def _gnss(spec: Spec, photos: Photos, output: GroundFrame) -> Array | None:
+    """Measure the perspective centres.
+
+    Draws (`Purpose.GNSS`): for each photo east, north, up.
+    """
+    if spec.gnss is None:
+        return None
+    error = Draws(spec.seed, Purpose.GNSS).normal(len(photos.ids), 3) * spec.gnss.sigma
+    moved = photos.centers + np.einsum("ni,nij->nj", error, output.axes_at(photos.centers))
+    return output.ground_from_cartesian(moved)
+
+
+def _truth(
+    output: GroundFrame, points: PointTable, photos: Photos, image: Array, errors: tuple[InjectedError, ...]
+) -> Truth:
+    return Truth(
+        points,
+        PointTable(points.ids, output.ground_from_cartesian(points.xyz), Frame.GROUND),
+        photos.ids,
+        photos.centers,
+        output.ground_from_cartesian(photos.centers),
+        photos.rotations,
+        output.axes_at(photos.centers) @ photos.rotations,
+        image,
+        errors,
+    )

@@ -1,0 +1,365 @@
+"""What is to be simulated: the camera, the flight, the ground, the measurements and what is wrong with them.
+
+The fields of these classes are the keys of a specification file, under the same names. Quantities carry their unit
+in the name or are metres, millimetres in the image or plain numbers.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from photostrip.camera import Camera
+
+FILM = Camera(
+    "film",
+    principal_distance=153.0,
+    format=(230.0, 230.0),
+    fiducials={
+        "F1": (106.0, -106.0),
+        "F2": (-106.0, -106.0),
+        "F3": (-106.0, 106.0),
+        "F4": (106.0, 106.0),
+        "F5": (0.0, -110.0),
+        "F6": (-110.0, 0.0),
+        "F7": (0.0, 110.0),
+        "F8": (110.0, 0.0),
+    },
+)
+DIGITAL = Camera("digital", principal_distance=100.5, format=(103.86, 67.86), pixel_size=0.006)
+PRESETS = {"film": FILM, "digital": DIGITAL}
+
+DEFAULT_SCALE = 10_000.0
+LAYOUTS = ("bands", "corners", "corners+centre", "random")
+USES = ("xyz", "xy", "z")
+ERROR_KINDS = ("image", "control", "swap")
+
+Triple = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Ground:
+    """The frame of the ground coordinates, and where in it the strips lie.
+
+    Parameters
+    ----------
+    crs : str
+        Authority code, PROJ string, ``geocentric`` or ``local``. With ``local`` the world is flat.
+    axes : tuple of str
+        Order of the coordinates in the files.
+    height : str
+        ``ellipsoidal`` or ``orthometric``: the heights in the files.
+    geoid_undulation : float or None
+        Height of the geoid above the ellipsoid, metres, for orthometric heights.
+    ellipsoid : tuple of float or None
+        Semi-axes (a, b), metres, of another body with ``geocentric``.
+    center_deg : tuple of float
+        Longitude and latitude of the middle of the strips on the datum of `crs`, degrees. Not used with ``local``,
+        where the middle is the origin.
+    """
+
+    crs: str = "EPSG:32633"
+    axes: tuple[str, str, str] = ("east", "north", "up")
+    height: str = "ellipsoidal"
+    geoid_undulation: float | None = None
+    ellipsoid: tuple[float, float] | None = None
+    center_deg: tuple[float, float] = (15.3, 49.2)
+
+
+@dataclass(frozen=True)
+class Flight:
+    """Where the photos are taken and in which attitude.
+
+    Parameters
+    ----------
+    photos : int
+        Photos of each strip.
+    strips : int
+        Parallel strips; each next one lies to the left of the one before.
+    end_lap_percent, side_lap_percent : float
+        Overlap of neighbouring photos and strips at the mean height of the terrain. When the photos are turned
+        (`photo_rotation_deg`), that of the largest upright rectangle of the same proportions in them.
+    scale : float or None
+        Scale number of the photos at the mean height of the terrain; 10 000 when neither it nor `flying_height`
+        is given.
+    flying_height : float or None
+        Height above the mean height of the terrain, metres.
+    heading_deg : float
+        Azimuth of the flight in the middle of the strips, clockwise from north (from the second axis in ``local``).
+    alternate : bool
+        Fly every second strip in the opposite direction.
+    photo_rotation_deg : float
+        Constant turn of the photo's x axis against the direction of flight, counter-clockwise seen from above.
+    attitude_sigma_deg : tuple of float
+        Scatter of alpha, omega and kappa, cut off at three times its size.
+    position_sigma : tuple of float or None
+        Scatter of the perspective centres along, across and in height, metres, cut off likewise; None: 2, 2 and 1
+        percent of the base.
+    """
+
+    photos: int = 10
+    strips: int = 1
+    end_lap_percent: float = 60.0
+    side_lap_percent: float = 30.0
+    scale: float | None = None
+    flying_height: float | None = None
+    heading_deg: float = 90.0
+    alternate: bool = False
+    photo_rotation_deg: float = 0.0
+    attitude_sigma_deg: Triple = (1.0, 1.0, 1.0)
+    position_sigma: Triple | None = None
+
+
+@dataclass(frozen=True)
+class Terrain:
+    """The shape of the ground.
+
+    Parameters
+    ----------
+    height : float
+        Mean height above the ellipsoid, metres.
+    relief : float
+        Largest height above or below the sloping plane, metres; 0 is flat.
+    wavelength : float or None
+        Mean distance of hills, metres; None: three bases.
+    slope_percent : tuple of float
+        Rise along the first strip's direction of flight and to its left.
+    """
+
+    height: float = 300.0
+    relief: float = 60.0
+    wavelength: float | None = None
+    slope_percent: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Points:
+    """Pass points.
+
+    Parameters
+    ----------
+    rows : int
+        Gruber points of each photo, side by side across the flight at its nadir; each lies on three photos.
+    reach_percent : float
+        Distance of the outermost rows from the flight line, in percent of half the width of the photos.
+    scatter_percent : float
+        Scatter of the Gruber points, in percent of half the width of the zone on three photos.
+    extra_per_model : int
+        Further points at random places of each model.
+    """
+
+    rows: int = 3
+    reach_percent: float = 80.0
+    scatter_percent: float = 25.0
+    extra_per_model: int = 4
+
+
+@dataclass(frozen=True)
+class Control:
+    """Which points are given on the ground, and how well.
+
+    Parameters
+    ----------
+    layout : str
+        ``bands`` across the strip, ``corners``, ``corners+centre`` or ``random``; always in each strip.
+    bands : int
+        Number of bands, spread evenly from the first to the last photo.
+    every : int or None
+        Models from one band to the next, instead of `bands`; the last photo always has a band.
+    per_band : int
+        Points of a band: 1 in the middle, 2 at the edges, and so on; at most ``points.rows``.
+    count : int
+        Control points of each strip in the layout ``random``.
+    use : dict of str to float
+        Shares of the points given in full (``xyz``), in plan only (``xy``), in height only (``z``).
+    check : int
+        Check points, anywhere.
+    sigma : tuple of float
+        Stated standard deviations east, north, up (X, Y, Z), metres.
+    noise : tuple of float or None
+        Errors really added, standard deviations, metres; None: as stated.
+    second_crs : str or None
+        Frame of a second control file, for the points east of `boundary_longitude_deg`.
+    boundary_longitude_deg : float or None
+        Where the second file begins, degrees; None: in the middle of the strips.
+    """
+
+    layout: str = "bands"
+    bands: int = 3
+    every: int | None = None
+    per_band: int = 3
+    count: int = 8
+    use: dict[str, float] = field(default_factory=lambda: {"xyz": 1.0})
+    check: int = 10
+    sigma: Triple = (0.05, 0.05, 0.08)
+    noise: Triple | None = None
+    second_crs: str | None = None
+    boundary_longitude_deg: float | None = None
+
+
+@dataclass(frozen=True)
+class Image:
+    """The measurement of image coordinates.
+
+    Parameters
+    ----------
+    sigma_um : float
+        Standard deviation of each coordinate, micrometres; 0 is free of errors.
+    unit : str
+        ``mm``, ``um`` or ``px`` in the files.
+    y_axis : str
+        ``up`` or ``down`` in the files.
+    """
+
+    sigma_um: float = 5.0
+    unit: str = "mm"
+    y_axis: str = "up"
+
+
+@dataclass(frozen=True)
+class Film:
+    """Deformation of the film and its place in the comparator, different on each photo.
+
+    Parameters
+    ----------
+    scale_ppm, shear_ppm : float
+        Scatter of the change of scale of each axis, and of the angle between the axes, parts per million.
+    irregular_um : float
+        Rms of a smooth deformation that is not affine, micrometres.
+    rotation_deg : float
+        Scatter of the turn of the film in the comparator.
+    offset_mm : float
+        Scatter of its place.
+    """
+
+    scale_ppm: float = 150.0
+    shear_ppm: float = 50.0
+    irregular_um: float = 0.0
+    rotation_deg: float = 1.0
+    offset_mm: float = 3.0
+
+
+@dataclass(frozen=True)
+class GrossError:
+    """One or more gross errors of a kind.
+
+    Parameters
+    ----------
+    kind : str
+        ``image``: an image coordinate; ``control``: a given coordinate; ``swap``: two points exchanged on a photo.
+    count : int
+        How many.
+    size_um : float
+        Size of an error of an image coordinate, micrometres.
+    size_m : float
+        Size of an error of a given coordinate, metres.
+    photo, point : str or None
+        Where; None: anywhere. A swap takes a second point at random.
+    axis : str or None
+        ``x`` or ``y`` (image, y up), ``x``, ``y`` or ``z`` (east, north, up at control); None: any.
+    """
+
+    kind: str
+    count: int = 1
+    size_um: float = 200.0
+    size_m: float = 5.0
+    photo: str | None = None
+    point: str | None = None
+    axis: str | None = None
+
+
+@dataclass(frozen=True)
+class Gnss:
+    """Measured positions of the perspective centres.
+
+    Parameters
+    ----------
+    sigma : tuple of float
+        Standard deviations east, north, up (X, Y, Z), metres.
+    use : bool
+        Name the file in the project.
+    """
+
+    sigma: Triple = (0.10, 0.10, 0.15)
+    use: bool = False
+
+
+@dataclass(frozen=True)
+class Spec:
+    """A whole simulation; the defaults give a film strip of ten photos, 1:10 000, on the real Earth.
+
+    Parameters
+    ----------
+    name : str
+        Name of the project.
+    seed : int
+        Number that all random numbers come from.
+    camera : Camera
+        The camera of all photos.
+    ground, flight, terrain, points, control, image
+        The parts.
+    film : Film or None
+        Film deformation; fiducial marks are measured when it is given.
+    refraction : bool
+        Bend the rays as the standard atmosphere does.
+    gross_errors : tuple of GrossError
+        Gross errors to put in.
+    gnss : Gnss or None
+        Measured positions of the perspective centres.
+    """
+
+    name: str = "simulated"
+    seed: int = 1
+    camera: Camera = FILM
+    ground: Ground = field(default_factory=Ground)
+    flight: Flight = field(default_factory=Flight)
+    terrain: Terrain = field(default_factory=Terrain)
+    points: Points = field(default_factory=Points)
+    control: Control = field(default_factory=Control)
+    image: Image = field(default_factory=Image)
+    film: Film | None = None
+    refraction: bool = False
+    gross_errors: tuple[GrossError, ...] = ()
+    gnss: Gnss | None = None
+
+    @property
+    def format(self) -> tuple[float, float]:
+        """Width and height of the photo, mm."""
+        return self.camera.format or (230.0, 230.0)
+
+    @property
+    def flying_height(self) -> float:
+        """Height above the mean height of the terrain, metres."""
+        if self.flight.flying_height is not None:
+            return self.flight.flying_height
+        return (self.flight.scale or DEFAULT_SCALE) * self.camera.principal_distance / 1000.0
+
+    @property
+    def scale(self) -> float:
+        """Scale number of the photos at the mean height of the terrain."""
+        return self.flying_height / (self.camera.principal_distance / 1000.0)
+
+    @property
+    def footprint(self) -> tuple[float, float]:
+        """Length along and width across the flight of what a photo covers, metres.
+
+        That of the largest rectangle of the photo's proportions whose sides are parallel to the flight: for photos
+        turned by multiples of 90 degrees the whole photo.
+        """
+        quarter, rest = divmod(self.flight.photo_rotation_deg + 45.0, 90.0)
+        along, across = self.format if quarter % 2 == 0 else self.format[::-1]
+        turn = abs(math.radians(rest - 45.0))
+        sin, cos = math.sin(turn), math.cos(turn)
+        part = min(along / (along * cos + across * sin), across / (along * sin + across * cos))
+        metres = part * self.scale / 1000.0
+        return along * metres, across * metres
+
+    @property
+    def base(self) -> float:
+        """Distance of neighbouring perspective centres, metres on the ground."""
+        return self.footprint[0] * (1.0 - self.flight.end_lap_percent / 100.0)
+
+    @property
+    def strip_distance(self) -> float:
+        """Distance of neighbouring strips, metres on the ground."""
+        return self.footprint[1] * (1.0 - self.flight.side_lap_percent / 100.0)
