@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     Rows = NDArray[np.intp]
 
 
+CHECK_POINTS = 10  # when the specification does not say how many
+
+
 @dataclass(frozen=True, eq=False)
 class Roles:
     """Numbers of the points that are given.
@@ -76,10 +79,11 @@ def roles(spec: Spec, placed: Placed, rays: Rows) -> Roles:
     use = _shares(spec.control.use, draws.order(len(control)))
     order = draws.order(len(rays))
     free = order[(rays[order] >= 2) & ~np.isin(order, control)]
-    if len(free) < spec.control.check:
-        message = f"{spec.control.check} check points are asked for, but only {len(free)} points are left for them"
+    check = min(CHECK_POINTS, len(free) // 2) if spec.control.check is None else spec.control.check
+    if len(free) < check:
+        message = f"{check} check points are asked for, but only {len(free)} points are left for them"
         raise InputError(Fault(message, code="simulation-points", key="control.check", fix="add extra_per_model"))
-    return Roles(control, use, np.sort(free[: spec.control.check]))
+    return Roles(control, use, np.sort(free[:check]))
 
 
 def band_photos(spec: Spec) -> list[int]:

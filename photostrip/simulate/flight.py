@@ -32,20 +32,24 @@ class Photos:
         Photo ids.
     strips : tuple of tuple (str, tuple of str)
         Each strip's id and its photos in flight order.
-    along, across : ndarray, shape (n,)
-        Places of the perspective centres from the middle of the strips, metres.
+    along, across, height : ndarray, shape (n,)
+        Places of the perspective centres from the middle of the strips and heights above the ellipsoid, metres.
     centers : ndarray, shape (n, 3)
         Perspective centres in the Cartesian frame, metres.
     rotations : ndarray, shape (n, 3, 3)
         Rotations that take image axes to the Cartesian frame.
+    up : ndarray, shape (n, 3)
+        The vertical at the perspective centres, in the Cartesian frame.
     """
 
     ids: tuple[str, ...]
     strips: tuple[tuple[str, tuple[str, ...]], ...]
     along: Array
     across: Array
+    height: Array
     centers: Array
     rotations: Array
+    up: Array
 
 
 def strip_id(number: int) -> str:
@@ -115,7 +119,8 @@ def fly(spec: Spec, space: World) -> Photos:
     tilt = np.radians(flight.attitude_sigma_deg) * scatter[..., 3:]
     kappa = tilt[..., 2] + np.radians(flight.photo_rotation_deg) + np.pi * back[:, None]
     attitude = from_alpha_omega_kappa(sign * tilt[..., 0], sign * tilt[..., 1], kappa).reshape(-1, 3, 3)
-    along, across = along.ravel(), across.ravel()
+    along, across, height = along.ravel(), across.ravel(), height.ravel()
+    frames = space.frames(along, across)
     digits = max(3, len(str(n)))
     names = tuple((strip_id(j), tuple(f"{j + 1}{i + 1:0{digits}d}" for i in range(n))) for j in range(strips))
     return Photos(
@@ -123,6 +128,8 @@ def fly(spec: Spec, space: World) -> Photos:
         names,
         along,
         across,
-        space.cartesian(along, across, height.ravel()),
-        space.frames(along, across) @ attitude,
+        height,
+        space.cartesian(along, across, height),
+        frames @ attitude,
+        frames[:, :, 2],
     )

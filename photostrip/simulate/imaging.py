@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.simulate.flight import CUT, position_sigma
+from photostrip.triangulation import lens
+from photostrip.triangulation.refinement import refraction_constant
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -19,11 +21,12 @@ if TYPE_CHECKING:
     Rows = NDArray[np.intp]
 
 USABLE = 0.97  # part of the width and height of the photo that is measured in
+BENDING_STEPS = 6  # each gains four digits
 STEEPEST = np.radians(75.0)  # a ray flatter than this is not looked for
 
 
-def project(photos: Photos, photo: Rows, xyz: Array, principal_distance: float) -> tuple[Array, Array]:
-    """Central projection of points into photos, one point for each row.
+def project(photos: Photos, photo: Rows, ray: Array, principal_distance: float) -> tuple[Array, Array]:
+    """Central projection of rays into photos, one for each row.
 
     Parameters
     ----------
@@ -31,8 +34,8 @@ def project(photos: Photos, photo: Rows, xyz: Array, principal_distance: float) 
         Exterior orientations.
     photo : ndarray of int, shape (n,)
         Number of the photo of each row.
-    xyz : ndarray, shape (n, 3)
-        Points in the Cartesian frame, metres.
+    ray : ndarray, shape (n, 3)
+        Points minus perspective centre, or anything in their direction, in the Cartesian frame.
     principal_distance : float
         Principal distance, mm.
 
@@ -41,16 +44,51 @@ def project(photos: Photos, photo: Rows, xyz: Array, principal_distance: float) 
     xy : ndarray, shape (n, 2)
         Ideal image coordinates from the principal point, mm.
     depth : ndarray, shape (n,)
-        Distance of the point in front of the camera along its axis, metres; behind it negative.
+        Part of the ray along the camera's axis; negative for what lies behind the camera.
 
     Notes
     -----
-    Source: theory section 1.1, collinearity of (x, y, -f) with A^T (X - X0).
+    Source: collinearity of (x, y, -f) with A^T (X - X0).
     """
-    ray = np.einsum("ni,nij->nj", xyz - photos.centers[photo], photos.rotations[photo])
-    depth = -ray[:, 2]
+    turned = np.einsum("ni,nij->nj", ray, photos.rotations[photo])
+    depth = -turned[:, 2]
     safe = np.where(depth > 0.0, depth, np.inf)
-    return principal_distance * ray[:, :2] / safe[:, None], depth
+    return principal_distance * turned[:, :2] / safe[:, None], depth
+
+
+def bent(photos: Photos, photo: Rows, ray: Array, ground_height: float) -> Array:
+    """Directions in which the cameras see the ends of rays through the standard atmosphere, one for each row.
+
+    Parameters
+    ----------
+    photos : Photos
+        Exterior orientations.
+    photo : ndarray of int, shape (n,)
+        Number of the photo of each row.
+    ray : ndarray, shape (n, 3)
+        Points minus perspective centre, in the Cartesian frame, metres.
+    ground_height : float
+        Mean height of the terrain above sea level, metres.
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+        Rays turned away from the nadir.
+
+    Notes
+    -----
+    Source: refraction in plane layers, tan(alpha) = tan(theta) (1 - K / cos(theta)^2) for the straight line alpha and
+    the direction theta in which it is seen, both from the nadir: whatever the tilt of the photo.
+    """
+    constant = np.array([refraction_constant(height, ground_height) for height in photos.height.tolist()])[photo]
+    up = photos.up[photo]
+    down = -np.einsum("ni,ni->n", ray, up)
+    aside = ray + down[:, None] * up
+    square = np.einsum("ni,ni->n", aside, aside) / down**2
+    stretch = np.ones(len(ray))
+    for _ in range(BENDING_STEPS):
+        stretch = 1.0 / (1.0 - constant * (1.0 + square * stretch**2))
+    return np.asarray(aside * stretch[:, None] - down[:, None] * up)
 
 
 def sees(spec: Spec, photos: Photos, photo: Rows, xyz: Array) -> NDArray[np.bool_]:
@@ -72,9 +110,11 @@ def sees(spec: Spec, photos: Photos, photo: Rows, xyz: Array) -> NDArray[np.bool
     ndarray of bool, shape (n,)
         True where it does.
     """
-    xy, depth = project(photos, photo, xyz, spec.camera.principal_distance)
-    inside = np.abs(xy + spec.camera.principal_point) <= USABLE / 2.0 * np.asarray(spec.format)
-    return np.asarray(inside.all(axis=1) & (depth > 0.0))
+    xy, depth = project(photos, photo, xyz - photos.centers[photo], spec.camera.principal_distance)
+    inside = (np.abs(xy + spec.camera.principal_point) <= USABLE / 2.0 * np.asarray(spec.format)).all(axis=1)
+    if spec.camera.distortion is not None:
+        inside &= np.hypot(xy[:, 0], xy[:, 1]) <= USABLE * lens.reach(spec.camera.distortion)[1]
+    return np.asarray(inside & (depth > 0.0))
 
 
 def shown(spec: Spec, photos: Photos, placed: Placed) -> tuple[Rows, Rows]:

@@ -17,9 +17,10 @@ from photostrip.simulate.film import sheets
 from photostrip.simulate.flight import fly
 from photostrip.simulate.gross import spoil_control, spoil_images
 from photostrip.simulate.ground import surface, world
-from photostrip.simulate.imaging import project, shown
+from photostrip.simulate.imaging import bent, project, shown
 from photostrip.simulate.placement import place
 from photostrip.simulate.validation import LARGEST_ARC, faults_of
+from photostrip.triangulation.refinement import distort
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -243,8 +244,10 @@ def _names(placed: Placed, chosen: Roles) -> tuple[str, ...]:
 def _image(spec: Spec, photos: Photos, placed: Placed, film: Sheets | None, photo: Rows, point: Rows) -> Array:
     """Image coordinates without errors of measurement, mm."""
     camera = spec.camera
-    ideal, _ = project(photos, photo, placed.xyz[point], camera.principal_distance)
-    xy = ideal + camera.principal_point
+    ray = placed.xyz[point] - photos.centers[photo]
+    if spec.refraction:
+        ray = bent(photos, photo, ray, spec.terrain.height)
+    xy = distort(project(photos, photo, ray, camera.principal_distance)[0], camera)
     return xy if film is None else film.comparator_from_photo(photo, xy)
 
 

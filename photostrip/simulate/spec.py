@@ -26,7 +26,7 @@ FILM = Camera(
         "F8": (110.0, 0.0),
     },
 )
-DIGITAL = Camera("digital", principal_distance=100.5, format=(103.86, 67.86), pixel_size=0.006)
+DIGITAL = Camera("digital", principal_distance=100.5, format=(67.86, 103.86), pixel_size=0.006)
 PRESETS = {"film": FILM, "digital": DIGITAL}
 
 DEFAULT_SCALE = 10_000.0
@@ -172,8 +172,8 @@ class Control:
         Control points of each strip in the layout ``random``.
     use : dict of str to float
         Shares of the points given in full (``xyz``), in plan only (``xy``), in height only (``z``).
-    check : int
-        Check points, anywhere.
+    check : int or None
+        Check points, anywhere; None: ten, or half of the points that are left when that is fewer.
     sigma : tuple of float
         Stated standard deviations east, north, up (X, Y, Z), metres.
     noise : tuple of float or None
@@ -190,7 +190,7 @@ class Control:
     per_band: int = 3
     count: int = 8
     use: dict[str, float] = field(default_factory=lambda: {"xyz": 1.0})
-    check: int = 10
+    check: int | None = None
     sigma: Triple = (0.05, 0.05, 0.08)
     noise: Triple | None = None
     second_crs: str | None = None

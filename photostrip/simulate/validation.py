@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from photostrip.errors import Fault
 from photostrip.simulate.spec import ERROR_KINDS, LAYOUTS, USES
+from photostrip.triangulation import lens
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -48,7 +50,7 @@ def _range(key: str, value: float, low: float, high: float, unit: str = "") -> I
     """Refuse a number outside [low, high], or one that is no number."""
     if not low <= value <= high:
         unit = f" {unit}" if unit else ""
-        yield _fault(key, f"{value:g}{unit} cannot be simulated", f"{low:g} to {high:g}{unit}")
+        yield _fault(key, f"{value:g}{unit} is out of range", f"{low:g} to {high:g}{unit}")
 
 
 def _each(key: str, values: tuple[float, ...] | None, low: float, high: float, unit: str) -> Iterator[Fault]:
@@ -62,6 +64,8 @@ def _camera(spec: Spec) -> Iterator[Fault]:
     if camera.format is None:
         yield _fault("camera.format", "the camera has no format", "width and height of the photo in mm")
     yield from _each("camera.format", camera.format, 1.0, 2_000.0, "mm")
+    for fault in lens.faults(camera):
+        yield replace(fault, key="camera.distortion")
     if camera.pixel_size is not None:
         yield from _range("camera.pixel_size", camera.pixel_size, 1e-5, 1.0, "mm")
 
@@ -125,7 +129,7 @@ def _control(spec: Spec) -> Iterator[Fault]:
             yield from _range("control.every", control.every, 1, max(last, 1), "models")
     if control.layout == "random":
         yield from _range("control.count", control.count, 1, MOST_POINTS)
-    yield from _range("control.check", control.check, 0, MOST_POINTS)
+    yield from _each("control.check", (control.check or 0,), 0, MOST_POINTS, "")
     for name, share in control.use.items():
         if name not in USES:
             yield _fault(f"control.use.{name}", f"{name!r} is no set of coordinates", " | ".join(USES))

@@ -1,0 +1,170 @@
+"""Control and check points: where, how many, given how, and with what errors."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pyproj import CRS, Transformer
+from scipy import stats
+
+from photostrip.errors import InputError
+from photostrip.simulate import Control, Flight, Ground, Points, Simulation, Spec, simulate
+from photostrip.simulate.control import band_photos
+
+NONE = (0.0, 0.0, 0.0)
+
+
+def true_ground(done: Simulation, ids: tuple[str, ...]) -> np.ndarray:
+    """True coordinates of points in the output frame."""
+    return done.truth.ground.xyz[[done.truth.ground.index[name] for name in ids]]
+
+
+def stations(done: Simulation) -> list[list[int]]:
+    """Photos on which each control point lies."""
+    o = done.observations
+    number = {name: k for k, name in enumerate(o.point_ids)}
+    control = [name for name, check in zip(done.control.ids, done.control.check, strict=True) if not check]
+    return [sorted(o.photo[o.point == number[name]].tolist()) for name in control]
+
+
+@pytest.mark.parametrize(
+    ("photos", "bands", "every", "expected"),
+    [
+        (21, 3, None, [0, 10, 20]),
+        (21, 4, None, [0, 7, 13, 20]),
+        (10, 1, None, [4]),
+        (10, 2, None, [0, 9]),
+        (21, 3, 5, [0, 5, 10, 15, 20]),
+        (20, 3, 5, [0, 5, 10, 15, 19]),
+        (3, 3, None, [0, 1, 2]),
+    ],
+)
+def test_bands(photos: int, bands: int, every: int | None, expected: list[int]) -> None:
+    spec = Spec(flight=Flight(photos=photos), control=Control(bands=bands, every=every))
+    assert band_photos(spec) == expected
+    done = simulate(spec)
+    seen = stations(done)
+    assert len(seen) == 3 * len(expected)
+    assert all(station in seen[3 * k + i] for k, station in enumerate(expected) for i in range(3))
+
+
+@pytest.mark.parametrize(("per_band", "sides"), [(1, [0]), (2, [1, -1]), (3, [1, 0, -1])])
+def test_points_of_a_band_stand_across_the_strip(per_band: int, sides: list[int]) -> None:
+    done = simulate(Spec(ground=Ground(crs="local"), control=Control(per_band=per_band, check=0, noise=NONE)))
+    north = done.control.enu[:, 1].reshape(3, per_band)
+    assert north / 920.0 == pytest.approx(np.tile(sides, (3, 1)), abs=0.15)
+
+
+@pytest.mark.parametrize(("layout", "count"), [("corners", 4), ("corners+centre", 5)])
+def test_corners(layout: str, count: int) -> None:
+    done = simulate(Spec(ground=Ground(crs="local"), control=Control(layout=layout, check=0, noise=NONE)))
+    east, north = done.control.enu[:, :2].T
+    assert len(done.control) == count
+    corner = np.arange(count) != 2 if count == 5 else np.ones(4, dtype=bool)
+    assert np.abs(east[corner]) == pytest.approx(4.5 * 920.0, rel=0.05)
+    assert np.abs(north[corner]) == pytest.approx(920.0, rel=0.15)
+    assert len({(e > 0, n > 0) for e, n in done.control.enu[corner, :2]}) == 4
+    if count == 5:
+        assert np.abs(done.control.enu[2, :2]).max() < 700.0
+
+
+def test_random_control_and_check_points_are_as_many_as_asked_for() -> None:
+    done = simulate(Spec(flight=Flight(strips=2), control=Control(layout="random", count=9, check=12)))
+    control = done.control
+    assert (~control.check).sum() == 18
+    assert control.check.sum() == 12
+    assert len(set(control.ids)) == 30
+    assert set(control.ids) <= set(done.observations.point_ids)
+    other = simulate(Spec(seed=2, flight=Flight(strips=2), control=Control(layout="random", count=9, check=12)))
+    assert not np.allclose(other.control.enu, control.enu)
+
+
+def test_check_points_are_half_of_what_is_left_when_there_are_few() -> None:
+    done = simulate(Spec(flight=Flight(photos=3), points=Points(extra_per_model=4)))
+    assert done.control.check.sum() == 4
+    assert simulate(Spec()).control.check.sum() == 10
+
+
+@pytest.mark.parametrize(
+    ("control", "message"),
+    [
+        (Control(check=1000), "1000 check points are asked for, but only 57 points are left"),
+        (Control(layout="random", count=1000), "1000 control points are asked for, but a strip has only 66 points"),
+    ],
+)
+def test_too_many_points_are_refused(control: Control, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        simulate(Spec(control=control))
+
+
+def test_shares_of_full_plan_and_height_points() -> None:
+    use = {"xyz": 0.5, "xy": 0.3, "z": 0.2}
+    done = simulate(Spec(flight=Flight(photos=20), control=Control(bands=7, use=use)))
+    kinds = [
+        "".join(axis for axis, used in zip("xyz", row, strict=True) if used)
+        for row in done.control.use[~done.control.check]
+    ]
+    assert [kinds.count(kind) for kind in ("xyz", "xy", "z")] == [11, 6, 4]  # of 21: 10.5, 6.3, 4.2
+    assert done.control.use[done.control.check].all()
+    assert np.array_equal(np.isnan(done.control.enu), ~done.control.use)
+
+
+def test_without_noise_the_given_coordinates_are_true() -> None:
+    done = simulate(Spec(control=Control(noise=NONE)))
+    assert done.control.enu == pytest.approx(true_ground(done, done.control.ids), abs=1e-6)
+
+
+@pytest.mark.parametrize("crs", ["EPSG:32633", "EPSG:4979", "geocentric", "local"])
+def test_noise_is_normal_and_as_large_as_stated(crs: str) -> None:
+    sigma = np.array([0.03, 0.06, 0.12])
+    spec = Spec(
+        flight=Flight(photos=150),
+        ground=Ground(crs=crs, center_deg=(15.0, 0.0)),
+        points=Points(extra_per_model=9),
+        control=Control(layout="random", count=1500, check=0, sigma=(0.03, 0.06, 0.12)),
+    )
+    done = simulate(spec)
+    error = done.control.enu - true_ground(done, done.control.ids)
+    if crs == "EPSG:4979":
+        error *= np.radians(6_378_000.0), np.radians(6_335_000.0), 1.0  # metres per degree at the equator
+    for column, s in zip(error.T, sigma, strict=True):
+        assert column.std() == pytest.approx(s, rel=4 / np.sqrt(2 * 1500))
+        assert stats.kstest(column / s, "norm").pvalue > 0.01
+    assert done.control.sigma == pytest.approx(np.tile(sigma, (1500, 1)))
+    double = simulate(replace(spec, control=replace(spec.control, noise=(0.06, 0.12, 0.24))))
+    assert double.control.sigma == pytest.approx(done.control.sigma)
+    assert double.control.enu - done.control.enu == pytest.approx(
+        done.control.enu - true_ground(done, done.control.ids), abs=1e-6
+    )
+
+
+def test_two_zones_give_the_same_points() -> None:
+    spec = Spec(
+        ground=Ground(crs="EPSG:31468", axes=("north", "east", "up"), center_deg=(13.5, 48.0)),
+        flight=Flight(photos=20, heading_deg=85.0),
+        control=Control(every=3, noise=NONE, second_crs="EPSG:31469"),
+    )
+    done = simulate(spec)
+    west, east = done.control.frame == 0, done.control.frame == 1
+    assert west.sum() >= 6
+    assert east.sum() >= 6
+    assert [frame.crs for frame in done.frames] == ["EPSG:31468", "EPSG:31469"]
+    true = true_ground(done, done.control.ids)
+    assert done.control.enu[west] == pytest.approx(true[west], abs=1e-6)
+    zones = Transformer.from_crs(CRS("EPSG:31468"), CRS("EPSG:31469"), always_xy=True)
+    e, n = zones.transform(true[east, 0], true[east, 1])
+    assert done.control.enu[east] == pytest.approx(np.column_stack([e, n, true[east, 2]]), abs=1e-4)
+    longitude, _ = Transformer.from_crs("EPSG:31468", "EPSG:4314", always_xy=True).transform(true[:, 0], true[:, 1])
+    assert np.array_equal(np.array(longitude) >= 13.5, east)
+
+
+@pytest.mark.parametrize(("boundary", "place"), [(179.98, 180.0), (-179.98, -179.99), (None, 180.0)])
+def test_a_boundary_near_the_meridian_of_180_degrees(boundary: float | None, place: float) -> None:
+    control = Control(every=2, second_crs="EPSG:32601", boundary_longitude_deg=boundary)
+    done = simulate(Spec(ground=Ground(crs="EPSG:32660", center_deg=(place, 20.0)), control=control))
+    assert set(done.control.frame.tolist()) == {0, 1}
+    east_of_all = done.control.enu[done.control.frame == 1, 0]
+    assert (east_of_all < 500_000.0).all()  # just beyond the western edge of zone 1
+    assert (done.control.enu[done.control.frame == 0, 0] > 500_000.0).all()

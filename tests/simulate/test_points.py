@@ -1,0 +1,122 @@
+"""Where the points lie: enough for every pair and every triple of photos, named, and as many as asked for."""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import settings as hypothesis_settings
+from hypothesis import strategies as st
+
+from photostrip.simulate import DIGITAL, FILM, Control, Flight, Ground, Points, Simulation, Spec, Terrain, simulate
+
+
+def photos_of(done: Simulation) -> list[set[int]]:
+    """Points of each photo."""
+    observations = done.observations
+    return [set(observations.point[observations.photo == k].tolist()) for k in range(len(observations.photo_ids))]
+
+
+@hypothesis_settings(max_examples=60)
+@given(
+    seed=st.integers(0, 10_000),
+    lap=st.floats(57.0, 85.0),
+    heading=st.floats(0.0, 360.0),
+    rotation=st.floats(-180.0, 180.0),
+    relief=st.floats(0.0, 150.0),
+    camera=st.sampled_from([FILM, DIGITAL]),
+    latitude=st.floats(-75.0, 75.0),
+)
+def test_every_pair_and_triple_has_its_points(
+    seed: int, lap: float, heading: float, rotation: float, relief: float, camera: object, latitude: float
+) -> None:
+    done = simulate(
+        Spec(
+            seed=seed,
+            camera=FILM if camera is FILM else DIGITAL,
+            ground=Ground(crs="EPSG:4979", center_deg=(20.0, latitude)),
+            flight=Flight(end_lap_percent=lap, heading_deg=heading, photo_rotation_deg=rotation),
+            terrain=Terrain(relief=relief),
+        )
+    )
+    on = photos_of(done)
+    assert min(len(a & b) for a, b in itertools.pairwise(on)) >= 9
+    assert min(len(a & b & c) for a, b, c in zip(on, on[1:], on[2:], strict=False)) >= 3
+    assert min(Counter(done.observations.point.tolist()).values()) >= 2
+
+
+def test_gruber_points_stand_where_they_should() -> None:
+    spec = Spec(
+        ground=Ground(crs="local"),
+        flight=Flight(attitude_sigma_deg=(0.0, 0.0, 0.0), position_sigma=(0.0, 0.0, 0.0)),
+        terrain=Terrain(relief=0.0),
+        points=Points(extra_per_model=0, scatter_percent=0.0),
+        control=Control(layout="corners", check=0),
+    )
+    done = simulate(spec)
+    assert len(done.observations.point_ids) == 30
+    own = [
+        done.truth.image[row].tolist()
+        for row, (photo, point) in enumerate(zip(done.observations.photo, done.observations.point, strict=True))
+        if done.observations.point_ids[point].startswith(f"{done.observations.photo_ids[photo]}-")
+    ]
+    assert len(own) == 26  # four are control points and have other names
+    expected = {(0.0, 92.0), (0.0, 0.0), (0.0, -92.0)}  # 80 % of 115 mm
+    assert {(round(x, 6) + 0.0, round(y, 6) + 0.0) for x, y in own} == expected
+    assert Counter(Counter(done.observations.point.tolist()).values()) == {3: 24, 2: 6}
+
+
+def test_ids_are_unique_and_say_where_a_point_is() -> None:
+    done = simulate(Spec(flight=Flight(photos=5, strips=2), points=Points(extra_per_model=2), control=Control(check=3)))
+    ids = done.observations.point_ids
+    assert len(set(ids)) == len(ids) == 2 * (5 * 3 + 4 * 2)
+    assert done.strips == (
+        ("A", ("1001", "1002", "1003", "1004", "1005")),
+        ("B", ("2001", "2002", "2003", "2004", "2005")),
+    )
+    assert "1002-4" in ids or "1002-5" in ids
+    assert [name for name in ids if name.startswith("G")] != []
+
+
+def test_neighbouring_strips_share_points() -> None:
+    done = simulate(Spec(flight=Flight(strips=3)))
+    on = photos_of(done)
+    strips = [set().union(*on[10 * j : 10 * j + 10]) for j in range(3)]
+    assert len(strips[0] & strips[1]) >= 10
+    assert len(strips[1] & strips[2]) >= 10
+
+
+def test_overlaps_are_those_asked_for() -> None:
+    flight = Flight(
+        strips=2, end_lap_percent=62.0, side_lap_percent=25.0, position_sigma=(0.0, 0.0, 0.0), flying_height=1530.0
+    )
+    centers = simulate(Spec(ground=Ground(crs="local"), flight=flight)).truth.centers.reshape(2, 10, 3)
+    assert np.diff(centers[0, :, 0]) == pytest.approx(0.38 * 2300.0)
+    assert centers[1, :, 1] - centers[0, :, 1] == pytest.approx(0.75 * 2300.0)
+    assert centers[..., 2] == pytest.approx(1830.0)
+
+
+def test_a_turned_photo_uses_its_largest_upright_rectangle() -> None:
+    assert Spec(flight=Flight(photo_rotation_deg=90.0), camera=DIGITAL).footprint == pytest.approx((1038.6, 678.6))
+    assert Spec(flight=Flight(photo_rotation_deg=180.0), camera=DIGITAL).footprint == pytest.approx((678.6, 1038.6))
+    assert Spec(flight=Flight(photo_rotation_deg=45.0)).footprint == pytest.approx(
+        (2300 / np.sqrt(2), 2300 / np.sqrt(2))
+    )
+
+
+def test_time_grows_with_the_photos_only() -> None:
+    done = simulate(Spec(flight=Flight(photos=1000), points=Points(extra_per_model=9)))
+    assert 28 <= len(done.observations) / 1000 <= 36
+
+
+def test_points_that_nobody_can_see_refuse_the_strip() -> None:
+    from photostrip.errors import InputError
+
+    with pytest.raises(
+        InputError, match=r"no point lies on photos 1\d\d\d, 1\d\d\d and 1\d\d\d; raise end_lap_percent"
+    ) as caught:
+        simulate(Spec(flight=Flight(attitude_sigma_deg=(9.0, 9.0, 9.0), photos=30)))
+    assert caught.value.exit_code == 2
