@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,7 +28,7 @@ class Frame(StrEnum):
     GROUND = "ground"  # east, north, height in the units of a CRS
 
 
-def frozen(values: ArrayLike, dtype: type = float, shape: tuple[int, ...] | None = None) -> NDArray[np.float64]:
+def frozen(values: ArrayLike, dtype: type = float, shape: tuple[int, ...] | None = None) -> NDArray[Any]:
     """Give a read-only array, copied only when needed.
 
     Parameters
@@ -45,7 +45,7 @@ def frozen(values: ArrayLike, dtype: type = float, shape: tuple[int, ...] | None
     numpy.ndarray
         The values; writing to it raises.
     """
-    array = np.ascontiguousarray(values, dtype=dtype)
+    array: NDArray[Any] = np.ascontiguousarray(values, dtype=dtype)
     if shape is not None:
         array = array.reshape(shape)
     if array.flags.writeable:

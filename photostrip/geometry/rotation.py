@@ -203,7 +203,8 @@ def from_vector(vector: ArrayLike) -> NDArray[np.float64]:
     safe = np.where(angle < 1e-9, 1.0, angle)  # noqa: PLR2004  below it the series' first terms are exact
     first = np.where(angle < 1e-9, 1.0, np.sin(safe) / safe)  # noqa: PLR2004
     second = np.where(angle < 1e-9, 0.5, (1 - np.cos(safe)) / safe**2)  # noqa: PLR2004
-    return np.eye(3) + first * k + second * (k @ k)
+    matrix: NDArray[np.float64] = np.eye(3) + first * k + second * (k @ k)
+    return matrix
 
 
 def cross_matrix(vector: ArrayLike) -> NDArray[np.float64]:
@@ -245,4 +246,5 @@ def angle_between(first: ArrayLike, second: ArrayLike) -> NDArray[np.float64]:
     """
     a, b = np.asarray(first, float), np.asarray(second, float)
     chord = np.linalg.norm(a - b, axis=(-2, -1)) / np.sqrt(8.0)
-    return 2 * np.arcsin(np.clip(chord, 0, 1))
+    angle: NDArray[np.float64] = 2 * np.arcsin(np.clip(chord, 0, 1))
+    return angle

@@ -51,7 +51,8 @@ class Similarity:
         ndarray, shape (n, 3)
             Target coordinates.
         """
-        return self.scale * np.asarray(points, float) @ self.rotation.T + self.shift
+        moved: Floats = self.scale * np.asarray(points, float) @ self.rotation.T + self.shift
+        return moved
 
     @property
     def inverse(self) -> Similarity:
@@ -60,7 +61,7 @@ class Similarity:
         return Similarity(1 / self.scale, back, -back @ self.shift / self.scale)
 
     def residuals(self, source: ArrayLike, target: ArrayLike) -> Floats:
-        """Transformed source minus target.
+        """Subtract the target from the transformed source.
 
         Parameters
         ----------
@@ -72,7 +73,8 @@ class Similarity:
         ndarray, shape (n, 3)
             Differences in the unit of the target.
         """
-        return self(source) - np.asarray(target, float)
+        difference: Floats = self(source) - np.asarray(target, float)
+        return difference
 
     @classmethod
     def from_points(cls, source: ArrayLike, target: ArrayLike, weights: ArrayLike | None = None) -> Self:
@@ -122,7 +124,7 @@ def collinearity(points: ArrayLike, weights: ArrayLike | None = None) -> float:
         0 for points on a line, 1 for points spread alike in two directions; 0 for fewer than three points.
     """
     p = np.asarray(points, float)
-    if len(p) < 3:  # noqa: PLR2004
+    if len(p) < 3:
         return 0.0
     w = np.ones(len(p)) if weights is None else np.asarray(weights, float)
     d = p - np.average(p, axis=0, weights=w)

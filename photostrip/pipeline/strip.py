@@ -75,7 +75,7 @@ def adjust_strip(
             spacing=float(np.linalg.norm(np.diff(centers, axis=0), axis=1).mean()),
             breadth=max(float(np.quantile(np.abs(xyz[:, 1]), 0.95)), 1e-6),
         )
-        correction = polynomial.fit(problem, settings.polynomial, precision)
+        correction = polynomial.fit(problem, settings.polynomial)
     adjusted = xyz if correction is None else correction(xyz)
     resection, image_rows = _orient_photos(strip, observations, oriented, formed, adjusted, orientation)
     return StripResult(
@@ -236,7 +236,7 @@ def _notes(
     adjusted: Floats,
     resection: exterior.Resection,
 ) -> tuple[Note, ...]:
-    """What this strip's numbers say that a surveyor should know."""
+    """Collect what this strip's numbers say that a surveyor should know."""
     return (
         *_pair_notes(strip, oriented),
         *_joint_notes(strip, formed),
@@ -255,8 +255,8 @@ def _pair_notes(strip: Strip, oriented: relative.Orientation) -> list[Note]:
             notes.append(Note("no-check", text, strip=strip.id, photos=names))
         if oriented.condition[number] > relative.CONDITION_WARNING:
             text = (
-                f"photos {names[0]} and {names[1]}: weak relative orientation (condition number {oriented.condition[number]:.0f}); "
-                "the points stand in a narrow band"
+                f"photos {names[0]} and {names[1]}: weak relative orientation (condition number "
+                f"{oriented.condition[number]:.0f}); the points stand in a narrow band"
             )
             notes.append(Note("weak-pair", text, strip=strip.id, photos=names))
     return notes
@@ -279,8 +279,11 @@ def _joint_notes(strip: Strip, formed: formation.FormedStrip) -> list[Note]:
 
 def _control_notes(strip: Strip, orientation: absolute.AbsoluteOrientation) -> list[Note]:
     notes = []
-    if orientation.redundancy < 3:  # noqa: PLR2004
-        text = f"strip {strip.id}: the absolute orientation has a redundancy of {orientation.redundancy}: errors of the control hardly show"
+    if orientation.redundancy < 3:
+        text = (
+            f"strip {strip.id}: the absolute orientation has a redundancy of {orientation.redundancy}: errors of the "
+            "control hardly show"
+        )
         notes.append(Note("little-control", text, strip=strip.id))
     if orientation.condition > 1 / absolute.WEAK_LIMIT:
         text = f"strip {strip.id}: the control is nearly on one line (condition number {orientation.condition:.0f})"
@@ -295,27 +298,28 @@ def _polynomial_notes(strip: Strip, correction: polynomial.Polynomial | None, ad
     asked = correction.asked
     if asked != "auto" and correction.degree < int(asked):
         text = (
-            f"strip {strip.id}: degree {asked} was asked for; the control, {len(correction.axes[0].residuals)} points at "
-            f"{correction.stations[0]} stations in plan and {correction.stations[1]} in height, carries degree {correction.degree}"
+            f"strip {strip.id}: degree {asked} was asked for; the control, {len(correction.axes[0].residuals)} points "
+            f"at {correction.stations[0]} stations in plan and {correction.stations[1]} in height, carries degree "
+            f"{correction.degree}"
         )
         notes.append(Note("degree-reduced", text, strip=strip.id))
     if correction.degree:
         low, high = correction.reach
         outside = int(((adjusted[:, 0] < low) | (adjusted[:, 0] > high)).sum())
         reach = max(low - float(adjusted[:, 0].min()), float(adjusted[:, 0].max()) - high)
-        if outside and reach > 0.1 * (high - low):  # noqa: PLR2004  the polynomial's own points scatter about its ends
+        if outside and reach > 0.1 * (high - low):
             text = (
                 f"strip {strip.id}: {outside} points lie up to {reach:.0f} m beyond the control along the strip, where "
                 f"the polynomial of degree {correction.degree} is extrapolated"
             )
             notes.append(Note("extrapolation", text, strip=strip.id))
-        if min(axis.redundancy for axis in correction.axes) < 3:  # noqa: PLR2004
+        if min(axis.redundancy for axis in correction.axes) < 3:
             text = f"strip {strip.id}: the polynomial has a redundancy below 3 in an axis: its residuals say little"
             notes.append(Note("little-redundancy", text, strip=strip.id))
     if len(strip.photos) - 1 > LONG_STRIP:
         text = (
-            f"strip {strip.id}: {len(strip.photos) - 1} models; beyond about {LONG_STRIP} a polynomial falls far behind a rigorous "
-            "adjustment (errors 2.5 times larger at 30 models, 12 times at 100)"
+            f"strip {strip.id}: {len(strip.photos) - 1} models; beyond about {LONG_STRIP} a polynomial falls far "
+            "behind a rigorous adjustment (errors 2.5 times larger at 30 models, 12 times at 100)"
         )
         notes.append(Note("long-strip", text, strip=strip.id))
     return notes
@@ -325,7 +329,8 @@ def _photo_notes(strip: Strip, resection: exterior.Resection) -> list[Note]:
     return [
         Note(
             "not-resected",
-            f"photo {strip.photos[number]} could not be oriented on its adjusted points; it keeps its orientation in the strip",
+            f"photo {strip.photos[number]} could not be oriented on its adjusted points; it keeps its orientation in "
+            "the strip",
             strip=strip.id,
             photos=(strip.photos[number],),
         )

@@ -66,7 +66,19 @@ def triangulate(inputs: Inputs, settings: Settings, *, directory: Path | None = 
     missing = _not_determined(refined.observations, points, inputs)
     notes = _notes(inputs, settings, strips, fiducial)
     return Result(
-        inputs, settings, tuple(frames), output, fiducial, refined, strips, points, rows, differences, ties, missing, notes
+        inputs,
+        settings,
+        tuple(frames),
+        output,
+        fiducial,
+        refined,
+        strips,
+        points,
+        rows,
+        differences,
+        ties,
+        missing,
+        notes,
     )
 
 
@@ -95,9 +107,7 @@ def _frames(inputs: Inputs, settings: Settings, directory: Path | None) -> tuple
     return [frame.with_origin(origin) for frame in frames], target.with_origin(origin)
 
 
-def _photo_coordinates(
-    inputs: Inputs, settings: Settings
-) -> tuple[PhotoPoints, interior.InteriorOrientation | None]:
+def _photo_coordinates(inputs: Inputs, settings: Settings) -> tuple[PhotoPoints, interior.InteriorOrientation | None]:
     """Interior orientation, when fiducial marks were measured."""
     if inputs.fiducials is None:
         return inputs.observations, None
@@ -118,17 +128,18 @@ def _ideal_coordinates(
     if wanted.refraction and (wanted.flying_height is None or wanted.ground_height is None):
         # The heights come from a first run without refraction; metres do not matter to it.
         first = triangulate(inputs, replace(settings, refinement=replace(wanted, refraction=False)))
-        wanted = replace(wanted, **_heights(first, frames))
+        flying, ground = _heights(first, frames)
+        wanted = replace(wanted, flying_height=flying, ground_height=ground)
     return refinement.refine(observations, _cameras(inputs), wanted)
 
 
-def _heights(first: Result, frames: Sequence[GroundFrame]) -> dict[str, float]:
-    """Mean height of the ground and of the cameras above the ellipsoid, metres."""
+def _heights(first: Result, frames: Sequence[GroundFrame]) -> tuple[float, float]:
+    """Mean height of the cameras and of the ground above the ellipsoid, metres."""
     frame = frames[0]
     centers = np.concatenate([s.intermediate.cartesian_from_intermediate(s.resection.centers) for s in first.strips])
     ground = first.points.cartesian
     heights = [points[:, 2] if frame.kind == "local" else frame.geodetic(points)[:, 2] for points in (centers, ground)]
-    return {"flying_height": float(heights[0].mean()), "ground_height": float(heights[1].mean())}
+    return float(heights[0].mean()), float(heights[1].mean())
 
 
 def _measured_control(inputs: Inputs, observations: PhotoPoints) -> ControlPoints:
@@ -173,7 +184,7 @@ def _ties(strip: Numbers, point: Numbers, cartesian: Floats, output: GroundFrame
 def _at_given_points(
     inputs: Inputs, frames: Sequence[GroundFrame], points: Adjusted, observations: PhotoPoints
 ) -> tuple[Numbers, Floats]:
-    """Adjusted minus given at control and check points, each in its own ground frame."""
+    """Compare adjusted with given coordinates at control and check points, each in its own ground frame."""
     control = inputs.control
     number = {name: n for n, name in enumerate(observations.point_ids)}
     row_of = {int(n): row for row, n in enumerate(points.number)}
@@ -218,7 +229,8 @@ def _notes(
         notes.append(
             Note(
                 "curvature-in-frames",
-                "earth_curvature: none changes nothing here: the coordinates go through geocentric space, which is curved",
+                "earth_curvature: none changes nothing here: the coordinates go through geocentric space, where the "
+                "Earth is curved",
                 severity="note",
             )
         )

@@ -217,7 +217,7 @@ def orient(strip: Floats, targets: Targets, weight: Floats) -> AbsoluteOrientati
         xyz = similarity(strip)
         design, free = _design(xyz, targets, weight, half)
         _refuse_deficient(design, xyz, targets, half)
-        step, *_ = np.linalg.lstsq(design, free, rcond=None)
+        step = np.asarray(np.linalg.lstsq(design, free, rcond=None)[0], float)
         similarity = _corrected(similarity, step, xyz.mean(axis=0), half)
         if np.abs(step).max() < CONVERGED * half:
             break
@@ -227,7 +227,7 @@ def orient(strip: Floats, targets: Targets, weight: Floats) -> AbsoluteOrientati
                 "the strip fits the control only upside down: the control coordinates are left-handed",
                 code="left-handed-control",
                 key="control.axes",
-                expected="axes in the order of the columns, for example [north, east, up] for grids with X to the north",
+                expected="the axes in the order of the columns, [north, east, up] where X is north",
             )
         )
     misclosures = targets.misclosures(similarity(strip))
@@ -240,13 +240,13 @@ def orient(strip: Floats, targets: Targets, weight: Floats) -> AbsoluteOrientati
 
 def _refuse_too_few(control: ControlPoints) -> None:
     plan, height = int(control.use[:, 0].sum()), int(control.use[:, HEIGHT].sum())
-    if plan >= 2 and height >= 3:  # noqa: PLR2004
+    if plan >= 2 and height >= 3:
         return
     msg = (
-        f"absolute orientation needs at least 2 control points in plan and 3 in height on the strip, not on one line; there are "
-        f"{plan} in plan and {height} in height"
+        "absolute orientation needs at least 2 control points in plan and 3 in height on the strip, not on one line; "
+        f"there are {plan} in plan and {height} in height"
     )
-    if plan == height == 2:  # noqa: PLR2004
+    if plan == height == 2:
         msg += f": the rotation about the line of control points {control.ids[0]} and {control.ids[1]} stays free"
     raise GeometryError(msg, points=control.ids, code="too-little-control")
 
@@ -254,7 +254,7 @@ def _refuse_too_few(control: ControlPoints) -> None:
 def _start(strip: Floats, targets: Targets, weight: Floats) -> Similarity:
     """Similarity to start from: closed form of the full points, else plan and height apart."""
     full = targets.control.use.all(axis=1)
-    if full.sum() >= 3 and collinearity(strip[full]) > RANK_LIMIT**2:  # noqa: PLR2004
+    if full.sum() >= 3 and collinearity(strip[full]) > RANK_LIMIT**2:
         return Similarity.from_points(strip[full], targets.of(strip)[full], weight[full].mean(axis=1))
     return _start_apart(strip, targets)
 
@@ -279,11 +279,12 @@ def _start_apart(strip: Floats, targets: Targets) -> Similarity:
     center = np.array([xyz[height, 0].mean(), xyz[height, 1].mean(), 0.0])
     rotation = tilt @ level.rotation
     middle = level.inverse(center[None, :])[0]
-    return Similarity(scale, rotation, center + [0.0, 0.0, up] - scale * rotation @ middle)
+    lift = np.array([0.0, 0.0, up])
+    return Similarity(scale, rotation, center + lift - scale * rotation @ middle)
 
 
 def _design(xyz: Floats, targets: Targets, weight: Floats, half: float) -> tuple[Floats, Floats]:
-    """Weighted design and free terms of one step: three shifts, three rotations, scale, all in metres at the strip's end."""
+    """Weighted design and free terms of one step: shifts, rotations, scale, all in metres at the strip's end."""
     axes = targets.axes(xyz)
     arm = (xyz - xyz.mean(axis=0)) / half
     columns = np.empty((len(xyz), 3, PARAMETERS))
@@ -343,15 +344,15 @@ def free_motion(direction: Floats, xyz: Floats, control: ControlPoints, half: fl
     """
     shift, turn, growth = direction[:3], direction[3:6], direction[6]
     sizes = np.array([np.linalg.norm(shift), np.linalg.norm(turn), abs(growth)])
-    if sizes[2] > 0.7 * np.linalg.norm(sizes):  # noqa: PLR2004
+    if sizes[2] > 0.7 * np.linalg.norm(sizes):
         return "the scale"
-    if sizes[1] < 0.3 * np.linalg.norm(sizes):  # noqa: PLR2004
+    if sizes[1] < 0.3 * np.linalg.norm(sizes):
         return "the height" if abs(shift[2]) > np.hypot(shift[0], shift[1]) else "the plan position"
     axis = turn / sizes[1]
     foot = np.cross(turn, shift) / sizes[1] ** 2  # a point of the axis, from the centre, in half lengths
     offset = np.linalg.norm(np.cross((xyz - xyz.mean(axis=0)) / half - foot, axis), axis=1)
     near = [name for name, distance in zip(control.ids, offset, strict=True) if distance < 0.02]  # noqa: PLR2004
-    if len(near) >= 2:  # noqa: PLR2004
+    if len(near) >= 2:
         return f"the rotation about the line of control points {', '.join(near)}"
     if abs(axis[2]) > 0.7:  # noqa: PLR2004
         return "the azimuth (rotation about the vertical)"

@@ -69,12 +69,11 @@ def project(points: Floats, centers: Floats, rotations: Floats, photo: Numbers, 
         Ideal image coordinates in mm, relative to the principal point.
     """
     ray = np.einsum("mi,mij->mj", points - centers[photo], rotations[photo])
-    return -focal[photo, None] * ray[:, :2] / ray[:, 2:]
+    xy: Floats = -focal[photo, None] * ray[:, :2] / ray[:, 2:]
+    return xy
 
 
-def resect(
-    xy: Floats, points: Floats, photo: Numbers, focal: Floats, start: tuple[Floats, Floats]
-) -> Resection:
+def resect(xy: Floats, points: Floats, photo: Numbers, focal: Floats, start: tuple[Floats, Floats]) -> Resection:
     """Orient every photo on its points by least squares on the image coordinates.
 
     Parameters
@@ -113,7 +112,10 @@ def resect(
         if settled.all():
             break
     solved = settled & enough
-    centers, rotations = np.where(solved[:, None], centers, start[0]), np.where(solved[:, None, None], rotations, start[1])
+    centers, rotations = (
+        np.where(solved[:, None], centers, start[0]),
+        np.where(solved[:, None, None], rotations, start[1]),
+    )
     residuals = xy - project(points, centers, rotations, photo, focal)
     squares = np.bincount(photo, (residuals**2).sum(axis=1), len(centers))
     rms = np.sqrt(squares / np.maximum(2 * counts, 1))
@@ -152,5 +154,4 @@ def _steps(
     normal[:, UPPER[1], UPPER[0]] = sums[:, : len(UPPER[0])]
     diagonal = np.arange(UNKNOWNS)
     normal[:, diagonal, diagonal] += SINGULAR * np.maximum(normal[:, diagonal, diagonal], 1e-9)
-    result: Floats = np.linalg.solve(normal, sums[:, len(UPPER[0]) :, None])[:, :, 0]
-    return result
+    return np.asarray(np.linalg.solve(normal, sums[:, len(UPPER[0]) :, None])[:, :, 0], float)

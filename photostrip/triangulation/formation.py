@@ -1,8 +1,9 @@
 """Forming the strip: orientation handed on from photo to photo, models brought to one scale.
 
 Every photo takes its orientation from its left neighbour, so that all models are parallel to the frame of the
-first photo; only their scales are free ("partially dependent models"). The ratio of the scales of two neighbouring models does
-not depend on the chain before them, so all ratios are found in one batch, in the frame of the photo that joins them.
+first photo; only their scales are free ("partially dependent models"). The ratio of the scales of two neighbouring
+models does not depend on the chain before them, so all ratios are found in one batch, in the frame of the photo that
+joins them.
 
 Source: [001] eq. 125-141.
 """
@@ -15,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import GeometryError
+from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.triangulation import relative
 from photostrip.triangulation.intersection import intersect
 
@@ -171,7 +173,7 @@ def model_points(orientation: Orientation) -> tuple[Floats, Floats, Flags]:
     # In the base frame the x parallax is the whole parallax at any kappa; along the strip's X it may vanish.
     found = intersect(np.array([1.0, 0.0, 0.0]), left, right, pairs.focal)
     al1, ka1 = orientation.elements[:, 0], orientation.elements[:, 1]
-    to_base = relative.from_alpha_omega_kappa(al1, 0.0, ka1)
+    to_base = from_alpha_omega_kappa(al1, 0.0, ka1)
     vectors = np.einsum("mji,mj->mi", to_base[pairs.pair], found.xyz)
     return vectors, found.gap / found.ray_factor, found.sound
 
@@ -235,11 +237,12 @@ def transfer_scale(
 
 def _require_joints(joint: Numbers, joints: int, photos: Sequence[str]) -> None:
     counts = np.bincount(joint, minlength=joints) if joints else np.zeros(0, np.intp)
-    for number in np.flatnonzero(counts == 0):
+    for number in np.flatnonzero(counts == 0).tolist():
         names = photos[number : number + 3]
         msg = (
             f"no point is common to photos {names[0]}, {names[1]} and {names[2]}: the models on either side of photo "
-            f"{names[1]} cannot be brought to one scale; measure at least one pass point on all three (three or more are recommended)"
+            f"{names[1]} cannot be brought to one scale; measure at least one pass point on all three (three or more "
+            "are recommended)"
         )
         raise GeometryError(msg, photos=names, code="broken-joint")
 
@@ -255,12 +258,11 @@ def _weights(
     depth_before = np.linalg.norm(np.cross(vectors[before], base[joint]), axis=1)
     depth_after = np.linalg.norm(np.cross(vectors[after], base[joint + 1]), axis=1)
     quality = np.minimum(orientation.pairs.weight[before], orientation.pairs.weight[after])
-    return quality / (depth_before**2 + depth_after**2)
+    weight: Floats = quality / (depth_before**2 + depth_after**2)
+    return weight
 
 
-def _factors(
-    ratio: Floats, weight: Floats, joint: Numbers, joints: int, settings: Settings
-) -> tuple[Floats, Floats]:
+def _factors(ratio: Floats, weight: Floats, joint: Numbers, joints: int, settings: Settings) -> tuple[Floats, Floats]:
     """Weighted mean ratio of each joint and the relative spread of a single one."""
     del settings
     total = np.bincount(joint, weight, joints)
@@ -283,7 +285,7 @@ def _reject_ratios(ratio: Floats, weight: Floats, joint: Numbers, joints: int) -
         deviation = np.where(used, np.abs(ratio / factor[joint] - 1), 0.0)
         peak = np.zeros(joints)
         np.maximum.at(peak, joint, deviation)
-        bad = (deviation == peak[joint]) & (deviation > limit[joint]) & (count[joint] > 3)  # noqa: PLR2004
+        bad = (deviation == peak[joint]) & (deviation > limit[joint]) & (count[joint] > 3)
         if not bad.any():
             return used, limit
         rows = np.flatnonzero(bad)
@@ -341,7 +343,7 @@ def form(orientation: Orientation, settings: Settings, photos: Sequence[str]) ->
 
 def _refuse_vertical_base(directions: Floats, photos: Sequence[str]) -> None:
     steep = np.flatnonzero(np.hypot(directions[:, 0], directions[:, 1]) < STEEPEST_BASE)
-    for number in steep:
+    for number in steep.tolist():
         names = photos[number : number + 2]
         msg = f"the base from photo {names[0]} to {names[1]} is parallel to the viewing direction"
         raise GeometryError(msg, photos=names, code="vertical-base")

@@ -1,8 +1,9 @@
 """Strip polynomials: the deformation that a similarity leaves, taken out axis by axis.
 
-Every axis of the intermediate frame, X along the strip, gets its own polynomial in X and Y. How many terms the control can
-carry is decided by where it stands, not by how many points there are: a cubic needs four different stations along
-the strip. How many it should carry is decided by evidence: an F test of each step and errors at control points left out.
+Every axis of the intermediate frame, X along the strip, gets its own polynomial in X and Y. How many terms the control
+can carry is decided by where it stands, not by how many points there are: a cubic needs four different stations along
+the strip. How many it should carry is decided by evidence: an F test of each step and the errors at control points left
+out.
 
 Source: [001] eq. 150-151, the free term of 151 corrected to X - X'.
 """
@@ -36,11 +37,15 @@ LADDER = (
     (("1", "X", "Y"), 1, 2, 3),
 )
 DROP_ORDER = ("XY", "Y", "X^3", "X^2", "X")
-RANK_LIMIT = 0.02  # smallest over largest singular value of the scaled design; below it the control cannot tell the terms apart
-F_LEVEL = 0.10  # significance asked of a step to more terms
+RANK_LIMIT = (
+    0.02  # smallest over largest singular value of the scaled design; below it the control cannot tell the terms apart
+)
+SURE, LIKELY = 0.10, 0.40  # levels of the F test: enough by itself, and enough when left-out points get better too
+WORSE = 1.5  # left-out errors may not grow by more, however significant the step: such control only bends the strip
 PASSES = 4  # plan-only and height-only points take their missing coordinate from the fit itself
-FLOOR = 1e-3  # of a point's a-priori standard deviation: smaller residuals are rounding
-SIMILARITY_PARAMETERS = 7
+PLAN, HEIGHT = "plan", "height"
+GROUPS = ((PLAN, (0, 1)), (HEIGHT, (2,)))  # decided apart: control can be good in one and poor in the other
+SIMILARITY_PARAMETERS = {PLAN: 4, HEIGHT: 3}  # of the seven, those that each group determines
 
 
 @dataclass(frozen=True)
@@ -93,22 +98,24 @@ class AxisFit:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What speaks for a degree.
+    """What speaks for a degree, in plan or in height.
 
     Parameters
     ----------
+    group : str
+        ``"plan"`` (X and Y) or ``"height"``.
     degree : int
         0 for the similarity alone.
-    terms : tuple of int
-        Number of terms in X, Y and Z.
+    terms : int
+        Number of terms in each axis of the group.
     redundancy : int
-        Redundancy over all three axes.
-    rms : ndarray, shape (3,)
+        Redundancy over the axes of the group.
+    rms : float
         Root mean square of the residuals at control, metres.
-    left_out : ndarray, shape (3,)
+    left_out : float
         Root mean square at control points that did not take part in the fit, metres.
     left_out_by : str
-        ``"band"`` or ``"point"``: what was left out at a time; empty when nothing could be.
+        ``"band"`` or ``"point"``: what was left out at a time.
     f, p : float
         F ratio of the step from the degree compared with, and the probability of a larger one by chance; NaN without.
     against : int
@@ -117,11 +124,12 @@ class Evidence:
         Whether the step was taken.
     """
 
+    group: str
     degree: int
-    terms: tuple[int, int, int]
+    terms: int
     redundancy: int
-    rms: Floats
-    left_out: Floats
+    rms: float
+    left_out: float
     left_out_by: str
     f: float
     p: float
@@ -351,17 +359,13 @@ def _fit(problem: Problem, terms: Sequence[tuple[str, ...]], without: Numbers | 
     partial = not problem.targets.control.use.all()
     corrected = problem.xyz
     for _ in range(PASSES if partial else 1):
-        misclosure = problem.xyz - (problem.targets.of(corrected) if partial else _full_targets(problem))
+        misclosure = problem.xyz - problem.targets.of(corrected)
         fits = [_fit_axis(problem, misclosure[:, axis], weight[:, axis], terms[axis]) for axis in range(3)]
         corrected = problem.xyz + np.column_stack([_columns(problem.xyz, f.terms) @ f.coefficients for f in fits])
     return fits
 
 
-def _full_targets(problem: Problem) -> Floats:
-    return problem.targets.of(problem.xyz)
-
-
-def fit(problem: Problem, settings: Settings, precision: tuple[float, float]) -> Polynomial:
+def fit(problem: Problem, settings: Settings) -> Polynomial:
     """Fit the polynomial that the settings ask for, or the one that the evidence supports.
 
     Parameters
@@ -370,77 +374,95 @@ def fit(problem: Problem, settings: Settings, precision: tuple[float, float]) ->
         Control points after the similarity.
     settings : Settings
         Degree, or ``"auto"``.
-    precision : tuple of float
-        A-priori standard deviation of a strip point in plan and height, metres; residuals far below it are rounding.
 
     Returns
     -------
     Polynomial
         The correction; of degree 0, without terms, when the control carries none or the evidence supports none.
     """
-    forced = settings.degree != "auto"
-    highest = int(settings.degree) if forced else 3
     counts = problem.by_axis > 0
-    stations = (
-        count_stations(problem.xyz[counts[:, 0], 0], problem.spacing),
-        count_stations(problem.xyz[counts[:, 2], 0], problem.spacing),
-    )
-    candidates = _candidates(problem, highest, forced=forced)
-    floor = FLOOR * np.array([precision[0], precision[0], precision[1]])
-    chosen, evidence = _weigh(problem, candidates, floor, forced=forced)
-    terms = candidates[chosen]
-    fits = _fit(problem, terms)
-    x = problem.xyz[counts.any(axis=1), 0]
-    degree = max(_degree_of(t) for t in terms)
+    x = problem.xyz[:, 0]
+    stations = tuple(count_stations(x[counts[:, axis]], problem.spacing) for axis in (0, 2))
+    chosen: list[tuple[str, ...]] = []
+    evidence: list[Evidence] = []
+    for group, axes in GROUPS:
+        terms, weighed = _decide(problem, group, axes, settings.degree)
+        chosen += [terms] * len(axes)
+        evidence += weighed
+    fits = _fit(problem, chosen)
+    inside = x[counts.any(axis=1)]
     return Polynomial(
-        degree,
+        max(_degree_of(terms) for terms in chosen),
         (fits[0], fits[1], fits[2]),
-        evidence,
-        stations,
-        (float(x.min()), float(x.max())),
+        tuple(evidence),
+        (stations[0], stations[1]),
+        (float(inside.min()), float(inside.max())),
         settings.degree,
     )
 
 
-def _candidates(problem: Problem, highest: int, *, forced: bool) -> list[list[tuple[str, ...]]]:
-    """Terms of each axis for the similarity alone and every degree that adds something."""
-    counts = problem.by_axis > 0
-    found: list[list[tuple[str, ...]]] = [[(), (), ()]]
-    for degree in range(1, highest + 1):
-        terms = [choose_terms(problem.xyz[counts[:, axis]], degree, problem, forced=forced) for axis in range(3)]
+def _candidates(problem: Problem, axis: int, asked: str) -> list[tuple[str, ...]]:
+    """Terms for the similarity alone and for every degree that adds something, as far as the control carries them."""
+    forced = asked != "auto"
+    points = problem.xyz[problem.by_axis[:, axis] > 0]
+    found: list[tuple[str, ...]] = [()]
+    for degree in range(1, (int(asked) if forced else 3) + 1):
+        terms = choose_terms(points, degree, problem, forced=forced)
         if terms != found[-1]:
             found.append(terms)
     return found
 
 
-def _weigh(
-    problem: Problem, candidates: list[list[tuple[str, ...]]], floor: Floats, *, forced: bool
-) -> tuple[int, tuple[Evidence, ...]]:
-    """Go up the degrees: a step is taken when the F test asks for it and left-out points do not get worse."""
-    fits = [_fit(problem, terms) for terms in candidates]
-    left_out, by = _left_out_errors(problem, candidates, fits)
+def _decide(problem: Problem, group: str, axes: tuple[int, ...], asked: str) -> tuple[tuple[str, ...], list[Evidence]]:
+    """Go up the degrees of one group: each step must be asked for by its F test and not spoil left-out points."""
+    candidates = _candidates(problem, axes[0], asked)
+    forced = asked != "auto"
+    fits = [_fit(problem, [terms] * 3) for terms in candidates]
+    left_out, by = _left_out_errors(problem, candidates, fits, axes)
+    expected = _expected(problem)
     chosen, evidence = 0, []
     for number, terms in enumerate(candidates):
-        f, p = (float("nan"), float("nan")) if not number else _f_test(fits[chosen], fits[number], floor)
-        better = number > 0 and p < F_LEVEL and _relative_error(left_out[number], left_out[chosen], floor) <= 1.0
-        against = max(_degree_of(t) for t in candidates[chosen])
-        if better or (forced and number == len(candidates) - 1):
-            chosen = number
+        against = chosen
+        f, p = _f_test(fits[against], fits[number], expected) if number else (float("nan"), float("nan"))
+        taken = (
+            number == len(candidates) - 1
+            if forced
+            else number == 0 or _step_taken(p, left_out[number], left_out[against])
+        )
+        chosen = number if taken else chosen
+        of_group = [fits[number][axis] for axis in axes]
+        residuals = np.concatenate([a.residuals[_counted(problem, k)] for k, a in zip(axes, of_group, strict=True)])
         evidence.append(
             Evidence(
-                max(_degree_of(t) for t in terms),
-                (len(terms[0]), len(terms[1]), len(terms[2])),
-                _total_redundancy(fits[number]),
-                np.array([_rms(axis.residuals[_counted(problem, k)]) for k, axis in enumerate(fits[number])]),
-                left_out[number],
-                by,
-                f,
-                p,
-                against,
-                bool(better or number == 0 or (forced and number == len(candidates) - 1)),
+                group=group,
+                degree=_degree_of(terms),
+                terms=len(terms),
+                redundancy=_redundancy(of_group, SIMILARITY_PARAMETERS[group]),
+                rms=_rms(residuals),
+                left_out=left_out[number],
+                left_out_by=by,
+                f=f,
+                p=p,
+                against=_degree_of(candidates[against]),
+                accepted=bool(taken or number == 0),
             )
         )
-    return chosen, tuple(evidence)
+    return candidates[chosen], evidence
+
+
+def _step_taken(p: float, rich: float, simple: float) -> bool:
+    """Whether a step to more terms is taken: by its F test alone, or by a weaker one that left-out points confirm."""
+    ratio = rich / simple if simple > 0 and np.isfinite(rich) else WORSE
+    return (p < SURE and ratio < WORSE) or (p < LIKELY and ratio < 1.0)
+
+
+def _expected(problem: Problem) -> Floats:
+    """Give the standard deviation, by axis in metres, of a misclosure from the control and the point alone."""
+    weight = problem.by_axis
+    with np.errstate(divide="ignore", invalid="ignore"):
+        variance = np.where(weight > 0, 1 / weight, 0.0).sum(axis=0) / (weight > 0).sum(axis=0)
+    expected: Floats = np.sqrt(np.nan_to_num(variance))
+    return expected
 
 
 def _counted(problem: Problem, axis: int) -> NDArray[np.bool_]:
@@ -452,78 +474,70 @@ def _rms(values: Floats) -> float:
     return float(np.sqrt(np.mean(values**2))) if len(values) else float("nan")
 
 
-def _total_redundancy(fits: Sequence[AxisFit]) -> int:
-    if any(axis.terms for axis in fits):
-        return sum(axis.redundancy for axis in fits)
-    return sum(axis.redundancy for axis in fits) - SIMILARITY_PARAMETERS
+def _redundancy(fits: Sequence[AxisFit], similarity: int) -> int:
+    """Redundancy of a fit; without terms the similarity's own parameters count."""
+    total = sum(axis.redundancy for axis in fits)
+    return total if any(axis.terms for axis in fits) else total - similarity
 
 
-def _f_test(simple: Sequence[AxisFit], rich: Sequence[AxisFit], floor: Floats) -> tuple[float, float]:
-    """F ratio of the richer fit against the simpler over all axes, each in units of its own richer variance."""
-    gained = _total_redundancy(simple) - _total_redundancy(rich)
-    left = _total_redundancy(rich)
+def _f_test(simple: Sequence[AxisFit], rich: Sequence[AxisFit], expected: Floats) -> tuple[float, float]:
+    """F ratio of the richer fit against the simpler over all axes, each in units of its own richer variance.
+
+    A strip bends in plan and height together, so all axes testify to a step; whether plan or height takes it their
+    own left-out points say. The variance is never taken below what the control's own standard deviations say: with
+    few points a fit can look better than the control is.
+    """
+    similarity = sum(SIMILARITY_PARAMETERS.values())
+    gained = _redundancy(simple, similarity) - _redundancy(rich, similarity)
+    left = _redundancy(rich, similarity)
     if gained < 1 or left < 1 or any(axis.redundancy < 1 for axis in rich):
         return float("nan"), float("nan")
     explained = 0.0
-    for before, after, limit in zip(simple, rich, floor, strict=True):
-        variance = max(float((after.residuals**2).sum()) / after.redundancy, limit**2)
+    for before, after, limit in zip(simple, rich, expected, strict=True):
+        variance = max(float((after.residuals**2).sum()) / after.redundancy, float(limit) ** 2)
         explained += max(float((before.residuals**2).sum() - (after.residuals**2).sum()), 0.0) / variance
     f = explained / gained
     return f, f_p_value(f, gained, left)
 
 
-def _relative_error(rich: Floats, simple: Floats, floor: Floats) -> float:
-    """Left-out error of the richer fit over that of the simpler, mean over the axes; 1 when unknown."""
-    ratio = np.maximum(rich, floor) / np.maximum(simple, floor)
-    known = np.isfinite(ratio)
-    return float(np.sqrt(np.mean(ratio[known] ** 2))) if known.any() else 1.0
-
-
 def _left_out_errors(
-    problem: Problem, candidates: list[list[tuple[str, ...]]], fits: list[list[AxisFit]]
-) -> tuple[list[Floats], str]:
+    problem: Problem, candidates: list[tuple[str, ...]], fits: list[list[AxisFit]], axes: tuple[int, ...]
+) -> tuple[list[float], str]:
     """Errors at control that took no part: inner bands when every degree can do without one, else single points.
 
     An outer band is not left out: predicting it would be extrapolation, which no user of a polynomial should do.
     """
-    group = bands(problem.xyz[:, 0], problem.spacing)
-    inner = range(1, int(group.max()))
-    rest = [np.flatnonzero(group != band) for band in inner]
-    richest = candidates[-1]
-    if inner and all(_carried(problem, rows, richest) for rows in rest):
-        return [_by_bands(problem, terms, group, inner) for terms in candidates], "band"
-    return [_by_points(problem, axis_fits) for axis_fits in fits], "point"
+    counted = np.flatnonzero(_counted(problem, axes[0]))
+    group = bands(problem.xyz[counted, 0], problem.spacing)
+    inner = [counted[group == band] for band in range(1, int(group.max(initial=0)))]
+    if inner and all(_carried(problem, np.setdiff1d(counted, rows), candidates[-1]) for rows in inner):
+        return [_by_bands(problem, terms, inner, axes) for terms in candidates], "band"
+    return [_by_points(problem, all_axes, axes) for all_axes in fits], "point"
 
 
-def _carried(problem: Problem, rows: Numbers, terms: Sequence[tuple[str, ...]]) -> bool:
+def _carried(problem: Problem, rows: Numbers, terms: tuple[str, ...]) -> bool:
     """Whether some of the control still carries all terms."""
-    weight = problem.by_axis
-    for axis in range(3):
-        kept = rows[weight[rows, axis] > 0]
-        if choose_terms(problem.xyz[kept], _degree_of(terms[axis]), problem, forced=True) != terms[axis]:
-            return False
-    return True
+    return choose_terms(problem.xyz[rows], _degree_of(terms), problem, forced=True) == terms
 
 
-def _by_bands(problem: Problem, terms: Sequence[tuple[str, ...]], group: Numbers, inner: range) -> Floats:
-    errors: list[list[float]] = [[], [], []]
-    for band in inner:
-        rows = np.flatnonzero(group == band)
-        fits = _fit(problem, terms, rows)
-        misclosure = problem.xyz - _full_targets(problem)
-        for axis, result in enumerate(fits):
-            counted = rows[problem.by_axis[rows, axis] > 0]
-            predicted = misclosure[counted, axis] + _columns(problem.xyz[counted], result.terms) @ result.coefficients
-            errors[axis] += predicted.tolist()
-    return np.array([_rms(np.array(values)) for values in errors])
+def _by_bands(problem: Problem, terms: tuple[str, ...], inner: list[Numbers], axes: tuple[int, ...]) -> float:
+    misclosure = problem.xyz - problem.targets.of(problem.xyz)
+    errors: list[float] = []
+    for rows in inner:
+        fits = _fit(problem, [terms] * 3, rows)
+        for axis in axes:
+            predicted = misclosure[rows, axis] + _columns(problem.xyz[rows], terms) @ fits[axis].coefficients
+            errors += predicted.tolist()
+    return _rms(np.array(errors))
 
 
-def _by_points(problem: Problem, fits: Sequence[AxisFit]) -> Floats:
+def _by_points(problem: Problem, fits: Sequence[AxisFit], axes: tuple[int, ...]) -> float:
     """Leave-one-out errors in closed form: residual over one minus leverage."""
-    errors = []
-    for axis, result in enumerate(fits):
-        rows = _counted(problem, axis)
-        free = 1 - result.leverage[rows] if result.terms else np.full(rows.sum(), 1 - SIMILARITY_PARAMETERS / max(3 * rows.sum(), 8))
+    errors: list[Floats] = []
+    for axis in axes:
+        result, rows = fits[axis], _counted(problem, axis)
+        share = SIMILARITY_PARAMETERS[PLAN] / 2 if len(axes) > 1 else SIMILARITY_PARAMETERS[HEIGHT]
+        leverage = result.leverage[rows] if result.terms else np.full(rows.sum(), share / rows.sum())
         with np.errstate(divide="ignore", invalid="ignore"):
-            errors.append(_rms(np.where(free > 1e-6, result.residuals[rows] / free, np.inf)))  # noqa: PLR2004
-    return np.array(errors)
+            errors.append(np.where(leverage < 1 - 1e-6, result.residuals[rows] / (1 - leverage), np.inf))
+    return _rms(np.concatenate(errors))

@@ -10,7 +10,7 @@ Source: [001] for the elements; condition, derivatives, start values and retries
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -125,7 +125,8 @@ class Pairs:
         ndarray, shape (..., p)
             Sums by pair.
         """
-        return np.add.reduceat(values, self.starts, axis=-1)
+        total: Floats = np.add.reduceat(values, self.starts, axis=-1)
+        return total
 
 
 def rays(elements: Floats, pairs: Pairs) -> tuple[Floats, Floats]:
@@ -172,7 +173,8 @@ def parallaxes(elements: Floats, pairs: Pairs) -> Floats:
         y parallaxes in mm at photo scale.
     """
     left, right = rays(elements, pairs)
-    return -pairs.focal * (left[1] / left[2] - right[1] / right[2])
+    q: Floats = -pairs.focal * (left[1] / left[2] - right[1] / right[2])
+    return q
 
 
 def linearised(elements: Floats, pairs: Pairs) -> tuple[Floats, Floats]:
@@ -210,7 +212,7 @@ def linearised(elements: Floats, pairs: Pairs) -> tuple[Floats, Floats]:
 
 
 def normal_matrices(jacobian: Floats, pairs: Pairs) -> Floats:
-    """Normal matrices J^T W J of all pairs.
+    """Form the normal matrices J^T W J of all pairs.
 
     Parameters
     ----------
@@ -319,7 +321,8 @@ def in_front(elements: Floats, pairs: Pairs) -> NDArray[np.bool_]:
     (lx, _, lz), (rx, _, rz) = rays(elements, pairs)
     determinant = lx * rz - rx * lz
     with np.errstate(divide="ignore", invalid="ignore"):
-        return (rz / determinant > 0) & (lz / determinant > 0)
+        front: NDArray[np.bool_] = (rz / determinant > 0) & (lz / determinant > 0)
+    return front
 
 
 def solve(pairs: Pairs) -> tuple[Floats, NDArray[np.bool_], Numbers]:
@@ -352,7 +355,7 @@ def solve(pairs: Pairs) -> tuple[Floats, NDArray[np.bool_], Numbers]:
         elements, success, count = iterate(attempt, part)
         tried = _score(elements, success, part)
         share, squares = score[0][todo], score[1][todo]
-        better = (tried[0] > share + 1e-9) | ((tried[0] > share - 1e-9) & (tried[1] < squares))  # noqa: PLR2004
+        better = (tried[0] > share + 1e-9) | ((tried[0] > share - 1e-9) & (tried[1] < squares))
         chosen = todo[better]
         best[chosen], converged[chosen], steps[chosen] = elements[better], success[better], count[better]
         score[0][chosen], score[1][chosen] = tried[0][better], tried[1][better]
@@ -465,12 +468,7 @@ def collect_pairs(
     rows = np.column_stack([order[both], order[both + 1]])
     pair = position[both]
     counts = np.bincount(pair, minlength=len(photos) - 1)
-    for number in np.flatnonzero(counts < MINIMUM_POINTS):
-        msg = (
-            f"relative orientation of photos {photos[number]} and {photos[number + 1]}: {counts[number]} common points, "
-            f"at least {MINIMUM_POINTS} are necessary (12 are recommended); measure more points or correct the order of photos"
-        )
-        raise GeometryError(msg, photos=photos[number : number + 2], code="too-few-common-points")
+    _require_points(counts, photos)
     variance = (observations.sigma**2).mean(axis=1)
     sums = variance[rows].sum(axis=1)
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
@@ -483,6 +481,17 @@ def collect_pairs(
         focal,
     )
     return pairs, observations.point[rows[:, 0]], rows
+
+
+def _require_points(counts: Numbers, photos: Sequence[str]) -> None:
+    for number in np.flatnonzero(counts < MINIMUM_POINTS).tolist():
+        names = photos[number : number + 2]
+        msg = (
+            f"relative orientation of photos {names[0]} and {names[1]}: {counts[number]} common points, "
+            f"at least {MINIMUM_POINTS} are necessary (12 are recommended); measure more points or correct the order "
+            "of the photos"
+        )
+        raise GeometryError(msg, photos=names, code="too-few-common-points")
 
 
 def condition_numbers(jacobian: Floats, pairs: Pairs) -> Floats:
@@ -513,9 +522,7 @@ def condition_numbers(jacobian: Floats, pairs: Pairs) -> Floats:
     return np.where(sound & (values[:, 0] > 0), condition, np.inf)
 
 
-def assess(
-    elements: Floats, pairs: Pairs, point: Numbers, rows: Numbers, iterations: Numbers
-) -> Orientation:
+def assess(elements: Floats, pairs: Pairs, point: Numbers, rows: Numbers, iterations: Numbers) -> Orientation:
     """Everything said about oriented pairs: standard deviations, redundancy, condition.
 
     Parameters
@@ -609,13 +616,23 @@ def refine(orientation: Orientation, weight: Floats, todo: Numbers) -> Orientati
         again, _ = part.take(lost)
         solved[lost], _, steps[lost] = solve(again)
     fresh = assess(solved, part, orientation.point[rows], orientation.rows[rows], orientation.iterations[todo] + steps)
-    by_pair, by_row = ("elements", "sigmas", "sigma0", "condition", "iterations"), ("parallax", "redundancy")
-    changed: dict[str, Floats] = {}
-    for names, place in ((by_pair, todo), (by_row, rows)):
-        for name in names:
-            changed[name] = getattr(orientation, name).copy()
-            changed[name][place] = getattr(fresh, name)
-    return replace(orientation, pairs=pairs, **changed)
+    return replace(
+        orientation,
+        pairs=pairs,
+        elements=_put(orientation.elements, todo, fresh.elements),
+        sigmas=_put(orientation.sigmas, todo, fresh.sigmas),
+        sigma0=_put(orientation.sigma0, todo, fresh.sigma0),
+        condition=_put(orientation.condition, todo, fresh.condition),
+        iterations=_put(orientation.iterations, todo, fresh.iterations),
+        parallax=_put(orientation.parallax, rows, fresh.parallax),
+        redundancy=_put(orientation.redundancy, rows, fresh.redundancy),
+    )
+
+
+def _put(values: NDArray[Any], rows: Numbers, fresh: NDArray[Any]) -> NDArray[Any]:
+    result = values.copy()
+    result[rows] = fresh
+    return result
 
 
 def _refuse(result: Orientation, number: int, photos: Sequence[str], *, converged: bool) -> None:
@@ -627,26 +644,25 @@ def _refuse(result: Orientation, number: int, photos: Sequence[str], *, converge
     raise GeometryError(msg, photos=names, code=code)
 
 
-def _reason(
-    result: Orientation, number: int, of_pair: NDArray[np.bool_], *, converged: bool
-) -> tuple[str, str]:
+def _reason(result: Orientation, number: int, of_pair: NDArray[np.bool_], *, converged: bool) -> tuple[str, str]:
     xy = result.pairs.left[of_pair]
     spread = np.linalg.svd(xy - xy.mean(axis=0), compute_uv=False)
-    if spread[1] < 1e-3 * max(spread[0], 1e-9):  # noqa: PLR2004  a thousandth of the length: a line
+    if spread[1] < 1e-3 * max(spread[0], 1e-9):
         return (
             "all common points lie on one line of the photo; points in at least the corners of the overlap are needed",
             "points-on-a-line",
         )
     parallax = np.linalg.norm((result.pairs.left - result.pairs.right)[of_pair].mean(axis=0))
-    if parallax < 1e-3 * result.pairs.focal:  # noqa: PLR2004
+    if parallax < 1e-3 * result.pairs.focal:
         return (
             f"the x parallax is only {parallax:.3f} mm: the photos have no base; the same photo twice?",
             "no-base",
         )
     if converged and result.condition[number] > CONDITION_LIMIT:
+        condition = result.condition[number]
+        text = f"its elements cannot be separated (condition number {condition:.0e}): "
         return (
-            f"its elements cannot be separated (condition number {result.condition[number]:.0e}): the points form a narrow "
-            "band or lie with both cameras on a critical surface",
+            text + "the points form a narrow band or lie with both cameras on a critical surface",
             "degenerate-pair",
         )
     if not converged:

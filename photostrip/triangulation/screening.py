@@ -55,9 +55,7 @@ class Rejection:
     parallax: float
 
 
-def screen(
-    orientation: Orientation, settings: Settings, sigma: float
-) -> tuple[Orientation, tuple[Rejection, ...]]:
+def screen(orientation: Orientation, settings: Settings, sigma: float) -> tuple[Orientation, tuple[Rejection, ...]]:
     """Reject points with gross errors from all pairs and orient those pairs again.
 
     Parameters
@@ -115,7 +113,8 @@ def _without(orientation: Orientation, rows: NDArray[np.intp]) -> Orientation:
 
 def _stage(orientation: Orientation, test: str, bound: float) -> tuple[Orientation, list[Rejection]]:
     """Repeat one test, worst point first, until no pair has anything to reject."""
-    result, log = orientation, []
+    result = orientation
+    log: list[Rejection] = []
     while True:
         value, limit = _values(result, test, bound)
         value[~result.used] = -np.inf
@@ -157,8 +156,10 @@ def _tau(orientation: Orientation, alpha: float) -> tuple[Floats, Floats]:
     pairs = orientation.pairs
     count = orientation.points_used
     unknowns = relative.MINIMUM_POINTS
-    tested = (count - unknowns >= 3) & (orientation.sigma0 > NEGLIGIBLE)  # noqa: PLR2004  tau needs 3 redundant points
-    limits = np.array([tau_limit(int(n), unknowns, alpha) if ok else np.inf for n, ok in zip(count, tested, strict=True)])
+    tested = (count - unknowns >= 3) & (orientation.sigma0 > NEGLIGIBLE)
+    limits = np.array(
+        [tau_limit(int(n), unknowns, alpha) if ok else np.inf for n, ok in zip(count, tested, strict=True)]
+    )
     sigma = np.sqrt(2.0) * orientation.sigma0[pairs.pair]
     with np.errstate(divide="ignore", invalid="ignore"):
         value = np.abs(orientation.parallax) * np.sqrt(pairs.weight) / (sigma * np.sqrt(orientation.redundancy))
