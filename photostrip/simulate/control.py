@@ -210,4 +210,10 @@ def _frame_numbers(spec: Spec, xyz: Array, frames: list[GroundFrame]) -> Rows:
     if boundary is None:
         boundary = spec.ground.center_deg[0]
     east = np.degrees(frames[0].geodetic(xyz)[:, 0]) - boundary
-    return (((east + 180.0) % 360.0) >= 180.0).astype(np.intp)  # noqa: PLR2004  half a turn: the short way round
+    number = (((east + 180.0) % 360.0) >= 180.0).astype(np.intp)  # noqa: PLR2004  half a turn: the short way round
+    if number.min() == number.max():
+        where = "east" if number.any() else "west"
+        message = f"all given points lie {where} of the boundary at {boundary:g} degrees"
+        key = "control.boundary_longitude_deg"
+        raise InputError(Fault(message, code="simulation-boundary", key=key, fix="put it between them"))
+    return number
