@@ -6,7 +6,7 @@ What stands behind the three backticks says what a block is::
     console exit=2      the same for commands that must end with this code
     console no-run      shown, not run; the line above is a comment <!-- ... --> that says why
     python              a program of its own; it must run
-    yaml project        a project file; it must be valid
+    yaml project        a project file; it and the tables it names must be valid
     ANY file=NAME       the block is written to NAME in the scratch folder before it is treated further
     sh                  shown only: make, pip, git, which belong to a fresh clone
 
@@ -24,6 +24,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+from photostrip.errors import InputError
 from tests.source_tree import ROOT
 
 FENCE = "```"
@@ -182,7 +183,20 @@ def faults_of_page(page: Path, folder: Path) -> list[str]:
             outcome = scratch.run([sys.executable, str(scratch.write("block.py", block.lines))])
             if outcome.code:
                 found.append(f"{block.place}: {outcome.err}")
+        elif block.words[:2] == ("yaml", "project"):
+            found += _faults_of_project(block, scratch)
     return found
+
+
+def _faults_of_project(block: Block, scratch: Scratch) -> list[str]:
+    from photostrip.project.loading import load_project
+
+    path = scratch.write(block.option("file") or "block.yaml", block.lines)
+    try:
+        load_project(path)
+    except InputError as error:
+        return [f"{block.place}: {fault}" for fault in error.faults]
+    return []
 
 
 def _faults_of_step(block: Block, step: Step, scratch: Scratch) -> list[str]:

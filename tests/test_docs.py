@@ -136,6 +136,11 @@ error: no such command: 'rnu'; did you mean 'run'?; 'photostrip --help' lists wh
 ```python
 raise SystemExit("no")
 ```
+
+```yaml project file=bad.yaml
+photostrip: 1
+nmae: strip
+```
 """
 
 
@@ -147,7 +152,8 @@ def test_a_wrong_page_is_found(tmp_path: Path) -> None:
         ["page.md:4", "$ photostrip --version"],
         ["page.md:12", "$ cat notes.txt"],
     ]
-    assert found[2:] == ["page.md:34: no\n"]
+    assert found[2] == "page.md:34: no\n"
+    assert any("nmae" in fault for fault in found[3:])
 
 
 def test_renewing_a_page_mends_what_is_printed_and_keeps_the_rest(tmp_path: Path) -> None:
