@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 SINGULAR = 1e-9  # smallest over largest singular value: below, rounding decides
 ITERATIONS = 50
 CONVERGED = 1e-12  # in units of the spread of the points
+ROUNDING = 1e-14  # relative; a large shift of the target costs digits of the source
 LINEAR = [0, 1, 3]  # columns of x, y and 1
 
 
@@ -149,11 +150,13 @@ class PlaneInverse:
         found = PlaneTransform(_from_matrix(_inverse(self.inverse.coefficients[..., LINEAR])))(target)
         for _ in range(ITERATIONS):
             jacobian = self.inverse.jacobian(found)
-            if not (np.abs(np.linalg.det(jacobian)) > 0).all():
+            area = np.abs(np.linalg.det(jacobian))
+            if not (area > 0).all():
                 break
             step = np.linalg.solve(jacobian, self.inverse.residuals(found, target)[..., None])[..., 0]
             found = found - step
-            if (np.abs(step) <= CONVERGED * (1 + np.abs(found))).all():
+            rounding = ROUNDING * np.abs(target).max(initial=0.0) / np.sqrt(area[..., None])
+            if (np.abs(step) <= CONVERGED * (1 + np.abs(found)) + rounding).all():
                 return found
         raise GeometryError("the bilinear transformation has no inverse at some point", code="no-inverse")
 

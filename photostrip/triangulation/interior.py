@@ -320,7 +320,7 @@ def _remarks(part: InteriorOrientation, camera: Camera) -> list[Note]:
     if strong.any():
         worst = int(np.argmax(np.where(strong, affinity + np.abs(part.shear), 0)))
         text = f"{_photos(part, strong)}: the marks of camera {camera.name} need scales that differ by "
-        text += f"{100 * affinity[worst]:.1f} % and a shear of {np.degrees(part.shear[worst]):.2f} degrees (photo "
+        text += f"{100 * affinity[worst]:.1f} % and a shear of {abs(np.degrees(part.shear[worst])):.2f} degrees (photo "
         text += f"{part.photo_ids[worst]}): check the calibrated coordinates and the shape of the pixels"
         notes.append(_note("strong-affinity", text, part, strong))
     return notes
