@@ -1,0 +1,140 @@
+"""What is found while files are read: faults that stop the run, notes that do not."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from typing import TYPE_CHECKING
+
+from photostrip.errors import Fault, InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from photostrip.notes import Note
+
+LARGEST_LIST = 200  # faults kept of one file; a wrong export has one in every row
+IDS_NAMED = 8
+
+
+@dataclass
+class Findings:
+    """Faults of all files of a project, and notes about them.
+
+    Parameters
+    ----------
+    notes : list of Note
+        What the surveyor should know.
+    """
+
+    notes: list[Note] = field(default_factory=list)
+    _faults: list[Fault] = field(default_factory=list)
+    _count: Counter[str] = field(default_factory=Counter)
+
+    def add(self, *faults: Fault) -> None:
+        """Keep faults; of a file that has too many they are only counted."""
+        for fault in faults:
+            if not self.full(fault.file):
+                self._faults.append(fault)
+            self._count[fault.file] += 1
+
+    def full(self, file: str) -> bool:
+        """Whether further faults of a file are only counted, so that their texts need not be made."""
+        return self._count[file] >= LARGEST_LIST
+
+    def number(self, file: str) -> int:
+        """Give the number of faults of a file so far."""
+        return self._count[file]
+
+    def count(self, file: str, number: int) -> None:
+        """Count faults of a full file without making them."""
+        self._count[file] += number
+
+    def absorb(self, other: Findings, told: Callable[[Fault], Fault]) -> None:
+        """Take over the faults of another collection.
+
+        Parameters
+        ----------
+        other : Findings
+            Faults of one file.
+        told : callable
+            Gives each fault the place where it is told.
+        """
+        kept = Counter(fault.file for fault in other._faults)
+        self.add(*map(told, other._faults))
+        for file, number in other._count.items():
+            self._count[file] += number - kept[file]
+
+    def extend(self, error: InputError) -> None:
+        """Keep the faults of an error."""
+        self.add(*error.faults)
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """All faults, file by file in the order the files were met, each by line; what was only counted comes last."""
+        order = {file: number for number, file in enumerate(self._count)}
+        found = sorted(self._faults, key=lambda fault: (order[fault.file], fault.line, fault.column))
+        rest = [
+            Fault(f"and {count - LARGEST_LIST} more faults in this file", code="more", file=file)
+            for file, count in self._count.items()
+            if count > LARGEST_LIST
+        ]
+        return (*found, *rest)
+
+    def stop(self) -> None:
+        """Raise one error for all faults, if there are any.
+
+        Raises
+        ------
+        InputError
+            With every fault.
+        """
+        if self._count:
+            raise InputError(self.faults)
+
+
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """Ask whether a similar known name was meant.
+
+    Parameters
+    ----------
+    name : str
+        What the user wrote.
+    known : iterable of str
+        Names that exist.
+
+    Returns
+    -------
+    str
+        ``did you mean `...`?``, empty when nothing is similar.
+    """
+    names = list(known)
+    folded = {each.casefold(): each for each in reversed(names)}
+    close = get_close_matches(name.casefold(), list(folded), n=1, cutoff=0.65)
+    return f"did you mean `{folded[close[0]]}`?" if close else ""
+
+
+def listed(ids: Iterable[str], limit: int = IDS_NAMED) -> str:
+    """Name some ids and count the rest.
+
+    Parameters
+    ----------
+    ids : iterable of str
+        Ids of photos or points.
+    limit : int
+        How many are named.
+
+    Returns
+    -------
+    str
+        For example ``A1, A2 and 7 more``.
+    """
+    names = list(ids)
+    head = ", ".join(names[:limit])
+    return head if len(names) <= limit else f"{head} and {len(names) - limit} more"
+
+
+def counted(number: int, one: str, many: str = "") -> str:
+    """Give a number with its noun: ``1 row``, ``2 rows``."""
+    return f"{number} {one if number == 1 else many or one + 's'}"

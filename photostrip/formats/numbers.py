@@ -1,0 +1,101 @@
+"""Numbers as users write them: what counts as one, and in words what is wrong with a text that does not."""
+
+from __future__ import annotations
+
+import math
+import re
+import unicodedata
+
+NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_DECIMAL_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+")
+_GROUPED = re.compile(r"[+-]?[0-9]{1,3}(?:[ '’_\u00a0\u202f][0-9]{3})+(?:\.[0-9]*)?")
+_WITH_UNIT = re.compile(rf"({NUMBER.pattern})\s*([^\W\d_]+|%|°)")
+_SEXAGESIMAL = re.compile(r"[+-]?[0-9]+[°: ][0-9]+(?:['′: ].*)?")
+_NOT_FINITE = {"nan", "inf", "infinity"}
+_MINUS_SIGNS = str.maketrans("−–—", "---")
+
+
+class NotANumber(ValueError):  # noqa: N818 (the name of what it says)
+    """A text that is not a number.
+
+    Parameters
+    ----------
+    message : str
+        What it is instead.
+    fix : str
+        What would make it one.
+    """
+
+    def __init__(self, message: str, fix: str = "") -> None:
+        super().__init__(message)
+        self.message, self.fix = message, fix
+
+
+def number(text: str) -> float:
+    """Read a decimal number.
+
+    Parameters
+    ----------
+    text : str
+        What the user wrote; blanks around it do not count.
+
+    Returns
+    -------
+    float
+        A finite number.
+
+    Raises
+    ------
+    NotANumber
+        For anything else, also for ``nan``, ``1_000``, decimal commas and full-width digits.
+    """
+    word = text.strip()
+    if NUMBER.fullmatch(word):
+        value = float(word)
+        if math.isfinite(value):
+            return value
+        raise NotANumber(f"`{shown(word)}` is too large")
+    raise _reason(word)
+
+
+def _reason(word: str) -> NotANumber:
+    """Say what a word is that is no number."""
+    plain = unicodedata.normalize("NFKC", word).translate(_MINUS_SIGNS)
+    unit = _WITH_UNIT.fullmatch(word)
+    what, fix = "is not a number", ""
+    if not word:
+        return NotANumber("no value is given")
+    if word.lstrip("+-").casefold() in _NOT_FINITE:
+        what = "is not a measured value"
+    elif _GROUPED.fullmatch(word):
+        what, fix = "has digits in groups", "write the digits without separators"
+    elif _DECIMAL_COMMA.fullmatch(word):
+        what, fix = "has a decimal comma", f"write {word.replace(',', '.')}"
+    elif plain != word and NUMBER.fullmatch(plain):
+        what, fix = "is not written with ASCII characters", f"write {plain}"
+    elif _SEXAGESIMAL.fullmatch(word):
+        what, fix = "is not one number", "write decimal degrees"
+    elif unit:
+        what, fix = "has a unit in it", f"write the number alone: {unit[1]}"
+    return NotANumber(f"`{shown(word)}` {what}", fix)
+
+
+def shown(text: str, limit: int = 40) -> str:
+    """Give a text as it can stand in a message: on one line and not too long.
+
+    Parameters
+    ----------
+    text : str
+        What the user wrote.
+    limit : int
+        Most characters shown.
+
+    Returns
+    -------
+    str
+        The text, or its beginning; characters that do not print as their escapes.
+    """
+    visible = "".join(
+        c if c.isprintable() or unicodedata.category(c) == "Cf" else repr(c)[1:-1] for c in text[: limit + 1]
+    )
+    return visible if len(text) <= limit else f"{visible[:limit]}…"

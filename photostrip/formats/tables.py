@@ -1,0 +1,503 @@
+"""A CSV table with a header: its columns as arrays, its ids as numbers, and the place of every cell.
+
+Whole columns are converted at once. Only where that fails is a column read cell by cell, to say which cell it was;
+so a clean table costs next to nothing and a wrong one is explained.
+"""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import re
+import zlib
+from dataclasses import dataclass, field
+from functools import cached_property
+from io import BytesIO, StringIO
+from itertools import islice
+from operator import itemgetter
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import Fault, InputError
+from photostrip.formats.files import GZIP, MEGABYTE, decode, read_bytes, refuse
+from photostrip.formats.findings import Findings, counted, listed, suggestion
+from photostrip.formats.numbers import NotANumber, number, shown
+from photostrip.notes import Note
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+    Cells = tuple[str, ...]
+
+LARGEST_TABLE = 200 * MEGABYTE  # unpacked; a million points are 50 MB
+CHUNK = 16_384  # rows turned into columns at a time, so that a big table never stands in memory cell by cell
+CONTROL_CHARACTER = re.compile(r"[\x00-\x1f\x7f]")
+SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "vertical bars"}
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One column of a table as the format defines it.
+
+    Parameters
+    ----------
+    name : str
+        Its name in the header.
+    number : bool
+        Whether its cells are numbers; otherwise they are ids.
+    required : bool
+        Whether the table must have it.
+    filled : bool
+        Whether no cell may be empty.
+    positive : bool
+        Whether its numbers must be larger than 0.
+    words : tuple of str
+        The only values allowed, the first being that of an empty cell.
+    aliases : tuple of str
+        Other names for it.
+    """
+
+    name: str
+    number: bool = False
+    required: bool = True
+    filled: bool = True
+    positive: bool = False
+    words: tuple[str, ...] = ()
+    aliases: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """What a CSV file holds.
+
+    Parameters
+    ----------
+    file : str
+        Path as the user knows it.
+    lines : ndarray of int, shape (n,)
+        Line of each row, counted from 1.
+    numbers : dict of str to ndarray, shape (n,)
+        Columns of numbers; NaN where a cell is empty or wrong.
+    codes : dict of str to ndarray of int, shape (n,)
+        Columns of ids, as numbers that count in ``ids``.
+    ids : dict of str to tuple of str
+        The different ids of a column in order of first appearance.
+    """
+
+    file: str
+    lines: Numbers
+    numbers: dict[str, Floats]
+    codes: dict[str, Numbers]
+    ids: dict[str, tuple[str, ...]]
+    _source: _Source = field(repr=False)
+
+    def __len__(self) -> int:
+        """Give the number of rows."""
+        return len(self.lines)
+
+    def column(self, name: str) -> Floats:
+        """Give a column of numbers; NaN in every row when the table has no such column."""
+        return self.numbers[name] if name in self.numbers else np.full(len(self), np.nan)
+
+    def cells(self, name: str) -> list[str]:
+        """Give a column of ids, or of words, row by row."""
+        ids = self.ids[name]
+        return [ids[code] for code in self.codes[name]]
+
+    def fault(self, row: int, column: str, message: str, code: str, *, expected: str = "", fix: str = "") -> Fault:
+        """Make a fault with the place of a cell.
+
+        Parameters
+        ----------
+        row : int
+            Number of the row in the table's arrays.
+        column : str
+            Name of the column.
+        message, code, expected, fix : str
+            As in :class:`photostrip.errors.Fault`.
+
+        Returns
+        -------
+        Fault
+            With file, line and column.
+        """
+        return self._source.fault(int(self.lines[row]), column, message, code, expected=expected, fix=fix)
+
+
+@dataclass(eq=False)
+class _Source:
+    """The text of a table and where its columns stand: what positions are made from."""
+
+    file: str
+    text: str
+    where: dict[str, int] = field(default_factory=dict)  # column name -> number of the field in a row
+    header: dict[str, str] = field(default_factory=dict)  # column name -> name in the header
+
+    @cached_property
+    def _lines(self) -> list[str]:
+        return StringIO(self.text, newline="").readlines()
+
+    def fault(self, line: int, column: str, message: str, code: str, *, expected: str = "", fix: str = "") -> Fault:
+        position = self._position(line, self.where[column]) if column in self.where else 0
+        name = self.header.get(column, column)
+        return Fault(message, code, self.file, line, position, name, expected, fix)
+
+    def _position(self, line: int, wanted: int) -> int:
+        """Character, counted from 1, at which a field of a line begins; 0 when the line has not so many."""
+        text = self._lines[line - 1]
+        start, quoted, number_of_field = 0, False, 0
+        for position, character in enumerate(text):
+            if number_of_field == wanted:
+                break
+            if character == '"':
+                quoted = not quoted
+            elif character == "," and not quoted:
+                number_of_field, start = number_of_field + 1, position + 1
+        if number_of_field != wanted:
+            return 0
+        blanks = len(text[start:]) - len(text[start:].lstrip(" \t"))
+        return start + blanks + 1
+
+
+def read_table(file: str, layout: Sequence[Column], findings: Findings) -> Table | None:
+    """Read a table.
+
+    Parameters
+    ----------
+    file : str
+        Path of a ``.csv`` or ``.csv.gz`` file.
+    layout : sequence of Column
+        Columns the format knows.
+    findings : Findings
+        Where faults and notes go.
+
+    Returns
+    -------
+    Table or None
+        What could be read; None when not even the header could.
+    """
+    try:
+        text, marked = _text(file)
+    except InputError as error:
+        findings.extend(error)
+        return None
+    if marked:
+        findings.notes.append(Note("byte-order-mark", f"{file} begins with a byte order mark; it was skipped", "note"))
+    return _Reader(_Source(file, text), layout, findings).read()
+
+
+def _text(file: str) -> tuple[str, bool]:
+    """Read and unpack a file."""
+    data = read_bytes(file, LARGEST_TABLE)
+    packed = file.casefold().endswith(".gz")
+    if packed != data.startswith(GZIP):
+        what = "is compressed (gzip), but its name does not say so" if not packed else "is not compressed (gzip)"
+        refuse(file, "gzip", what, fix="name it .csv.gz" if not packed else "name it .csv")
+    return decode(file, _unpack(file, data) if packed else data)
+
+
+def _unpack(file: str, data: bytes) -> bytes:
+    try:
+        with gzip.GzipFile(fileobj=BytesIO(data)) as stream:
+            unpacked = stream.read(LARGEST_TABLE + 1)
+    except (EOFError, zlib.error, gzip.BadGzipFile) as error:
+        how = "ends too early" if isinstance(error, EOFError) else "is damaged"
+        refuse(file, "gzip", f"the compressed file {how}", fix="copy or pack it again")
+    if len(unpacked) > LARGEST_TABLE:
+        refuse(file, "file-size", f"unpacks to more than {LARGEST_TABLE // MEGABYTE} MB", expected="a table")
+    if not unpacked:
+        refuse(file, "file-empty", "is empty")
+    return unpacked
+
+
+class _Codes(dict[str, int]):
+    """Numbers for ids, given out in order of first appearance."""
+
+    def __missing__(self, key: str) -> int:
+        self[key] = code = len(self)
+        return code
+
+
+class _Reader:
+    """One pass over one table."""
+
+    def __init__(self, source: _Source, layout: Sequence[Column], findings: Findings) -> None:
+        self.source, self.layout, self.findings = source, layout, findings
+        self.rows = csv.reader(StringIO(source.text, newline=""), strict=True, skipinitialspace=True)
+        self.width = 0
+        self.columns: list[Column] = []
+        self.lines: list[Numbers] = []
+        self.numbers: dict[str, list[Floats]] = {}
+        self.codes: dict[str, list[Numbers]] = {}
+        self.index: dict[str, _Codes] = {}
+
+    def read(self) -> Table | None:
+        if not self._header():
+            return None
+        for rows, lines in self._chunks():
+            self._take(rows, lines)
+        places = np.concatenate([np.zeros(0, np.intp), *self.lines])
+        if not len(places) and not self.findings.full(self.source.file):
+            fault = Fault("has a header but no rows", code="no-rows", file=self.source.file, line=1)
+            self.findings.add(fault)
+        numbers = {name: np.concatenate([np.zeros(0), *parts]) for name, parts in self.numbers.items()}
+        codes, ids = {}, {}
+        for column in self.columns:
+            if not column.number:
+                parts = [np.zeros(0, np.intp), *self.codes[column.name]]
+                codes[column.name], ids[column.name] = self._clean(column, np.concatenate(parts), places)
+        return Table(self.source.file, places, numbers, codes, ids, self.source)
+
+    def _add(self, line: int, column: str, message: str, code: str, *, expected: str = "", fix: str = "") -> None:
+        if self.findings.full(self.source.file):
+            self.findings.count(self.source.file, 1)
+        else:
+            self.findings.add(self.source.fault(line, column, message, code, expected=expected, fix=fix))
+
+    # ---------------------------------------------------------------------------------------- the header
+
+    def _header(self) -> bool:
+        """Read the header; False when the table cannot be read without it."""
+        try:
+            cells = next((row for row in self.rows if any(map(str.strip, row))), [])
+        except csv.Error as error:
+            self._unreadable(error, 1)
+            return False
+        line = self.rows.line_num
+        names = [cell.strip() for cell in cells]
+        while names and not names[-1]:
+            names.pop()
+        self.width = len(names)
+        before = self.findings.number(self.source.file)
+        if self._looks_like_a_header(names, line):
+            self._assign(names, line)
+        return self.findings.number(self.source.file) == before
+
+    def _looks_like_a_header(self, names: list[str], line: int) -> bool:
+        """Refuse a first line that is not a header, and say what it is instead."""
+        wanted = ",".join(column.name for column in self.layout if column.required)
+        if not names:
+            self._add(1, "", "has no header and no rows", "no-header", expected=f"a header `{wanted}`")
+            return False
+        other = next((mark for mark in SEPARATORS if mark in names[0]), "") if len(names) <= 2 else ""
+        if other:
+            message = f"fields are separated by {SEPARATORS[other]}"
+            fix = "save as CSV with commas between the fields and points in the numbers"
+            self._add(line, "", message, "separator", expected="commas", fix=fix)
+            return False
+        known = {alias for column in self.layout for alias in (column.name, *column.aliases)}
+        if not {name.casefold() for name in names} & known:
+            message = f"the first line `{shown(','.join(names))}` is not a header"
+            self._add(line, "", message, "no-header", expected=f"column names such as `{wanted}`")
+            return False
+        return True
+
+    def _assign(self, names: list[str], line: int) -> None:
+        """Find the columns of the format among the names of the header."""
+        unused = dict(enumerate(names))
+        for column in self.layout:
+            accepted = (column.name, *column.aliases)
+            places = [place for place, name in unused.items() if name.casefold() in accepted]
+            if places:
+                self.columns.append(column)
+                self.source.where[column.name] = places[0]
+                self.source.header[column.name] = names[places[0]]
+            for place in places:
+                del unused[place]
+            for place in places[1:]:
+                message = f"column `{names[place]}` stands twice in the header (fields {places[0] + 1} and {place + 1})"
+                self._add(line, column.name, message, "duplicate-column", fix="remove or rename one")
+        self._missing(unused, line)
+        self._extra(unused, line)
+        for column in self.columns:
+            if column.number:
+                self.numbers[column.name] = []
+            else:
+                self.codes[column.name], self.index[column.name] = [], _Codes()
+
+    def _missing(self, unused: dict[int, str], line: int) -> None:
+        for column in self.layout:
+            if column.required and column not in self.columns:
+                expected = ",".join(each.name for each in self.layout if each.required)
+                message = f"there is no column `{column.name}`"
+                near = suggestion(column.name, unused.values()) if len(column.name) > 1 else ""
+                fix = near or f"found: {', '.join(shown(name) or '(no name)' for name in self._names(unused))}"
+                self._add(line, column.name, message, "missing-column", expected=f"a header `{expected}`", fix=fix)
+
+    def _names(self, unused: dict[int, str]) -> list[str]:
+        found = {self.source.where[column.name]: self.source.header[column.name] for column in self.columns}
+        return [name for _, name in sorted((found | unused).items())]
+
+    def _extra(self, unused: dict[int, str], line: int) -> None:
+        """Refuse columns that look like a slip of the pen, and name the others that are not used."""
+        free = [column.name for column in self.layout if column not in self.columns and not column.required]
+        others = []
+        for place, name in unused.items():
+            near = suggestion(name, [each for each in free if len(each) > 2])
+            loose = re.sub(r"[\W_]", "", name.casefold())
+            twin = next((each for each in free if each == loose), "")
+            if near or twin:
+                self.source.where[name] = place
+                fix = near or f"did you mean `{twin}`?"
+                self._add(line, name, f"column `{shown(name)}` is not known", "unknown-column", fix=fix)
+            else:
+                others.append(shown(name) or "(no name)")
+        if others:
+            used = ", ".join(column.name for column in self.columns)
+            message = f"{self.source.file}: {counted(len(others), 'column')} not used: {listed(others)}; used: {used}"
+            self.findings.notes.append(Note("unused-column", message, "note"))
+
+    # ------------------------------------------------------------------------------------------ the rows
+
+    def _chunks(self) -> Iterator[tuple[list[list[str]], list[int]]]:
+        """Give rows with their line numbers, some thousands at a time."""
+        last = self.rows.line_num
+        while True:
+            rows, lines = [], []
+            try:
+                for row in islice(self.rows, CHUNK):
+                    rows.append(row)
+                    lines.append(last + 1)
+                    last = self.rows.line_num
+            except csv.Error as error:
+                yield rows, lines
+                self._unreadable(error, last + 1)
+                return
+            if not rows:
+                return
+            yield rows, lines
+
+    def _unreadable(self, error: csv.Error, line: int) -> None:
+        fix = ""
+        if any(word in str(error) for word in ("unexpected end", "field limit")):
+            message, fix = "a quotation mark is opened and never closed", 'close it, or write `""` for one in a field'
+        elif "expected after" in str(error):
+            message, fix = "something stands between a closing quotation mark and the comma", "remove it"
+        else:
+            message = f"cannot be read as CSV ({error})"
+        self._add(line, "", message, "csv", fix=fix)
+
+    def _take(self, rows: list[list[str]], lines: list[int]) -> None:
+        """Turn a chunk of rows into columns."""
+        if set(map(len, rows)) - {self.width}:
+            rows, lines = self._even(rows, lines)
+        if not rows:
+            return
+        numbered = [column for column in self.columns if column.number]
+        fields = {column: tuple(map(itemgetter(self.source.where[column.name]), rows)) for column in self.columns}
+        values = {column: _fast_floats(fields[column]) for column in numbered}
+        if any(each is None for each in values.values()):
+            kept = [row for row, cells in enumerate(rows) if any(map(str.strip, cells))]
+            if len(kept) < len(rows):  # rows of empty cells, as spreadsheets leave them behind
+                self._take([rows[row] for row in kept], [lines[row] for row in kept])
+                return
+        for column in self.columns:
+            name, cells = column.name, fields[column]
+            if column.number:
+                fast = values[column]
+                self.numbers[name].append(self._floats(column, cells, lines) if fast is None else fast)
+                if column.positive:
+                    self._positive(column, lines)
+            else:
+                codes = map(self.index[name].__getitem__, cells)
+                self.codes[name].append(np.fromiter(codes, np.intp, len(cells)))
+        self.lines.append(np.array(lines, np.intp))
+
+    def _even(self, rows: list[list[str]], lines: list[int]) -> tuple[list[list[str]], list[int]]:
+        """Drop blank rows and refuse rows with too few or too many fields."""
+        kept, places = [], []
+        for row, line in zip(rows, lines, strict=True):
+            extra = row[self.width :]
+            if not any(map(str.strip, row)):
+                continue
+            if len(row) < self.width or any(map(str.strip, extra)):
+                self._uneven(row, line)
+                continue
+            kept.append(row[: self.width])
+            places.append(line)
+        return kept, places
+
+    def _uneven(self, row: list[str], line: int) -> None:
+        message = f"the row has {counted(len(row), 'field')}, the header {self.width}"
+        fix = ""
+        if len(row) == 1 and any(mark in row[0] for mark in SEPARATORS):
+            fix = "separate the fields by commas"
+        elif len(row) > self.width:
+            fix = "write decimal points, not commas; put an id that has a comma between quotation marks"
+        self._add(line, "", message, "row-length", fix=fix)
+
+    def _floats(self, column: Column, cells: Cells, lines: list[int]) -> Floats:
+        """Convert cell by cell and refuse those that are no numbers."""
+        values = np.full(len(cells), np.nan)
+        for row, cell in enumerate(cells):
+            if not cell.strip() and not column.filled:
+                continue
+            try:
+                values[row] = number(cell)
+            except NotANumber as why:
+                self._add(lines[row], column.name, why.message, "number", expected="a number", fix=why.fix)
+        return values
+
+    def _positive(self, column: Column, lines: list[int]) -> None:
+        values = self.numbers[column.name][-1]
+        for row in np.flatnonzero(values <= 0):
+            message = f"{values[row]:g} cannot be a standard deviation"
+            self._add(lines[row], column.name, message, "range", expected="a number larger than 0")
+
+    def _clean(self, column: Column, codes: Numbers, lines: Numbers) -> tuple[Numbers, tuple[str, ...]]:
+        """Take blanks off ids and refuse ids that cannot be."""
+        written = list(self.index[column.name])
+        stripped = [name.strip() for name in written]
+        if column.words:
+            stripped = self._words(column, stripped, codes, lines)
+        elif stripped != written:
+            self._note_blanks(column, written, codes, lines)
+        index = _Codes()
+        renumbered = np.fromiter(map(index.__getitem__, stripped), np.intp, len(stripped))
+        for name, code in list(index.items()):
+            if column.words or (name and not CONTROL_CHARACTER.search(name)):
+                continue
+            what = (
+                f"the {column.name} has no id" if not name else f"the id `{shown(name)}` has a control character in it"
+            )
+            for row in np.flatnonzero(renumbered[codes] == code):
+                self._add(int(lines[row]), column.name, what, "id", expected="an id on one line")
+        return renumbered[codes], tuple(index)
+
+    def _words(self, column: Column, cells: list[str], codes: Numbers, lines: Numbers) -> list[str]:
+        """Read words of a fixed list, whatever their case; an empty cell is the first of them."""
+        words = [cell.casefold() or column.words[0] for cell in cells]
+        for code, word in enumerate(words):
+            if word in column.words:
+                continue
+            fix = suggestion(word, column.words)
+            for row in np.flatnonzero(codes == code):
+                message = f"`{shown(cells[code])}` is not known"
+                expected = f"one of {', '.join(column.words)}"
+                self._add(int(lines[row]), column.name, message, "word", expected=expected, fix=fix)
+        return words
+
+    def _note_blanks(self, column: Column, written: list[str], codes: Numbers, lines: Numbers) -> None:
+        padded = np.array([name != name.strip() for name in written])
+        rows = np.flatnonzero(padded[codes])
+        file, first = self.source.file, int(lines[rows[0]])
+        example = shown(written[codes[rows[0]]])
+        message = f"{file}: blanks around the id of a {column.name} taken off in {counted(len(rows), 'row')}"
+        self.findings.notes.append(Note("stray-blanks", f"{message} (first `{example}`, line {first})", "note"))
+
+
+def _fast_floats(cells: Cells) -> Floats | None:
+    """Convert a clean column at once; None when a cell needs a closer look."""
+    joined = "".join(cells)
+    if not joined.isascii() or "_" in joined:  # float() takes digits of every script, and 1_000
+        return None
+    try:
+        values = np.fromiter(map(float, cells), float, len(cells))
+    except ValueError:
+        return None
+    return values if np.isfinite(values).all() else None

@@ -1,0 +1,302 @@
+"""From what the project says to what the house works with: cameras, image coordinates, control, settings.
+
+Here the user's units, axes and directions end: inside there are millimetres with y up, and east, north, up.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip import camera
+from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec
+from photostrip.pipeline import Settings, Strip
+from photostrip.points import ControlPoints, PhotoPoints
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.formats.control import ControlTable
+    from photostrip.formats.observations import Measurements
+    from photostrip.project import schema
+
+    Floats = NDArray[np.float64]
+
+MICROMETRES = 1000.0  # in a millimetre
+
+
+@dataclass(frozen=True, slots=True)
+class ImageSystem:
+    """Unit, direction and origin of measured image coordinates.
+
+    Parameters
+    ----------
+    unit : str
+        ``mm``, ``um`` or ``px``.
+    y_axis : str
+        ``up`` or ``down``.
+    origin : str
+        ``center``, ``top-left`` or ``first-pixel``.
+    sigma : float or None
+        Standard deviation, in `unit`, of rows without one.
+    """
+
+    unit: str
+    y_axis: str
+    origin: str
+    sigma: float | None
+
+
+def cameras(project: schema.ProjectFile) -> dict[str, camera.Camera]:
+    """Give the cameras of a project.
+
+    Parameters
+    ----------
+    project : ProjectFile
+        The project.
+
+    Returns
+    -------
+    dict of str to Camera
+        By name.
+    """
+    return {name: _camera(name, each) for name, each in project.cameras.items()}
+
+
+def _camera(name: str, given: schema.Camera) -> camera.Camera:
+    distortion = None
+    if given.distortion is not None:
+        lens = given.distortion
+        distortion = camera.Distortion(
+            lens.model, lens.direction, lens.k, lens.p, tuple(lens.radius), tuple(lens.distortion)
+        )
+    return camera.Camera(
+        name,
+        given.principal_distance,
+        given.principal_point,
+        given.format,
+        dict(given.fiducials),
+        given.pixel_size,
+        distortion,
+    )
+
+
+def strips(project: schema.ProjectFile, known: Mapping[str, camera.Camera]) -> tuple[Strip, ...]:
+    """Give the strips of a project.
+
+    Parameters
+    ----------
+    project : ProjectFile
+        The project.
+    known : mapping of str to Camera
+        Its cameras.
+
+    Returns
+    -------
+    tuple of Strip
+        In the project's order.
+    """
+    return tuple(Strip(str(each.id), known[each.camera], tuple(map(str, each.photos))) for each in project.strips)
+
+
+def photo_points(read: Measurements, system: ImageSystem, photos: Mapping[str, camera.Camera]) -> PhotoPoints:
+    """Bring measured image coordinates into millimetres with y up.
+
+    Parameters
+    ----------
+    read : Measurements
+        The table.
+    system : ImageSystem
+        What its numbers mean.
+    photos : mapping of str to Camera
+        Camera of each photo of the strips; rows of other photos are left out.
+
+    Returns
+    -------
+    PhotoPoints
+        Image coordinates in mm, x to the right, y up; the origin is the middle of the photo, unless `system` has
+        its own.
+    """
+    wanted = np.array([name in photos for name in read.photo_ids], bool)
+    rows = np.flatnonzero(wanted[read.photo])
+    owners = [photos.get(name) for name in read.photo_ids]
+    scale = _per_photo([_millimetres(system.unit, each) for each in owners], read, rows)
+    sigma = read.sigma[rows]
+    if system.sigma is not None:
+        sigma = np.where(np.isnan(sigma), system.sigma, sigma)
+    xy = _scaled(read.xy[rows], scale)
+    if system.y_axis == "down":
+        xy[:, 1] = -xy[:, 1]
+    if system.origin != "center":
+        half = system.origin == "first-pixel"
+        xy += _per_photo([_corner(each, half_pixel=half) for each in owners], read, rows)
+    photo_ids, photo = _renumbered(read.photo_ids, read.photo[rows])
+    point_ids, point = _renumbered(read.target_ids, read.target[rows])
+    return PhotoPoints(photo_ids, point_ids, photo, point, xy, _scaled(sigma, scale))
+
+
+def _millimetres(unit: str, owner: camera.Camera | None) -> tuple[float, float]:
+    """Factor and divisor that make millimetres of a unit; a division keeps 12345 um exactly 12.345 mm."""
+    if unit == "px":
+        return (owner.pixel_size or np.nan) if owner is not None else np.nan, 1.0
+    return 1.0, MICROMETRES if unit == "um" else 1.0
+
+
+def _corner(owner: camera.Camera | None, *, half_pixel: bool) -> tuple[float, float]:
+    """Where x = y = 0 lies, in mm from the middle of the photo."""
+    if owner is None or owner.format is None:
+        return np.nan, np.nan
+    shift = (owner.pixel_size or np.nan) / 2 if half_pixel else 0.0
+    return -owner.format[0] / 2 + shift, owner.format[1] / 2 - shift
+
+
+def _per_photo(values: Sequence[tuple[float, float]], read: Measurements, rows: NDArray[np.intp]) -> Floats:
+    return np.array(values, float).reshape(-1, 2)[read.photo[rows]]
+
+
+def _scaled(values: Floats, scale: Floats) -> Floats:
+    return np.asarray(values * scale[:, :1] / scale[:, 1:])
+
+
+def _renumbered(ids: Sequence[str], codes: NDArray[np.intp]) -> tuple[tuple[str, ...], NDArray[np.intp]]:
+    """Give the ids that are left new numbers, in order of first appearance."""
+    kept, first, inverse = np.unique(codes, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.empty(len(kept), np.intp)
+    rank[order] = np.arange(len(kept))
+    return tuple(ids[code] for code in kept[order]), rank[inverse]
+
+
+# --------------------------------------------------------------------------------------------------- the ground
+
+
+def frame_spec(control: schema.Control) -> FrameSpec:
+    """Give the frame of a control list.
+
+    Parameters
+    ----------
+    control : Control
+        The list as the project describes it.
+
+    Returns
+    -------
+    FrameSpec
+        Its frame.
+    """
+    return FrameSpec(
+        str(control.crs),
+        control.axes or CARTESIAN_AXES,
+        control.height,
+        control.geoid_undulation,
+        _semi_axes(control.ellipsoid),
+    )
+
+
+def _semi_axes(given: schema.Ellipsoid | None) -> tuple[float, float] | None:
+    return None if given is None else (given.a, given.b)
+
+
+def output_spec(output: schema.Output, first: FrameSpec) -> FrameSpec | None:
+    """Give the frame of the results.
+
+    Parameters
+    ----------
+    output : Output
+        What the project says about it.
+    first : FrameSpec
+        Frame of the first control list, which stands in for what is not said.
+
+    Returns
+    -------
+    FrameSpec or None
+        None when nothing is said.
+    """
+    said = (output.crs, output.axes, output.height, output.geoid_undulation, output.ellipsoid)
+    if all(each is None for each in said):
+        return None
+    if output.crs is None:
+        spec = replace(first, axes=output.axes or first.axes)
+        if output.height is not None:
+            spec = replace(spec, height=output.height, geoid_undulation=None)
+        if output.geoid_undulation is not None:
+            spec = replace(spec, geoid_undulation=output.geoid_undulation)
+        return spec if output.ellipsoid is None else replace(spec, ellipsoid=_semi_axes(output.ellipsoid))
+    usual = CARTESIAN_AXES if output.crs == "geocentric" else GROUND_AXES
+    height, ellipsoid = output.height or "ellipsoidal", _semi_axes(output.ellipsoid)
+    return FrameSpec(str(output.crs), output.axes or usual, height, output.geoid_undulation, ellipsoid)
+
+
+def control_points(tables: Sequence[ControlTable], lists: Sequence[schema.Control]) -> ControlPoints:
+    """Put all control lists into one table, in the internal order of axes.
+
+    Parameters
+    ----------
+    tables : sequence of ControlTable
+        The tables.
+    lists : sequence of Control
+        What the project says about each of them.
+
+    Returns
+    -------
+    ControlPoints
+        All points that are used; ``frame`` counts in `lists`.
+    """
+    ids: list[str] = []
+    parts = []
+    for number, (read, given) in enumerate(zip(tables, lists, strict=True)):
+        rows = np.flatnonzero(read.used)
+        sigma = read.sigma[rows]
+        if given.sigma is not None:
+            sigma = np.where(np.isnan(sigma), given.sigma, sigma)
+        columns = _columns(frame_spec(given))
+        xyz, use = read.xyz[rows][:, columns], read.use[rows][:, columns]
+        parts.append((xyz, use, read.check[rows], sigma[:, columns], np.full(len(rows), number, np.intp)))
+        ids += [read.ids[row] for row in rows]
+    enu, use, check, sigma, frame = (np.concatenate(each) for each in zip(*parts, strict=True))
+    return ControlPoints(tuple(ids), enu, use, check, sigma, frame)
+
+
+def _columns(spec: FrameSpec) -> list[int]:
+    """Which of the columns x, y, z is east, which north, which up (or X, Y, Z)."""
+    names = CARTESIAN_AXES if "x" in spec.axes else GROUND_AXES
+    return [spec.axes.index(name) for name in names]
+
+
+# ------------------------------------------------------------------------------------------------- the settings
+
+
+def settings(project: schema.ProjectFile) -> Settings:
+    """Give what is to be done.
+
+    Parameters
+    ----------
+    project : ProjectFile
+        The project.
+
+    Returns
+    -------
+    pipeline.Settings
+        Settings of every operation; what the project does not say keeps the default that stands there.
+    """
+    wanted, usual = project.processing, Settings()
+    return Settings(
+        adjustment=wanted.adjustment,
+        relative=replace(usual.relative, **wanted.relative.model_dump()),
+        formation=replace(usual.formation, scale_transfer=wanted.scale_transfer),
+        absolute=replace(usual.absolute, earth_curvature=wanted.earth_curvature, earth_radius=wanted.earth_radius),
+        polynomial=replace(usual.polynomial, degree=wanted.polynomial.degree),
+        interior=replace(usual.interior, transform=wanted.interior.transform),
+        refinement=replace(
+            usual.refinement,
+            refraction=wanted.refraction,
+            flying_height=wanted.flying_height,
+            ground_height=wanted.ground_height,
+        ),
+        angle_system=project.output.angles.system,
+        angle_unit=project.output.angles.unit,
+        tolerances=project.tolerances.model_dump(exclude_none=True),
+    )

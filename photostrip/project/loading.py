@@ -1,0 +1,167 @@
+"""A project file and its tables, read and checked: plain inputs and settings for the pipeline.
+
+Everything that is wrong with any of the files is told in one go; see :class:`photostrip.errors.Fault`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from photostrip.errors import Fault, InputError
+from photostrip.formats.findings import Findings
+from photostrip.geodesy.crs import tie_frames
+from photostrip.pipeline import Inputs, Settings
+from photostrip.project import schema
+from photostrip.project.conversion import (
+    ImageSystem,
+    cameras,
+    control_points,
+    frame_spec,
+    output_spec,
+    photo_points,
+    settings,
+    strips,
+)
+from photostrip.project.document import Node, fault_at
+from photostrip.project.hints import hints
+from photostrip.project.merging import override, read_tree, steps
+from photostrip.project.references import check_references
+from photostrip.project.resolved import completed, text_of
+from photostrip.project.schema import json_schema
+from photostrip.project.tables import Tables, check_tables, read_tables
+from photostrip.project.validation import valid_section, validate
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from photostrip.camera import Camera
+    from photostrip.notes import Note
+    from photostrip.points import PhotoPoints
+
+__all__ = ["Project", "json_schema", "load_project"]
+
+
+@dataclass(frozen=True, eq=False)
+class Project:
+    """A project, ready to run.
+
+    Parameters
+    ----------
+    inputs : Inputs
+        What is given.
+    settings : Settings
+        What is to be done.
+    path : Path
+        The project file.
+    files : tuple of Path
+        Every file that was read, the project file first.
+    resolved : str
+        The project as YAML with all defaults filled in, without absolute paths.
+    hints : tuple of Note
+        What was passed over or not used, and why.
+    """
+
+    inputs: Inputs
+    settings: Settings
+    path: Path
+    files: tuple[Path, ...]
+    resolved: str
+    hints: tuple[Note, ...]
+
+    @property
+    def directory(self) -> Path:
+        """Folder of the project file."""
+        return self.path.parent
+
+
+def load_project(path: Path, overrides: Sequence[str] = ()) -> Project:
+    """Read a project and all its tables.
+
+    Parameters
+    ----------
+    path : Path
+        The project file.
+    overrides : sequence of str
+        Assignments ``key.path=value`` that replace values of the file.
+
+    Returns
+    -------
+    Project
+        The project.
+
+    Raises
+    ------
+    InputError
+        With every fault of every file.
+    """
+    findings, files, name = Findings(), list[str](), str(path)
+    root = read_tree(name, findings, files)
+    if root is None:
+        raise InputError(findings.faults)
+    root = override(root, overrides, findings)
+    project = validate(root, findings)
+    check_references(root, findings)
+    tables = read_tables(root, name, findings, files)
+    check_tables(root, tables, findings)
+    _check_frames(root, Path(name).parent, findings)
+    findings.stop()
+    if project is None:  # cannot be: validate() had a reason, and stop() told it
+        raise InputError(f"{name} is not a valid project")
+    project = completed(project, root, name)
+    inputs, notes = _inputs(project, tables)
+    read = tuple(map(Path, files))
+    return Project(inputs, settings(project), path, read, text_of(project), (*findings.notes, *notes))
+
+
+def _check_frames(root: Node, directory: Path, findings: Findings) -> None:
+    """Tie the ground frames together once, to find out whether that can be done."""
+    node = root.find("control")
+    lists = [valid_section(schema.Control, each) for each in (node.elements if node is not None else [])]
+    output = valid_section(schema.Output, root.find("output"))
+    specs = [frame_spec(each) for each in lists if each is not None]
+    if not specs or len(specs) != len(lists) or output is None:
+        return  # the schema has told what is wrong with them
+    try:
+        tie_frames(specs, output_spec(output, specs[0]), directory=directory)
+    except InputError as error:
+        findings.add(*(_placed(root, fault) for fault in error.faults))
+
+
+def _placed(root: Node, fault: Fault) -> Fault:
+    """Give a fault that only knows its key a place in a file."""
+    return fault_at(root, steps(fault.key), fault.message, fault.code, expected=fault.expected, fix=fault.fix)
+
+
+def _inputs(project: schema.ProjectFile, tables: Tables) -> tuple[Inputs, list[Note]]:
+    """Turn a project without faults into what the pipeline takes."""
+    known = cameras(project)
+    photos = {str(photo): known[strip.camera] for strip in project.strips for photo in strip.photos}
+    control = [read for read in tables.control if read is not None]
+    if tables.observations is None or len(control) != len(project.control):
+        raise InputError("a table of the project is missing")
+    frames = tuple(frame_spec(each) for each in project.control)
+    given = project.observations
+    system = ImageSystem(given.unit, given.y_axis or "up", given.origin or "center", given.sigma)
+    output = output_spec(project.output, frames[0])
+    inputs = Inputs(
+        name=str(project.name),
+        strips=strips(project, known),
+        observations=photo_points(tables.observations, system, photos),
+        control=control_points(control, project.control),
+        frames=frames,
+        output=None if output == frames[0] else output,
+        fiducials=_fiducials(project, tables, photos),
+    )
+    return inputs, list(hints(project, tables.observations, tables.fiducials, control))
+
+
+def _fiducials(project: schema.ProjectFile, tables: Tables, photos: dict[str, Camera]) -> PhotoPoints | None:
+    """Measured fiducial marks of the photos of the strips."""
+    given = project.fiducial_measurements
+    if given is None or tables.fiducials is None:
+        return None
+    unit = given.unit or project.observations.unit
+    system = ImageSystem(unit, given.y_axis or "up", "center", given.sigma)
+    return photo_points(tables.fiducials, system, photos)

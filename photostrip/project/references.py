@@ -1,0 +1,157 @@
+"""What the schema cannot see: values of the project file that must fit to each other.
+
+All checks look at the tree, not at the validated project, so that they also run when something else is at fault.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from photostrip.formats.findings import suggestion
+from photostrip.formats.numbers import shown
+from photostrip.project.document import fault_at
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from photostrip.formats.findings import Findings
+    from photostrip.project.document import Node
+
+    Path = tuple[str | int, ...]
+
+LEAST_MARKS = 2
+
+
+@dataclass(frozen=True, slots=True)
+class ListedPhoto:
+    """One photo of one strip: its id, where it stands, and the camera of its strip."""
+
+    id: str
+    path: Path
+    camera: str
+
+
+def listed_photos(root: Node) -> Iterator[ListedPhoto]:
+    """Give every photo of every strip.
+
+    Parameters
+    ----------
+    root : Node
+        The project.
+
+    Yields
+    ------
+    ListedPhoto
+        Photos in the order of the file.
+    """
+    strips = root.find("strips")
+    for i, strip in enumerate(strips.elements if strips is not None else []):
+        photos = strip.find("photos")
+        for j, photo in enumerate(photos.elements if photos is not None else []):
+            if photo.text:
+                yield ListedPhoto(photo.text, ("strips", i, "photos", j), strip.word("camera"))
+
+
+def check_references(root: Node, findings: Findings) -> None:
+    """Check what refers to something else in the project file.
+
+    Parameters
+    ----------
+    root : Node
+        The project.
+    findings : Findings
+        Where faults go.
+    """
+    _strips(root, findings)
+    _photos(root, findings)
+    _cameras(root, findings)
+    _system_of_coordinates(root, findings)
+    _curvature(root, findings)
+
+
+def _strips(root: Node, findings: Findings) -> None:
+    """Refuse strips of the same name and cameras that do not exist."""
+    strips, cameras = root.find("strips"), root.find("cameras")
+    known = list(cameras.entries) if cameras is not None else []
+    first: dict[str, int] = {}
+    for number, strip in enumerate(strips.elements if strips is not None else []):
+        name, camera = strip.word("id"), strip.word("camera")
+        if name and first.setdefault(name, number) != number:
+            line = root.place_of(("strips", first[name], "id")).line
+            message = f"strip {shown(name)} exists already" + (f", in line {line}" if line else "")
+            findings.add(fault_at(root, ("strips", number, "id"), message, "duplicate-strip", fix="give it another id"))
+        if camera and known and camera not in known:
+            message = f"there is no camera `{shown(camera)}`"
+            expected, fix = f"one of {', '.join(known)}", suggestion(camera, known)
+            path = ("strips", number, "camera")
+            findings.add(fault_at(root, path, message, "unknown-camera", expected=expected, fix=fix))
+
+
+def _photos(root: Node, findings: Findings) -> None:
+    """Refuse a photo that is listed twice, in one strip or in two."""
+    first: dict[str, Path] = {}
+    for photo in listed_photos(root):
+        before = first.setdefault(photo.id, photo.path)
+        if before == photo.path:
+            continue
+        strip = root.word("strips", before[1], "id") or str(before[1])
+        place = root.place_of(before)
+        where = f"{place.file}:{place.line}:{place.column}" if place.line else place.file
+        message = f"photo {shown(photo.id)} is listed already, in strip {shown(strip)} ({where})"
+        findings.add(fault_at(root, photo.path, message, "duplicate-photo", fix="list every photo once"))
+
+
+def _cameras(root: Node, findings: Findings) -> None:
+    """Ask cameras for what their photos need: marks to orient by, the size of a pixel."""
+    cameras, strips = root.find("cameras"), root.find("strips")
+    used = dict.fromkeys(strip.word("camera") for strip in (strips.elements if strips is not None else []))
+    pixels = "px" in {root.word("observations", "unit"), root.word("fiducial_measurements", "unit")}
+    marked = root.has("fiducial_measurements")
+    origin = root.word("observations", "origin") or ("top-left" if root.word("observations", "unit") == "px" else "")
+    cornered = origin in {"top-left", "first-pixel"} and not marked
+    for name, camera in (cameras.entries if cameras is not None else {}).items():
+        path = ("cameras", name)
+        marks = camera.find("fiducials")
+        if marks is not None and len(marks.entries) == 1:
+            message = "one mark alone does not orient a photo"
+            findings.add(fault_at(root, (*path, "fiducials"), message, "length", expected="at least 2 marks"))
+        if name not in used or not isinstance(camera.value, dict):
+            continue
+        if marked and marks is None:
+            message = f"fiducial marks are measured, but camera {shown(name)} has none"
+            fix = "give their calibrated coordinates, or remove fiducial_measurements"
+            findings.add(fault_at(root, (*path, "fiducials"), message, "missing-key", fix=fix))
+        if (pixels or origin == "first-pixel") and "pixel_size" not in camera.entries:
+            message = f"coordinates are measured in pixels, but camera {shown(name)} has no pixel_size"
+            expected = "the size of a pixel in mm"
+            findings.add(fault_at(root, (*path, "pixel_size"), message, "missing-key", expected=expected))
+        if cornered and "format" not in camera.entries:
+            message = f"x and y begin at the {origin.replace('-', ' ')}, but camera {shown(name)} has no format"
+            expected = "width and height in mm; or `observations.origin: center`"
+            findings.add(fault_at(root, (*path, "format"), message, "missing-key", expected=expected))
+
+
+def _system_of_coordinates(root: Node, findings: Findings) -> None:
+    """Ask for the direction of y with pixels, and refuse an origin that would mean nothing."""
+    if root.word("observations", "unit") == "px" and not root.has("observations", "y_axis"):
+        message = "nothing says where y grows; with pixels both are in use"
+        expected = "down (rows, as image viewers count) or up"
+        findings.add(fault_at(root, ("observations", "y_axis"), message, "missing-key", expected=expected))
+    if root.has("fiducial_measurements") and root.has("observations", "origin"):
+        message = "an origin means nothing here: the measured fiducial marks say where the photo lies"
+        findings.add(fault_at(root, ("observations", "origin"), message, "origin", fix="remove it"))
+
+
+def _curvature(root: Node, findings: Findings) -> None:
+    """Refuse to count the Earth's curvature twice."""
+    if root.word("processing", "earth_curvature") != "model":
+        return
+    control = root.find("control")
+    systems = [each.word("crs") for each in (control.elements if control is not None else [])]
+    curved = next((crs for crs in [*systems, root.word("output", "crs")] if crs not in {"", "local"}), "")
+    if curved:
+        message = f"Earth curvature would be counted twice: coordinates in {shown(curved)} carry it already"
+        fix = "remove earth_curvature, or give plane coordinates of an unknown projection as `crs: local`"
+        path = ("processing", "earth_curvature")
+        findings.add(fault_at(root, path, message, "curvature-twice", expected="auto", fix=fix))

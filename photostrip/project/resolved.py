@@ -1,0 +1,175 @@
+"""The project with nothing left unsaid: every default filled in, every preset merged, as a project file again."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pydantic import BaseModel
+
+from photostrip.geodesy.frame_spec import CARTESIAN_AXES
+from photostrip.project.conversion import frame_spec, output_spec
+from photostrip.project.merging import path_of
+from photostrip.project.schema import Distortion, Ellipsoid, ProjectFile, Text
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from photostrip.project.document import Node
+
+HEADER = (
+    "# A project of photostrip with all defaults filled in. Paths are relative to the folder of the project file.\n"
+)
+AUTO = {"parallax_limit", "flying_height", "ground_height"}  # keys of which no value means `auto`
+LONGEST_LINE = 110
+_NOT_PRINTED = re.compile("[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
+
+
+def completed(project: ProjectFile, root: Node, path: str) -> ProjectFile:
+    """Fill in the defaults that depend on other keys.
+
+    Parameters
+    ----------
+    project : ProjectFile
+        The project.
+    root : Node
+        Its tree, which knows which file names which path.
+    path : str
+        Path of the project file.
+
+    Returns
+    -------
+    ProjectFile
+        The same project; only keys for which nothing stands in are left empty. Paths are relative to its folder.
+    """
+    observations = project.observations
+    usual = None if project.fiducial_measurements else "top-left" if observations.unit == "px" else "center"
+    observations = observations.model_copy(
+        update={
+            "file": _relative(root, path, "observations"),
+            "y_axis": observations.y_axis or "up",
+            "origin": observations.origin or usual,
+        }
+    )
+    marks = project.fiducial_measurements
+    if marks is not None:
+        same = marks.unit in {None, observations.unit}
+        update = {
+            "file": _relative(root, path, "fiducial_measurements"),
+            "unit": marks.unit or observations.unit,
+            "y_axis": marks.y_axis or observations.y_axis,
+            "sigma": marks.sigma or (observations.sigma if same else None),
+        }
+        marks = marks.model_copy(update=update)
+    control = [
+        each.model_copy(update={"file": _relative(root, path, "control", i), "axes": each.axes or CARTESIAN_AXES})
+        for i, each in enumerate(project.control)
+    ]
+    spec = output_spec(project.output, frame_spec(control[0])) or frame_spec(control[0])
+    ellipsoid = None if spec.ellipsoid is None else Ellipsoid.model_construct(a=spec.ellipsoid[0], b=spec.ellipsoid[1])
+    frame: dict[str, Any] = {
+        "crs": Text(spec.crs),
+        "axes": spec.axes,
+        "height": spec.height,
+        "geoid_undulation": spec.geoid_undulation,
+        "ellipsoid": ellipsoid,
+    }
+    filled: dict[str, Any] = {
+        "name": project.name or Text(Path(path).stem),
+        "extends": None,
+        "observations": observations,
+        "fiducial_measurements": marks,
+        "control": control,
+        "output": project.output.model_copy(update=frame),
+    }
+    return project.model_copy(update=filled)
+
+
+def _relative(root: Node, project: str, *owner: str | int) -> Text:
+    """Path of a table as seen from the project's folder, the same on every system."""
+    node = root.find(*owner, "file")
+    path = path_of(node, project) if node is not None else ""
+    try:
+        path = os.path.relpath(path, Path(project).parent)
+    except ValueError:  # another drive
+        path = str(Path(path).resolve())
+    return Text(path.replace(os.sep, "/"))
+
+
+def text_of(project: ProjectFile) -> str:
+    """Write a project as YAML.
+
+    Parameters
+    ----------
+    project : ProjectFile
+        The project.
+
+    Returns
+    -------
+    str
+        YAML that reads as the same project; the same text for the same project everywhere. Texts of the user stand
+        between quotation marks, so that other programs read ids as texts, too.
+    """
+    return HEADER + "".join(f"{line}\n" for line in _block(_plain(project), ""))
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401 (any value of a project)
+    """Turn sections into mappings, without keys that say nothing."""
+    if isinstance(value, BaseModel):
+        skipped = ("k", "p") if isinstance(value, Distortion) and value.model == "radial-table" else ()
+        fields = ((name, getattr(value, name)) for name in type(value).model_fields if name not in skipped)
+        return {
+            name: "auto" if each is None else _plain(each)
+            for name, each in fields
+            if each not in (None, [], {}) or (each is None and name in AUTO)
+        }
+    if isinstance(value, dict):
+        return {Text(name): _plain(each) for name, each in value.items()}
+    return [_plain(each) for each in value] if isinstance(value, list | tuple) else value
+
+
+def _block(mapping: dict[str, Any], indent: str) -> Iterator[str]:
+    """Give the lines of a mapping."""
+    for name, value in mapping.items():
+        begin = f"{indent}{_scalar(name)}:"
+        if isinstance(value, dict) and value:
+            yield begin
+            yield from _block(value, indent + "  ")
+        elif isinstance(value, list) and value and isinstance(value[0], dict):
+            yield begin
+            for each in value:
+                first, *rest = _block(each, indent + "    ")
+                yield f"{indent}  - {first.strip()}"
+                yield from rest
+        elif isinstance(value, list):
+            yield from _row(begin, [_scalar(each) for each in value])
+        else:
+            yield f"{begin} {_scalar(value) if value != {} else '{}'}"
+
+
+def _row(begin: str, words: list[str]) -> Iterator[str]:
+    """Give a list of values in brackets, broken into lines where it is long."""
+    line, indent = f"{begin} [", " " * (len(begin) - len(begin.lstrip()) + 2)
+    for number, word in enumerate(words):
+        end = "]" if number == len(words) - 1 else ", "
+        if len(line) + len(word) + len(end) > LONGEST_LINE:
+            yield line.rstrip()
+            line = indent
+        line += word + end
+    yield line if words else f"{line}]"
+
+
+def _scalar(value: object) -> str:
+    """Write one value."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, Text):
+        quoted = json.dumps(value, ensure_ascii=False)
+        return _NOT_PRINTED.sub(lambda found: f"\\u{ord(found[0]):04x}", quoted)
+    text = repr(value) if isinstance(value, float) else str(value)
+    if isinstance(value, float) and "e" in text and "." not in text:
+        text = text.replace("e", ".0e")  # a number for all readers of YAML
+    return text

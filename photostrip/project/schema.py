@@ -1,0 +1,474 @@
+"""The project file as a schema: every key, its unit, its default, and what its text must be.
+
+Values arrive as texts (see :mod:`photostrip.project.document`) and get their type here. Defaults of processing are
+those of the settings beside the mathematics; none is repeated. Each description ends with the unit.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainValidator, WithJsonSchema, model_validator
+from pydantic_core import PydanticCustomError
+
+from photostrip.formats.findings import suggestion
+from photostrip.formats.numbers import NotANumber, shown
+from photostrip.formats.numbers import number as read_number
+from photostrip.formats.tables import CONTROL_CHARACTER
+from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
+from photostrip.geometry.rotation import SYSTEMS
+from photostrip.pipeline import ADJUSTMENTS, Settings
+from photostrip.triangulation.formation import SCALE_TRANSFERS
+from photostrip.triangulation.polynomial import DEGREES
+from photostrip.triangulation.screening import METHODS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+DEFAULTS = Settings()
+SCHEMA_NUMBER = 1
+FALSE, TRUE = ("false", "no", "off"), ("true", "yes", "on")
+
+
+class Text(str):
+    """A text that the user chose: an id, a name, a path."""
+
+    __slots__ = ()
+
+
+# ------------------------------------------------------------------------------------------------ single values
+
+
+def wrong(message: str, *, code: str = "value", expected: str = "", fix: str = "", at: str = "") -> PydanticCustomError:
+    """Make the error of one value; `at` is the key inside a mapping that is at fault."""
+    context = {"message": message, "expected": expected, "fix": fix, "at": at}
+    return PydanticCustomError("photostrip", "{message}", {**context, "code": code})
+
+
+def _word(value: object, expected: str) -> str:
+    """Require a single value."""
+    if not isinstance(value, str):
+        what = "a list" if isinstance(value, list) else "a mapping"
+        raise wrong(f"{what} stands here", code="type", expected=expected)
+    if not value:
+        raise wrong("no value is given", code="no-value", expected=expected, fix="write one or remove the key")
+    return value
+
+
+def _text(value: object) -> Text:
+    word = _word(value, "a text")
+    if CONTROL_CHARACTER.search(word):
+        raise wrong(f"`{shown(word)}` has a control character or a line break in it", expected="a text on one line")
+    return Text(word)
+
+
+def _typed(read: Callable[[object], object], schema: dict[str, Any]) -> tuple[PlainValidator, WithJsonSchema]:
+    """Type that is read by a function of our own and described to editors by a schema of our own."""
+    return PlainValidator(read), WithJsonSchema(schema)
+
+
+def _number(expected: str, least: float = -float("inf"), most: float = float("inf")) -> Callable[[object], float]:
+    """Reader of a number strictly between two limits."""
+
+    def read(value: object) -> float:
+        word = _word(value, expected)
+        try:
+            result = read_number(word)
+        except NotANumber as why:
+            raise wrong(why.message, code="number", expected=expected, fix=why.fix) from None
+        if not least < result < most:
+            raise wrong(f"{shown(word)} is out of range", code="range", expected=expected)
+        return result
+
+    return read
+
+
+def _or_auto(read: Callable[[object], float]) -> Callable[[object], float | None]:
+    """Reader of a number that may also be ``auto`` (None)."""
+    return lambda value: None if value == "auto" else read(value)
+
+
+def _choice(allowed: tuple[str, ...], *later: str) -> tuple[PlainValidator, WithJsonSchema]:
+    """Type of a word from a list; words of a later version are refused by name."""
+    expected = allowed[0] if len(allowed) == 1 else f"one of {', '.join(allowed)}"
+
+    def read(value: object) -> str:
+        word = _word(value, expected)
+        if word in allowed:
+            return word
+        if word in later:
+            raise wrong(f"`{word}` is not available yet", code="not-available", expected=expected)
+        raise wrong(f"`{shown(word)}` is not known", code="word", expected=expected, fix=suggestion(word, allowed))
+
+    values = [int(word) if word.isdecimal() else word for word in allowed]
+    return _typed(read, {"enum": values})
+
+
+def _flag(value: object) -> bool:
+    word = _word(value, "true or false").casefold()
+    if word not in FALSE + TRUE:
+        raise wrong(f"`{shown(word)}` is neither true nor false", code="word", expected="true or false")
+    return word in TRUE
+
+
+def _schema_number(value: object) -> int:
+    word = _word(value, str(SCHEMA_NUMBER))
+    if word != str(SCHEMA_NUMBER):
+        message = f"this version of photostrip does not read schema {shown(word)}"
+        raise wrong(message, code="schema-number", expected=f"photostrip: {SCHEMA_NUMBER}")
+    return SCHEMA_NUMBER
+
+
+def _axes(value: object) -> tuple[str, str, str]:
+    allowed = (GROUND_AXES, CARTESIAN_AXES)
+    expected = "a permutation of [east, north, up]; for geocentric coordinates [x, y, z]"
+    names = [_word(name, expected) for name in (value if isinstance(value, list) else [value])]
+    if not any(sorted(names) == sorted(each) for each in allowed):
+        written = shown(", ".join(names))
+        raise wrong(f"[{written}] does not say which column is which", code="axes", expected=expected)
+    first, second, third = names
+    return first, second, third
+
+
+def _if_empty(value: object) -> object:
+    """Read a key whose entries are all commented out as an empty mapping."""
+    return {} if value == "" else value
+
+
+_read_number = _number("a number")
+_read_positive = _number("a number larger than 0", least=0.0)
+_read_fraction = _number("a number between 0 and 1", least=0.0, most=1.0)
+_ANY = {"type": ["string", "number", "boolean", "null"]}  # whatever an id looks like, it is read as text
+_NUMBER = {"type": "number"}
+_POSITIVE = {"type": "number", "exclusiveMinimum": 0}
+_FRACTION = {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1}
+_AUTO = {"const": "auto"}
+_AXES = {"type": "array", "items": {"enum": [*GROUND_AXES, *CARTESIAN_AXES]}, "minItems": 3, "maxItems": 3}
+
+Id = Annotated[str, *_typed(_text, _ANY)]
+Words = Annotated[str, *_typed(_text, {"type": "string", "minLength": 1})]
+Number = Annotated[float, *_typed(_read_number, _NUMBER)]
+Positive = Annotated[float, *_typed(_read_positive, _POSITIVE)]
+Fraction = Annotated[float, *_typed(_read_fraction, _FRACTION)]
+PositiveOrAuto = Annotated[float | None, *_typed(_or_auto(_read_positive), {"anyOf": [_AUTO, _POSITIVE]})]
+NumberOrAuto = Annotated[float | None, *_typed(_or_auto(_read_number), {"anyOf": [_AUTO, _NUMBER]})]
+Flag = Annotated[bool, *_typed(_flag, {"type": "boolean"})]
+SchemaNumber = Annotated[int, *_typed(_schema_number, {"const": SCHEMA_NUMBER})]
+Pair = tuple[Number, Number]
+Axes = Annotated[tuple[str, str, str], *_typed(_axes, _AXES)]
+Unit = Annotated[str, *_choice(("mm", "um", "px"))]
+YAxis = Annotated[str, *_choice(("up", "down"))]
+Height = Annotated[str, *_choice(("ellipsoidal", "orthometric"))]
+
+
+def key(description: str, default: Any = ..., *, unit: str = "") -> Any:  # noqa: ANN401 (pydantic's own manner)
+    """Describe one key.
+
+    Parameters
+    ----------
+    description : str
+        What it says.
+    default : object
+        Its default; without one the key is required.
+    unit : str
+        Unit of its value, put behind the description.
+
+    Returns
+    -------
+    pydantic.fields.FieldInfo
+        The field.
+    """
+    extra: dict[str, Any] | None = {"unit": unit} if unit else None
+    return Field(default, description=f"{description} [{unit}]" if unit else description, json_schema_extra=extra)
+
+
+# ------------------------------------------------------------------------------------------------- the sections
+
+
+class Section(BaseModel):
+    """A mapping of the project file: unknown keys are faults."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _nothing_is_empty(cls, value: object) -> object:
+        return _if_empty(value)
+
+
+class Distortion(Section):
+    """Lens distortion of a camera."""
+
+    model: Annotated[str, *_choice(("brown", "radial-table"))] = key("`brown` or `radial-table`")
+    direction: Annotated[str, *_choice(("image_to_ideal", "ideal_to_image"))] = key(
+        "`image_to_ideal`: ideal = image + D(image); `ideal_to_image`: image = ideal + D(ideal)"
+    )
+    k: tuple[Number, Number, Number] = key(
+        "Radial coefficients k1, k2, k3", (0.0, 0.0, 0.0), unit="mm^-2, mm^-4, mm^-6"
+    )
+    p: Pair = key("Decentring coefficients p1, p2", (0.0, 0.0), unit="mm^-1")
+    radius: list[Number] = key("Radial table: ascending distances from the principal point", [], unit="mm")
+    distortion: list[Number] = key("Radial table: distortion at these distances, outwards positive", [], unit="mm")
+
+    @model_validator(mode="after")
+    def _one_model(self) -> Self:
+        table = self.model == "radial-table"
+        for name in ("k", "p") if table else ("radius", "distortion"):
+            if name in self.model_fields_set:
+                raise wrong(f"`{name}` does not belong to model {self.model}", at=name, fix="remove it or change model")
+        if not table:
+            return self
+        if len(self.radius) < 2 or len(self.radius) != len(self.distortion):
+            message = f"{len(self.radius)} radii and {len(self.distortion)} values of distortion are given"
+            raise wrong(message, at="distortion", expected="as many values as radii, at least two")
+        steps = zip(self.radius, self.radius[1:], strict=False)
+        if self.radius[0] < 0 or any(after <= before for before, after in steps):
+            raise wrong("the radii do not ascend", at="radius", expected="distances from 0 upwards")
+        return self
+
+
+class Camera(Section):
+    """One camera."""
+
+    principal_distance: Positive = key("Principal distance", unit="mm")
+    principal_point: Pair = key("Principal point in the system of the image coordinates", (0.0, 0.0), unit="mm")
+    format: tuple[Positive, Positive] | None = key("Width and height of the photo; needed for pixels", None, unit="mm")
+    pixel_size: Positive | None = key("Size of a pixel; needed for pixels", None, unit="mm")
+    fiducials: Annotated[dict[str, Pair], BeforeValidator(_if_empty)] = key(
+        "Calibrated coordinates of the fiducial marks, by mark", {}, unit="mm"
+    )
+    distortion: Distortion | None = key("Lens distortion", None)
+
+
+class Strip(Section):
+    """Photos of one flight line."""
+
+    id: Id = key("Id of the strip")
+    camera: Id = key("Camera of all its photos, a key of `cameras`")
+    photos: Annotated[list[Id], Field(min_length=2)] = key("Photos in flight order")
+
+
+class Observations(Section):
+    """Points measured on photos."""
+
+    file: Words = key("Table `photo,point,x,y[,sx,sy]`, .csv or .csv.gz")
+    unit: Unit = key("Unit of the table: `mm`, `um` or `px`")
+    y_axis: YAxis | None = key(
+        "Direction of y, `up` or `down`; x grows to the right. Default: `up`; required for px", None
+    )
+    origin: Annotated[str, *_choice(("center", "top-left", "first-pixel"))] | None = key(
+        "Where x = y = 0: `center` of the photo, `top-left` corner of the first pixel, `first-pixel`: its centre."
+        " Default: `center`; for px `top-left`. Meaningless with measured fiducial marks",
+        None,
+    )
+    sigma: Positive | None = key("Standard deviation of rows without sx, sy", None, unit="the table's unit")
+
+
+class FiducialMeasurements(Section):
+    """Fiducial marks measured on photos."""
+
+    file: Words = key("Table `photo,mark,x,y[,sx,sy]`, .csv or .csv.gz")
+    unit: Unit | None = key("Unit of the table; default: that of `observations`", None)
+    y_axis: YAxis | None = key("Direction of y; default: that of `observations`", None)
+    sigma: Positive | None = key(
+        "Standard deviation of rows without sx, sy; default: that of `observations`", None, unit="the table's unit"
+    )
+
+
+class Ellipsoid(Section):
+    """Ellipsoid of geocentric coordinates."""
+
+    a: Positive = key("Semi-major axis", unit="m")
+    b: Positive = key("Semi-minor axis", unit="m")
+
+
+CRS = "An authority code (`EPSG:32633`), a PROJ string, WKT, `geocentric`, or `local` (right-handed, metres)"
+
+
+class Control(Section):
+    """One list of given ground coordinates."""
+
+    file: Words = key("Table `point,x,y,z[,use][,role][,sx,sy,sz]`, .csv or .csv.gz")
+    crs: Words = key(CRS)
+    axes: Axes | None = key(
+        "What the columns x, y, z are: a permutation of east, north, up; required, except for geocentric", None
+    )
+    height: Height = key("`ellipsoidal` or `orthometric`", "ellipsoidal")
+    geoid_undulation: Number | None = key(
+        "Height of the geoid above the ellipsoid, for orthometric heights", None, unit="m"
+    )
+    ellipsoid: Ellipsoid | None = key("Ellipsoid of geocentric coordinates; default: WGS 84", None)
+    sigma: tuple[Positive, Positive, Positive] | None = key(
+        "Standard deviations of rows without sx, sy, sz, in the order of `axes`", None, unit="m"
+    )
+
+    @model_validator(mode="after")
+    def _axes_are_said(self) -> Self:
+        if self.axes is None and self.crs != "geocentric":
+            expected = "axes: [east, north, up], or [north, east, up] where x points north"
+            raise wrong(
+                "nothing says which of the columns x, y, z is east", code="missing-key", at="axes", expected=expected
+            )
+        return self
+
+
+class Angles(Section):
+    """Angles of the exterior orientations."""
+
+    system: Annotated[str, *_choice(SYSTEMS)] = key(
+        "`alpha-omega-kappa`, `omega-phi-kappa` or `phi-omega-kappa`", DEFAULTS.angle_system
+    )
+    unit: Annotated[str, *_choice(("deg", "gon", "rad"))] = key("`deg`, `gon` or `rad`", DEFAULTS.angle_unit)
+
+
+class Output(Section):
+    """Frame and angles of the results."""
+
+    crs: Words | None = key(f"{CRS}. Default: that of the first control list", None)
+    axes: Axes | None = key(
+        "Order of x, y, z. Default: that of the first control list; with a crs of its own east, north, up", None
+    )
+    height: Height | None = key(
+        "`ellipsoidal` or `orthometric`; default: that of the first control list, or ellipsoidal", None
+    )
+    geoid_undulation: Number | None = key(
+        "Height of the geoid above the ellipsoid, for orthometric heights", None, unit="m"
+    )
+    ellipsoid: Ellipsoid | None = key("Ellipsoid of geocentric coordinates; default: WGS 84", None)
+    angles: Angles = key("Angles of the exterior orientations", Angles.model_construct())
+
+
+class Relative(Section):
+    """Relative orientation and its search for gross errors."""
+
+    screening: Annotated[str, *_choice(METHODS, "deletion", "robust")] = key(
+        "`auto` (parallax+grubbs), `parallax+grubbs`, `tau` or `none`", DEFAULTS.relative.screening
+    )
+    grubbs_alpha: Fraction = key(
+        "Probability of rejecting a good point of a pair without gross errors", DEFAULTS.relative.grubbs_alpha
+    )
+    parallax_limit: PositiveOrAuto = key(
+        "y parallax that needs no rejection; `auto`: four times its standard deviation",
+        DEFAULTS.relative.parallax_limit,
+        unit="mm",
+    )
+
+
+class Polynomial(Section):
+    """Polynomial adjustment of a strip."""
+
+    degree: Annotated[str, *_choice(DEGREES)] = key(
+        "`auto` (decided by evidence, which is printed), `1`, `2` or `3`", DEFAULTS.polynomial.degree
+    )
+
+
+class Interior(Section):
+    """Interior orientation by fiducial marks."""
+
+    transform: Annotated[str, *_choice(("auto", "conformal", "affine", "bilinear", "projective"))] = key(
+        "`auto` (affine from four marks on, else conformal), `conformal`, `affine`, `bilinear` or `projective`",
+        DEFAULTS.interior.transform,
+    )
+
+
+class Processing(Section):
+    """What is computed and how."""
+
+    adjustment: Annotated[str, *_choice(ADJUSTMENTS, "covariance", "bundle")] = key(
+        "`polynomial` (the strip method) or `similarity` (without a polynomial)", DEFAULTS.adjustment
+    )
+    polynomial: Polynomial = key("Polynomial adjustment", Polynomial.model_construct())
+    relative: Relative = key("Relative orientation", Relative.model_construct())
+    scale_transfer: Annotated[str, *_choice(SCALE_TRANSFERS)] = key(
+        "`least_squares`: all common points with their precision; `distances`: the textbook's mean of ratios",
+        DEFAULTS.formation.scale_transfer,
+    )
+    earth_curvature: Annotated[str, *_choice(("auto", "model", "none"), "image")] = key(
+        "`auto` or `none`: the frames carry it, `local` is truly Cartesian; `model`: D^2/2R, for plane map"
+        " coordinates of an unknown projection given as `local`",
+        DEFAULTS.absolute.earth_curvature,
+    )
+    earth_radius: Positive = key(
+        "Radius of the Earth for `earth_curvature: model`", DEFAULTS.absolute.earth_radius, unit="m"
+    )
+    refraction: Flag = key("Correct for atmospheric refraction", DEFAULTS.refinement.refraction)
+    flying_height: NumberOrAuto = key(
+        "Mean height of the cameras above sea level, for refraction; `auto`: derived",
+        DEFAULTS.refinement.flying_height,
+        unit="m",
+    )
+    ground_height: NumberOrAuto = key(
+        "Mean height of the ground above sea level, for refraction; `auto`: derived",
+        DEFAULTS.refinement.ground_height,
+        unit="m",
+    )
+    interior: Interior = key("Interior orientation", Interior.model_construct())
+
+
+class Tolerances(Section):
+    """Largest allowed values; where one is exceeded the exit code is 1."""
+
+    check_rms_xy: Positive | None = key("Largest rms of the check points in plan", None, unit="m")
+    check_rms_z: Positive | None = key("Largest rms of the check points in height", None, unit="m")
+    check_max_xy: Positive | None = key("Largest difference at a check point in plan", None, unit="m")
+    check_max_z: Positive | None = key("Largest difference at a check point in height", None, unit="m")
+    control_rms_xy: Positive | None = key("Largest rms of the control points in plan", None, unit="m")
+    control_rms_z: Positive | None = key("Largest rms of the control points in height", None, unit="m")
+    sigma0_um: Positive | None = key("Largest sigma0 of the image coordinates", None, unit="um")
+
+
+class ProjectFile(Section):
+    """A project of photostrip: what was measured, what is given, and what is to be done.
+
+    All paths are relative to the file itself. All ids are text, quoted or not.
+    """
+
+    photostrip: SchemaNumber = key("Number of this schema")
+    name: Words | None = key("Name of the project; default: the file's name without its ending", None)
+    extends: Words | None = key("Another file whose keys are taken where this one has none", None)
+    cameras: Annotated[dict[str, Camera], BeforeValidator(_if_empty), Field(min_length=1)] = key("Cameras by name")
+    strips: Annotated[list[Strip], Field(min_length=1)] = key("Strips")
+    observations: Observations = key("Points measured on photos")
+    fiducial_measurements: FiducialMeasurements | None = key("Fiducial marks measured on photos", None)
+    control: Annotated[list[Control], Field(min_length=1)] = key(
+        "Lists of given ground coordinates, each in its own frame"
+    )
+    output: Output = key("Frame and angles of the results", Output.model_construct())
+    processing: Processing = key("What is computed and how", Processing.model_construct())
+    tolerances: Tolerances = key(
+        "Largest allowed values; where one is exceeded the exit code is 1", Tolerances.model_construct()
+    )
+
+
+NOT_YET: dict[str, Literal["needs the bundle adjustment"]] = {"camera_positions": "needs the bundle adjustment"}
+"""Keys of the project file that are known but cannot be used yet, and why."""
+
+
+def json_schema() -> dict[str, Any]:
+    """JSON Schema of the project file, with every key, default and unit.
+
+    Returns
+    -------
+    dict
+        JSON Schema, draft 2020-12; the same on every call.
+    """
+    schema = _for_editors(ProjectFile.model_json_schema())
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "photostrip project", **schema}
+
+
+def _for_editors(schema: Any) -> Any:  # noqa: ANN401 (JSON)
+    """Take out what pydantic adds: titles made of names, and null, which no key accepts."""
+    if isinstance(schema, list):
+        return [_for_editors(each) for each in schema]
+    if not isinstance(schema, dict):
+        return schema
+    result = {name: _for_editors(each) for name, each in schema.items() if name != "title" or isinstance(each, dict)}
+    kinds = [each for each in result.get("anyOf", []) if each != {"type": "null"}]
+    if "anyOf" in result:
+        del result["anyOf"]
+        result |= kinds[0] if len(kinds) == 1 else {"anyOf": kinds}
+    if "default" in result and result["default"] is None:
+        del result["default"]
+        if _AUTO in kinds:
+            result["default"] = "auto"
+    return result

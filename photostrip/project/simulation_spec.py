@@ -1,0 +1,322 @@
+"""Specifications of simulations: the YAML file, its keys, and the places of what is wrong with it.
+
+The keys are the fields of the classes of :mod:`photostrip.simulate`, whose defaults hold here too. Types are checked
+here, values there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import AfterValidator, BeforeValidator, WithJsonSchema
+
+from photostrip import camera, simulate
+from photostrip.errors import InputError
+from photostrip.formats.findings import Findings, suggestion
+from photostrip.formats.numbers import shown
+from photostrip.project.document import fault_at
+from photostrip.project.merging import override, read_tree, steps
+from photostrip.project.schema import (
+    CRS,
+    Axes,
+    Distortion,
+    Ellipsoid,
+    Flag,
+    Height,
+    Number,
+    Pair,
+    Positive,
+    SchemaNumber,
+    Section,
+    Unit,
+    Words,
+    YAxis,
+    key,
+    wrong,
+)
+from photostrip.project.validation import checked
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from photostrip.errors import Fault
+    from photostrip.project.document import Node
+
+USUAL = simulate.Spec()
+USUAL_FILM, USUAL_GNSS, USUAL_ERROR = simulate.Film(), simulate.Gnss(), simulate.GrossError("image")
+
+
+def _whole(value: float) -> int:
+    if value != int(value):
+        raise wrong(f"{value:g} is not a whole number", code="number", expected="a whole number")
+    return int(value)
+
+
+def _preset(value: str) -> str:
+    if value not in simulate.PRESETS:
+        expected = f"one of {', '.join(simulate.PRESETS)}"
+        fix = suggestion(value, simulate.PRESETS)
+        raise wrong(f"`{shown(value)}` is no preset", code="word", expected=expected, fix=fix)
+    return value
+
+
+def _shares(value: object) -> object:
+    """A single word stands for all points."""
+    return {value: "1"} if isinstance(value, str) and value else value
+
+
+Whole = Annotated[Number, AfterValidator(_whole), WithJsonSchema({"type": "integer"})]
+Three = tuple[Number, Number, Number]
+Shares = Annotated[dict[str, Number], BeforeValidator(_shares)]
+
+
+class SimulatedCamera(Section):
+    """The camera: a preset, and what is different from it."""
+
+    preset: Annotated[Words, AfterValidator(_preset)] = key("`film` (153 mm, 230 mm) or `digital` (100.5 mm, 6 um)", "film")
+    name: Words | None = key("Name of the camera; default: that of the preset", None)
+    principal_distance: Positive | None = key("Principal distance", None, unit="mm")
+    principal_point: Pair | None = key("Principal point in the system of the image coordinates", None, unit="mm")
+    format: Pair | None = key("Width and height of the photo", None, unit="mm")
+    pixel_size: Positive | None = key("Size of a pixel", None, unit="mm")
+    fiducials: dict[str, Pair] | None = key("Calibrated coordinates of the fiducial marks, by mark", None, unit="mm")
+    distortion: Distortion | None = key("Lens distortion, which the images will have exactly", None)
+
+
+class Ground(Section):
+    """Frame and place of the strips."""
+
+    crs: Words = key(f"{CRS}; in `local` the world is flat", USUAL.ground.crs)
+    axes: Axes = key("Order of x, y, z in the tables", USUAL.ground.axes)
+    height: Height = key("Heights in the tables", USUAL.ground.height)
+    geoid_undulation: Number | None = key("Height of the geoid above the ellipsoid, for orthometric heights", None, unit="m")
+    ellipsoid: Ellipsoid | None = key("Ellipsoid of `geocentric`; default: WGS 84", None)
+    center_deg: Pair = key("Longitude and latitude of the middle of the strips", USUAL.ground.center_deg, unit="degrees")
+
+
+class Flight(Section):
+    """Photos and strips."""
+
+    photos: Whole = key("Photos of each strip", USUAL.flight.photos)
+    strips: Whole = key("Parallel strips, each to the left of the one before", USUAL.flight.strips)
+    end_lap_percent: Number = key("Overlap of neighbouring photos", USUAL.flight.end_lap_percent, unit="%")
+    side_lap_percent: Number = key("Overlap of neighbouring strips", USUAL.flight.side_lap_percent, unit="%")
+    scale: Number | None = key("Scale number of the photos; default: 10000", None)
+    flying_height: Number | None = key("Height above the mean terrain, instead of `scale`", None, unit="m")
+    heading_deg: Number = key("Azimuth of the flight, clockwise from north", USUAL.flight.heading_deg, unit="degrees")
+    alternate: Flag = key("Fly every second strip in the opposite direction", USUAL.flight.alternate)
+    photo_rotation_deg: Number = key(
+        "Turn of the photos' x axis against the flight, counter-clockwise", USUAL.flight.photo_rotation_deg, unit="degrees"
+    )
+    attitude_sigma_deg: Three = key("Scatter of alpha, omega, kappa", USUAL.flight.attitude_sigma_deg, unit="degrees")
+    position_sigma: Three | None = key(
+        "Scatter of the cameras along, across, in height; default: 2, 2 and 1 % of the base", None, unit="m"
+    )
+
+
+class Terrain(Section):
+    """The ground."""
+
+    height: Number = key("Mean height above the ellipsoid", USUAL.terrain.height, unit="m")
+    relief: Number = key("Largest deviation from the plane; 0 is flat", USUAL.terrain.relief, unit="m")
+    wavelength: Number | None = key("Mean distance of the hills; default: three bases", None, unit="m")
+    slope_percent: Pair = key("Rise along the flight and to its left", USUAL.terrain.slope_percent, unit="%")
+
+
+class Points(Section):
+    """Pass points."""
+
+    rows: Whole = key("Gruber points at the nadir of each photo, side by side", USUAL.points.rows)
+    reach_percent: Number = key("Outermost rows, of half the width of the photo", USUAL.points.reach_percent, unit="%")
+    scatter_percent: Number = key(
+        "Scatter of the Gruber points, of half the zone on three photos", USUAL.points.scatter_percent, unit="%"
+    )
+    extra_per_model: Whole = key("Further points at random places of each model", USUAL.points.extra_per_model)
+
+
+class Control(Section):
+    """Control and check points."""
+
+    layout: Words = key("`bands`, `corners`, `corners+centre` or `random`, in each strip", USUAL.control.layout)
+    bands: Whole = key("Bands across the strip, from the first to the last photo", USUAL.control.bands)
+    every: Whole | None = key("Models from band to band, instead of `bands`", None)
+    per_band: Whole = key("Points of a band", USUAL.control.per_band)
+    count: Whole = key("Control points of a strip in the layout `random`", USUAL.control.count)
+    use: Shares = key("`xyz`, `xy` or `z`, or the share of each: {xyz: 0.5, z: 0.5}", USUAL.control.use)
+    check: Whole | None = key("Check points; default: ten, or half of the points that are left", None)
+    sigma: Three = key("Stated standard deviations east, north, up", USUAL.control.sigma, unit="m")
+    noise: Three | None = key("Errors added, standard deviations; default: as stated", None, unit="m")
+    second_crs: Words | None = key("CRS of a second control file, for points east of the boundary", None)
+    boundary_longitude_deg: Number | None = key("Boundary; default: the middle of the strips", None, unit="degrees")
+
+
+class Image(Section):
+    """Measurement of image coordinates."""
+
+    sigma_um: Number = key("Standard deviation of an image coordinate; 0 is free of errors", USUAL.image.sigma_um, unit="um")
+    unit: Unit = key("Unit in the tables: `mm`, `um` or `px`", USUAL.image.unit)
+    y_axis: YAxis = key("Direction of y in the tables, `up` or `down`", USUAL.image.y_axis)
+
+
+class Film(Section):
+    """Deformation of the film and its place in the comparator; fiducial marks are measured."""
+
+    scale_ppm: Number = key("Scatter of the scale of each axis", USUAL_FILM.scale_ppm, unit="ppm")
+    shear_ppm: Number = key("Scatter of the angle between the axes", USUAL_FILM.shear_ppm, unit="ppm")
+    irregular_um: Number = key("Rms of a smooth deformation that is not affine", USUAL_FILM.irregular_um, unit="um")
+    rotation_deg: Number = key("Scatter of the turn in the comparator", USUAL_FILM.rotation_deg, unit="degrees")
+    offset_mm: Number = key("Scatter of the place in the comparator", USUAL_FILM.offset_mm, unit="mm")
+
+
+class GrossError(Section):
+    """Gross errors of one kind."""
+
+    kind: Words = key("`image`, `control` or `swap`: two points exchanged on a photo")
+    count: Whole = key("How many", USUAL_ERROR.count)
+    size_um: Number = key("Size in the image", USUAL_ERROR.size_um, unit="um")
+    size_m: Number = key("Size of an error of control", USUAL_ERROR.size_m, unit="m")
+    photo: Words | None = key("The photo; default: any", None)
+    point: Words | None = key("The point; default: any", None)
+    axis: Words | None = key("x or y in the image (y up), x, y or z for east, north, up; default: any", None)
+
+
+class Gnss(Section):
+    """Measured positions of the cameras."""
+
+    sigma: Three = key("Standard deviations east, north, up", USUAL_GNSS.sigma, unit="m")
+    use: Flag = key("Name the file in the project", USUAL_GNSS.use)
+
+
+class SimulationFile(Section):
+    """A specification: strips of photos to be simulated. Every key has a default."""
+
+    photostrip_simulation: SchemaNumber = key("Number of this schema")
+    extends: Words | None = key("Another file whose keys are taken where this one has none", None)
+    name: Words = key("Name of the project", USUAL.name)
+    seed: Whole = key("Number that all random numbers come from", USUAL.seed)
+    camera: SimulatedCamera = key("Camera", SimulatedCamera.model_construct())
+    ground: Ground = key("Frame and place", Ground.model_construct())
+    flight: Flight = key("Photos and strips", Flight.model_construct())
+    terrain: Terrain = key("The ground", Terrain.model_construct())
+    points: Points = key("Pass points", Points.model_construct())
+    control: Control = key("Control and check points", Control.model_construct())
+    image: Image = key("Measurement of image coordinates", Image.model_construct())
+    film: Film | None = key("Deformed film with measured fiducial marks; default: none", None)
+    refraction: Flag = key("Bend the rays in the standard atmosphere", USUAL.refraction)
+    gross_errors: list[GrossError] = key("Gross errors", [])
+    gnss: Gnss | None = key("Measured positions of the cameras; default: none", None)
+
+
+@dataclass(frozen=True, eq=False)
+class Specification:
+    """A specification and where its values stand.
+
+    Parameters
+    ----------
+    spec : Spec
+        What is to be simulated.
+    files : tuple of str
+        Every file that was read.
+    root : Node
+        The file as a tree.
+    """
+
+    spec: simulate.Spec
+    files: tuple[str, ...]
+    root: Node
+
+    def simulate(self) -> simulate.Simulation:
+        """Simulate what is specified.
+
+        Returns
+        -------
+        Simulation
+            The simulation.
+
+        Raises
+        ------
+        InputError
+            With all that cannot be simulated, each fault at its place in the file.
+        """
+        try:
+            return simulate.simulate(self.spec)
+        except InputError as error:
+            raise InputError(self._placed(fault) for fault in error.faults) from None
+
+    def _placed(self, fault: Fault) -> Fault:
+        words = {"expected": fault.expected, "fix": fault.fix}
+        return fault_at(self.root, steps(fault.key), fault.message, fault.code, **words)
+
+
+def load_specification(path: Path, overrides: Sequence[str] = ()) -> Specification:
+    """Read the specification of a simulation.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    overrides : sequence of str
+        Assignments ``key.path=value`` that replace values of the file.
+
+    Returns
+    -------
+    Specification
+        The specification.
+
+    Raises
+    ------
+    InputError
+        With every fault of the file.
+    """
+    findings, files = Findings(), list[str]()
+    root = read_tree(str(path), findings, files)
+    if root is None:
+        raise InputError(findings.faults)
+    root = override(root, overrides, findings)
+    given = checked(SimulationFile, root, findings)
+    findings.stop()
+    if given is None:  # cannot be: checked() had a reason, and stop() told it
+        raise InputError(f"{path} is not a valid specification")
+    return Specification(_spec(given), tuple(files), root)
+
+
+def _spec(given: SimulationFile) -> simulate.Spec:
+    """Turn the file into the plain specification."""
+    return simulate.Spec(
+        name=str(given.name),
+        seed=given.seed,
+        camera=_camera(given.camera),
+        ground=simulate.Ground(**_fields(given.ground) | {"ellipsoid": _semi_axes(given.ground.ellipsoid)}),
+        flight=simulate.Flight(**_fields(given.flight)),
+        terrain=simulate.Terrain(**_fields(given.terrain)),
+        points=simulate.Points(**_fields(given.points)),
+        control=simulate.Control(**_fields(given.control)),
+        image=simulate.Image(**_fields(given.image)),
+        film=None if given.film is None else simulate.Film(**_fields(given.film)),
+        refraction=given.refraction,
+        gross_errors=tuple(simulate.GrossError(**_fields(each)) for each in given.gross_errors),
+        gnss=None if given.gnss is None else simulate.Gnss(**_fields(given.gnss)),
+    )
+
+
+def _fields(section: Section) -> dict[str, Any]:
+    """Values of a section by key, texts as plain texts."""
+    values = {name: getattr(section, name) for name in type(section).model_fields}
+    return {name: str(value) if isinstance(value, str) else value for name, value in values.items()}
+
+
+def _semi_axes(given: Ellipsoid | None) -> tuple[float, float] | None:
+    return None if given is None else (given.a, given.b)
+
+
+def _camera(given: SimulatedCamera) -> camera.Camera:
+    """The preset with what is said beside it."""
+    changed = {name: value for name, value in _fields(given).items() if value is not None and name != "preset"}
+    if given.distortion is not None:
+        lens = given.distortion
+        changed["distortion"] = camera.Distortion(
+            lens.model, lens.direction, lens.k, lens.p, tuple(lens.radius), tuple(lens.distortion)
+        )
+    return replace(simulate.PRESETS[given.preset], **changed)
