@@ -1,8 +1,48 @@
-"""Refinement of image coordinates: principal point, lens distortion, atmospheric refraction."""
+"""Refinement: from photo coordinates to ideal image coordinates, as a pinhole in vacuum would have made them.
+
+The order of the corrections, from the image to the ideal, is that in which light collects the errors, backwards:
+
+1. principal point: coordinates are reduced to it;
+2. lens distortion, :mod:`photostrip.triangulation.lens`;
+3. atmospheric refraction.
+
+Film deformation is taken out before, by the interior orientation. Earth curvature is no error of an image: the ground
+frames carry it. :func:`distort` goes the other way and is the exact inverse.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeGuard
+
+import numpy as np
+
+from photostrip.errors import Fault, InputError
+from photostrip.points import PhotoPoints
+from photostrip.triangulation import lens
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from photostrip.camera import Camera, Distortion
+
+    Floats = NDArray[np.float64]
+
+MICROMETRE = 1e-3  # mm
+SHOWN = 20  # points beyond the distortion table that are named one by one
+
+# Standard atmosphere, ICAO Doc 7488 (ISO 2533): layers to 11 km and above.
+LAPSE = 6.5 / 288.15  # relative fall of temperature per km
+EXPONENT = 5.25588  # of pressure; one less for density
+TROPOPAUSE = 11.0  # km
+STRATOSPHERE_SCALE = 6.341616  # km, height in which the pressure above the tropopause falls to 1/e
+SCALE_HEIGHT = 8.43450  # km, pressure over density and gravity at sea level
+# Refractivity of dry air at sea level in the standard atmosphere, visible light; Saastamoinen 1972.
+REFRACTIVITY = 277e-6
+CONVERGED = 1e-15  # relative to the radius
+ITERATIONS = 20
 
 
 @dataclass(frozen=True)
@@ -21,3 +61,292 @@ class Settings:
     refraction: bool = False
     flying_height: float | None = None
     ground_height: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """Refined image coordinates.
+
+    Parameters
+    ----------
+    observations : PhotoPoints
+        Ideal image coordinates, reduced to the principal point, mm.
+    largest_um : dict of str to float
+        Largest shift by each effect that was corrected, micrometres: ``"principal point"``, ``"distortion"``,
+        ``"refraction"``.
+    """
+
+    observations: PhotoPoints
+    largest_um: dict[str, float]
+
+
+def refine(
+    observations: PhotoPoints,
+    camera_of_photo: Mapping[str, Camera],
+    settings: Settings,
+    *,
+    flying_height: float | None = None,
+    ground_height: float | None = None,
+) -> Refined:
+    """Refine photo coordinates of all photos.
+
+    Parameters
+    ----------
+    observations : PhotoPoints
+        Photo coordinates, mm, in the system in which the principal point of the camera is given.
+    camera_of_photo : mapping of str to Camera
+        Camera of each photo.
+    settings : Settings
+        What is corrected.
+    flying_height, ground_height : float, optional
+        Heights above sea level in metres that count where the settings have none.
+
+    Returns
+    -------
+    Refined
+        Ideal coordinates in the same rows with the same standard deviations; the same table when no camera has
+        anything to correct.
+
+    Raises
+    ------
+    InputError
+        When a distortion has no inverse over the format, or refraction is asked for without heights, or a point
+        lies beyond the radii of a distortion table: with photo, point and radius.
+    """
+    cameras = {camera_of_photo[photo].name: camera_of_photo[photo] for photo in observations.photo_ids}
+    number = {name: row for row, name in enumerate(cameras)}
+    camera_of_row = np.array([number[camera_of_photo[photo].name] for photo in observations.photo_ids], np.intp)[
+        observations.photo
+    ]
+    constant = _constant(settings, flying_height, ground_height)
+    rows_of = {name: np.flatnonzero(camera_of_row == row) for name, row in number.items()}
+    _refuse_distortion(observations, cameras, rows_of)
+    xy = observations.xy
+    largest: dict[str, float] = {}
+    for name, camera in cameras.items():
+        if not _active(camera, constant):
+            continue
+        if xy is observations.xy:
+            xy = xy.copy()
+        xy[rows_of[name]], shifts = _corrected(xy[rows_of[name]], camera, constant)
+        for effect, length in shifts.items():
+            largest[effect] = max(largest.get(effect, 0.0), length / MICROMETRE)
+    if not largest:
+        return Refined(observations, largest)
+    o = observations
+    return Refined(PhotoPoints(o.photo_ids, o.point_ids, o.photo, o.point, xy, o.sigma), largest)
+
+
+def undistort(image_xy: ArrayLike, camera: Camera, refraction: float = 0.0) -> Floats:
+    """Give the ideal points of image points of one camera.
+
+    Parameters
+    ----------
+    image_xy : array_like, shape (n, 2)
+        Photo coordinates, mm.
+    camera : Camera
+        The camera.
+    refraction : float
+        Constant of :func:`refraction_constant`; 0: none.
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        Ideal coordinates reduced to the principal point, mm.
+    """
+    return _corrected(np.asarray(image_xy, float), camera, refraction)[0]
+
+
+def distort(ideal_xy: ArrayLike, camera: Camera, refraction: float = 0.0) -> Floats:
+    """Give the image points of ideal points of one camera; the exact inverse of :func:`undistort`.
+
+    Parameters
+    ----------
+    ideal_xy : array_like, shape (n, 2)
+        Ideal coordinates reduced to the principal point, mm.
+    camera : Camera
+        The camera.
+    refraction : float
+        Constant of :func:`refraction_constant`; 0: none.
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        Photo coordinates, mm, exact to 1e-9 mm.
+
+    Raises
+    ------
+    InputError
+        When a point lies beyond the radii of a distortion table.
+    """
+    xy = np.asarray(ideal_xy, float)
+    if refraction:
+        xy = _with_refraction(xy, camera.principal_distance, refraction)
+    if _distorts(camera.distortion):
+        xy = lens.image_from_ideal(xy, camera.distortion)
+    return np.asarray(xy + np.array(camera.principal_point), np.float64)
+
+
+def refraction_constant(flying_height: float, ground_height: float) -> float:
+    """Constant K of atmospheric refraction of vertical photos in the standard atmosphere.
+
+    Parameters
+    ----------
+    flying_height, ground_height : float
+        Heights of the perspective center and of the ground above sea level, metres.
+
+    Returns
+    -------
+    float
+        K, dimensionless (radians at 45 degrees off the vertical): the mean refractivity of the air between
+        ground and camera minus that at the camera. Positive, so that images lie too far outside.
+
+    Raises
+    ------
+    InputError
+        When the camera is not above the ground.
+
+    Notes
+    -----
+    Source: Saastamoinen 1972, whose formula this is for heights to 11 km, with the factor 2335 rounded from
+    277 x 8.4345, and with the layer above of the standard atmosphere, ICAO Doc 7488. From n sin(theta) = constant
+    in plane layers follows tan(alpha) = tan(theta) (1 - K / cos(theta)^2) for the direction theta at the camera and
+    the straight line alpha to the ground.
+    """
+    camera, ground = flying_height / 1000, ground_height / 1000
+    if camera <= ground:
+        message = f"refraction: the flying height {flying_height:g} m is not above the ground, {ground_height:g} m"
+        raise InputError(
+            Fault(message, code="flying-height", key="processing.refraction", expected="heights in metres")
+        )
+    fall = _pressure(ground) - _pressure(camera)
+    return REFRACTIVITY * (SCALE_HEIGHT * fall / (camera - ground) - _density(camera))
+
+
+def refraction_shift(radius: ArrayLike, principal_distance: float, constant: float) -> Floats:
+    """Outward shift of image points by refraction.
+
+    Parameters
+    ----------
+    radius : array_like, shape (...)
+        Distances of image points from the principal point, mm, on a vertical photo.
+    principal_distance : float
+        Principal distance f, mm.
+    constant : float
+        Constant K of :func:`refraction_constant`.
+
+    Returns
+    -------
+    ndarray, shape (...)
+        dr = K (r + r^3 / f^2), mm, to be subtracted from the radius of the image point.
+
+    Notes
+    -----
+    Source: Saastamoinen 1972. Tilts of a few degrees change it by K f tan(tilt), the same for the whole photo, which
+    the orientation takes up.
+    """
+    r = np.asarray(radius, float)
+    return np.asarray(constant * r * (1 + (r / principal_distance) ** 2), np.float64)
+
+
+def _pressure(height_km: float) -> float:
+    """Pressure of the standard atmosphere over that at sea level; above 20 km little is left to be wrong."""
+    if height_km <= TROPOPAUSE:
+        return float((1 - LAPSE * height_km) ** EXPONENT)
+    return _pressure(TROPOPAUSE) * float(np.exp((TROPOPAUSE - height_km) / STRATOSPHERE_SCALE))
+
+
+def _density(height_km: float) -> float:
+    """Density of the standard atmosphere relative to sea level: pressure over relative temperature."""
+    return _pressure(height_km) / (1 - LAPSE * min(height_km, TROPOPAUSE))
+
+
+def _constant(settings: Settings, flying_height: float | None, ground_height: float | None) -> float:
+    if not settings.refraction:
+        return 0.0
+    flying = flying_height if settings.flying_height is None else settings.flying_height
+    ground = ground_height if settings.ground_height is None else settings.ground_height
+    if flying is None or ground is None:
+        message = "refraction: flying height and height of the ground are not known"
+        raise InputError(Fault(message, code="flying-height", key="processing.refraction", fix="give both, in metres"))
+    return refraction_constant(flying, ground)
+
+
+def _distorts(distortion: Distortion | None) -> TypeGuard[Distortion]:
+    return distortion is not None and any((*distortion.k, *distortion.p, *distortion.distortion))
+
+
+def _active(camera: Camera, constant: float) -> bool:
+    return any(camera.principal_point) or camera.distortion is not None or constant != 0
+
+
+def _corrected(image: Floats, camera: Camera, constant: float) -> tuple[Floats, dict[str, float]]:
+    """Ideal points, and the largest shift in mm by each effect."""
+    shifts = {}
+    xy = image
+    if any(camera.principal_point):
+        xy = xy - np.array(camera.principal_point)
+        shifts["principal point"] = float(np.hypot(*camera.principal_point))
+    if camera.distortion is not None:
+        ideal = lens.ideal_from_image(xy, camera.distortion) if _distorts(camera.distortion) else xy
+        shifts["distortion"] = _longest(ideal - xy)
+        xy = ideal
+    if constant:
+        ideal = xy * (1 - constant * (1 + (xy**2).sum(-1, keepdims=True) / camera.principal_distance**2))
+        shifts["refraction"] = _longest(ideal - xy)
+        xy = ideal
+    return xy, shifts
+
+
+def _longest(shifts: Floats) -> float:
+    return float(np.hypot(shifts[..., 0], shifts[..., 1]).max(initial=0.0))
+
+
+def _with_refraction(ideal: Floats, principal_distance: float, constant: float) -> Floats:
+    """Solve ``s (1 - K (1 + s^2 q)) = 1`` for the stretch s of ideal points, q = r^2 / f^2, by Newton's iteration."""
+    q = (ideal**2).sum(-1, keepdims=True) / principal_distance**2
+    stretch = np.ones_like(q)
+    for _ in range(ITERATIONS):
+        misclosure = stretch * (1 - constant * (1 + stretch**2 * q)) - 1
+        step = misclosure / (1 - constant * (1 + 3 * stretch**2 * q))
+        stretch = stretch - step
+        if (np.abs(step) <= CONVERGED * stretch).all():
+            break
+    return np.asarray(ideal * stretch, np.float64)
+
+
+def _refuse_distortion(
+    observations: PhotoPoints, cameras: Mapping[str, Camera], rows_of: Mapping[str, NDArray[np.intp]]
+) -> None:
+    """Refuse distortion that folds the photo, and points beyond a distortion table."""
+    faults = []
+    for name, camera in cameras.items():
+        if not _distorts(camera.distortion):
+            continue
+        rows = rows_of[name]
+        radius = np.hypot(*(observations.xy[rows] - np.array(camera.principal_point)).T)
+        found = lens.faults(camera, float(radius.max(initial=0.0)))
+        faults += found or _beyond(observations, camera, rows, radius)
+    if faults:
+        raise InputError(faults)
+
+
+def _beyond(observations: PhotoPoints, camera: Camera, rows: NDArray[np.intp], radius: Floats) -> list[Fault]:
+    """Name the points beyond the last radius of a distortion table, the first ones one by one."""
+    if camera.distortion is None:
+        return []
+    limit, _ = lens.reach(camera.distortion)
+    outside = np.flatnonzero(radius > limit + lens.EDGE)
+    key = f"cameras.{camera.name}.distortion.radius"
+    fix = "continue the table to the corners of the format, or leave the point out"
+    faults = []
+    for i in outside[:SHOWN]:
+        photo = observations.photo_ids[observations.photo[rows[i]]]
+        point = observations.point_ids[observations.point[rows[i]]]
+        message = f"photo {photo}, point {point}: {radius[i]:.3f} mm from the principal point, the distortion table of "
+        message += f"camera {camera.name} ends at {limit:.3f} mm"
+        faults.append(Fault(message, code="beyond-distortion-table", key=key, fix=fix))
+    if len(outside) > SHOWN:
+        message = f"{len(outside) - SHOWN} more points lie beyond the distortion table of camera {camera.name}"
+        faults.append(Fault(message, code="beyond-distortion-table", key=key))
+    return faults
