@@ -64,12 +64,19 @@ class _Operation:
 
     def __init__(self, source: CRS, target: CRS) -> None:
         self._ends = (source, target)
-        self._settled = False
+        self._decided_by: tuple[Array, bool] | None = None  # the point, and whether it went the inverse way
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Keep what the operation is made from: PROJ's own object cannot be sent to another process."""
+        return {"_ends": self._ends, "_decided_by": self._decided_by}
 
     @cached_property
     def transformer(self) -> Transformer:
-        """The PROJ object; making it takes 2 to 100 ms. Raises ProjError where no sound operation exists."""
+        """The PROJ object; making it takes 1 to 100 ms. Raises ProjError where no sound operation exists."""
         made: Transformer = _pyproj().Transformer.from_crs(*self._ends, always_xy=True, allow_ballpark=False)
+        if self._decided_by is not None:  # in another process
+            point, inverse = self._decided_by
+            made = _used(made, point, inverse=inverse)
         return made
 
     @property
@@ -79,23 +86,11 @@ class _Operation:
 
     def apply(self, columns: Array, *, inverse: bool = False) -> Array:
         """Transform rows of coordinates; what lies outside the domain becomes infinite."""
-        if not self._settled and len(columns):
-            self._settle(columns[len(columns) // 2], inverse=inverse)
-        return np.stack(self._run(columns.T, inverse=inverse), axis=-1)
-
-    def _run(self, columns: Array, *, inverse: bool) -> Any:  # noqa: ANN401 (arrays or numbers, as given)
-        """Hand columns to PROJ and get columns back."""
-        transform: Any = self.transformer.transform
-        return transform(*columns, direction="INVERSE" if inverse else "FORWARD", errcheck=False)
-
-    def _settle(self, point: Array, *, inverse: bool) -> None:
-        """Keep the operation that PROJ uses for one point."""
-        self._run(point, inverse=inverse)
-        try:
-            self.transformer = self.transformer.get_last_used_operation()
-        except _pyproj().exceptions.ProjError:
-            return  # nothing is valid at this point, or nothing is to be done
-        self._settled = True
+        if self._decided_by is None and len(columns):
+            self._decided_by = columns[len(columns) // 2], inverse
+            self.transformer = _used(self.transformer, columns[len(columns) // 2], inverse=inverse)
+        rows = np.repeat(columns, 2, axis=0) if len(columns) == 1 else columns  # pyproj 3.6 takes one row for numbers
+        return np.stack(_run(self.transformer, rows.T, inverse=inverse), axis=-1)[: len(columns)]
 
     @property
     def accuracy(self) -> float | None:
@@ -104,12 +99,27 @@ class _Operation:
         return stated if stated >= 0.0 else None
 
     def __str__(self) -> str:
-        if not self.idle and not self._settled:
+        if not self.idle and self._decided_by is None:
             return "chosen by PROJ at the first point"
         steps = [step for step in self.transformer.description.split(" + ") if not step.startswith("axis order change")]
         return " + ".join(steps) + (
             ", accuracy not known" if self.accuracy is None else f", accuracy {self.accuracy:g} m"
         )
+
+
+def _run(transformer: Transformer, columns: Array, *, inverse: bool) -> Any:  # noqa: ANN401 (arrays or numbers)
+    """Hand columns to PROJ and get columns back."""
+    transform: Any = transformer.transform
+    return transform(*columns, direction="INVERSE" if inverse else "FORWARD", errcheck=False)
+
+
+def _used(transformer: Transformer, point: Array, *, inverse: bool) -> Transformer:
+    """Single out the operation that PROJ uses for one point."""
+    _run(transformer, point, inverse=inverse)
+    try:
+        return transformer.get_last_used_operation()
+    except _pyproj().exceptions.ProjError:
+        return transformer  # nothing is valid at this point, or nothing is to be done
 
 
 # ------------------------------------------------------------------------- reading a CRS of the user
@@ -153,11 +163,19 @@ class _Parts:
     def shift_end(self) -> CRS:
         """The three-dimensional geographic CRS a datum shift starts from or leads to."""
         crs = self.geographic
-        if self.plane is not None and self.plane.is_bound:
-            bound = self.plane.to_json_dict()
-            bound["source_crs"] = crs.to_json_dict()
-            crs = _pyproj().CRS.from_json_dict(bound)
-        return crs.to_3d()
+        if self.plane is None or not self.plane.is_bound:
+            return crs.to_3d()
+        bound = self.plane.to_json_dict()
+        if self.kind == "geocentric" and self.plane.coordinate_operation is not None:
+            # PROJ ties a geocentric CRS to the geocentric WGS 84; the same numbers serve for longitude and latitude.
+            from pyproj.crs.coordinate_operation import ToWGS84Transformation
+
+            shift = ToWGS84Transformation(crs, *self.plane.coordinate_operation.towgs84)
+            bound["transformation"] = shift.to_json_dict()
+            bound["target_crs"] = _pyproj().CRS.from_user_input("EPSG:4326").to_json_dict()
+        bound["source_crs"] = crs.to_json_dict()
+        made: CRS = _pyproj().CRS.from_json_dict(bound)
+        return made.to_3d()
 
     @cached_property
     def hub(self) -> str:
@@ -220,12 +238,13 @@ def _read(spec: FrameSpec, directory: Path | None) -> _Parts:
     ellipsoid = core.ellipsoid
     if ellipsoid is None:
         raise PhotostripError(f"PROJ gives no ellipsoid for {spec.name}")
+    third = axes[2] if kind == "geocentric" else heights
     return _Parts(
         kind=kind,
         title=whole.name,
         ellipsoid=(float(ellipsoid.semi_major_metre), float(ellipsoid.semi_minor_metre)),
-        units=(axes[0].unit_name, heights.unit_name if heights else "metre"),
-        factors=(float(axes[0].unit_conversion_factor), float(heights.unit_conversion_factor) if heights else 1.0),
+        units=(axes[0].unit_name, third.unit_name if third else "metre"),
+        factors=(float(axes[0].unit_conversion_factor), float(third.unit_conversion_factor) if third else 1.0),
         whole=whole,
         plane=plane,
         core=core,
@@ -341,20 +360,20 @@ def _same_datum(one: _Parts, other: _Parts) -> bool:
     return first is not None and second is not None and first.longitude == second.longitude
 
 
-def _sound(operation: _Operation) -> str | None:
-    """Make an operation; what PROJ says against it, or None when it is sound."""
+def _trouble(operation: _Operation) -> str:
+    """Make an operation; give what PROJ says against it, nothing when it is sound."""
     try:
         operation.transformer  # noqa: B018 (made here, so that a refusal comes before any computing)
     except _pyproj().exceptions.ProjError as error:
-        return str(error)
-    return None
+        return str(error) or "no operation"
+    return ""
 
 
 def _datum_shift(spec: FrameSpec, own: _Parts, target: FrameSpec, out: _Parts) -> DatumShift:
     """Find the PROJ operation from one datum to that of the Cartesian frame; refused when there is no sound one."""
     operation = _Operation(own.shift_end, out.shift_end)
-    trouble = _sound(operation)
-    if trouble is None:
+    trouble, missing = _trouble(operation), _own_grids_missing(own) or _own_grids_missing(out)
+    if not trouble and not missing:
         return DatumShift(operation, own.angle, out.angle)
     message = f"there is no known way from the datum of {spec.name} to that of {target.name}"
     fix = "give both in one datum"
@@ -364,8 +383,8 @@ def _datum_shift(spec: FrameSpec, own: _Parts, target: FrameSpec, out: _Parts) -
         which = target.name if own.datum_is_stated else spec.name
         message += f": {which} states an ellipsoid but no datum"
         fix = "add +towgs84=... (or +datum=...) to it, or use an authority code"
-    elif grids := _missing_grids(own.shift_end, out.shift_end):
-        message += f": the grid {grids} is not installed"
+    elif missing := missing or _grids_missing(own.shift_end, out.shift_end):
+        message += f": the grid {missing} is not installed"
         fix = (
             "put the grid beside the project file or into PROJ's data directory (`projsync`), or give both in one datum"
         )
@@ -377,12 +396,14 @@ def _vertical_operation(spec: FrameSpec, own: _Parts) -> _Operation:
     if own.whole is None or own.plane is None:
         raise PhotostripError(f"{spec.name} has no vertical part")
     operation = _Operation(own.whole, own.plane.to_3d())
-    trouble = _sound(operation)
-    if trouble is None:
+    trouble, missing = _trouble(operation), _own_grids_missing(own)
+    if not trouble and not missing:
         return operation
     message = f"the heights of {spec.name} ({own.vertical}) cannot be brought to the ellipsoid"
-    if grids := _missing_grids(own.whole, own.plane.to_3d()):
-        message += f": the geoid grid {grids} is not installed"
+    if missing := missing or _grids_missing(own.whole, own.plane.to_3d()):
+        message += f": the geoid grid {missing} is not installed"
+    elif "invalid" in trouble:
+        message += ": PROJ cannot read the grid"
     elif not own.datum_is_stated:
         message += ": a geoid grid refers to WGS 84, and the datum of the plan is not stated (add +towgs84 or +datum)"
     else:
@@ -395,7 +416,16 @@ def _vertical_operation(spec: FrameSpec, own: _Parts) -> _Operation:
     )
 
 
-def _missing_grids(source: CRS, target: CRS) -> str:
+def _own_grids_missing(parts: _Parts) -> str:
+    """Name the grids of a PROJ string that are not there: not every version of PROJ notices before it computes."""
+    whole = parts.whole
+    crss = [] if whole is None else [whole, *whole.sub_crs_list]
+    operations = [crs.coordinate_operation for crs in crss if crs.is_bound and crs.coordinate_operation is not None]
+    grids = [grid for operation in operations for grid in operation.grids]
+    return " and ".join(g.short_name for g in grids if not g.available and g.short_name.removeprefix("@") != "null")
+
+
+def _grids_missing(source: CRS, target: CRS) -> str:
     """Name the grids that PROJ would use between two CRSs if they were there."""
     from pyproj.transformer import TransformerGroup
 

@@ -38,6 +38,8 @@ WGS84: Ellipsoid = (6378137.0, 6356752.314245179)
 """Semi-axes of WGS 84, metres: by definition a = 6378137 m, 1/f = 298.257223563 (NIMA TR8350.2)."""
 
 _DERIVATIVE_STEP = 1e-4  # of the radius: 640 m on the Earth; truncation and rounding stay below 1e-11 rad
+_EXACT = 1e-7  # metres: some projections of PROJ (equal-area ones) come back to a millimetre only
+_COMES_BACK = 1.0  # metres: a point that misses itself by more was never in the domain of the projection
 _POLE = 1e-9  # radians: nearer to a pole, east and north are not defined
 _CENTRE = 0.1  # of the radius: nearer to the centre of the body, latitude means nothing
 _ROWS_NAMED = 8
@@ -223,7 +225,7 @@ class GroundFrame:
         Source: [001] eq. 153 for a local frame with a radius.
         """
         points = np.array(enu, dtype=np.float64).reshape(-1, 3)
-        self._require(_finite(points), "has a coordinate that is not a number", ids)
+        self._require(_finite(points), "a coordinate is not a number", ids)
         if self.kind == "local":
             return self._bent(points, tangent_from_height)
         if self.kind == "geocentric":
@@ -270,10 +272,8 @@ class GroundFrame:
         plan = geodetic[:, :2] / self._angle
         if self._plane is not None:
             plan = self._plane.apply(plan, inverse=True)
-        self._reached(plan, ids, "lies outside the domain of")
-        height = self._from_ellipsoidal(plan, geodetic[:, 2])
-        self._reached(height[:, None], ids, "lies outside the geoid grid of")
-        return np.column_stack([plan, height])
+        self._reached(plan, ids, "outside the domain of")
+        return np.column_stack([plan, self._from_ellipsoidal(plan, geodetic[:, 2], ids)])
 
     def geodetic(self, xyz: ArrayLike) -> Array:
         """Longitude, latitude and ellipsoidal height, on the frame's own datum.
@@ -306,7 +306,7 @@ class GroundFrame:
         geodetic = geodetic_from_geocentric(points, self._cartesian)
         if self._shift is not None:
             geodetic = self._shift.inverse(geodetic)
-            self._reached(geodetic, None, "cannot be shifted to the datum of")
+            self._reached(geodetic, None, "no datum shift is known there to")
         return geodetic
 
     # ------------------------------------------------------------ directions
@@ -440,12 +440,19 @@ class GroundFrame:
     def _lonlat(self, plan: Array, ids: Sequence[str] | None) -> Array:
         """Longitude and latitude, radians, of plan coordinates."""
         if self._plane is not None:
-            lonlat = self._plane.apply(plan) * self._angle
-            self._require(_finite(lonlat), f"lies outside the domain of {self.spec.name}", ids)
-            return lonlat
+            lonlat = self._plane.apply(plan)
+            miss = plan - self._plane.apply(lonlat, inverse=True)
+            # PROJ gives some points outside the domain a place inside: they do not come back. East may: some grids
+            # go round the globe, and a coordinate beyond 180 degrees comes back as one before it.
+            good = _finite(lonlat) & (np.abs(miss[:, 1]) * self.plan_factor < _COMES_BACK)
+            self._require(good, f"outside the domain of {self.spec.name}", ids)
+            if np.abs(miss).max(initial=0.0) * self.plan_factor > _EXACT:  # an inverse by a short series
+                near = (np.abs(miss[:, 0]) * self.plan_factor < _COMES_BACK)[:, None]
+                lonlat = self._plane.apply(plan + np.where(near, miss, 0.0))
+            return lonlat * self._angle
         lonlat = plan * self._angle
         inside = (np.abs(lonlat[:, 0]) <= 2.0 * math.pi) & (np.abs(lonlat[:, 1]) <= math.pi / 2.0)
-        self._require(inside, "has no such longitude and latitude (are the axes in the right order?)", ids)
+        self._require(inside, "no such longitude and latitude (are the axes in the right order?)", ids)
         return lonlat
 
     def _ellipsoidal(self, points: Array, ids: Sequence[str] | None) -> Array:
@@ -453,14 +460,15 @@ class GroundFrame:
         if self._vertical is None:
             return points[:, 2] * self.height_factor + (self.spec.geoid_undulation or 0.0)
         height = self._vertical.apply(points)[:, 2]
-        self._require(np.isfinite(height), f"lies outside the geoid grid of {self.spec.name}", ids)
+        self._require(np.isfinite(height), f"outside the geoid grid of {self.spec.name}", ids)
         return height
 
-    def _from_ellipsoidal(self, plan: Array, ellipsoidal: Array) -> Array:
+    def _from_ellipsoidal(self, plan: Array, ellipsoidal: Array, ids: Sequence[str] | None) -> Array:
         """Heights in the user's sense and unit from heights above the frame's own ellipsoid."""
         if self._vertical is None:
             return (ellipsoidal - (self.spec.geoid_undulation or 0.0)) / self.height_factor
         first = self._vertical.apply(np.column_stack([plan, ellipsoidal]), inverse=True)[:, 2]
+        self._reached(first[:, None], ids, "outside the geoid grid of")
         # A geoid on a shifted datum is inverted by PROJ to 0.1 mm only; one step of iteration makes it exact.
         again = self._vertical.apply(np.column_stack([plan, first]))[:, 2]
         return first + (ellipsoidal - again) / self.height_factor
@@ -469,7 +477,7 @@ class GroundFrame:
         """Cartesian coordinates from longitude, latitude (radians) and height of the frame's own datum."""
         if self._shift is not None:
             geodetic = self._shift.forward(geodetic)
-            self._require(_finite(geodetic), f"lies where no datum shift from {self.spec.name} is known", ids)
+            self._require(_finite(geodetic), f"no datum shift from {self.spec.name} is known there", ids)
         return geocentric_from_geodetic(geodetic, self._cartesian)
 
     def _own_geocentric(self, geodetic: Array) -> Array:
@@ -500,14 +508,15 @@ class GroundFrame:
         """
         if self._plane is None or self.ellipsoid is None:
             raise PhotostripError(f"{self.spec.name} has no grid")
-        n, height = len(geodetic), geodetic[:, 2]
+        n = len(geodetic)
         plan = self._plane.apply(geodetic[:, :2] / self._angle, inverse=True)
         step = _DERIVATIVE_STEP * self.ellipsoid[0] / self.plan_factor
         offsets = step * np.array([[2, 0], [1, 0], [-1, 0], [-2, 0], [0, 2], [0, 1], [0, -1], [0, -2]])
-        around = (plan + offsets[:, None, :]).reshape(-1, 2)
-        lonlat = self._plane.apply(around) * self._angle
-        xyz = self._own_geocentric(np.column_stack([lonlat, np.tile(height, len(offsets))])).reshape(2, 4, n, 3)
-        self._reached(xyz.transpose(2, 0, 1, 3).reshape(n, -1), None, "lies outside, or at the edge of, the domain of")
+        lonlat = self._plane.apply((plan + offsets[:, None, :]).reshape(-1, 2)) * self._angle
+        around = lonlat.reshape(8, n, 2).transpose(1, 0, 2).reshape(n, 16)
+        self._reached(around, None, "outside, or at the edge of, the domain of")
+        # On the ellipsoid: with the height of the point, two lines that cross at right angles there would not here.
+        xyz = self._own_geocentric(np.column_stack([lonlat, np.zeros(len(lonlat))])).reshape(2, 4, n, 3)
         weights = np.array([-1.0, 8.0, -8.0, 1.0])
         east, north = (_unit(tangent) for tangent in np.einsum("k,aknc->anc", weights, xyz))
         up = _unit(np.cross(east, north))
@@ -532,14 +541,14 @@ class GroundFrame:
     def _require(self, good: NDArray[np.bool_], trouble: str, ids: Sequence[str] | None) -> None:
         """Refuse coordinates given by the user that cannot be used."""
         if not good.all():
-            raise InputError(Fault(f"{_named(~good, ids)} {trouble}", code="ground-domain"))
+            raise InputError(Fault(f"{_named(~good, ids)}: {trouble}", code="ground-domain"))
 
     def _reached(self, values: Array, ids: Sequence[str] | None, trouble: str) -> None:
         """Refuse computed points that cannot be expressed in this frame."""
         bad = ~_finite(values)
         if bad.any():
             points = [ids[int(row)] for row in np.flatnonzero(bad)] if ids is not None else []
-            raise GeometryError(f"{_named(bad, ids)} {trouble} {self.spec.name}", points=points, code="ground-domain")
+            raise GeometryError(f"{_named(bad, ids)}: {trouble} {self.spec.name}", points=points, code="ground-domain")
 
 
 def _unit(vectors: Array) -> Array:

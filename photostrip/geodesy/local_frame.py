@@ -155,15 +155,17 @@ def mean_position(lat: ArrayLike, lon: ArrayLike, height: ArrayLike) -> tuple[fl
     Returns
     -------
     tuple of float
-        Mean latitude, longitude in (-pi, pi] and height. The longitude is the direction of the mean unit vector,
-        so that 179 and -179 degrees have the mean 180 and not 0.
+        Mean latitude, longitude in [-pi, pi) and height. Longitudes are counted from the direction of their mean
+        unit vector, so that 179 and -179 degrees have the mean 180 and not 0.
 
     Notes
     -----
-    Source: [001] eq. 142, the longitude as a mean of directions.
+    Source: [001] eq. 142, the longitude by way of directions.
     """
     lat, lon, height = (np.asarray(column, dtype=np.float64) for column in (lat, lon, height))
     middle = np.arctan2(np.mean(np.sin(lon)), np.mean(np.cos(lon)))
+    middle += np.mean((lon - middle + np.pi) % (2.0 * np.pi) - np.pi)
+    middle = (middle + np.pi) % (2.0 * np.pi) - np.pi
     return float(np.mean(lat)), float(middle), float(np.mean(height))  # eq. 142
 
 

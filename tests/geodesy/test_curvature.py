@@ -1,0 +1,129 @@
+"""Radii of the ellipsoid and the curvature correction, against the ellipsoid itself."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pyproj import Geod
+
+from photostrip.geodesy import curvature
+from photostrip.geodesy.local_frame import IntermediateFrame, axes_matrix, geocentric_from_geodetic
+from tests.vectors import Vector, cases
+
+GRS80 = (6378137.0, 6378137.0 * (1.0 - 1.0 / 298.257222101))
+LAT = np.radians(42.5)
+
+
+def ellipsoid_named(text: str) -> tuple[float, float]:
+    """Semi-axes from a text such as "Krasovsky 1940, a=6378245, 1/f=298.3"."""
+    a, inverse = (float(part.split("=")[1]) for part in text.split(", ")[1:])
+    return a, a * (1.0 - 1.0 / inverse)
+
+
+@pytest.mark.parametrize("example", cases("earth_curvature"))
+def test_vectors(example: Vector) -> None:
+    inside, out = example.input, example.expected
+    lat, azimuth = np.radians([inside["B_deg"], inside["azimuth_of_point_deg"]])
+    ellipsoid = ellipsoid_named(inside["ellipsoid"])
+    distance = np.hypot(inside["X"], inside["Y"])
+    mean = curvature.mean_radius(lat, ellipsoid)
+    directed = curvature.radius_in_azimuth(lat, azimuth, ellipsoid)
+    found = {
+        "D": distance,
+        "M": curvature.meridian_radius(lat, ellipsoid),
+        "N": curvature.prime_vertical_radius(lat, ellipsoid),
+        "R_mean": mean,
+        "R_azimuth": directed,
+        "correction_mean_R": curvature.curvature_correction(distance, mean),
+        "Z_corrected_mean_R": curvature.height_from_tangent(inside["Z"], distance, mean),
+        "Z_corrected_azimuth_R": curvature.height_from_tangent(inside["Z"], distance, directed),
+        "Z_corrected_sphere_exact_azimuth_R": curvature.height_on_sphere(inside["Z"], distance, directed),
+    }
+    assert found.keys() == out.keys()
+    for name, value in found.items():
+        assert value == pytest.approx(out[name], rel=example.tol["rel"], abs=example.tol["abs"]), name
+
+
+def errors_on_the_ellipsoid(distance_km: float, azimuth_deg: float, height: float = 0.0) -> tuple[float, float]:
+    """Error of eq. 153 with the mean radius and with the radius in the azimuth, metres.
+
+    A point at a geodesic distance and a height is seen from the tangent plane; its height is computed back.
+    """
+    lon, lat, _ = Geod(a=GRS80[0], b=GRS80[1]).fwd(0.0, 42.5, azimuth_deg, distance_km * 1e3)
+    point = geocentric_from_geodetic([[np.radians(lon), np.radians(lat), height]], GRS80)
+    tangent = IntermediateFrame(geocentric_from_geodetic([[0.0, LAT, 0.0]], GRS80)[0], axes_matrix(LAT, 0.0, 0.0))
+    x, y, z = tangent.intermediate_from_cartesian(point)[0]
+    distance, azimuth = np.hypot(x, y), np.arctan2(-y, x)
+    radii = curvature.mean_radius(LAT, GRS80), curvature.radius_in_azimuth(LAT, azimuth, GRS80)
+    mean, directed = (float(curvature.height_from_tangent(z, distance, radius)) - height for radius in radii)
+    return abs(mean), abs(directed)
+
+
+@pytest.mark.parametrize(
+    ("distance_km", "size", "mean", "directed", "digits"),
+    [
+        (5.0, 1.96, 0.004, 0.0, (2, 3, 3)),
+        (10.0, 7.84, 0.014, 0.0, (2, 3, 3)),
+        (20.0, 31.4, 0.06, 0.0003, (1, 2, 4)),
+        (50.0, 196.0, 0.36, 0.003, (0, 2, 3)),
+        (100.0, 784.0, 1.4, 0.05, (0, 1, 2)),
+    ],
+)
+def test_table_of_the_formula_s_accuracy(
+    distance_km: float, size: float, mean: float, directed: float, digits: tuple[int, int, int]
+) -> None:
+    """At latitude 42.5 degrees, along the meridian and across it, the larger one."""
+    found = [errors_on_the_ellipsoid(distance_km, azimuth) for azimuth in (0.0, 90.0)]
+    correction = curvature.curvature_correction(distance_km * 1e3, curvature.mean_radius(LAT, GRS80))
+    assert round(float(correction), digits[0]) == size
+    assert round(max(error for error, _ in found), digits[1]) == mean
+    assert round(max(error for _, error in found), digits[2]) == directed
+
+
+def test_high_terrain_is_off_by_half_a_centimetre_at_20_km() -> None:
+    assert errors_on_the_ellipsoid(20.0, 90.0, height=1000.0)[1] == pytest.approx(0.005, abs=0.0005)
+
+
+@given(
+    lat=st.floats(-np.pi / 2, np.pi / 2),
+    azimuth=st.floats(-7.0, 7.0),
+)
+def test_radii_keep_their_order(lat: float, azimuth: float) -> None:
+    m, n = curvature.meridian_radius(lat, GRS80), curvature.prime_vertical_radius(lat, GRS80)
+    directed = curvature.radius_in_azimuth(lat, azimuth, GRS80)
+    assert m <= n * (1.0 + 1e-15)
+    assert m * (1.0 - 1e-12) <= directed <= n * (1.0 + 1e-12)
+    assert m * (1.0 - 1e-12) <= curvature.mean_radius(lat, GRS80) <= n * (1.0 + 1e-12)
+
+
+def test_radii_in_the_cardinal_directions() -> None:
+    lat = np.radians([-80.0, 0.0, 42.5])
+    assert curvature.radius_in_azimuth(lat, 0.0, GRS80) == pytest.approx(curvature.meridian_radius(lat, GRS80))
+    across = curvature.radius_in_azimuth(lat, np.pi / 2, GRS80)
+    assert across == pytest.approx(curvature.prime_vertical_radius(lat, GRS80))
+
+
+def test_radius_of_the_meridian_is_the_derivative_of_its_arc() -> None:
+    arc = Geod(a=GRS80[0], b=GRS80[1]).inv(10.0, 42.49, 10.0, 42.51)[2]
+    assert curvature.meridian_radius(LAT, GRS80) == pytest.approx(arc / np.radians(0.02), rel=1e-7)
+
+
+@given(
+    height=st.floats(-500.0, 9000.0),
+    distance=st.floats(0.0, 1e5),
+    radius=st.floats(1e6, 1e7),
+)
+def test_there_and_back_and_the_sphere(height: float, distance: float, radius: float) -> None:
+    z = curvature.tangent_from_height(height, distance, radius)
+    assert z <= height
+    assert curvature.height_from_tangent(z, distance, radius) == pytest.approx(height, abs=1e-8)
+    exact = np.sqrt(np.longdouble(distance) ** 2 + (np.longdouble(radius) + np.longdouble(z)) ** 2) - radius
+    assert float(curvature.height_on_sphere(z, distance, radius)) == pytest.approx(float(exact), abs=1e-8)
+
+
+def test_largest_correction() -> None:
+    plan = [[500000.0, 4600000.0], [503000.0, 4604000.0], [500100.0, 4600000.0]]
+    assert curvature.largest_correction(plan, [500000.0, 4600000.0, 12.0], 6.37e6) == pytest.approx(25e6 / 2 / 6.37e6)
+    assert curvature.largest_correction(np.empty((0, 3)), [0.0, 0.0], 6.37e6) == 0.0

@@ -1,0 +1,437 @@
+"""Ground frames by themselves: points, directions, differences, local frames, what they refuse."""
+
+from __future__ import annotations
+
+import math
+import pickle
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pyproj import Proj, Transformer
+
+from photostrip.errors import GeometryError, InputError, PhotostripError
+from photostrip.geodesy.crs import FrameSpec, GroundFrame, tie_frames
+from tests.geodesy.frames import NEU, XYZ, frame, krueger, pair, spec
+
+MICROMETRE = 1e-6  # m
+NANORADIAN = 1e-9
+WGS84 = {"a": 6378137.0, "flattening": 1.0 / 298.257223563}
+US_FOOT = 1200.0 / 3937.0
+MOON = 1737400.0
+UTM33 = frame("EPSG:32633")
+
+# crs, west, east, south, north: where each of these is in use
+GRIDS = {
+    "EPSG:32633": (9.0, 21.0, 0.0, 83.0),
+    "EPSG:32733": (9.0, 21.0, -80.0, 0.0),
+    "EPSG:32601": (-180.0, -174.0, -10.0, 70.0),
+    "EPSG:32660": (174.0, 180.0, -10.0, 70.0),
+    "EPSG:28407": (36.0, 42.0, 45.0, 70.0),
+    "EPSG:2154": (-5.0, 10.0, 41.0, 51.0),  # Lambert conformal
+    "EPSG:27572": (-4.0, 5.0, 43.0, 50.0),  # grads from Paris underneath
+    "EPSG:5514": (12.0, 22.0, 48.0, 51.0),  # Krovak, negative coordinates
+    "EPSG:2263": (-75.0, -72.0, 40.0, 41.5),  # US survey feet
+    "EPSG:3857": (-179.0, 179.0, -80.0, 80.0),
+    "EPSG:3035": (0.0, 25.0, 35.0, 65.0),  # equal area: not conformal
+    "EPSG:3031": (-180.0, 180.0, -90.0, -60.0),
+    "EPSG:5041": (-180.0, 180.0, 60.0, 90.0),
+    "EPSG:32661": (-180.0, 180.0, 60.0, 90.0),
+    "+proj=eqc +lat_ts=30 +R=1737400": (-179.9, 179.9, -80.0, 80.0),
+    "+proj=stere +lat_0=-90 +lon_0=0 +a=3396190 +b=3376200": (-180.0, 180.0, -90.0, -60.0),
+}
+CONFORMAL = [crs for crs in GRIDS if crs not in {"EPSG:3035", "EPSG:3857"} and "eqc" not in crs]
+FRAMES = {crs: frame(crs) for crs in GRIDS}
+ZONES = {grid.spec.crs: grid for grid in tie_frames([spec(f"EPSG:326{zone}") for zone in ("33", "34", "01", "60")])[0]}
+PROJ_ITSELF = {crs: Transformer.from_crs("EPSG:4326", crs, always_xy=True) for crs in ZONES}
+fraction = st.floats(0.0, 1.0)
+height = st.floats(-500.0, 9000.0)
+
+
+def point_of(crs: str, u: float, v: float, up: float) -> np.ndarray:
+    """Longitude, latitude (degrees from Greenwich) and height of a point in the area of a CRS."""
+    west, east, south, north = GRIDS[crs]
+    return np.array([west + u * (east - west), south + v * (north - south), up])
+
+
+def cartesian(grid: GroundFrame, lonlath: np.ndarray) -> np.ndarray:
+    """Cartesian coordinates by the ellipsoid's formulas, longitudes counted from the zero meridian of the frame."""
+    assert grid.ellipsoid is not None
+    a, b = grid.ellipsoid
+    lon, lat = np.radians(lonlath[0]), np.radians(lonlath[1])
+    n = a**2 / math.hypot(a * math.cos(lat), b * math.sin(lat))
+    across = (n + lonlath[2]) * math.cos(lat)
+    return np.array([[across * math.cos(lon), across * math.sin(lon), (n * (b / a) ** 2 + lonlath[2]) * math.sin(lat)]])
+
+
+@pytest.mark.parametrize("crs", GRIDS)
+@given(u=fraction, v=fraction, up=height)
+def test_round_trip(crs: str, u: float, v: float, up: float) -> None:
+    grid = FRAMES[crs]
+    xyz = cartesian(grid, point_of(crs, u, v, up))
+    enu = grid.ground_from_cartesian(xyz)
+    assert enu[0, 2] * grid.height_factor == pytest.approx(up, abs=MICROMETRE)
+    assert np.abs(grid.cartesian_from_ground(enu) - xyz).max() < MICROMETRE
+
+
+@given(lon=st.floats(-180.0, 180.0), lat=st.floats(-90.0, 90.0), up=height)
+def test_geographic_round_trip_and_the_geocentric_frame_beside_it(lon: float, lat: float, up: float) -> None:
+    geographic, geocentric = pair("EPSG:4979", "geocentric")
+    xyz = geographic.cartesian_from_ground([[lon, lat, up]])
+    assert xyz == pytest.approx(cartesian(geographic, np.array([lon, lat, up])), abs=MICROMETRE)
+    assert (geocentric.ground_from_cartesian(xyz) == xyz).all()
+    back = geographic.ground_from_cartesian(xyz)
+    assert np.abs(geographic.difference(back, [[lon, lat, up]])).max() < MICROMETRE
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "lon"), [("EPSG:32633", "EPSG:32634", 18.0), ("EPSG:32601", "EPSG:32660", 180.0)]
+)
+@given(across=st.floats(-0.5, 0.5), lat=st.floats(-10.0, 70.0), up=height)
+def test_two_zones_meet_in_one_point(first: str, second: str, lon: float, across: float, lat: float, up: float) -> None:
+    """Coordinates of both zones by PROJ itself; on both sides of a zone boundary, one at 180 degrees."""
+    point = ((lon + across + 180.0) % 360.0 - 180.0, lat)
+    found = [ZONES[crs].cartesian_from_ground([[*PROJ_ITSELF[crs].transform(*point), up]]) for crs in (first, second)]
+    assert np.abs(found[0] - found[1]).max() < MICROMETRE
+    assert np.abs(found[0] - cartesian(UTM33, np.array([*point, up]))).max() < MICROMETRE
+
+
+def test_gauss_krueger_zones_with_their_numbers_in_front() -> None:
+    (west, east), out = tie_frames([spec("EPSG:28404", axes=NEU), spec("EPSG:28405", axes=NEU)])
+    point = np.radians([24.0, 42.7])
+    xyz = cartesian(west, np.array([24.0, 42.7, 600.0]))
+    user = [grid.user_from_internal(grid.ground_from_cartesian(xyz))[0] for grid in (west, east)]
+    assert [int(columns[1] // 1e6) for columns in user] == [4, 5]  # y, the second column, carries the zone
+    assert user[0][0] == pytest.approx(user[1][0], abs=1e-6)  # the boundary is as far from both meridians
+    assert out.geodetic(xyz)[0] == pytest.approx((*point, 600.0))
+
+
+@given(lon=st.floats(11.0, 19.0), lat=st.floats(-80.0, 84.0))
+def test_transverse_mercator_is_that_of_krueger_s_series(lon: float, lat: float) -> None:
+    expected, convergence = krueger(np.array([[lon, lat]]), **WGS84, lon_0=15.0, k0=0.9996)
+    xyz = cartesian(UTM33, np.array([lon, lat, 100.0]))
+    assert UTM33.ground_from_cartesian(xyz)[0, :2] == pytest.approx(expected[0], abs=MICROMETRE)
+    assert UTM33.convergence(xyz) == pytest.approx(convergence, abs=NANORADIAN)
+
+
+@pytest.mark.parametrize("crs", GRIDS)
+@given(u=st.floats(0.05, 0.95), v=st.floats(0.05, 0.95), up=height)
+def test_axes_are_right_angled_and_follow_the_grid(crs: str, u: float, v: float, up: float) -> None:
+    grid = FRAMES[crs]
+    lonlath = point_of(crs, u, v, up)
+    axes = grid.axes_at(cartesian(grid, lonlath))[0]
+    xyz = cartesian(grid, lonlath * (1.0, 1.0, 0.0))  # on the ellipsoid, where conformal grids have right angles
+    assert axes @ axes.T == pytest.approx(np.eye(3), abs=1e-14)
+    assert np.linalg.det(axes) == pytest.approx(1.0)
+    lon, lat = np.radians(lonlath[:2])
+    normal = [math.cos(lat) * math.cos(lon), math.cos(lat) * math.sin(lon), math.sin(lat)]
+    assert axes[2] == pytest.approx(normal, abs=NANORADIAN)
+    enu, step = grid.ground_from_cartesian(xyz), 10.0 / grid.plan_factor
+    along = [grid.cartesian_from_ground(enu + d) - grid.cartesian_from_ground(enu - d) for d in np.eye(3)[:2] * step]
+    east, north = (difference[0] / np.linalg.norm(difference) for difference in along)
+    if crs in CONFORMAL:
+        assert np.abs(np.array([east, north]) - axes[:2]).max() < 1e-8
+    assert east @ axes[1] == pytest.approx(north @ axes[0], abs=1e-8)  # the deviation from a right angle is shared
+
+
+@pytest.mark.parametrize("crs", CONFORMAL)
+@given(u=st.floats(0.1, 0.9), v=st.floats(0.1, 0.9))
+def test_convergence_is_that_of_proj(crs: str, u: float, v: float) -> None:
+    grid = FRAMES[crs]
+    lonlath = point_of(crs, u, v, 500.0)
+    expected = math.radians(Proj(crs).get_factors(*lonlath[:2]).meridian_convergence)  # itself good to 1e-8 only
+    turn = grid.convergence(cartesian(grid, lonlath))[0] - expected
+    assert math.remainder(turn, 2.0 * math.pi) == pytest.approx(0.0, abs=1e-7)
+
+
+@given(lon=st.floats(-5.0, 10.0), lat=st.floats(41.0, 51.0))
+def test_convergence_of_a_lambert_grid_is_proportional_to_the_longitude(lon: float, lat: float) -> None:
+    grid = FRAMES["EPSG:2154"]
+    e = math.sqrt(2.0 / 298.257222101 - 1.0 / 298.257222101**2)
+
+    def m(phi: float) -> float:
+        return math.cos(phi) / math.sqrt(1.0 - (e * math.sin(phi)) ** 2)
+
+    def t(phi: float) -> float:
+        return math.tan(math.pi / 4 - phi / 2) * math.exp(e * math.atanh(e * math.sin(phi)))
+
+    first, second = math.radians(49.0), math.radians(44.0)
+    n = math.log(m(first) / m(second)) / math.log(t(first) / t(second))
+    found = grid.convergence(cartesian(grid, np.array([lon, lat, 0.0])))[0]
+    assert found == pytest.approx(n * math.radians(lon - 3.0), abs=NANORADIAN)
+
+
+@pytest.mark.parametrize(("crs", "lat", "sign"), [("EPSG:3031", -75.0, -1.0), ("EPSG:5041", 75.0, 1.0)])
+@given(lon=st.floats(-179.0, 179.0))
+def test_convergence_of_a_polar_grid_is_the_longitude(crs: str, lat: float, sign: float, lon: float) -> None:
+    xyz = cartesian(FRAMES[crs], np.array([lon, lat, 0.0]))
+    assert FRAMES[crs].convergence(xyz)[0] == pytest.approx(sign * math.radians(lon), abs=NANORADIAN)
+
+
+def test_convergence_has_the_sign_of_the_textbooks() -> None:
+    """North-east of the central meridian grid north lies east of true north."""
+    xyz = np.vstack([cartesian(UTM33, np.array([lon, lat, 0.0])) for lon, lat in ((17, 50), (13, 50), (17, -50))])
+    found = UTM33.convergence(xyz)
+    assert found == pytest.approx(np.radians([2.0, -2.0, -2.0]) * math.sin(math.radians(50.0)), abs=1e-4)
+
+
+def test_a_polar_grid_works_at_its_pole() -> None:
+    for crs, normal in (("EPSG:3031", -1.0), ("EPSG:5041", 1.0), ("EPSG:32661", 1.0)):
+        grid = FRAMES[crs]
+        xyz = cartesian(grid, np.array([0.0, normal * 90.0, 100.0]))
+        axes = grid.axes_at(xyz)[0]
+        assert axes[2] == pytest.approx((0.0, 0.0, normal), abs=NANORADIAN)
+        assert np.linalg.det(axes) == pytest.approx(1.0)
+        enu = grid.ground_from_cartesian(xyz)
+        assert np.abs(grid.cartesian_from_ground(enu) - xyz).max() < MICROMETRE
+        with pytest.raises(GeometryError, match="row 0: at a pole there is no east and no north"):
+            grid.convergence(xyz)
+
+
+def test_at_a_pole_a_geographic_frame_has_no_axes() -> None:
+    grid = frame("EPSG:4979")
+    xyz = grid.cartesian_from_ground([[30.0, 50.0, 0.0], [30.0, 90.0, 5.0]])
+    assert grid.ground_from_cartesian(xyz)[1, 1:] == pytest.approx((90.0, 5.0))
+    with pytest.raises(GeometryError, match="row 1: at a pole there is no east and no north"):
+        grid.axes_at(xyz)
+
+
+@given(lon=st.floats(-180.0, 180.0), lat=st.floats(-89.9, 89.9))
+def test_axes_of_a_geographic_frame(lon: float, lat: float) -> None:
+    grid = frame("EPSG:4326")
+    axes = grid.axes_at(cartesian(grid, np.array([lon, lat, 10.0])))[0]
+    sin_l, cos_l, sin_b, cos_b = (
+        *(f(np.radians(lon)) for f in (np.sin, np.cos)),
+        *(f(np.radians(lat)) for f in (np.sin, np.cos)),
+    )
+    expected = [[-sin_l, cos_l, 0.0], [-sin_b * cos_l, -sin_b * sin_l, cos_b], [cos_b * cos_l, cos_b * sin_l, sin_b]]
+    assert axes == pytest.approx(np.array(expected), abs=1e-13)
+
+
+def test_geocentric_and_local_frames_have_their_own_axes_and_no_convergence() -> None:
+    points = np.array([[4.3e6, 1.8e6, 4.3e6], [4.3e6, 1.9e6, 4.2e6]])
+    for crs in ("geocentric", "local"):
+        assert (frame(crs).axes_at(points) == np.eye(3)).all()
+        assert (frame(crs).convergence(points) == 0.0).all()
+    assert (frame("EPSG:4979").convergence(points) == 0.0).all()
+
+
+# ------------------------------------------------------------------------------- units, bodies, differences
+
+
+def test_feet_in_plan_and_metres_in_height() -> None:
+    grid = frame("EPSG:2263")  # 300 000 m are 984 250 feet at the origin 40 10' N, 74 W
+    assert (grid.plan_unit, grid.height_unit) == ("US survey foot", "metre")
+    xyz = cartesian(grid, np.array([-74.0, 40.0 + 10.0 / 60.0, 12.0]))
+    assert grid.ground_from_cartesian(xyz)[0] == pytest.approx((300000.0 / US_FOOT, 0.0, 12.0), abs=1e-5)
+    a, b = np.array([[984250.0, 100.0, 12.0]]), np.array([[984249.0, 97.0, 10.0]])
+    assert grid.difference(a, b)[0] == pytest.approx((US_FOOT, 3.0 * US_FOOT, 2.0))
+
+
+def test_feet_in_plan_and_in_height() -> None:
+    feet = "+proj=utm +zone=33 +datum=WGS84 +units=us-ft +vunits=us-ft"
+    grid, metres = pair(feet, "+proj=utm +zone=33 +datum=WGS84")
+    assert (grid.plan_unit, grid.height_unit) == ("US survey foot", "US survey foot")
+    metric = np.array([[500000.0, 4600000.0, 300.0]])
+    assert grid.cartesian_from_ground(metric / US_FOOT) == pytest.approx(metres.cartesian_from_ground(metric), abs=1e-5)
+    assert grid.difference(metric / US_FOOT, 0.0 * metric) == pytest.approx(metric, rel=1e-9)
+
+
+def test_grads_from_paris() -> None:
+    grid = frame("EPSG:4807", axes=NEU)
+    assert grid.plan_unit == "grad"
+    lat, lon, h = grid.user_from_internal(grid.ground_from_cartesian(cartesian(grid, np.array([0.9, 45.0, 80.0]))))[0]
+    assert (lat, lon, h) == pytest.approx((50.0, 1.0, 80.0))
+    radius = 6378249.2**2 / math.hypot(6378249.2, 6356515.0)  # of the parallel of 45 degrees, Clarke 1880 IGN
+    found = grid.difference([[1.0, 50.0, 0.0]], [[0.0, 50.0, 0.0]])[0]
+    assert found == pytest.approx((radius * math.pi / 200.0, 0.0, 0.0))
+
+
+def test_geocentric_kilometres() -> None:
+    grid = frame("+proj=geocent +datum=WGS84 +units=km", axes=XYZ)
+    assert grid.cartesian_from_ground([[4300.0, 1800.0, 4200.0]])[0] == pytest.approx((4.3e6, 1.8e6, 4.2e6))
+    assert grid.ground_from_cartesian([[4.3e6, 1.8e6, 4.2e6]])[0] == pytest.approx((4300.0, 1800.0, 4200.0))
+    assert grid.difference([[1.0, 2.0, 3.0]], [[0.0, 0.0, 0.0]])[0] == pytest.approx((1000.0, 2000.0, 3000.0))
+
+
+@given(lon=st.floats(-180.0, 180.0), lat=st.floats(-90.0, 90.0), up=st.floats(-9000.0, 110000.0))
+def test_geocentric_coordinates_on_the_moon(lon: float, lat: float, up: float) -> None:
+    geocentric, output = pair(
+        spec("geocentric", ellipsoid=(MOON, MOON)), spec("+proj=longlat +R=1737400", axes=("north", "east", "up"))
+    )
+    east, north = np.radians([lon, lat])
+    direction = [[math.cos(north) * math.cos(east), math.cos(north) * math.sin(east), math.sin(north)]]
+    xyz = (MOON + up) * np.array(direction)
+    assert (geocentric.cartesian_from_ground(xyz) == xyz).all()
+    assert np.abs(output.difference(output.ground_from_cartesian(xyz), [[lon, lat, up]])).max() < MICROMETRE
+    assert np.abs(output.cartesian_from_ground([[lon, lat, up]]) - xyz).max() < MICROMETRE
+
+
+def test_the_moon_by_its_code_and_by_its_radius_is_one() -> None:
+    specs = [spec("IAU_2015:30110"), spec("+proj=eqc +R=1737400"), spec("geocentric", ellipsoid=(MOON, MOON))]
+    (code, radius, geocentric), _ = tie_frames(specs)
+    point = [[math.radians(26.1) * MOON, math.radians(3.6) * MOON, -1900.0]]
+    xyz = code.cartesian_from_ground(point)
+    assert radius.cartesian_from_ground(point) == pytest.approx(xyz, abs=MICROMETRE)
+    assert geocentric.ground_from_cartesian(xyz) == pytest.approx(xyz)
+    assert np.linalg.norm(xyz) == pytest.approx(MOON - 1900.0)
+
+
+@given(
+    lon=st.floats(-180.0, 180.0),
+    lat=st.floats(-89.0, 89.0),
+    shift=st.tuples(*[st.floats(-50.0, 50.0)] * 3),
+)
+def test_differences_of_longitudes_and_latitudes_are_metres(lon: float, lat: float, shift: tuple[float, ...]) -> None:
+    grid = frame("EPSG:4979")
+    here = grid.cartesian_from_ground([[lon, lat, 300.0]])
+    there = grid.ground_from_cartesian(here + np.array(shift) @ grid.axes_at(here)[0])
+    found = grid.difference(there, [[lon, lat, 300.0]])[0]
+    # The curvature of the meridian and the convergence of two meridians over 50 m are all that may remain.
+    assert found == pytest.approx(shift, abs=0.01 / math.cos(math.radians(lat)))
+
+
+def test_differences_take_the_short_way_across_180_degrees() -> None:
+    found = frame("EPSG:4979").difference([[-179.9999, 0.0, 3.0]], [[179.9999, 0.0, 1.0]])[0]
+    assert found == pytest.approx((math.radians(0.0002) * 6378139.0, 0.0, 2.0))
+
+
+# ------------------------------------------------------------------------------------------ orders of axes
+
+
+@pytest.mark.parametrize(
+    ("crs", "axes", "order"),
+    [
+        ("EPSG:32633", ("east", "north", "up"), (0, 1, 2)),
+        ("EPSG:28405", ("north", "east", "up"), (1, 0, 2)),
+        ("EPSG:32633", ("up", "north", "east"), (2, 1, 0)),
+        ("local", ("north", "up", "east"), (1, 2, 0)),
+        ("geocentric", ("x", "y", "z"), (0, 1, 2)),
+        ("geocentric", ("z", "x", "y"), (2, 0, 1)),
+        ("geocentric", ("north", "east", "up"), (1, 0, 2)),
+    ],
+)
+def test_order_of_columns(crs: str, axes: tuple[str, str, str], order: tuple[int, int, int]) -> None:
+    grid = frame(crs, axes=axes)
+    assert (grid.axes, grid.order) == (axes, order)
+    internal = np.array([[10.0, 20.0, 30.0]])
+    user = grid.user_from_internal(internal)
+    assert all((user[:, i] == internal[:, order[i]]).all() for i in range(3))
+    assert (grid.internal_from_user(user) == internal).all()
+
+
+def test_lists_of_a_project_file_will_do() -> None:
+    description = FrameSpec("geocentric", ["x", "y", "z"], ellipsoid=[MOON, MOON])  # type: ignore[arg-type]
+    assert description == spec("geocentric", ellipsoid=(MOON, MOON))
+    assert hash(description) == hash(spec("geocentric", ellipsoid=(MOON, MOON)))
+
+
+# ------------------------------------------------------------------------------------------- local frames
+
+
+def test_a_local_frame_passes_coordinates_on() -> None:
+    grid = frame("local", axes=NEU, height="orthometric")
+    points = np.array([[1000.0, 2000.0, 300.0]])
+    assert (grid.cartesian_from_ground(points) == points).all()
+    assert (grid.ground_from_cartesian(points) == points).all()
+    assert (grid.difference(points, points - 1.0) == 1.0).all()
+    with pytest.raises(GeometryError, match="a local frame has no longitude and latitude"):
+        grid.geodetic(points)
+
+
+@given(
+    offset=st.tuples(st.floats(-3e4, 3e4), st.floats(-3e4, 3e4)),
+    up=height,
+    radius=st.floats(1e6, 1e7),
+)
+def test_curvature_counts_before_and_after(offset: tuple[float, float], up: float, radius: float) -> None:
+    origin = (500000.0, 4600000.0)
+    grid = frame("local", axes=NEU, curvature_radius=radius).with_origin((*origin, 350.0))
+    point = np.array([[origin[0] + offset[0], origin[1] + offset[1], up]])
+    tangent = grid.cartesian_from_ground(point)
+    assert tangent[0, 2] == pytest.approx(up - (offset[0] ** 2 + offset[1] ** 2) / (2.0 * radius), abs=1e-6)
+    assert (tangent[0, :2] == point[0, :2]).all()
+    assert grid.ground_from_cartesian(tangent) == pytest.approx(point, abs=1e-9)
+    assert point[0, 2] == up  # the caller's array is left alone
+
+
+def test_the_curvature_of_a_level_lake_bends_it_away_from_the_tangent_plane() -> None:
+    """An independent case for the sign: points at one height, 10 km away, lie 7.8 m below the plane."""
+    grid = frame("local", curvature_radius=6376234.66).with_origin((0.0, 0.0))
+    lake = grid.cartesian_from_ground([[0.0, 0.0, 100.0], [10000.0, 0.0, 100.0], [0.0, -10000.0, 100.0]])
+    assert lake[:, 2] == pytest.approx((100.0, 92.16, 92.16), abs=0.005)
+
+
+def test_the_curvature_correction_needs_an_origin_once_for_all() -> None:
+    bent = frame("local", curvature_radius=6.37e6)
+    with pytest.raises(PhotostripError, match="has no origin: call with_origin first"):
+        bent.cartesian_from_ground([[0.0, 0.0, 0.0]])
+    flat = frame("local")
+    assert flat.with_origin((1.0, 2.0)) is flat
+    assert bent.with_origin(np.array([1.0, 2.0, 3.0])).origin == (1.0, 2.0)
+
+
+# ------------------------------------------------------------------------------------------- the rim of the world
+
+
+def test_points_outside_the_domain_are_named() -> None:
+    points = np.array([[500000.0, 5e6, 0.0], [1e9, 5e6, 0.0], [500000.0, 1e12, 0.0]])
+    with pytest.raises(InputError, match=r"^rows 1, 2: outside the domain of EPSG:32633$"):
+        UTM33.cartesian_from_ground(points)
+    with pytest.raises(InputError, match=r"^point B7: outside the domain of EPSG:32633$"):
+        UTM33.cartesian_from_ground(points[:2], ids=["A1", "B7"])
+
+
+def test_many_points_outside_are_counted() -> None:
+    with pytest.raises(InputError, match=r"^rows 0, 1, 2, 3, 4, 5, 6, 7 and 12 more: outside"):
+        UTM33.cartesian_from_ground(np.full((20, 3), 1e9))
+
+
+def test_computed_points_outside_the_domain_are_named() -> None:
+    xyz = np.vstack([cartesian(UTM33, np.array([lon, 0.0, 10.0])) for lon in (15.0, 105.0)])
+    with pytest.raises(GeometryError, match=r"^row 1: outside the domain of EPSG:32633$") as caught:
+        UTM33.ground_from_cartesian(xyz)
+    assert caught.value.points == ()
+    with pytest.raises(GeometryError, match=r"^point P2: outside the domain of EPSG:32633$") as caught:
+        UTM33.ground_from_cartesian(xyz, ids=["P1", "P2"])
+    assert caught.value.points == ("P2",)
+    with pytest.raises(GeometryError, match=r"^row 0: outside, or at the edge of, the domain of EPSG:32633$"):
+        UTM33.axes_at(xyz[1:])
+
+
+@pytest.mark.parametrize("crs", ["EPSG:32633", "EPSG:4979", "geocentric", "local"])
+def test_a_coordinate_that_is_not_a_number_is_named(crs: str) -> None:
+    points = np.array([[15.0, 45.0, 0.0], [15.0, 45.0, np.nan]])
+    with pytest.raises(InputError, match=r"^row 1: a coordinate is not a number$"):
+        frame(crs).cartesian_from_ground(points)
+
+
+@pytest.mark.parametrize("point", [(15.0, 95.0, 0.0), (400.0, 45.0, 0.0), (500000.0, 4600000.0, 200.0)])
+def test_longitudes_and_latitudes_that_do_not_exist(point: tuple[float, ...]) -> None:
+    with pytest.raises(
+        InputError, match=r"^row 0: no such longitude and latitude \(are the axes in the right order\?\)$"
+    ):
+        frame("EPSG:4979").cartesian_from_ground([point])
+
+
+def test_points_at_the_centre_of_the_earth_are_refused() -> None:
+    with pytest.raises(GeometryError, match="row 0: not a point near the surface; are these geocentric coordinates"):
+        UTM33.geodetic([[100.0, 200.0, 300.0]])
+
+
+@pytest.mark.parametrize("crs", ["EPSG:32633", "EPSG:4979", "geocentric", "local"])
+def test_no_points_are_no_trouble(crs: str) -> None:
+    grid, none = frame(crs), np.empty((0, 3))
+    assert grid.cartesian_from_ground(none).shape == (0, 3)
+    assert grid.ground_from_cartesian(none).shape == (0, 3)
+    assert grid.axes_at(none).shape == (0, 3, 3)
+    assert grid.convergence(none).shape == (0,)
+    assert grid.difference(none, none).shape == (0, 3)
+
+
+def test_a_frame_can_be_sent_to_another_process() -> None:
+    grid, _ = pair("EPSG:28404", "EPSG:32634")
+    xyz = grid.cartesian_from_ground([[4684955.095, 4709713.209, 550.0]])
+    sent = pickle.loads(pickle.dumps(grid))  # noqa: S301 (what was pickled a moment ago)
+    assert (sent.ground_from_cartesian(xyz) == grid.ground_from_cartesian(xyz)).all()

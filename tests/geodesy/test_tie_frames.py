@@ -1,0 +1,653 @@
+"""Frames tied to one Cartesian frame: datums, geoids, and everything that is refused."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from photostrip.errors import GeometryError, InputError
+from photostrip.geodesy.crs import FrameSpec, tie_frames
+from tests.geodesy.frames import NEU, XYZ, frame, pair, refused, spec, write_gtx
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+MICROMETRE = 1e-6  # m
+ARC_SECOND = math.pi / 180.0 / 3600.0
+UTM33 = np.array([[500000.0, 5000000.0, 100.0], [501000.0, 4999000.0, 250.0]])
+BULGARIA = "+proj=tmerc +lon_0=27 +x_0=500000 +ellps=krass +towgs84=23.57,-140.95,-79.8,0,0.35,0.79,-0.22"
+PULKOVO = np.array([[370000.0, 4710000.0, 550.0], [371000.0, 4713000.0, 700.0]])
+
+# --------------------------------------------------------------------------------------------- one datum
+
+
+def test_the_output_is_the_first_control_list_unless_it_is_given() -> None:
+    frames, output = tie_frames([spec("EPSG:32634"), spec("EPSG:32633")])
+    assert output is frames[0]
+    frames, output = tie_frames([spec("EPSG:32634"), spec("EPSG:32633")], spec("EPSG:32633"))
+    assert output is frames[1]
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        ("EPSG:32633", "EPSG:32634"),
+        ("EPSG:32633", "EPSG:4979"),
+        ("EPSG:32633", "geocentric"),
+        ("EPSG:25833", "EPSG:4258"),
+        ("EPSG:28404", "EPSG:28405"),
+        ("+proj=tmerc +lon_0=27 +ellps=krass", "+proj=longlat +ellps=krass"),
+        (BULGARIA, BULGARIA.replace("lon_0=27", "lon_0=21")),
+        ("+proj=utm +zone=33 +datum=WGS84", "+proj=utm +zone=34 +datum=WGS84"),
+        ("+proj=eqc +R=1737400", "IAU_2015:30100"),
+    ],
+)
+def test_within_one_datum_nothing_is_shifted(first: str, second: str) -> None:
+    for given, output in (pair(first, second), pair(second, first)):
+        assert (given.datum_shift, given.datum_accuracy) == ("", 0.0)
+        assert "datum shift" not in given.describe() + output.describe()
+
+
+def test_frames_that_are_described_alike_are_one() -> None:
+    frames, _ = tie_frames([spec("EPSG:32633"), spec("EPSG:32633")])
+    assert frames[0] is frames[1]
+
+
+def test_a_proj_string_with_a_datum_meets_its_code() -> None:
+    """PROJ tells two datums apart here (an ensemble and its name), with nothing between them."""
+    given, output = pair("+proj=utm +zone=33 +datum=WGS84", "EPSG:32633")
+    assert (given.cartesian_from_ground(UTM33) == output.cartesian_from_ground(UTM33)).all()
+    assert given.datum_accuracy == 0.0
+    assert "datum shift" not in given.describe()
+
+
+# ------------------------------------------------------------------------------------------ between datums
+
+
+def helmert(xyz: np.ndarray, towgs84: tuple[float, ...]) -> np.ndarray:
+    """Seven parameters in the sense of +towgs84: shift, small rotations of the position vector, parts per million."""
+    x, y, z = np.array(towgs84[3:6]) * ARC_SECOND
+    rotation = np.array([[1.0, -z, y], [z, 1.0, -x], [-y, x, 1.0]])
+    return np.asarray(np.array(towgs84[:3]) + (1.0 + towgs84[6] * 1e-6) * xyz @ rotation.T)
+
+
+@pytest.mark.parametrize(
+    "towgs84",
+    [
+        (23.57, -140.95, -79.8, 0.0, 0.35, 0.79, -0.22),
+        (570.8, 85.7, 462.8, 4.998, 1.587, 5.261, 3.56),
+        (100.0, -50.0, 70.0, 30.0, -40.0, 50.0, 20.0),  # rotations of nearly a minute
+    ],
+)
+def test_seven_parameters_there_and_back(towgs84: tuple[float, ...]) -> None:
+    text = "+proj=tmerc +lon_0=27 +x_0=500000 +ellps=krass"
+    given, output = pair(f"{text} +towgs84={','.join(map(str, towgs84))}", "EPSG:32635")
+    xyz = given.cartesian_from_ground(PULKOVO)
+    expected = helmert(frame(text).cartesian_from_ground(PULKOVO), towgs84)
+    assert np.abs(xyz - expected).max() < 1e-5
+    assert np.abs(given.ground_from_cartesian(xyz) - PULKOVO).max() < MICROMETRE
+    assert output.geodetic(xyz)[0, 0] == pytest.approx(math.radians(25.4), abs=0.01)
+
+
+def test_axes_are_carried_through_a_datum_shift() -> None:
+    towgs84 = (570.8, 85.7, 462.8, 40.0, -50.0, 60.0, 3.56)
+    text = "+proj=tmerc +lon_0=27 +x_0=500000 +ellps=krass"
+    given, _ = pair(f"{text} +towgs84={','.join(map(str, towgs84))}", "EPSG:32635")
+    own = frame(text)
+    turned = helmert(
+        own.axes_at(own.cartesian_from_ground(PULKOVO)).reshape(-1, 3), (0.0, 0.0, 0.0, *towgs84[3:6], 0.0)
+    )
+    axes = given.axes_at(given.cartesian_from_ground(PULKOVO))
+    assert axes.reshape(-1, 3) == pytest.approx(turned, abs=1e-6)  # small rotations are not quite rotations
+    assert np.abs(own.axes_at(own.cartesian_from_ground(PULKOVO)) - axes).max() > 1e-4
+    assert axes @ axes.transpose(0, 2, 1) == pytest.approx(np.broadcast_to(np.eye(3), (2, 3, 3)), abs=1e-14)
+    own_convergence = own.convergence(own.cartesian_from_ground(PULKOVO))
+    assert given.convergence(given.cartesian_from_ground(PULKOVO)) == pytest.approx(own_convergence, abs=1e-12)
+
+
+def test_a_geographic_and_a_geocentric_frame_on_a_foreign_datum() -> None:
+    geographic, geocentric = (
+        pair(
+            spec(f"+proj={name} +ellps=krass +towgs84=23.57,-140.95,-79.8,0,0.35,0.79,-0.22", axes=axes), "EPSG:32635"
+        )[0]
+        for name, axes in (("longlat", NEU), ("geocent", XYZ))
+    )
+    point = np.array([[25.4, 42.5, 600.0]])
+    xyz = geographic.cartesian_from_ground(point)
+    own = geocentric.ground_from_cartesian(xyz)
+    assert own == pytest.approx(frame("+proj=longlat +ellps=krass").cartesian_from_ground(point), abs=MICROMETRE)
+    assert geocentric.cartesian_from_ground(own) == pytest.approx(xyz, abs=MICROMETRE)
+    assert np.abs(geographic.difference(geographic.ground_from_cartesian(xyz), point)).max() < MICROMETRE
+    assert geographic.axes_at(xyz)[0] @ geographic.axes_at(xyz)[0].T == pytest.approx(np.eye(3), abs=1e-14)
+
+
+def test_a_shift_that_proj_knows_is_told_with_its_accuracy() -> None:
+    given, output = pair(spec("EPSG:28405", axes=NEU), "EPSG:32635")
+    assert given.describe().endswith("; datum shift: chosen by PROJ at the first point")
+    points = np.array([[5370000.0, 4710000.0, 550.0]])
+    given.cartesian_from_ground(points)
+    assert given.datum_shift.startswith("Pulkovo 1942 to WGS 84 (")
+    assert given.datum_accuracy is not None
+    assert 1.0 <= given.datum_accuracy <= 10.0
+    assert given.describe().endswith(f"; datum shift: {given.datum_shift}")
+    assert given.datum_shift.endswith(f"accuracy {given.datum_accuracy:g} m")
+    assert output.describe() == (
+        "EPSG:32635 (WGS 84 / UTM zone 35N): east, north, up; plan in metre, ellipsoidal heights in metre"
+    )
+
+
+def test_all_points_of_a_datum_are_shifted_by_one_operation() -> None:
+    """PROJ would take another one for a point in the North Sea than for a point in Spain, and tear a strip apart."""
+    south, north = [[500000.0, 4510000.0, 0.0]], [[500000.0, 6010000.0, 0.0]]
+    alone = [pair("EPSG:23030", "EPSG:32630")[0].cartesian_from_ground(point)[0] for point in (south, north)]
+    together = pair("EPSG:23030", "EPSG:32630")[0].cartesian_from_ground(np.vstack([north, south]))  # row 1 decides
+    assert together[1] == pytest.approx(alone[0], abs=MICROMETRE)
+    assert 0.1 < np.linalg.norm(together[0] - alone[1]) < 100.0
+    (first, second), _ = tie_frames([spec("EPSG:23030"), spec("EPSG:23031")], spec("EPSG:32630"))
+    first.cartesian_from_ground(south)
+    assert second.datum_shift == first.datum_shift  # both zones hang on one datum
+
+
+def test_a_shift_may_be_met_backwards_first() -> None:
+    there, _ = pair("EPSG:28405", "EPSG:32635")
+    back, _ = pair("EPSG:28405", "EPSG:32635")
+    points = np.array([[5370000.0, 4710000.0, 550.0]])
+    assert np.abs(back.ground_from_cartesian(there.cartesian_from_ground(points)) - points).max() < MICROMETRE
+
+
+def test_paris_counts_from_paris_and_meets_greenwich() -> None:
+    """PROJ's own transformation of the same point, in one step."""
+    from pyproj import CRS, Transformer
+
+    given, output = pair("EPSG:27572", "EPSG:2154")
+    point = (600000.0, 2200000.0, 10.0)
+    ends = CRS("EPSG:27572").to_3d(), CRS("EPSG:2154").to_3d()
+    expected = Transformer.from_crs(*ends, always_xy=True, allow_ballpark=False).transform(*point)
+    found = output.ground_from_cartesian(given.cartesian_from_ground([point]))[0]
+    assert found == pytest.approx(expected, abs=1e-4)
+    assert given.geodetic(given.cartesian_from_ground([point]))[0, 0] == pytest.approx(0.0, abs=1e-12)  # Paris
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "reason"),
+    [
+        (
+            "+proj=tmerc +lon_0=27 +ellps=krass",
+            "EPSG:32635",
+            (
+                "+proj=tmerc +lon_0=27 +ellps=krass to that of EPSG:32635: +proj=tmerc +lon_0=27 +ellps=krass states an"
+                " ellipsoid but no datum; add +towgs84=... (or +datum=...) to it, or use an authority code"
+            ),
+        ),
+        (
+            "EPSG:32635",
+            "+proj=utm +zone=35 +ellps=WGS84",
+            (
+                "EPSG:32635 to that of +proj=utm +zone=35 +ellps=WGS84: +proj=utm +zone=35 +ellps=WGS84 states an"
+                " ellipsoid but no datum; add +towgs84=... (or +datum=...) to it, or use an authority code"
+            ),
+        ),
+        (
+            "EPSG:28405",
+            "+proj=tmerc +lon_0=27 +ellps=krass",
+            (
+                "EPSG:28405 to that of +proj=tmerc +lon_0=27 +ellps=krass: +proj=tmerc +lon_0=27 +ellps=krass states an"
+                " ellipsoid but no datum; add +towgs84=... (or +datum=...) to it, or use an authority code"
+            ),
+        ),
+        (
+            "IAU_2015:30110",
+            "EPSG:32635",
+            "IAU_2015:30110 to that of EPSG:32635: they lie on different bodies; give both in one datum",
+        ),
+        (
+            "+proj=utm +zone=33 +ellps=bessel +nadgrids=@nowhere.gsb",
+            "EPSG:32633",
+            (
+                "+proj=utm +zone=33 +ellps=bessel +nadgrids=@nowhere.gsb to that of EPSG:32633: the grid nowhere.gsb"
+                " is not installed; put the grid beside the project file or into PROJ's data directory (`projsync`),"
+                " or give both in one datum"
+            ),
+        ),
+    ],
+)
+def test_datums_without_a_sound_way_between_them(first: str, second: str, reason: str) -> None:
+    expected = f"control[0].crs: there is no known way from the datum of {reason}"
+    assert refused(first, output=spec(second)) == [expected]
+
+
+def test_an_ellipsoid_of_the_earth_is_no_datum_but_that_of_another_body_is() -> None:
+    wgs84 = (6378137.0, 6356752.314245179)
+    ellipsoid_only = spec("geocentric", ellipsoid=(6378245.0, 6356863.018773047))
+    assert "geocentric (a = 6378245.0 m, b = 6356863.018773047 m) states an ellipsoid but no datum" in (
+        refused(ellipsoid_only, "EPSG:28405")[0] + refused("EPSG:28405", ellipsoid_only)[0]
+    )
+    given, _ = pair(spec("geocentric", ellipsoid=wgs84), "EPSG:32633")
+    assert given.datum_shift == ""  # the ellipsoid of WGS 84 is meant as WGS 84
+    given, _ = pair(spec("geocentric", ellipsoid=(3396190.0, 3376200.0)), "+proj=eqc +a=3396190 +b=3376200")
+    assert given.datum_shift == ""
+
+
+# ------------------------------------------------------------------------------------------------- heights
+
+
+def test_a_constant_undulation_lifts_heights_to_the_ellipsoid() -> None:
+    given, output = pair(spec("EPSG:32633", height="orthometric", geoid_undulation=45.5), "EPSG:32633")
+    lifted = UTM33 + np.array([0.0, 0.0, 45.5])
+    assert given.cartesian_from_ground(UTM33) == pytest.approx(output.cartesian_from_ground(lifted), abs=1e-9)
+    assert given.ground_from_cartesian(output.cartesian_from_ground(lifted)) == pytest.approx(UTM33, abs=MICROMETRE)
+    assert given.describe().endswith("plan in metre, orthometric heights in metre, geoid undulation +45.500 m")
+
+
+def test_a_three_dimensional_crs_has_ellipsoidal_heights() -> None:
+    given, output = pair(spec("EPSG:4979", axes=NEU), "EPSG:32633")
+    assert given.internal_from_user([45.0, 15.0, 100.0]) == pytest.approx((15.0, 45.0, 100.0))
+    found = output.ground_from_cartesian(given.cartesian_from_ground([[15.0, 45.0, 100.0]]))[0]
+    assert found == pytest.approx((500000.0, 4982950.4, 100.0), abs=0.05)
+
+
+@pytest.fixture
+def geoid(tmp_path: Path) -> Path:
+    """Write a geoid that rises by 1 m per degree to the east and by 2 m per degree to the north, 40 m at 10 E, 40 N."""
+    lat, lon = np.meshgrid(np.arange(11.0), np.arange(11.0), indexing="ij")
+    return write_gtx(tmp_path / "own_geoid.gtx", 40.0 + lon + 2.0 * lat, south=40.0, west=10.0, step=1.0)
+
+
+@pytest.mark.parametrize("how", ["path", "beside the project", "if there is one"])
+def test_heights_above_a_geoid_grid(geoid: Path, how: str) -> None:
+    name = {"path": str(geoid), "beside the project": geoid.name, "if there is one": f"@{geoid.name}"}[how]
+    text = f"+proj=utm +zone=33 +datum=WGS84 +geoidgrids={name}"
+    directory = None if how == "path" else geoid.parent
+    (given,), _ = tie_frames([spec(text, height="orthometric")], directory=directory)
+    flat = frame("+proj=utm +zone=33 +datum=WGS84")
+    xyz = given.cartesian_from_ground(UTM33)
+    lon, lat, height = flat.geodetic(xyz).T
+    undulation = 40.0 + (np.degrees(lon) - 10.0) + 2.0 * (np.degrees(lat) - 40.0)
+    assert height == pytest.approx(UTM33[:, 2] + undulation, abs=1e-5)
+    assert flat.ground_from_cartesian(xyz)[:, :2] == pytest.approx(UTM33[:, :2], abs=MICROMETRE)
+    assert np.abs(given.ground_from_cartesian(xyz) - UTM33).max() < MICROMETRE
+    assert given.describe().endswith(f"orthometric heights in metre (geoid grid {name})")
+
+
+def test_a_geoid_grid_refers_to_wgs_84_under_a_shifted_datum(geoid: Path) -> None:
+    towgs84 = "+towgs84=23.57,-140.95,-79.8,0,0.35,0.79,-0.22"
+    text = f"+proj=tmerc +lon_0=15 +x_0=500000 +ellps=krass {towgs84} +geoidgrids={geoid}"
+    given, output = pair(spec(text, height="orthometric"), "EPSG:32633")
+    xyz = given.cartesian_from_ground(UTM33)
+    lon, lat, height = output.geodetic(xyz).T
+    undulation = 40.0 + (np.degrees(lon) - 10.0) + 2.0 * (np.degrees(lat) - 40.0)
+    assert height == pytest.approx(UTM33[:, 2] + undulation, abs=1e-3)
+    assert np.abs(given.ground_from_cartesian(xyz) - UTM33).max() < MICROMETRE
+
+
+def test_a_geoid_grid_under_feet(geoid: Path) -> None:
+    foot = 1200.0 / 3937.0
+    text = f"+proj=utm +zone=33 +datum=WGS84 +units=us-ft +vunits=us-ft +geoidgrids={geoid}"
+    metric = f"+proj=utm +zone=33 +datum=WGS84 +geoidgrids={geoid}"
+    given, output = pair(spec(text, height="orthometric"), spec(metric, height="orthometric"))
+    assert (given.plan_unit, given.height_unit) == ("US survey foot", "US survey foot")
+    xyz = given.cartesian_from_ground(UTM33 / foot)
+    assert output.ground_from_cartesian(xyz) == pytest.approx(UTM33, abs=1e-5)
+    assert given.ground_from_cartesian(xyz) == pytest.approx(UTM33 / foot, abs=1e-5)
+
+
+def test_a_compound_crs_finds_its_grid_when_it_is_installed(tmp_path: Path) -> None:
+    """EGM96 from a data directory, in a process of its own: PROJ remembers where it has looked."""
+    write_gtx(tmp_path / "egm96_15.gtx", np.full((11, 11), 44.25), south=40.0, west=10.0, step=1.0)
+    program = """
+from photostrip.geodesy.crs import FrameSpec, tie_frames
+axes = ("east", "north", "up")
+(own,), out = tie_frames([FrameSpec("EPSG:32633+5773", axes, height="orthometric")], FrameSpec("EPSG:32633", axes))
+print(round(out.ground_from_cartesian(own.cartesian_from_ground([[5e5, 5e6, 100.0]]))[0, 2], 6))
+print(own.describe())
+"""
+    code = f"import pyproj; pyproj.datadir.append_data_dir({str(tmp_path)!r})\n{program}"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == [
+        "144.25",
+        (
+            "EPSG:32633+5773 (WGS 84 / UTM zone 33N + EGM96 height): east, north, up; plan in metre, orthometric"
+            " heights in metre (EGM96 height)"
+        ),
+    ]
+
+
+def test_points_outside_a_geoid_grid_are_named(geoid: Path) -> None:
+    text = f"+proj=utm +zone=33 +datum=WGS84 +geoidgrids={geoid}"
+    grid = frame(text, height="orthometric")
+    points = np.array([[500000.0, 5000000.0, 0.0], [500000.0, 3000000.0, 0.0]])
+    with pytest.raises(InputError, match=r"^point C: outside the geoid grid of \+proj=utm"):
+        grid.cartesian_from_ground(points, ids=["A", "C"])
+    xyz = frame("+proj=utm +zone=33 +datum=WGS84").cartesian_from_ground(points)
+    with pytest.raises(GeometryError, match=r"^row 1: outside the geoid grid of \+proj=utm"):
+        grid.ground_from_cartesian(xyz)
+
+
+NO_GRID = (
+    "; put the grid beside the project file or into PROJ's data directory (`projsync`), or give the CRS without heights"
+    " and a constant `geoid_undulation`"
+)
+
+
+@pytest.mark.parametrize(
+    ("crs", "reason"),
+    [
+        (
+            "EPSG:32633+5773",
+            "(EGM96 height) cannot be brought to the ellipsoid: the geoid grid us_nga_egm96_15.tif is not installed",
+        ),
+        ("EPSG:28405+5705", "(Baltic 1977 height) cannot be brought to the ellipsoid: PROJ knows no geoid for them"),
+        (
+            "+proj=utm +zone=33 +datum=WGS84 +geoidgrids=nowhere.gtx",
+            "(geoid grid nowhere.gtx) cannot be brought to the ellipsoid: the geoid grid nowhere.gtx is not installed",
+        ),
+        (
+            "+proj=utm +zone=33 +datum=WGS84 +geoidgrids=@nowhere.gtx",
+            "(geoid grid @nowhere.gtx) cannot be brought to the ellipsoid: the geoid grid nowhere.gtx is not installed",
+        ),
+    ],
+)
+def test_a_geoid_that_is_not_there_is_refused_by_name(crs: str, reason: str) -> None:
+    expected = f"control[0].crs: the heights of {crs} {reason}{NO_GRID}"
+    assert refused(spec(crs, height="orthometric")) == [expected]
+
+
+def test_a_file_that_is_no_grid_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "broken.gtx").write_text("this is not a grid", encoding="utf-8")
+    crs = f"+proj=utm +zone=33 +datum=WGS84 +geoidgrids={tmp_path / 'broken.gtx'}"
+    with pytest.raises(
+        InputError, match=r"PROJ cannot read the grid|outside the geoid grid"
+    ):  # it says so late, or early
+        frame(crs, height="orthometric").cartesian_from_ground(UTM33)
+
+
+def test_a_geoid_grid_needs_a_datum_under_it(geoid: Path) -> None:
+    crs = f"+proj=utm +zone=33 +ellps=krass +geoidgrids={geoid}"
+    (found,) = refused(spec(crs, height="orthometric"))
+    assert "a geoid grid refers to WGS 84, and the datum of the plan is not stated (add +towgs84 or +datum)" in found
+
+
+@pytest.mark.parametrize(
+    ("description", "expected"),
+    [
+        (
+            spec("EPSG:32633", height="orthometric"),
+            (
+                "control[0].height: EPSG:32633 with orthometric heights does not say how high the geoid lies above the"
+                " ellipsoid; expected geoid_undulation: metres, or a vertical CRS in `crs` (such as EPSG:32633+5773);"
+                " a constant undulation does for a strip of a few kilometres"
+            ),
+        ),
+        (
+            spec("EPSG:32633+5773"),
+            (
+                "control[0].height: EPSG:32633+5773 brings heights above a geoid (EGM96 height), but they are said to"
+                " be ellipsoidal; say `height: orthometric`, or leave the vertical part out of `crs`"
+            ),
+        ),
+        (
+            spec("EPSG:32633+5773", height="orthometric", geoid_undulation=40.0),
+            (
+                "control[0].geoid_undulation: EPSG:32633+5773 brings its own geoid (EGM96 height), and"
+                " geoid_undulation is given as well; drop `geoid_undulation`, or the vertical part of `crs`"
+            ),
+        ),
+        (
+            spec("EPSG:4979", height="orthometric", geoid_undulation=40.0),
+            (
+                "control[0].height: the heights of EPSG:4979 are ellipsoidal by definition, but they are said to be"
+                " orthometric; use the two-dimensional CRS with `geoid_undulation`, or a compound CRS"
+            ),
+        ),
+        (
+            spec("EPSG:32633", geoid_undulation=40.0),
+            (
+                "control[0].geoid_undulation: geoid_undulation is given for EPSG:32633, but its heights are said to be"
+                " ellipsoidal; drop it, or say `height: orthometric`"
+            ),
+        ),
+        (
+            spec("EPSG:32633", height="orthometric", geoid_undulation=math.nan),
+            "control[0].geoid_undulation: geoid_undulation nan is not a length in metres",
+        ),
+        (
+            spec("local", height="orthometric", geoid_undulation=40.0),
+            "control[0].geoid_undulation: geoid_undulation is given for local, but a local frame has no geoid; drop it",
+        ),
+        (
+            spec("geocentric", height="orthometric"),
+            "control[0].height: geocentric (WGS 84) has no heights that could be orthometric; drop `height`",
+        ),
+        (
+            spec("EPSG:32633", height="above sea level"),
+            "control[0].height: height: above sea level is not understood; expected ellipsoidal or orthometric",
+        ),
+        (
+            spec("+proj=utm +zone=33 +datum=WGS84 +geoidgrids=@null", height="orthometric"),
+            (
+                "control[0].crs: +proj=utm +zone=33 +datum=WGS84 +geoidgrids=@null names no geoid grid; name one, or"
+                " drop +geoidgrids and say `height: ellipsoidal`"
+            ),
+        ),
+    ],
+)
+def test_one_statement_about_heights_and_one_only(description: FrameSpec, expected: str) -> None:
+    assert refused(description) == [expected]
+
+
+# --------------------------------------------------------------------------------------------- other refusals
+
+KINDS = "expected a projected, geographic or geocentric CRS, with heights or without"
+OWN = "for a system of your own write `crs: local` (right-handed, metres)"
+EAST_NORTH = (
+    "expected axes that point east and north, in any order; use the east-north form of the grid, with the signs of the"
+    " coordinates changed"
+)
+
+
+@pytest.mark.parametrize(
+    ("crs", "expected"),
+    [
+        ("EPSG:2053", f"the axes of EPSG:2053 point west and south; {EAST_NORTH}"),
+        ("IAU_2015:49901", f"the axes of IAU_2015:49901 point north and west; {EAST_NORTH}"),
+        (
+            'LOCAL_CS["site",UNIT["metre",1]]',
+            (
+                'LOCAL_CS["site",UNIT["metre",1]] cannot carry ground control: it is of the kind '
+                f"'Engineering CRS'; {KINDS}; {OWN}"
+            ),
+        ),
+        ("EPSG:5703", f"EPSG:5703 cannot carry ground control: it is of the kind 'Vertical CRS'; {KINDS}; {OWN}"),
+        (
+            "IAU_2015:49902",
+            (
+                "IAU_2015:49902 cannot carry ground control: it is of the kind 'Geodetic CRS with planetocentric"
+                f" latitudes'; {KINDS}; use geodetic latitudes (a PROJ string with +a and +b), or `geocentric` with"
+                f" `ellipsoid`"
+            ),
+        ),
+        (
+            "IAU_2015:49912",
+            (
+                "IAU_2015:49912 cannot carry ground control: it is of the kind 'Projected CRS with planetocentric"
+                f" latitudes'; {KINDS}; use geodetic latitudes (a PROJ string with +a and +b), or `geocentric` with"
+                f" `ellipsoid`"
+            ),
+        ),
+        (
+            "+proj=ob_tran +o_proj=longlat +o_lat_p=30 +lon_0=10 +R=6371000",
+            (
+                "+proj=ob_tran +o_proj=longlat +o_lat_p=30 +lon_0=10 +R=6371000 cannot carry ground control: it is of"
+                f" the kind 'Derived Geographic 2D CRS'; {KINDS}; give the coordinates in the CRS it is derived from"
+            ),
+        ),
+        ("+init=epsg:32633", "+init=epsg:32633: PROJ has given up `+init=`; expected a code such as EPSG:32633"),
+        (
+            " ",
+            (
+                "no coordinate reference system is given; expected an authority code (EPSG:32633), a PROJ string, WKT,"
+                " `geocentric` or `local`"
+            ),
+        ),
+    ],
+)
+def test_a_crs_that_cannot_be_used(crs: str, expected: str) -> None:
+    assert refused(crs) == [f"control[0].crs: {expected}"]
+
+
+def test_a_crs_that_proj_does_not_know() -> None:
+    (found,) = refused("EPSG:99999")
+    assert found.startswith(
+        "control[0].crs: PROJ does not know the coordinate reference system 'EPSG:99999' (crs not fou"
+    )
+    assert found.endswith(
+        "; expected an authority code (EPSG:32633), a PROJ string, WKT, `geocentric` or `local`; for a system of your"
+        " own write `crs: local` (right-handed, metres)"
+    )
+
+
+def test_depths_are_no_heights() -> None:
+    (found,) = refused(spec("EPSG:32633+5706", height="orthometric"))
+    assert found == "control[0].crs: the third axis of EPSG:32633+5706 points down; expected heights, positive upwards"
+
+
+@pytest.mark.parametrize(
+    ("description", "expected"),
+    [
+        (
+            spec("EPSG:32633", axes=("x", "y", "z")),
+            (
+                "control[0].axes: axes [x, y, z] of EPSG:32633 are not understood; expected a permutation of"
+                " [east, north, up]"
+            ),
+        ),
+        (
+            spec("EPSG:4326", axes=("lat", "lon", "h")),
+            (
+                "control[0].axes: axes [lat, lon, h] of EPSG:4326 are not understood; expected a permutation of"
+                " [east, north, up]; longitude is east, latitude is north"
+            ),
+        ),
+        (
+            spec("geocentric", axes=("x", "y", "y")),
+            (
+                "control[0].axes: axes [x, y, y] of geocentric (WGS 84) are not understood; expected a permutation of"
+                " [x, y, z] or of [east, north, up]"
+            ),
+        ),
+        (
+            spec("local", axes=("north", "east", "down")),
+            (
+                "control[0].axes: axes [north, east, down] of local are not understood; expected a permutation of"
+                " [east, north, up]"
+            ),
+        ),
+        (
+            spec("EPSG:32633", curvature_radius=6.37e6),
+            (
+                "control[0].crs: the curvature correction of eq. 153 is asked for, but EPSG:32633 carries the curvature"
+                " already: it would count twice; drop `earth_curvature: model`, or give plane coordinates of an unknown"
+                " projection as `crs: local`"
+            ),
+        ),
+        (
+            spec("local", curvature_radius=-1.0),
+            "control[0].curvature_radius: the radius of curvature -1.0 m is not a positive length",
+        ),
+        (
+            spec("EPSG:32633", ellipsoid=(6378245.0, 6356863.019)),
+            (
+                "control[0].ellipsoid: `ellipsoid` belongs to `crs: geocentric`; EPSG:32633 has its own or none; drop"
+                " `ellipsoid`, or write the radii into a PROJ string (+a=... +b=...)"
+            ),
+        ),
+        (
+            spec("geocentric", ellipsoid=(6378245.0, 298.3)),
+            (
+                "control[0].ellipsoid: a = 6378245.0, b = 298.3 are not the semi-axes of an ellipsoid; expected both"
+                " semi-axes in metres, for example a: 6378245, b: 6356863.019"
+            ),
+        ),
+    ],
+)
+def test_keys_that_do_not_belong_together(description: FrameSpec, expected: str) -> None:
+    assert refused(description) == [expected]
+
+
+def test_local_and_geodetic_frames_do_not_mix() -> None:
+    message = (
+        "cannot be tied to {} of control[0]: nobody knows where `local` lies; give all of them as `local`, or none"
+    )
+    assert refused("local", "EPSG:32633") == [f"control[1].crs: EPSG:32633 {message.format('local')}"]
+    assert refused("EPSG:32633", output=spec("local")) == [f"output.crs: local {message.format('EPSG:32633')}"]
+
+
+def test_the_curvature_correction_counts_before_and_after_or_never() -> None:
+    expected = "the curvature correction differs from that of control[0]: it counts before and after, or never"
+    assert refused(spec("local", curvature_radius=6.37e6), output=spec("local")) == [f"output.crs: {expected}"]
+
+
+def test_a_project_without_a_frame() -> None:
+    assert refused() == ["no ground frame is given; expected a control list with its crs"]
+
+
+def test_all_faults_come_at_once_each_at_its_key() -> None:
+    found = refused(
+        "EPSG:99999",
+        spec("EPSG:32633", axes=("n", "e", "u"), height="orthometric", ellipsoid=(6378137.0, 6356752.3)),
+        "EPSG:99999",
+        output=spec("EPSG:2053"),
+    )
+    keys = [line.split(":")[0] for line in found]
+    assert keys == ["control[0].crs", "control[1].axes", "control[1].ellipsoid", "control[1].height", "output.crs"]
+    grids = refused(spec("EPSG:32633+5773", height="orthometric"), "IAU_2015:30110", output=spec("EPSG:32633"))
+    assert [line.split(":")[0] for line in grids] == ["control[0].crs", "control[1].crs"]
+
+
+def test_a_long_wkt_is_named_by_its_title() -> None:
+    from pyproj import CRS
+
+    wkt = CRS("EPSG:28405").to_wkt(pretty=True)
+    assert spec(wkt).name == 'WKT "Pulkovo 1942 / Gauss-Kruger zone 5"'
+    given, _ = pair(spec(wkt, axes=NEU), spec("EPSG:28405", axes=NEU))
+    assert given.datum_shift == ""
+    assert given.describe().startswith('WKT "Pulkovo 1942 / Gauss-Kruger zone 5"')
+
+
+# --------------------------------------------------------------------------------------- what is not loaded
+
+
+def run(program: str, **environment: str) -> str:
+    """Run a program in a process of its own and give what it prints."""
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True, env=os.environ | environment
+    )
+    return done.stdout.strip()
+
+
+def test_local_and_geocentric_frames_do_without_pyproj() -> None:
+    program = """
+import sys
+from photostrip.geodesy.crs import FrameSpec, tie_frames
+tie_frames([FrameSpec("local", ("east", "north", "up"))])
+frames, _ = tie_frames([FrameSpec("geocentric", ("x", "y", "z")), FrameSpec("geocentric", ("z", "x", "y"))])
+frames[0].geodetic([[4e6, 2e6, 4.5e6]])
+print("pyproj" in sys.modules)
+"""
+    assert run(program) == "False"
+
+
+def test_the_network_stays_off() -> None:
+    program = """
+from photostrip.geodesy.crs import FrameSpec, tie_frames
+tie_frames([FrameSpec("EPSG:32633", ("east", "north", "up"))])
+import pyproj.network
+print(pyproj.network.is_network_enabled())
+"""
+    assert run(program, PROJ_NETWORK="ON") == "False"
