@@ -217,7 +217,7 @@ def refraction_constant(flying_height: float, ground_height: float) -> float:
     if camera <= ground:
         message = f"refraction: the flying height {flying_height:g} m is not above the ground, {ground_height:g} m"
         raise InputError(
-            Fault(message, code="flying-height", key="processing.refraction", expected="heights in metres")
+            Fault(message, code="flying-height", key="processing.flying_height", expected="heights in metres")
         )
     fall = _pressure(ground) - _pressure(camera)
     return REFRACTIVITY * (SCALE_HEIGHT * fall / (camera - ground) - _density(camera))
@@ -268,7 +268,8 @@ def _constant(settings: Settings, flying_height: float | None, ground_height: fl
     ground = ground_height if settings.ground_height is None else settings.ground_height
     if flying is None or ground is None:
         message = "refraction: flying height and height of the ground are not known"
-        raise InputError(Fault(message, code="flying-height", key="processing.refraction", fix="give both, in metres"))
+        fix = "give processing.flying_height and processing.ground_height, in metres"
+        raise InputError(Fault(message, code="flying-height", key="processing.refraction", fix=fix))
     return refraction_constant(flying, ground)
 
 

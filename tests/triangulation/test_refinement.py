@@ -395,7 +395,7 @@ def test_refraction_is_that_of_a_ray_through_the_standard_atmosphere(
     found = refine(np.array([[0.6 * radius, -0.8 * radius]]), PLAIN, settings)
     corrected = np.hypot(*found.observations.xy[0])
     assert corrected < radius
-    assert abs(corrected - ideal) < 0.1 * MICROMETRE
+    assert abs(corrected - ideal) < 0.03 * MICROMETRE
     assert found.largest_um == {"refraction": pytest.approx((radius - ideal) / MICROMETRE, rel=0.004)}
 
 
