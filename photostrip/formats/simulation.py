@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from photostrip.formats.findings import counted
 from photostrip.formats.result.numbers import ROTATION, rounded
 from photostrip.geodesy.crs import tie_frames
 from photostrip.geometry.rotation import angles
@@ -377,3 +378,32 @@ def _error(error: InjectedError, output: GroundFrame) -> Document:
         return {"kind": "image", "photo": error.photo, "point": error.point, "axis": error.axis, "size_um": size_um}
     axis = "xyz"[output.order.index("xyz".index(error.axis))]
     return {"kind": "control", "point": error.point, "axis": axis, "size_m": round(error.size, 6)}
+
+
+def summary(simulation: Simulation) -> str:
+    """Say in one line what was simulated.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        The simulation.
+
+    Returns
+    -------
+    str
+        Counts of strips, photos, points and errors, photo scale and seed.
+    """
+    spec, control = simulation.spec, simulation.control
+    check = int(control.check.sum())
+    parts = [
+        counted(len(simulation.strips), "strip"),
+        counted(len(simulation.truth.photo_ids), "photo"),
+        f"scale 1:{spec.scale:.0f}",
+        counted(len(simulation.truth.points), "point"),
+        counted(len(simulation.observations), "image point"),
+        counted(len(control) - check, "control point"),
+        counted(check, "check point"),
+    ]
+    if simulation.truth.errors:
+        parts.append(counted(len(simulation.truth.errors), "gross error"))
+    return ", ".join([*parts, f"seed {spec.seed}"])

@@ -9,12 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import AfterValidator, BeforeValidator, WithJsonSchema
+from pydantic import AfterValidator, BeforeValidator, PlainValidator, WithJsonSchema
 
 from photostrip import camera, simulate
 from photostrip.errors import InputError
 from photostrip.formats.findings import Findings, suggestion
-from photostrip.formats.numbers import shown
+from photostrip.formats.numbers import NotANumber, shown
+from photostrip.formats.numbers import number as read_number
 from photostrip.project.document import fault_at
 from photostrip.project.merging import override, read_tree, steps
 from photostrip.project.schema import (
@@ -27,7 +28,6 @@ from photostrip.project.schema import (
     Number,
     Pair,
     Positive,
-    SchemaNumber,
     Section,
     Unit,
     Words,
@@ -44,14 +44,29 @@ if TYPE_CHECKING:
     from photostrip.errors import Fault
     from photostrip.project.document import Node
 
+SCHEMA_NUMBER = 1
 USUAL = simulate.Spec()
 USUAL_FILM, USUAL_GNSS, USUAL_ERROR = simulate.Film(), simulate.Gnss(), simulate.GrossError("image")
 
 
-def _whole(value: float) -> int:
-    if value != int(value):
-        raise wrong(f"{value:g} is not a whole number", code="number", expected="a whole number")
-    return int(value)
+def _whole(value: object) -> int:
+    expected = "a whole number"
+    if not isinstance(value, str) or not value:
+        raise wrong("no number stands here", code="type", expected=expected)
+    try:
+        result = read_number(value)
+    except NotANumber as why:
+        raise wrong(why.message, code="number", expected=expected, fix=why.fix) from None
+    if result != int(result):
+        raise wrong(f"{shown(value)} is not a whole number", code="number", expected=expected)
+    return int(result)
+
+
+def _schema_number(value: int) -> int:
+    if value != SCHEMA_NUMBER:
+        message = f"this version of photostrip does not read schema {value} of simulations"
+        raise wrong(message, code="schema-number", expected=f"photostrip_simulation: {SCHEMA_NUMBER}")
+    return value
 
 
 def _preset(value: str) -> str:
@@ -63,11 +78,11 @@ def _preset(value: str) -> str:
 
 
 def _shares(value: object) -> object:
-    """A single word stands for all points."""
+    """Let a single word stand for all points."""
     return {value: "1"} if isinstance(value, str) and value else value
 
 
-Whole = Annotated[Number, AfterValidator(_whole), WithJsonSchema({"type": "integer"})]
+Whole = Annotated[int, PlainValidator(_whole), WithJsonSchema({"type": "integer"})]
 Three = tuple[Number, Number, Number]
 Shares = Annotated[dict[str, Number], BeforeValidator(_shares)]
 
@@ -75,7 +90,9 @@ Shares = Annotated[dict[str, Number], BeforeValidator(_shares)]
 class SimulatedCamera(Section):
     """The camera: a preset, and what is different from it."""
 
-    preset: Annotated[Words, AfterValidator(_preset)] = key("`film` (153 mm, 230 mm) or `digital` (100.5 mm, 6 um)", "film")
+    preset: Annotated[Words, AfterValidator(_preset)] = key(
+        "`film` (153 mm, 230 mm) or `digital` (100.5 mm, 6 um)", "film"
+    )
     name: Words | None = key("Name of the camera; default: that of the preset", None)
     principal_distance: Positive | None = key("Principal distance", None, unit="mm")
     principal_point: Pair | None = key("Principal point in the system of the image coordinates", None, unit="mm")
@@ -91,9 +108,13 @@ class Ground(Section):
     crs: Words = key(f"{CRS}; in `local` the world is flat", USUAL.ground.crs)
     axes: Axes = key("Order of x, y, z in the tables", USUAL.ground.axes)
     height: Height = key("Heights in the tables", USUAL.ground.height)
-    geoid_undulation: Number | None = key("Height of the geoid above the ellipsoid, for orthometric heights", None, unit="m")
+    geoid_undulation: Number | None = key(
+        "Height of the geoid above the ellipsoid, for orthometric heights", None, unit="m"
+    )
     ellipsoid: Ellipsoid | None = key("Ellipsoid of `geocentric`; default: WGS 84", None)
-    center_deg: Pair = key("Longitude and latitude of the middle of the strips", USUAL.ground.center_deg, unit="degrees")
+    center_deg: Pair = key(
+        "Longitude and latitude of the middle of the strips", USUAL.ground.center_deg, unit="degrees"
+    )
 
 
 class Flight(Section):
@@ -108,7 +129,9 @@ class Flight(Section):
     heading_deg: Number = key("Azimuth of the flight, clockwise from north", USUAL.flight.heading_deg, unit="degrees")
     alternate: Flag = key("Fly every second strip in the opposite direction", USUAL.flight.alternate)
     photo_rotation_deg: Number = key(
-        "Turn of the photos' x axis against the flight, counter-clockwise", USUAL.flight.photo_rotation_deg, unit="degrees"
+        "Turn of the photos' x axis against the flight, counter-clockwise",
+        USUAL.flight.photo_rotation_deg,
+        unit="degrees",
     )
     attitude_sigma_deg: Three = key("Scatter of alpha, omega, kappa", USUAL.flight.attitude_sigma_deg, unit="degrees")
     position_sigma: Three | None = key(
@@ -155,7 +178,9 @@ class Control(Section):
 class Image(Section):
     """Measurement of image coordinates."""
 
-    sigma_um: Number = key("Standard deviation of an image coordinate; 0 is free of errors", USUAL.image.sigma_um, unit="um")
+    sigma_um: Number = key(
+        "Standard deviation of an image coordinate; 0 is free of errors", USUAL.image.sigma_um, unit="um"
+    )
     unit: Unit = key("Unit in the tables: `mm`, `um` or `px`", USUAL.image.unit)
     y_axis: YAxis = key("Direction of y in the tables, `up` or `down`", USUAL.image.y_axis)
 
@@ -192,7 +217,7 @@ class Gnss(Section):
 class SimulationFile(Section):
     """A specification: strips of photos to be simulated. Every key has a default."""
 
-    photostrip_simulation: SchemaNumber = key("Number of this schema")
+    photostrip_simulation: Annotated[Whole, AfterValidator(_schema_number)] = key("Number of this schema")
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
     name: Words = key("Name of the project", USUAL.name)
     seed: Whole = key("Number that all random numbers come from", USUAL.seed)
@@ -312,7 +337,7 @@ def _semi_axes(given: Ellipsoid | None) -> tuple[float, float] | None:
 
 
 def _camera(given: SimulatedCamera) -> camera.Camera:
-    """The preset with what is said beside it."""
+    """Give the preset with what is said beside it."""
     changed = {name: value for name, value in _fields(given).items() if value is not None and name != "preset"}
     if given.distortion is not None:
         lens = given.distortion

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.errors import Fault, InputError
+from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geodesy.crs import tie_frames
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.points import Frame, PhotoPoints, PointTable
 from photostrip.simulate.control import given_coordinates, roles
+from photostrip.simulate.coverage import shown
 from photostrip.simulate.draws import Draws, Purpose
 from photostrip.simulate.film import sheets
 from photostrip.simulate.flight import fly
 from photostrip.simulate.gross import spoil_control, spoil_images
 from photostrip.simulate.ground import surface, world
-from photostrip.simulate.imaging import bent, project, shown
+from photostrip.simulate.imaging import bent, project
 from photostrip.simulate.placement import place
 from photostrip.simulate.validation import LARGEST_ARC, faults_of
 from photostrip.triangulation.refinement import distort
@@ -40,6 +42,7 @@ if TYPE_CHECKING:
     Rows = NDArray[np.intp]
 
 STATED_SIGMA = 0.001  # mm: what is stated of image coordinates that have no errors
+ROUND_TRIP = 1e-4  # metres
 NEEDED = 5  # points common to two photos that relative orientation needs
 
 
@@ -143,14 +146,14 @@ def simulate(spec: Spec) -> Simulation:
     """
     if faults := faults_of(spec):
         raise InputError(faults)
-    specs = frame_specs(spec)
-    frames, output = tie_frames(specs)
+    frames, output = _tied(spec)
     space = world(spec, output.ellipsoid)
     _check_extent(spec, space)
     photos = fly(spec, space)
     placed = place(spec, space, surface(spec), photos)
     photo, point = shown(spec, photos, placed)
     _check_overlap(spec, photos, photo, point)
+    _check_reach(spec, frames, placed, photos)
     chosen = roles(spec, placed, _rays(spec, placed, photo, point))
     names = _names(placed, chosen)
     film = sheets(spec, len(photos.ids))
@@ -166,7 +169,7 @@ def simulate(spec: Spec) -> Simulation:
         spec.camera,
         observations,
         given_coordinates(spec, chosen, every, offset, frames),
-        tuple(specs),
+        tuple(frame.spec for frame in frames),
         _fiducials(spec, photos, film),
         _gnss(spec, photos, output),
         _truth(output, points, photos, image, image_errors + control_errors),
@@ -193,6 +196,40 @@ def frame_specs(spec: Spec) -> list[FrameSpec]:
     return frames
 
 
+def _tied(spec: Spec) -> tuple[list[GroundFrame], GroundFrame]:
+    """Make the frames; what is wrong with them is told at the keys of the specification."""
+    try:
+        return tie_frames(frame_specs(spec))
+    except InputError as error:
+        faults = []
+        for fault in error.faults:
+            path, _, name = fault.key.rpartition(".")
+            second = path == "control[1]"
+            faults.append(replace(fault, key="control.second_crs" if second and name == "crs" else f"ground.{name}"))
+        raise InputError(faults) from None
+
+
+def _check_reach(spec: Spec, frames: list[GroundFrame], placed: Placed, photos: Photos) -> None:
+    """Refuse strips that lie where a map projection or a grid does not reach."""
+    for number, frame in enumerate(frames):
+        reason = ""
+        try:
+            ground = frame.ground_from_cartesian(placed.xyz, ids=placed.ids)
+            returned = frame.cartesian_from_ground(ground, ids=placed.ids)
+            frame.ground_from_cartesian(photos.centers, ids=photos.ids)
+            frame.axes_at(photos.centers)
+        except (GeometryError, InputError) as error:
+            reason = str(error)
+        else:
+            if np.abs(returned - placed.xyz).max() > ROUND_TRIP:
+                reason = "coordinates do not lead back to where they came from"
+        if reason:
+            key = "control.second_crs" if number else "ground.center_deg"
+            where = ", ".join(f"{angle:g}" for angle in spec.ground.center_deg)
+            message = f"strips around longitude, latitude {where} cannot be given in {frame.spec.name}: {reason}"
+            raise InputError(Fault(message, code="simulation-place", key=key, fix="choose a CRS made for that place"))
+
+
 def _check_extent(spec: Spec, space: World) -> None:
     """Refuse strips that would go round the body."""
     length = np.hypot(spec.flight.photos * spec.base, spec.flight.strips * spec.strip_distance)
@@ -203,8 +240,6 @@ def _check_extent(spec: Spec, space: World) -> None:
 
 def _check_overlap(spec: Spec, photos: Photos, photo: Rows, point: Rows) -> None:
     """Refuse a strip that could not be formed, naming the photos."""
-    from itertools import pairwise
-
     n = spec.flight.photos
     on = [np.zeros(0, dtype=np.intp)] * len(photos.ids)
     starts = np.searchsorted(photo, np.arange(len(photos.ids) + 1))

@@ -123,7 +123,7 @@ def _control(spec: Spec) -> Iterator[Fault]:
     if control.layout not in LAYOUTS:
         yield _fault("control.layout", f"the layout {control.layout!r} is not known", " | ".join(LAYOUTS))
     if control.layout == "bands":
-        yield from _range("control.bands", control.bands, 1, max(last + 1, 1))
+        yield from _range("control.bands", control.bands, 1, max(last + 1, 2))
         yield from _range("control.per_band", control.per_band, 1, spec.points.rows)
         if control.every is not None:
             yield from _range("control.every", control.every, 1, max(last, 1), "models")
