@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     Numbers = NDArray[np.intp]
 
 ITERATIONS = 20
-CONVERGED = 1e-11  # rad, and of the distance to the points
+CONVERGED = 1e-10  # rad, and of the distance to the points; the next step would be its square
 UNKNOWNS = 6
 UPPER = np.triu_indices(UNKNOWNS)
 SINGULAR = 1e-12  # reciprocal condition of a scaled normal matrix

@@ -11,6 +11,7 @@ Source: [001] eq. 150-151, the free term of 151 corrected to X - X'.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -45,6 +46,7 @@ WORSE = 1.5  # left-out errors may not grow by more, however significant the ste
 PASSES = 4  # plan-only and height-only points take their missing coordinate from the fit itself
 PLAN, HEIGHT = "plan", "height"
 GROUPS = ((PLAN, (0, 1)), (HEIGHT, (2,)))  # decided apart: control can be good in one and poor in the other
+SMALLEST_REST = 1e-6  # smallest eigenvalue of I - H for a group that can be left out
 SIMILARITY_PARAMETERS = {PLAN: 4, HEIGHT: 3}  # of the seven, those that each group determines
 
 
@@ -75,8 +77,8 @@ class AxisFit:
         Size of each term in metres at the end of the control's range and the edge of the strip.
     residuals : ndarray, shape (n,)
         Corrected minus given in metres; 0 for points that do not count in this axis.
-    leverage : ndarray, shape (n,)
-        Share of each control coordinate in its own fit, 0 to 1.
+    basis : ndarray, shape (n, k)
+        Orthonormal basis of the weighted design; its rows say how control coordinates share in the fit.
     sigma0 : float
         Standard deviation in metres of a control coordinate of mean weight; NaN without redundancy.
     redundancy : int
@@ -90,10 +92,16 @@ class AxisFit:
     sigmas: Floats
     effects: Floats
     residuals: Floats
-    leverage: Floats
+    basis: Floats
     sigma0: float
     redundancy: int
     condition: float
+
+    @property
+    def leverage(self) -> Floats:
+        """Share of each control coordinate in its own fit, 0 to 1."""
+        share: Floats = (self.basis**2).sum(axis=1)
+        return share
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,12 +220,17 @@ class Problem:
     spacing: float
     breadth: float
 
-    @property
+    @cached_property
     def reach(self) -> float:
         """Largest distance of control from the origin along the strip, metres."""
         return max(float(np.abs(self.xyz[:, 0]).max()), 1e-6)
 
-    @property
+    @cached_property
+    def misclosures(self) -> Floats:
+        """Strip minus given after the similarity, intermediate frame, metres."""
+        return self.xyz - self.targets.of(self.xyz)
+
+    @cached_property
     def by_axis(self) -> Floats:
         """Weights for the axes X, Y, Z: plan weights are those of the two plan coordinates together."""
         plan = self.weight[:, :2].mean(axis=1)
@@ -325,43 +338,37 @@ def _degree_of(terms: Sequence[str]) -> int:
 def _fit_axis(problem: Problem, misclosure: Floats, weight: Floats, terms: tuple[str, ...]) -> AxisFit:
     """Weighted least squares of one axis; the misclosure is strip minus given."""
     rows = weight > 0
-    n = len(weight)
-    residuals, leverage = np.zeros(n), np.zeros(n)
-    residuals[rows] = misclosure[rows]
+    n, k = len(weight), len(terms)
+    residuals, basis = np.where(rows, misclosure, 0.0), np.zeros((n, k))
     empty = np.zeros(0)
     if not terms:
-        return AxisFit((), empty, empty, empty, residuals, leverage, float("nan"), int(rows.sum()), float("nan"))
+        return AxisFit((), empty, empty, empty, residuals, basis, float("nan"), int(rows.sum()), float("nan"))
     scales = _scales(terms, problem)
     columns = _columns(problem.xyz, terms)[rows] / scales
     root = np.sqrt(weight[rows] / weight[rows].mean())
-    q, r = np.linalg.qr(columns * root[:, None])
+    basis[rows], r = np.linalg.qr(columns * root[:, None])
     # eq. 151 with the free term X - X': the polynomial equals given minus strip
-    estimate = np.linalg.solve(r, q.T @ (-misclosure[rows] * root))
-    residuals[rows] = misclosure[rows] + columns @ estimate
-    leverage[rows] = (q**2).sum(axis=1)
-    redundancy = int(rows.sum()) - len(terms)
+    estimate = np.linalg.solve(r, basis[rows].T @ (-misclosure[rows] * root))
+    residuals[rows] += columns @ estimate
+    redundancy = int(rows.sum()) - k
     squares = float(((residuals[rows] * root) ** 2).sum())
     sigma0 = float(np.sqrt(squares / redundancy)) if redundancy > 0 else float("nan")
-    inverse = np.linalg.inv(r)
-    sigmas = sigma0 * np.sqrt((inverse**2).sum(axis=1))
-    return AxisFit(
-        terms, estimate / scales, sigmas / scales, estimate, residuals, leverage, sigma0, redundancy,
-        _condition(problem.xyz[rows], terms, problem),
-    )  # fmt: skip
+    sigmas = sigma0 * np.sqrt((np.linalg.inv(r) ** 2).sum(axis=1))
+    condition = _condition(problem.xyz[rows], terms, problem)
+    return AxisFit(terms, estimate / scales, sigmas / scales, estimate, residuals, basis, sigma0, redundancy, condition)
 
 
-def _fit(problem: Problem, terms: Sequence[tuple[str, ...]], without: Numbers | None = None) -> list[AxisFit]:
+def _fit(problem: Problem, terms: Sequence[tuple[str, ...]]) -> list[AxisFit]:
     """Fit all three axes; a few passes settle points that give only some of their coordinates."""
     weight = problem.by_axis
-    if without is not None:
-        weight = weight.copy()
-        weight[without] = 0.0
-    partial = not problem.targets.control.use.all()
-    corrected = problem.xyz
-    for _ in range(PASSES if partial else 1):
-        misclosure = problem.xyz - problem.targets.of(corrected)
+    misclosure = problem.misclosures
+    fits = [_fit_axis(problem, misclosure[:, axis], weight[:, axis], terms[axis]) for axis in range(3)]
+    if problem.targets.control.use.all():
+        return fits
+    for _ in range(PASSES):
+        corrections = [_columns(problem.xyz, axis.terms) @ axis.coefficients for axis in fits]
+        misclosure = problem.xyz - problem.targets.of(problem.xyz + np.column_stack(corrections))
         fits = [_fit_axis(problem, misclosure[:, axis], weight[:, axis], terms[axis]) for axis in range(3)]
-        corrected = problem.xyz + np.column_stack([_columns(problem.xyz, f.terms) @ f.coefficients for f in fits])
     return fits
 
 
@@ -511,8 +518,9 @@ def _left_out_errors(
     group = bands(problem.xyz[counted, 0], problem.spacing)
     inner = [counted[group == band] for band in range(1, int(group.max(initial=0)))]
     if inner and all(_carried(problem, np.setdiff1d(counted, rows), candidates[-1]) for rows in inner):
-        return [_by_bands(problem, terms, inner, axes) for terms in candidates], "band"
-    return [_by_points(problem, all_axes, axes) for all_axes in fits], "point"
+        return [_left_out(problem, all_axes, axes, inner) for all_axes in fits], "band"
+    single = [np.array([row]) for row in counted]
+    return [_left_out(problem, all_axes, axes, single) for all_axes in fits], "point"
 
 
 def _carried(problem: Problem, rows: Numbers, terms: tuple[str, ...]) -> bool:
@@ -520,24 +528,22 @@ def _carried(problem: Problem, rows: Numbers, terms: tuple[str, ...]) -> bool:
     return choose_terms(problem.xyz[rows], _degree_of(terms), problem, forced=True) == terms
 
 
-def _by_bands(problem: Problem, terms: tuple[str, ...], inner: list[Numbers], axes: tuple[int, ...]) -> float:
-    misclosure = problem.xyz - problem.targets.of(problem.xyz)
-    errors: list[float] = []
-    for rows in inner:
-        fits = _fit(problem, [terms] * 3, rows)
-        for axis in axes:
-            predicted = misclosure[rows, axis] + _columns(problem.xyz[rows], terms) @ fits[axis].coefficients
-            errors += predicted.tolist()
-    return _rms(np.array(errors))
+def _left_out(problem: Problem, fits: Sequence[AxisFit], axes: tuple[int, ...], groups: Sequence[Numbers]) -> float:
+    """Root mean square error at groups of control predicted from all others, without fitting again.
 
-
-def _by_points(problem: Problem, fits: Sequence[AxisFit], axes: tuple[int, ...]) -> float:
-    """Leave-one-out errors in closed form: residual over one minus leverage."""
+    The error of a left-out group is (I - H)^-1 times its residuals, H the part of the hat matrix within the group.
+    The similarity is taken to share its parameters evenly among the points.
+    """
+    share = SIMILARITY_PARAMETERS[PLAN] / 2 if len(axes) > 1 else float(SIMILARITY_PARAMETERS[HEIGHT])
     errors: list[Floats] = []
     for axis in axes:
-        result, rows = fits[axis], _counted(problem, axis)
-        share = SIMILARITY_PARAMETERS[PLAN] / 2 if len(axes) > 1 else SIMILARITY_PARAMETERS[HEIGHT]
-        leverage = result.leverage[rows] if result.terms else np.full(rows.sum(), share / rows.sum())
-        with np.errstate(divide="ignore", invalid="ignore"):
-            errors.append(np.where(leverage < 1 - 1e-6, result.residuals[rows] / (1 - leverage), np.inf))
+        fit_, total = fits[axis], int(_counted(problem, axis).sum())
+        root = np.sqrt(np.where(_counted(problem, axis), problem.by_axis[:, axis], 1.0))
+        for rows in groups:
+            hat = fit_.basis[rows] @ fit_.basis[rows].T if fit_.terms else np.eye(len(rows)) * min(share / total, 0.9)
+            rest = np.eye(len(rows)) - hat
+            if np.linalg.eigvalsh(rest)[0] < SMALLEST_REST:
+                errors.append(np.full(len(rows), np.inf))  # the group alone determines part of the fit
+            else:
+                errors.append(np.linalg.solve(rest, fit_.residuals[rows] * root[rows]) / root[rows])
     return _rms(np.concatenate(errors))
