@@ -39,6 +39,11 @@ COMMANDS = {
         "Adjust the strips of a project and report the accuracy.",
         "photostrip run project.yaml -o result",
     ),
+    "report": Entry(
+        "photostrip.cli.report",
+        "Print the accuracy report of a saved result again.",
+        "photostrip report result/result.json",
+    ),
     "simulate": Entry(
         "photostrip.cli.simulate",
         "Write a synthetic project with known truth, ready to run.",

@@ -1,0 +1,113 @@
+"""How the commands that have a result print it."""
+
+from __future__ import annotations
+
+import sys
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+class Format(StrEnum):
+    """Forms in which a report is printed."""
+
+    TEXT = "text"
+    JSON = "json"
+    MD = "md"
+
+
+ENDINGS = {".txt": Format.TEXT, ".json": Format.JSON, ".md": Format.MD}
+
+
+def show(document: dict[str, Any], form: Format, width: int | None, *, quiet: bool, verbose: bool) -> None:
+    """Print the report of a result on stdout.
+
+    Parameters
+    ----------
+    document : dict
+        The document of the result.
+    form : Format
+        How; JSON is the content of result.json.
+    width : int, optional
+        Width of the text in characters; default: that of the terminal.
+    quiet : bool
+        Whether the verdict is enough.
+    verbose : bool
+        Whether long tables are printed whole.
+    """
+    from photostrip.report import chosen_sections, console, title_of
+
+    if form is Format.TEXT:
+        sections = chosen_sections(document, quiet=quiet, everything=verbose)
+        console.print_report("" if quiet else title_of(document), sections, sys.stdout, width)
+    else:
+        sys.stdout.write(
+            rendered(
+                document, form, width, quiet=quiet, verbose=verbose, ascii_only=not console.speaks_unicode(sys.stdout)
+            )
+        )
+
+
+def rendered(
+    document: dict[str, Any],
+    form: Format,
+    width: int | None = None,
+    *,
+    quiet: bool = False,
+    verbose: bool = False,
+    ascii_only: bool = False,
+) -> str:
+    """Give the report of a result as text, without colours.
+
+    Parameters
+    ----------
+    document, form, width, quiet, verbose
+        As for :func:`show`; without a width the text is 100 characters wide.
+    ascii_only : bool
+        Whether the text may have ASCII letters only; ids in Markdown keep theirs.
+
+    Returns
+    -------
+    str
+        The report.
+    """
+    from photostrip.report import chosen_sections, layout, text, title_of
+
+    if form is Format.JSON:
+        from photostrip.formats.result.files import to_json
+
+        return to_json(document, ascii_only=ascii_only)
+    title, sections = "" if quiet else title_of(document), chosen_sections(document, quiet=quiet, everything=verbose)
+    if form is Format.MD:
+        page = text.to_markdown(title, sections)
+        return layout.plain_ascii(page) if ascii_only else page
+    return text.to_text(title, sections, width or layout.USUAL, ascii_only=ascii_only)
+
+
+def form_of(path: Path) -> Format:
+    """Give the format that the ending of a file name asks for.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    Format
+        Its format; text for a name without an ending.
+
+    Raises
+    ------
+    typer.BadParameter
+        For another ending.
+    """
+    if path.suffix.lower() not in {*ENDINGS, ""}:
+        known = ", ".join(ENDINGS)
+        message = f"no report is written as '{path.suffix}': the name may end in {known}, or give --format"
+        raise typer.BadParameter(message, param_hint="--output")
+    return ENDINGS.get(path.suffix.lower(), Format.TEXT)

@@ -1,0 +1,87 @@
+"""The document of a result: one plain dictionary, the content of result.json; everything else is rendered from it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from photostrip import __version__
+from photostrip.formats.result import conventions, ground, pairs, photos, strips, summary
+from photostrip.formats.result.numbers import Document, natural_rank
+from photostrip.formats.result.verdict import verdict_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from photostrip.notes import Note
+    from photostrip.pipeline import Result
+
+SCHEMA = 1
+
+
+def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
+    """Turn a result into the content of result.json.
+
+    Parameters
+    ----------
+    result : Result
+        What a run found.
+    notes : iterable of Note
+        What was noticed before the run, while the project was read; they come first.
+
+    Returns
+    -------
+    dict
+        Text, numbers, None, lists and dictionaries only; the same for the same inputs, without times and paths.
+        Numbers are rounded to decimals that lie well below what they are good for.
+    """
+    rank = natural_rank(result.refined.observations.point_ids)
+    images = [photos.ImageResiduals.of(result, strip, rank) for strip in result.strips]
+    found = ground.differences(result)
+    numbers = summary.summary_of(result, found)
+    polynomials = strips.polynomials_of(result)
+    body: Document = {
+        "adjustment": result.settings.adjustment,
+        "frame": ground.frame_of(result),
+        "summary": numbers,
+        "tolerances": summary.tolerances_of(result, numbers),
+        "counts": summary.counts_of(result, sum(len(image.rows) for image in images)),
+        "conventions": conventions.conventions_of(result),
+        "settings": conventions.settings_of(result),
+        "corrections": conventions.corrections_of(result),
+        "cameras": conventions.cameras_of(result),
+        "strips": strips.strips_of(result),
+        "absolute": strips.absolute_of(result),
+        **({"polynomial": polynomials[0], "polynomials": polynomials} if polynomials else {}),
+        "control": ground.control_of(result, found),
+        "misclosures": ground.misclosures_of(result),
+        "ties": ground.ties_of(result, rank),
+        "rejected": pairs.rejected_of(result),
+        "not_determined": ground.not_determined_of(result),
+        "notes": [_note(note) for note in (*notes, *result.notes)],
+        "models": pairs.models_of(result),
+        "junctions": pairs.junctions_of(result),
+        "photos": photos.photos_of(result, images),
+        "points": ground.points_of(result, photos.point_rms(result, images), rank),
+        "residuals": photos.residuals_of(result, images),
+        "parallaxes": pairs.parallaxes_of(result, rank),
+    }
+    verdict = verdict_of(body)
+    head = {
+        "photostrip_result": SCHEMA,
+        "version": __version__,
+        "name": result.inputs.name,
+        "status": verdict.pop("status"),
+        "verdict": verdict,
+    }
+    return head | body
+
+
+def _note(note: Note) -> Document:
+    return {
+        "code": note.code,
+        "severity": note.severity,
+        "message": note.message,
+        "strip": note.strip,
+        "photos": list(note.photos),
+        "points": list(note.points),
+    }

@@ -1,0 +1,218 @@
+"""The document of a result as text: result.json, and the CSV tables beside it."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import TYPE_CHECKING, Any
+
+from photostrip.errors import Fault, InputError
+from photostrip.formats.files import MEGABYTE, decode, read_bytes, refuse
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+    from photostrip.formats.result.numbers import Document, Plain
+
+LARGEST_RESULT = 1000 * MEGABYTE
+SCHEMA = 1
+LINE = 160  # characters up to which a dictionary stands on one line
+NEEDS_QUOTES = re.compile(r'[",\r\n]|^\s|\s$')
+GEOGRAPHIC_DECIMALS, GROUND_DECIMALS = 10, 4
+
+_encode = json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode
+_encode_ascii = json.JSONEncoder(ensure_ascii=True, allow_nan=False).encode
+
+
+def to_json(document: Document, *, ascii_only: bool = False) -> str:
+    """Give the text of result.json.
+
+    Parameters
+    ----------
+    document : dict
+        The document of a result.
+    ascii_only : bool
+        Whether letters beyond ASCII are to be written as escapes.
+
+    Returns
+    -------
+    str
+        JSON: one key after the other, each element of a list of records on a line of its own, so that results can be
+        compared line by line.
+    """
+    encode = _encode_ascii if ascii_only else _encode
+    return "{\n" + ",\n".join(f"{encode(key)}: {_block(value, encode)}" for key, value in document.items()) + "\n}\n"
+
+
+def _block(value: Plain, encode: Callable[[Plain], str]) -> str:
+    if isinstance(value, list) and value and isinstance(value[0], dict):
+        return "[\n" + ",\n".join(map(encode, value)) + "\n]"
+    text = encode(value)
+    if isinstance(value, dict) and len(text) > LINE:
+        return "{\n" + ",\n".join(f"  {encode(key)}: {encode(each)}" for key, each in value.items()) + "\n}"
+    return text
+
+
+def read_result(file: str) -> Document:
+    """Read a result.json.
+
+    Parameters
+    ----------
+    file : str
+        Its path.
+
+    Returns
+    -------
+    dict
+        The document.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read, is not JSON or not a result of photostrip.
+    """
+    text, _ = decode(file, read_bytes(file, LARGEST_RESULT))
+    try:
+        document: Any = json.loads(text)
+    except json.JSONDecodeError as error:
+        message = f"is not JSON: {error.msg[:1].lower()}{error.msg[1:]}"
+        fix = "a result.json that was not written to its end? run the project again"
+        raise InputError(Fault(message, "result-json", file, error.lineno, error.colno, fix=fix)) from None
+    except RecursionError:
+        refuse(file, "result-json", "is nested too deeply", expected="a result.json of photostrip")
+    if not isinstance(document, dict) or "photostrip_result" not in document:
+        refuse(file, "result-kind", "has no key `photostrip_result`", expected="a result.json of photostrip")
+    if document["photostrip_result"] != SCHEMA:
+        refuse(
+            file,
+            "result-schema",
+            f"has the result format {document['photostrip_result']!r}",
+            expected=str(SCHEMA),
+            fix="run the project again with this version of photostrip",
+        )
+    return document
+
+
+# ------------------------------------------------------------------------------------------------------- tables
+
+
+def result_files(document: Document, resolved: str = "") -> dict[str, str]:
+    """Give all files of a result.
+
+    Parameters
+    ----------
+    document : dict
+        The document of the result.
+    resolved : str
+        Text of project.resolved.yaml; none is written when it is empty.
+
+    Returns
+    -------
+    dict of str to str
+        Content by file name; result.json comes last: when it is there, all are.
+    """
+    files = {name: table(document) for name, table in TABLES.items()}
+    if resolved:
+        files["project.resolved.yaml"] = resolved
+    return {**files, "result.json": to_json(document)}
+
+
+def _table(header: str, rows: Iterable[str]) -> str:
+    return f"{header}\n{''.join(rows)}"
+
+
+def _cell(text: str) -> str:
+    """Quote an id where CSV needs it."""
+    return '"' + text.replace('"', '""') + '"' if NEEDS_QUOTES.search(text) or not text else text
+
+
+def _number(decimals: int) -> Callable[[float | None], str]:
+    form = f"%.{decimals}f"
+    return lambda value: "" if value is None else form % value
+
+
+def _coordinates(document: Document) -> Callable[[Document], str]:
+    """Give the writer of x, y, z: angles with more decimals than metres."""
+    frame = document["frame"]
+    angle = _number(GEOGRAPHIC_DECIMALS if frame["kind"] == "geographic" else GROUND_DECIMALS)
+    metre = _number(GROUND_DECIMALS)
+    x, y, z = (metre if axis == "up" else angle for axis in frame["axes"])
+    return lambda row: f"{x(row['x'])},{y(row['y'])},{z(row['z'])}"
+
+
+def points_csv(document: Document) -> str:
+    """Give points.csv: all points with their coordinates."""
+    place, metre, micrometre = _coordinates(document), _number(GROUND_DECIMALS), _number(2)
+    header = "point,role,x,y,z,sigma_x,sigma_y,sigma_z,rays,models,image_rms_um"
+    return _table(
+        header,
+        (
+            f"{_cell(row['id'])},{row['role']},{place(row)},"
+            f"{metre(row['sigma_x'])},{metre(row['sigma_y'])},{metre(row['sigma_z'])},"
+            f"{row['rays']},{row['models']},{micrometre(row['image_rms_um'])}\n"
+            for row in document["points"]
+        ),
+    )
+
+
+def photos_csv(document: Document) -> str:
+    """Give photos.csv: perspective centres, angles and rotation matrices."""
+    place, micrometre, cosine = _coordinates(document), _number(2), _number(12)
+    photos = document["photos"]
+    angles = photos[0]["angles"] if photos else {"system": "alpha-omega-kappa", "unit": "deg"}
+    names = [f"{name}_{angles['unit']}" for name in angles["system"].split("-")]
+    angle = _number(9 if angles["unit"] == "rad" else 6)
+    matrix = ",".join(f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3))
+    return _table(
+        f"photo,strip,x,y,z,{','.join(names)},{matrix},image_rms_um,points",
+        (
+            f"{_cell(row['id'])},{_cell(row['strip'])},{place(row)},"
+            f"{','.join(map(angle, row['angles']['values'] or (None,) * 3))},"
+            f"{','.join(map(cosine, row['rotation']))},{micrometre(row['image_rms_um'])},{row['points']}\n"
+            for row in photos
+        ),
+    )
+
+
+def residuals_csv(document: Document) -> str:
+    """Give residuals.csv: image residuals of all measurements."""
+    return _table("photo,point,vx_um,vy_um,used", _grouped(document["residuals"], ("photo",), ("vx_um", "vy_um")))
+
+
+def parallaxes_csv(document: Document) -> str:
+    """Give parallaxes.csv: y parallaxes of all points of all pairs."""
+    return _table("left,right,point,q_um,used", _grouped(document["parallaxes"], ("left", "right"), ("q_um",)))
+
+
+def _grouped(groups: Iterable[Document], heads: Sequence[str], numbers: Sequence[str]) -> Iterable[str]:
+    """Rows of points that stand together under a photo or a pair."""
+    cells: dict[str, str] = {}
+    for group in groups:
+        head = ",".join(_cell(group[name]) for name in heads)
+        columns = [["" if value is None else "%.2f" % value for value in group[name]] for name in numbers]  # noqa: UP031
+        points = [cells.get(point) or cells.setdefault(point, _cell(point)) for point in group["points"]]
+        used = ["1" if yes else "0" for yes in group["used"]]
+        yield "".join(f"{head},{','.join(row)}\n" for row in zip(points, *columns, used, strict=True))
+
+
+def rejected_csv(document: Document) -> str:
+    """Give rejected.csv: measurements that were taken out, and why."""
+    number = _number(2)
+    return _table(
+        "strip,photo,other_photo,point,stage,test,value,limit,unit,reason",
+        (
+            f"{_cell(row['strip'])},{_cell(row['photo'])},{_cell(row['other_photo']) if row['other_photo'] else ''},"
+            f"{_cell(row['point'])},{row['stage']},{row['test']},{number(row['value'])},{number(row['limit'])},"
+            f"{row['unit']},{_cell(row['reason'])}\n"
+            for row in document["rejected"]
+        ),
+    )
+
+
+TABLES: dict[str, Callable[[Document], str]] = {
+    "points.csv": points_csv,
+    "photos.csv": photos_csv,
+    "residuals.csv": residuals_csv,
+    "parallaxes.csv": parallaxes_csv,
+    "rejected.csv": rejected_csv,
+}

@@ -1,0 +1,262 @@
+"""Pairs, the joints between them, and what was taken out of both."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.formats.result.numbers import (
+    DEGREES,
+    EXACT,
+    GROUND,
+    Document,
+    micrometres,
+    rounded,
+    significant,
+)
+from photostrip.triangulation.relative import ELEMENTS, MINIMUM_POINTS
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.pipeline import Result, StripResult
+    from photostrip.triangulation.screening import Rejection
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+PPM = 1e6
+RATIO_DECIMALS = 1  # of parts per million
+
+
+@dataclass(frozen=True, eq=False)
+class Parallaxes:
+    """What the residual y parallaxes of a strip's pairs come to.
+
+    Parameters
+    ----------
+    squares : ndarray, shape (p,)
+        Sums of weighted squares, mm^2.
+    redundancy : ndarray of int, shape (p,)
+        Points used minus five.
+    rms : ndarray, shape (p,)
+        Root mean square over the points used, mm.
+    worst : ndarray of int, shape (p,)
+        Row of the largest one in the pairs' table.
+    """
+
+    squares: Floats
+    redundancy: Numbers
+    rms: Floats
+    worst: Numbers
+
+    @classmethod
+    def of(cls, strip: StripResult) -> Parallaxes:
+        """Sum up the parallaxes of a strip."""
+        oriented = strip.orientation
+        pairs, used = oriented.pairs, oriented.used
+        size = np.where(used, np.abs(oriented.parallax), -1.0)
+        peak = np.flatnonzero(size == np.maximum.reduceat(size, pairs.starts)[pairs.pair])
+        _, first = np.unique(pairs.pair[peak], return_index=True)
+        count = oriented.points_used
+        mean = pairs.sums(np.where(used, oriented.parallax**2, 0.0)) / np.maximum(count, 1)
+        squares = pairs.sums(pairs.weight * oriented.parallax**2)
+        return cls(squares, count - MINIMUM_POINTS, np.sqrt(mean), peak[first])
+
+
+def sigma0(squares: Floats, redundancy: Numbers) -> float:
+    """Give the standard deviation of an image coordinate from y parallaxes, in mm; NaN without redundancy.
+
+    A y parallax is the difference of two coordinates: its variance is twice theirs.
+    """
+    total = int(redundancy.sum())
+    return float(np.sqrt(squares.sum() / 2 / total)) if total > 0 else float("nan")
+
+
+def models_of(result: Result) -> list[Document]:
+    """Give the list ``models``: relative orientation and scale of every pair, in flight order."""
+    ids = result.refined.observations.point_ids
+    return [model for strip in result.strips for model in _models(strip, ids)]
+
+
+def _models(strip: StripResult, ids: Sequence[str]) -> list[Document]:
+    oriented, formed, photos = strip.orientation, strip.formed, strip.strip.photos
+    sums = Parallaxes.of(strip)
+    used = oriented.points_used
+    total = np.bincount(oriented.pairs.pair, minlength=len(used))
+    base = np.linalg.norm(np.diff(strip.resection.centers, axis=0), axis=1)
+    columns = {
+        "sigma0_um": micrometres(oriented.sigma0),
+        "rms_parallax_um": micrometres(sums.rms),
+        "max_parallax_um": micrometres(np.abs(oriented.parallax[sums.worst])),
+        "max_parallax_point": [ids[oriented.point[row]] for row in sums.worst],
+        "points_used": used.tolist(),
+        "points_rejected": (total - used).tolist(),
+        "redundancy": sums.redundancy.tolist(),
+        "condition": significant(oriented.condition),
+        "iterations": oriented.iterations.tolist(),
+        "base": rounded(base, GROUND),
+        "scale_factor": significant(formed.scale, EXACT),
+        "base_direction_deg": rounded(np.degrees(formed.base_direction), DEGREES),
+        "base_inclination_deg": rounded(np.degrees(formed.base_inclination), DEGREES),
+    }
+    elements = rounded(np.degrees(oriented.elements), DEGREES)
+    sigmas = significant(np.degrees(oriented.sigmas))
+    return [
+        {
+            "strip": strip.strip.id,
+            "left": photos[number],
+            "right": photos[number + 1],
+            "elements": {"unit": "deg", **dict(zip(ELEMENTS, elements[number], strict=True))},
+            "sigmas": {"unit": "deg", **dict(zip(ELEMENTS, sigmas[number], strict=True))},
+            **dict(zip(columns, row, strict=True)),
+        }
+        for number, row in enumerate(zip(*columns.values(), strict=True))
+    ]
+
+
+def parallaxes_of(result: Result, rank: Numbers) -> list[Document]:
+    """Give the list ``parallaxes``: y parallaxes of all points of every pair, in natural order of the points."""
+    ids = result.refined.observations.point_ids
+    found = []
+    for strip in result.strips:
+        oriented, photos = strip.orientation, strip.strip.photos
+        order = np.lexsort((rank[oriented.point], oriented.pairs.pair))
+        names = [ids[number] for number in oriented.point[order]]
+        values, used = micrometres(oriented.parallax[order]), oriented.used[order].tolist()
+        ends = [*oriented.pairs.starts.tolist(), len(names)]
+        found += [
+            {
+                "strip": strip.strip.id,
+                "left": photos[n],
+                "right": photos[n + 1],
+                "points": names[ends[n] : ends[n + 1]],
+                "q_um": values[ends[n] : ends[n + 1]],
+                "used": used[ends[n] : ends[n + 1]],
+            }
+            for n in range(len(photos) - 1)
+        ]
+    return found
+
+
+def junctions_of(result: Result) -> list[Document]:
+    """Give the list ``junctions``: the scale transfer at every photo that joins two models."""
+    ids = result.refined.observations.point_ids
+    return [junction for strip in result.strips for junction in _junctions(strip, ids)]
+
+
+def _junctions(strip: StripResult, ids: Sequence[str]) -> list[Document]:
+    photos, joined = strip.strip.photos, strip.formed.junctions
+    joints = len(joined.factor)
+    count = np.bincount(joined.joint, joined.used, joints).astype(np.intp)
+    gap = discrepancies(strip)
+    squares = np.column_stack([np.bincount(joined.joint, joined.used * gap[:, axis] ** 2, joints) for axis in range(3)])
+    size = np.sqrt(squares / np.maximum(count, 1)[:, None])
+    metres, in_photo = rounded(size, GROUND), rounded(size / strip.scale_number * PPM, 1)
+    left_out: dict[int, list[str]] = {}
+    for row in np.flatnonzero(~joined.used).tolist():
+        left_out.setdefault(int(joined.joint[row]), []).append(ids[joined.point[row]])
+    columns = zip(
+        count.tolist(),
+        significant(joined.factor, EXACT),
+        rounded(joined.spread * PPM, RATIO_DECIMALS),
+        metres,
+        in_photo,
+        strict=True,
+    )
+    return [
+        {
+            "strip": strip.strip.id,
+            "photo": photos[number + 1],
+            "photos": list(photos[number : number + 3]),
+            "points_used": points,
+            "points_rejected": left_out.get(number, []),
+            "factor": factor,
+            "spread_ppm": spread,
+            "discrepancy": dict(zip(("along", "across", "up"), ground, strict=True)),
+            "discrepancy_um": dict(zip(("along", "across", "up"), image, strict=True)),
+        }
+        for number, (points, factor, spread, ground, image) in enumerate(columns)
+    ]
+
+
+def discrepancies(strip: StripResult) -> Floats:
+    """Differences of points common to neighbouring models, after minus before.
+
+    Parameters
+    ----------
+    strip : StripResult
+        The strip.
+
+    Returns
+    -------
+    ndarray, shape (t, 3)
+        Metres along the strip, to its left and up, of every pass point of every joint.
+    """
+    joined, similarity = strip.formed.junctions, strip.absolute.similarity
+    gap = strip.formed.model_xyz[joined.after] - strip.formed.model_xyz[joined.before]
+    return similarity.scale * gap @ similarity.rotation.T
+
+
+# --------------------------------------------------------------------------------------------------- rejections
+
+
+def rejected_of(result: Result) -> list[Document]:
+    """Give the list ``rejected``: measurements taken out of pairs and of scale transfers, in flight order."""
+    ids = result.refined.observations.point_ids
+    found = []
+    for strip in result.strips:
+        oriented = strip.orientation
+        order = sorted(range(len(strip.rejections)), key=lambda n: int(oriented.pairs.pair[strip.rejections[n].row]))
+        found += [_from_pair(strip, strip.rejections[number], ids) for number in order]
+        found += [_from_joint(strip, int(row), ids) for row in np.flatnonzero(~strip.formed.junctions.used)]
+    return found
+
+
+def _from_pair(strip: StripResult, rejection: Rejection, ids: Sequence[str]) -> Document:
+    pair = int(strip.orientation.pairs.pair[rejection.row])
+    left, right = strip.strip.photos[pair : pair + 2]
+    parallax = rejection.parallax * 1000
+    reason, unit, value, limit = f"y parallax {parallax:.1f} µm", "", rejection.value, rejection.limit
+    if rejection.test == "in front":
+        reason = "the rays do not meet in front of the cameras"
+    elif rejection.test == "parallax":
+        unit, value, limit = "um", value * 1000, limit * 1000
+    else:
+        reason += f", {value:.2f} standard deviations"
+    return {
+        "strip": strip.strip.id,
+        "photo": left,
+        "other_photo": right,
+        "point": ids[strip.orientation.point[rejection.row]],
+        "stage": "relative",
+        "test": rejection.test,
+        "value": rounded(value, 2),
+        "limit": rounded(limit, 2),
+        "unit": unit,
+        "parallax_um": rounded(parallax, 2),
+        "reason": reason,
+    }
+
+
+def _from_joint(strip: StripResult, row: int, ids: Sequence[str]) -> Document:
+    joined = strip.formed.junctions
+    joint = int(joined.joint[row])
+    value = abs(joined.ratio[row] / joined.factor[joint] - 1) * PPM
+    return {
+        "strip": strip.strip.id,
+        "photo": strip.strip.photos[joint + 1],
+        "other_photo": None,
+        "point": ids[joined.point[row]],
+        "stage": "scale_transfer",
+        "test": "ratio",
+        "value": rounded(value, RATIO_DECIMALS),
+        "limit": rounded(joined.limit[joint] * PPM, RATIO_DECIMALS),
+        "unit": "ppm",
+        "parallax_um": None,
+        "reason": f"scale ratio {value:.0f} ppm from that of the other pass points",
+    }

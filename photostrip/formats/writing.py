@@ -1,0 +1,119 @@
+"""Writing files so that there is never a half one: to a temporary file beside the target, which is then renamed.
+
+An interrupted run, a full disk or a number that cannot be written leaves an earlier result as it was. Nothing is
+forced onto the disk (fsync): that guards against power cuts, costs more than the whole run and is no business
+of a program whose results can be computed again.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from photostrip.errors import Fault, InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write one file, whole or not at all.
+
+    Parameters
+    ----------
+    path : Path
+        The file; missing folders are made. A device or a pipe is written to as it is.
+    text : str
+        Its content, written as UTF-8 with the line ends that it has.
+
+    Raises
+    ------
+    InputError
+        When the path is a folder or lies below a file.
+    OSError
+        When the disk is full or the folder must not be written to.
+    """
+    write_files(path.parent, {path.name: text})
+
+
+def write_files(folder: Path, files: Mapping[str, str]) -> None:
+    """Write the files of one folder, all of them or none.
+
+    All contents are written first and renamed then, in the order given: put the file last that make or another program
+    looks at.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder; made when it is missing.
+    files : mapping of str to str
+        Content by file name.
+
+    Raises
+    ------
+    InputError
+        When the folder is a file, or one of the files a folder.
+    OSError
+        When the disk is full or the folder must not be written to.
+    """
+    _make(folder)
+    for name in files:
+        if (folder / name).is_dir():
+            _refuse(folder / name, "is a folder", "a file")
+    waiting: list[tuple[Path, Path]] = []
+    try:
+        for name, text in files.items():
+            target = folder / name
+            if target.exists() and not target.is_file():  # a pipe or a device: renaming would replace it
+                target.write_bytes(text.encode())
+                continue
+            target = Path(os.path.realpath(target))  # through a link, to where the file is
+            waiting.append((target.with_name(f".{target.name}.{os.getpid()}.tmp"), target))
+            waiting[-1][0].write_bytes(text.encode())
+        for temporary, target in waiting:
+            temporary.replace(target)
+    except BaseException:  # also when the user interrupts
+        for temporary, _ in waiting:
+            with suppress(OSError):
+                temporary.unlink()
+        raise
+
+
+def _make(folder: Path) -> None:
+    """Make the folder, or say what is in its way."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
+        blocking = next(place for place in (folder, *folder.parents) if place.exists())
+        _refuse(blocking, "is a file", "a folder")
+
+
+def _refuse(path: Path, what: str, expected: str) -> None:
+    raise InputError(Fault(what, code="output-path", file=str(path), expected=expected, fix="choose another place"))
+
+
+def make_rule(target: str | Path, sources: Iterable[str | Path]) -> str:
+    """Say to make what a file was made from.
+
+    Parameters
+    ----------
+    target : str or Path
+        The file made.
+    sources : iterable of str or Path
+        Files read for it.
+
+    Returns
+    -------
+    str
+        A rule for make's ``include``; an empty rule for each source keeps make going when one is deleted.
+    """
+    names = [_for_make(name) for name in dict.fromkeys(map(str, sources))]
+    rule = f"{_for_make(str(target))}: {' '.join(names)}\n"
+    return rule + "".join(f"\n{name}:\n" for name in names)
+
+
+def _for_make(name: str) -> str:
+    return re.sub(r"([\s#:])", r"\\\1", name.replace("$", "$$"))

@@ -1,0 +1,102 @@
+"""What a report is made of: sections of sentences, facts and tables. How they look is decided elsewhere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+DASH = "–"  # stands where there is no value
+
+
+class Column(NamedTuple):
+    """One column of a table.
+
+    Parameters
+    ----------
+    name : str
+        Its head.
+    unit : str
+        Unit of its numbers, in the second line of the head.
+    left : bool
+        Whether it holds words, flush left.
+    rank : int
+        0: always shown; where the page is too narrow, columns of the highest rank are left out first.
+    """
+
+    name: str
+    unit: str = ""
+    left: bool = False
+    rank: int = 0
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table.
+
+    Parameters
+    ----------
+    columns : tuple of Column
+        Its columns.
+    rows : tuple of tuple of str
+        Its cells.
+    foot : tuple of tuple of str
+        Rows that sum up the others.
+    note : str
+        A sentence below: what is not shown, and where it is.
+    """
+
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[str, ...], ...]
+    foot: tuple[tuple[str, ...], ...] = ()
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Labels with a value each.
+
+    Parameters
+    ----------
+    rows : tuple of tuple of str
+        Label and value.
+    """
+
+    rows: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class Words:
+    """A paragraph.
+
+    Parameters
+    ----------
+    text : str
+        Its sentences.
+    style : str
+        ``"good"``, ``"look"``, ``"failed"`` or empty.
+    mark : str
+        What stands before it: a number or a bullet; lines after the first are indented below the text.
+    """
+
+    text: str
+    style: str = ""
+    mark: str = ""
+
+
+Part = Table | Facts | Words
+
+
+@dataclass(frozen=True)
+class Section:
+    """One section of a report.
+
+    Parameters
+    ----------
+    title : str
+        Its heading.
+    parts : tuple of Table, Facts or Words
+        Its content.
+    """
+
+    title: str
+    parts: tuple[Part, ...]
