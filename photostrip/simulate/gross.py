@@ -131,23 +131,18 @@ def spoil_images(spec: Spec, observations: PhotoPoints) -> tuple[PhotoPoints, tu
     named has the sign of its size. No image point gets two errors.
     """
     xy = np.array(observations.xy)
-    photos, points = np.array(observations.photo_ids), np.array(observations.point_ids)
-    photo, point = photos[observations.photo], points[observations.point]
+    photo = np.array(observations.photo_ids)[observations.photo]
+    point = np.array(observations.point_ids)[observations.point]
     free = np.ones(len(xy), dtype=bool)
     errors = []
     for number, entry in _entries(spec, {"image", "swap"}):
         draws = Draws(spec.seed, Purpose.GROSS, number)
         order = draws.order(len(xy))
-        fits = np.ones(len(xy), dtype=bool)
-        if entry.photo is not None:
-            fits &= photo == entry.photo
-        if entry.point is not None:
-            fits &= point == entry.point
+        fits = np.isin(photo, entry.photo or photo) & np.isin(point, entry.point or point)
         for _ in range(entry.count):
             row = _take(order[(fits & free)[order]], number, replace(entry, count=1))[0]
             axis, sign, partner = draws.uniform(3)
             free[row] = False
-            where, what = str(photo[row]), str(point[row])
             if entry.kind == "swap":
                 others = np.flatnonzero(free & (photo == photo[row]))
                 if not len(others):
@@ -155,13 +150,13 @@ def spoil_images(spec: Spec, observations: PhotoPoints) -> tuple[PhotoPoints, tu
                 other = others[int(partner * len(others))]
                 free[other] = False
                 xy[[row, other]] = xy[[other, row]]
-                errors.append(InjectedError("swap", what, where, other=str(point[other])))
+                errors.append(InjectedError("swap", str(point[row]), str(photo[row]), other=str(point[other])))
                 continue
             column = AXES.index(entry.axis) if entry.axis else int(axis * 2)
             named = entry.photo is not None and entry.point is not None
             size = entry.size_um / 1000.0 * (1.0 if named or sign < HALF else -1.0)
             xy[row, column] += size
-            errors.append(InjectedError("image", what, where, axis=AXES[column], size=size))
+            errors.append(InjectedError("image", str(point[row]), str(photo[row]), AXES[column], size))
     return replace(observations, xy=xy), tuple(errors)
 
 

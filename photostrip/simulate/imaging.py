@@ -74,8 +74,8 @@ def bent(photos: Photos, photo: Rows, ray: Array, ground_height: float) -> Array
 
     Notes
     -----
-    Source: derived, refraction in plane layers, tan(alpha) = tan(theta) (1 - K / cos(theta)^2) for the straight line alpha and
-    the direction theta in which it is seen, both from the nadir: whatever the tilt of the photo.
+    Source: derived, refraction in plane layers: tan(alpha) = tan(theta) (1 - K / cos(theta)^2) for the straight line
+    alpha and the direction theta in which it is seen, both from the nadir, whatever the tilt of the photo.
     """
     constant = np.array([refraction_constant(height, ground_height) for height in photos.height.tolist()])[photo]
     up = photos.up[photo]

@@ -156,11 +156,12 @@ def simulate(spec: Spec) -> Simulation:
     _check_reach(spec, frames, placed, photos)
     chosen = roles(spec, placed, _rays(spec, placed, photo, point))
     names = _names(placed, chosen)
+    named = _with_final_names(spec, placed, names)
     film = sheets(spec, len(photos.ids))
     image = _image(spec, photos, placed, film, photo, point)
     observations, keep = _observations(spec, photos, names, photo, point, image)
-    observations, image_errors = spoil_images(spec, observations)
-    offset, control_errors = spoil_control(spec, tuple(names[i] for i in chosen.control.tolist()), chosen.use)
+    observations, image_errors = spoil_images(named, observations)
+    offset, control_errors = spoil_control(named, tuple(names[i] for i in chosen.control.tolist()), chosen.use)
     every = PointTable(names, placed.xyz, Frame.CARTESIAN)
     points = PointTable(observations.point_ids, placed.xyz[keep], Frame.CARTESIAN)
     return Simulation(
@@ -274,6 +275,13 @@ def _names(placed: Placed, chosen: Roles) -> tuple[str, ...]:
         for number, row in enumerate(rows):
             names[row] = f"{letter}{number + 1:0{digits}d}"
     return tuple(names)
+
+
+def _with_final_names(spec: Spec, placed: Placed, names: tuple[str, ...]) -> Spec:
+    """Let gross errors name a point also as it was called before it became a control or check point."""
+    final = dict(zip(placed.ids, names, strict=True))
+    entries = tuple(replace(each, point=final.get(each.point or "", each.point)) for each in spec.gross_errors)
+    return replace(spec, gross_errors=entries)
 
 
 def _image(spec: Spec, photos: Photos, placed: Placed, film: Sheets | None, photo: Rows, point: Rows) -> Array:

@@ -254,7 +254,8 @@ class GrossError:
     size_m : float
         Size of an error of a given coordinate, metres.
     photo, point : str or None
-        Where; None: anywhere. A swap takes a second point at random.
+        Where; None: anywhere. A swap takes a second point at random. Control and check points answer to their own
+        names (G01, K01) and to those of the pass points that they are.
     axis : str or None
         ``x`` or ``y`` (image, y up), ``x``, ``y`` or ``z`` (east, north, up at control); None: any.
     """

@@ -46,6 +46,16 @@ def test_a_named_image_error() -> None:
     assert size == pytest.approx(-0.25)
 
 
+def test_a_check_point_answers_to_the_name_of_its_pass_point() -> None:
+    for point in ("1002-2", "1005-5", "1001-3"):
+        done = simulate(replace(FREE, gross_errors=(GrossError("image", point=point),)))
+        ((row, _),) = changed(done)
+        plain = simulate(replace(FREE, control=Control(layout="random", count=1, check=0)))
+        observations = plain.observations
+        assert observations.point_ids[observations.point[row]] in {point, "G01"}
+        assert done.spec.gross_errors[0].point == point
+
+
 def test_random_image_errors() -> None:
     entries = (GrossError("image", count=40, size_um=100.0), GrossError("image", count=20, size_um=500.0, axis="x"))
     done = simulate(replace(FREE, film=Film(), gross_errors=entries))
@@ -109,7 +119,7 @@ def test_control_errors_only_in_coordinates_that_are_given() -> None:
     ("entry", "message"),
     [
         (GrossError("image", photo="9999"), r"gross_errors\[0\]: there are not enough image points on photo 9999"),
-        (GrossError("image", photo="1001", point="1008-1"), "not enough image points of point 1008-1 on photo 1001"),
+        (GrossError("image", photo="1001", point="G09"), "not enough image points of point G09 on photo 1001"),
         (GrossError("image", count=100_000), "not enough image points for a gross error"),
         (GrossError("control", point="K01"), "not enough control coordinates of point K01"),
         (GrossError("control", count=10), "not enough control coordinates"),

@@ -38,8 +38,8 @@ NAN = float("nan")
         (
             Spec(flight=Flight(end_lap_percent=-10.0)),
             (
-                "flight.end_lap_percent: an end lap of -10 % cannot be simulated: with it no point lies on three photos;"
-                " expected more than 50 and at most 95"
+                "flight.end_lap_percent: an end lap of -10 % cannot be simulated: with it no point lies on three photos"
+                "; expected more than 50 and at most 95"
             ),
         ),
         (Spec(flight=Flight(end_lap_percent=50.0)), "no point lies on three photos"),
