@@ -1,0 +1,125 @@
+"""Points and their tables: read-only, joined by id, never across frames."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from photostrip.points import ControlPoints, Frame, PhotoPoints, PointTable, frozen
+
+IDS = st.lists(st.text(min_size=1, max_size=3), unique=True, max_size=12)
+
+
+def table(ids: list[str] | tuple[str, ...], frame: Frame = Frame.STRIP) -> PointTable:
+    return PointTable(tuple(ids), np.arange(3 * len(ids), dtype=float), frame)
+
+
+def control(n: int = 4) -> ControlPoints:
+    enu = np.arange(3.0 * n).reshape(n, 3)
+    enu[1:2, :2] = np.nan
+    use = ~np.isnan(enu)
+    check = np.arange(n) % 2 == 1
+    return ControlPoints(tuple("ABCDEFGH"[:n]), enu, use, check, np.full((n, 3), 0.05), np.arange(n))
+
+
+# ----------------------------------------------------------------------------------------------- frozen
+
+
+def test_frozen_arrays_cannot_be_written() -> None:
+    array = frozen([1, 2, 3])
+    assert array.dtype == np.float64
+    with pytest.raises(ValueError, match="read-only"):
+        array[0] = 5
+    with pytest.raises(ValueError, match="read-only"):
+        frozen(np.zeros(3))[0] = 5
+    assert frozen(array) is array  # nothing is copied twice
+
+
+def test_frozen_leaves_the_caller_his_array() -> None:
+    own = np.zeros(3)
+    frozen(own)
+    own[0] = 1  # still his to write
+    assert own.flags.writeable
+
+
+def test_frozen_brings_any_layout_into_shape() -> None:
+    turned = frozen(np.arange(6).reshape(2, 3).T)
+    assert turned.flags.c_contiguous
+    assert turned.shape == (3, 2)
+    assert frozen([], shape=(0, 3)).shape == (0, 3)
+    assert frozen([True, False], dtype=np.bool_).dtype == np.bool_
+
+
+# ------------------------------------------------------------------------------------------- PointTable
+
+
+@given(IDS, IDS)
+def test_the_join_is_that_of_sets(first: list[str], second: list[str]) -> None:
+    a, b = table(first), table(second)
+    rows_a, rows_b = a.shared(b)
+    common = [name for name in first if name in set(second)]
+    assert [first[row] for row in rows_a] == common  # in the order of the first table
+    assert [second[row] for row in rows_b] == common
+    assert len(a) == len(first)
+
+
+def test_the_join_of_different_frames_is_refused() -> None:
+    with pytest.raises(ValueError, match="strip frame cannot be joined with points in the ground frame"):
+        table(["1", "2"]).shared(table(["1", "2"], Frame.GROUND))
+
+
+def test_rows_are_found_by_id() -> None:
+    points = table(["0123", "123", "NO"])
+    assert points.index == {"0123": 0, "123": 1, "NO": 2}  # ids are text: 0123 is not 123
+    assert points.xyz.shape == (3, 3)
+    with pytest.raises(ValueError, match="read-only"):
+        points.xyz[0, 0] = 1
+
+
+def test_coordinates_must_fit_the_ids() -> None:
+    with pytest.raises(ValueError, match="reshape"):
+        PointTable(("1", "2"), np.zeros((3, 3)), Frame.MODEL)
+
+
+# ------------------------------------------------------------------------------------------ PhotoPoints
+
+
+def test_image_points_are_columns() -> None:
+    points = PhotoPoints(("1",), ("a", "b"), np.array([0, 0]), np.array([0, 1]), np.zeros((2, 2)), np.ones((2, 2)))
+    assert len(points) == 2
+    for column in (points.photo, points.point, points.xy, points.sigma):
+        assert not column.flags.writeable
+    with pytest.raises(ValueError, match="reshape"):
+        PhotoPoints(("1",), ("a",), np.array([0]), np.array([0]), np.zeros((2, 2)), np.ones((1, 2)))
+
+
+# ---------------------------------------------------------------------------------------- ControlPoints
+
+
+@given(st.lists(st.booleans(), min_size=4, max_size=4))
+def test_rows_taken_by_mask_or_number_are_the_same(mask: list[bool]) -> None:
+    points = control()
+    numbers = np.flatnonzero(mask)
+    by_mask, by_number = points.take(np.array(mask)), points.take(numbers)
+    for part in (by_mask, by_number):
+        assert part.ids == tuple(points.ids[i] for i in numbers)
+        assert np.array_equal(part.enu, points.enu[numbers], equal_nan=True)
+        assert np.array_equal(part.use, points.use[numbers])
+        assert np.array_equal(part.check, points.check[numbers])
+        assert np.array_equal(part.sigma, points.sigma[numbers])
+        assert np.array_equal(part.frame, points.frame[numbers])
+
+
+def test_rows_keep_the_order_asked_for() -> None:
+    assert control().take([3, 0]).ids == ("D", "A")
+    assert len(control().take(np.zeros(0, np.intp))) == 0
+    assert len(control(0).take(np.zeros(0, np.intp))) == 0
+
+
+def test_one_ground_frame_when_none_is_said() -> None:
+    points = ControlPoints(("A", "B"), np.zeros((2, 3)), np.ones((2, 3), bool), np.zeros(2, bool), np.ones((2, 3)))
+    assert np.array_equal(points.frame, [0, 0])
+    for column in (points.enu, points.use, points.check, points.sigma, points.frame):
+        assert not column.flags.writeable
