@@ -48,7 +48,7 @@ def sections_of(document: Document, *, everything: bool = False) -> tuple[Sectio
         strip_sections.relative_section(document, everything=everything),
         strip_sections.junction_section(document, everything=everything),
         strip_sections.absolute_section(document),
-        *([strip_sections.polynomial_section(document)] if document.get("polynomials") else []),
+        *([strip_sections.polynomial_section(document, everything=everything)] if document.get("polynomials") else []),
         ground_sections.control_section(document, everything=everything),
         ground_sections.check_section(document, everything=everything),
         *([ground_sections.ties_section(document, everything=everything)] if several else []),

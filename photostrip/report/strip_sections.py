@@ -14,6 +14,7 @@ Document = dict[str, Any]
 
 ALL_SHOWN = 24  # rows up to which a table is printed whole
 SMALL = 0.001  # probabilities below it are not told apart
+STRIPS_SHOWN = 3  # strips up to which every polynomial is shown with its evidence
 WORST_SHOWN = 12  # rows shown of a longer one
 ELEMENTS = (("alpha1", "α1"), ("kappa1", "κ1"), ("alpha2", "α2"), ("omega2", "ω2"), ("kappa2", "κ2"))
 DIRECTIONS = ("along", "across", "up")
@@ -216,14 +217,42 @@ def _weights(precision: Document) -> str:
 # --------------------------------------------------------------------------------------------------- polynomials
 
 
-def polynomial_section(document: Document) -> Section:
+def polynomial_section(document: Document, *, everything: bool) -> Section:
     """Polynomial adjustment: what was chosen, why, and how large it is."""
+    blocks = document["polynomials"]
+    if len(blocks) > STRIPS_SHOWN and not everything:
+        return Section("Polynomial adjustment", (_by_strip(blocks),))
     parts: list[Part] = []
-    for block in document["polynomials"]:
+    for block in blocks:
         parts += [Words(_choice(document, block)), _evidence(block)]
         if block["degree"]:
             parts.append(_coefficients(block))
     return Section("Polynomial adjustment", tuple(parts))
+
+
+def _by_strip(blocks: Sequence[Document]) -> Table:
+    """Give one line for each of many strips."""
+    columns = (
+        Column("strip", left=True),
+        Column("asked"),
+        Column("plan", "degree"),
+        Column("height", "degree"),
+        Column("plan", "stations"),
+        Column("height", "stations"),
+        *(Column(f"{axis} effect", "m") for axis in "XYZ"),
+    )
+    rows = tuple(
+        (
+            block["strip"],
+            block["asked"],
+            *(str(_degree(block["terms"][axis])) for axis in "xz"),
+            *(str(block["stations"][group]) for group in ("plan", "height")),
+            *(metres(max(map(abs, block["effects"][axis]), default=0.0)) for axis in "xyz"),
+        )
+        for block in blocks
+    )
+    note = "effect: of the largest term; evidence and coefficients stand in `polynomials` of result.json"
+    return Table(columns, rows, note=note)
 
 
 def _choice(document: Document, block: Document) -> str:

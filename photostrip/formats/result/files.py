@@ -45,9 +45,12 @@ def to_json(document: Document, *, ascii_only: bool = False) -> str:
 
 
 def _block(value: Plain, encode: Callable[[Plain], str]) -> str:
-    if isinstance(value, list) and value and isinstance(value[0], dict):
-        return "[\n" + ",\n".join(map(encode, value)) + "\n]"
     text = encode(value)
+    if isinstance(value, list) and value and isinstance(value[0], dict):
+        # One call for the whole list, lines broken afterwards, in front of the first key of each record. Inside a
+        # string these signs cannot stand, its quotation marks being escaped; between records a line feed is a blank.
+        begin = f"{{{encode(next(iter(value[0])))}: "
+        return "[\n" + text[1:-1].replace(f"}}, {begin}", f"}},\n{begin}") + "\n]"
     if isinstance(value, dict) and len(text) > LINE:
         return "{\n" + ",\n".join(f"  {encode(key)}: {encode(each)}" for key, each in value.items()) + "\n}"
     return text
@@ -188,11 +191,13 @@ def _grouped(groups: Iterable[Document], heads: Sequence[str], numbers: Sequence
     """Rows of points that stand together under a photo or a pair."""
     cells: dict[str, str] = {}
     for group in groups:
-        head = ",".join(_cell(group[name]) for name in heads)
-        columns = [["" if value is None else "%.2f" % value for value in group[name]] for name in numbers]  # noqa: UP031
+        head = ",".join(_cell(group[name]) for name in heads).replace("%", "%%")
         points = [cells.get(point) or cells.setdefault(point, _cell(point)) for point in group["points"]]
-        used = ["1" if yes else "0" for yes in group["used"]]
-        yield "".join(f"{head},{','.join(row)}\n" for row in zip(points, *columns, used, strict=True))
+        columns, form = [group[name] for name in numbers], "%.2f"
+        if any(None in column for column in columns):
+            columns, form = [["" if v is None else f"{v:.2f}" for v in column] for column in columns], "%s"
+        line = f"{head},%s,{','.join([form] * len(columns))},%d\n"
+        yield "".join([line % row for row in zip(points, *columns, group["used"], strict=True)])
 
 
 def rejected_csv(document: Document) -> str:
