@@ -206,9 +206,14 @@ def _orient_photos(
     position = np.array([place.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo[used]]
     order = np.argsort(position, kind="stable")
     used, position = used[order], position[order]
-    points = adjusted[np.searchsorted(formed.point, observations.point[used])]
+    rows = np.searchsorted(formed.point, observations.point[used])
+    points = adjusted[rows]
     similarity = orientation.similarity
-    start = similarity(formed.centers), similarity.rotation @ formed.rotations
+    # A polynomial can move a long strip by much: a photo starts where its points went, on the average.
+    moved = points - similarity(formed.xyz[rows])
+    count = np.maximum(np.bincount(position, minlength=len(strip.photos)), 1)
+    shift = [np.bincount(position, moved[:, axis], len(strip.photos)) / count for axis in range(3)]
+    start = similarity(formed.centers) + np.column_stack(shift), similarity.rotation @ formed.rotations
     focal = np.full(len(strip.photos), strip.camera.principal_distance)
     return exterior.resect(observations.xy[used], points, position, focal, start), used
 

@@ -131,27 +131,29 @@ def _steps(
     distance: Floats,
     segments: tuple[Numbers, Numbers],
 ) -> Floats:
-    """Gauss-Newton steps of all photos: shift in units of the distance, rotation in radians."""
+    """Gauss-Newton steps of all photos: shift in units of the distance, rotation in radians, in the points' frame.
+
+    The partials are taken along the photo's own axes, where they are functions of the image point and its depth alone.
+    """
     centers, rotations = orientation
     present, starts = segments
-    arm = points - centers[photo]
-    turn = rotations[photo]
-    ray = np.einsum("mi,mij->mj", arm, turn)
-    scale = -focal[photo] / ray[:, 2]
-    computed = scale[:, None] * ray[:, :2]
-    # d(xy)/d(arm) in the frame of the points: scale * (photo axis + xy/f * viewing axis)
-    by_arm = (turn[:, :, :2] + computed[:, None, :] / focal[photo, None, None] * turn[:, :, 2:]) * scale[:, None, None]
-    jacobian = np.empty((UNKNOWNS, len(xy), 2))
-    jacobian[:3] = -by_arm.transpose(1, 0, 2) * distance[photo, None]
-    # turning the camera by theta moves the arm by -theta x arm in the camera's eyes
-    jacobian[3:] = -np.cross(arm[:, None, :], by_arm.transpose(0, 2, 1)).transpose(2, 0, 1)
-    misfit = xy - computed
-    sums = np.zeros((len(centers), len(UPPER[0]) + UNKNOWNS))
-    products = np.concatenate([(jacobian[UPPER[0]] * jacobian[UPPER[1]]).sum(-1), (jacobian * misfit).sum(-1)])
+    u, v, w = np.einsum("mi,mij->jm", points - centers[photo], rotations[photo])
+    f = focal[photo]
+    x, y = -f * u / w, -f * v / w
+    unit = f * distance[photo] / w  # image shift by moving the centre one distance, at this depth
+    zero = np.zeros_like(x)
+    by_x = np.stack([unit, zero, unit * x / f, -x * y / f, f + x * x / f, y])
+    by_y = np.stack([zero, unit, unit * y / f, -(f + y * y / f), x * y / f, -x])
+    misfit_x, misfit_y = xy[:, 0] - x, xy[:, 1] - y
+    products = np.concatenate(
+        [by_x[UPPER[0]] * by_x[UPPER[1]] + by_y[UPPER[0]] * by_y[UPPER[1]], by_x * misfit_x + by_y * misfit_y]
+    )
+    sums = np.zeros((len(centers), len(products)))
     sums[present] = np.add.reduceat(products, starts, axis=1).T
     normal = np.zeros((len(centers), UNKNOWNS, UNKNOWNS))
     normal[:, UPPER[0], UPPER[1]] = sums[:, : len(UPPER[0])]
     normal[:, UPPER[1], UPPER[0]] = sums[:, : len(UPPER[0])]
     diagonal = np.arange(UNKNOWNS)
     normal[:, diagonal, diagonal] += SINGULAR * np.maximum(normal[:, diagonal, diagonal], 1e-9)
-    return np.asarray(np.linalg.solve(normal, sums[:, len(UPPER[0]) :, None])[:, :, 0], float)
+    own = np.linalg.solve(normal, sums[:, len(UPPER[0]) :, None])[:, :, 0]
+    return np.einsum("nij,nkj->nki", rotations, own.reshape(-1, 2, 3)).reshape(-1, UNKNOWNS)
