@@ -156,4 +156,5 @@ def _steps(
     diagonal = np.arange(UNKNOWNS)
     normal[:, diagonal, diagonal] += SINGULAR * np.maximum(normal[:, diagonal, diagonal], 1e-9)
     own = np.linalg.solve(normal, sums[:, len(UPPER[0]) :, None])[:, :, 0]
-    return np.einsum("nij,nkj->nki", rotations, own.reshape(-1, 2, 3)).reshape(-1, UNKNOWNS)
+    turned = np.einsum("nij,nkj->nki", rotations, own.reshape(-1, 2, 3))
+    return np.asarray(turned.reshape(-1, UNKNOWNS), float)
