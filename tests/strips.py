@@ -129,7 +129,7 @@ def true_pairs(
     depth = focal * (1 + rng.uniform(-relief, relief, nadir.shape[:2]))
     ground: Floats = np.concatenate([nadir * (depth / focal)[..., None], -depth[..., None]], axis=2)
     angles = rng.uniform(-tilt_deg, tilt_deg, (2, pairs, 3))
-    angles[0, :, 2] = rng.uniform(-kappa_deg, kappa_deg, pairs)
+    angles[0, :, 2] = kappa_deg * rng.uniform(-1, 1, pairs)
     angles[1, :, 2] += angles[0, :, 2]
     bases = np.array([b, 0.0, 0.0]) + rng.normal(0, 0.03 * b, (pairs, 3))
     first, second = attitude(angles[0]), attitude(angles[1])
