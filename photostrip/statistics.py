@@ -1,13 +1,15 @@
 """Quantiles and critical values of the tests, and nothing else.
 
-scipy's special functions do the work; they are imported when first asked for, because the import costs more
-than all the quantiles of a project.
+The distribution functions themselves are in :mod:`photostrip.distributions`.
 """
 
 from __future__ import annotations
 
 from functools import lru_cache
 from math import sqrt
+from statistics import NormalDist
+
+from photostrip.distributions import chi2_ppf, f_sf, t_isf, t_sf
 
 
 @lru_cache(maxsize=4096)
@@ -26,9 +28,24 @@ def t_quantile(probability: float, dof: float) -> float:
     float
         The quantile.
     """
-    from scipy.special import stdtrit
+    return -t_isf(probability, dof)
 
-    return float(stdtrit(dof, probability))
+
+@lru_cache(maxsize=4096)
+def normal_quantile(probability: float) -> float:
+    """Quantile of the standard normal distribution.
+
+    Parameters
+    ----------
+    probability : float
+        Probability below the quantile.
+
+    Returns
+    -------
+    float
+        The quantile.
+    """
+    return NormalDist().inv_cdf(probability)
 
 
 def t_p_value(t: float, dof: float) -> float:
@@ -46,9 +63,7 @@ def t_p_value(t: float, dof: float) -> float:
     float
         Probability of a ratio at least as large by chance.
     """
-    from scipy.special import stdtr
-
-    return float(2 * stdtr(dof, -abs(t)))
+    return 2 * t_sf(abs(t), dof)
 
 
 def f_p_value(f: float, dof_numerator: float, dof_denominator: float) -> float:
@@ -66,9 +81,7 @@ def f_p_value(f: float, dof_numerator: float, dof_denominator: float) -> float:
     float
         Probability of a ratio at least as large by chance.
     """
-    from scipy.special import fdtrc
-
-    return float(fdtrc(dof_numerator, dof_denominator, f))
+    return f_sf(f, dof_numerator, dof_denominator)
 
 
 @lru_cache(maxsize=4096)
@@ -87,9 +100,7 @@ def chi2_quantile(probability: float, dof: float) -> float:
     float
         The quantile.
     """
-    from scipy.special import chdtri
-
-    return float(chdtri(dof, 1 - probability))
+    return chi2_ppf(probability, dof)
 
 
 @lru_cache(maxsize=4096)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 # Bottom to top. A room is a module or a folder directly below photostrip/.
 LAYERS = (
-    {"errors", "notes", "threads"},
+    {"errors", "notes", "threads", "distributions"},
     {"points", "camera", "adjustment", "statistics", "geometry", "geodesy"},
     {"triangulation", "planning", "terrestrial", "simulate"},
     {"pipeline"},
