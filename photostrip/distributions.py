@@ -34,7 +34,7 @@ def _continued_fraction(terms: Iterator[tuple[float, float]]) -> float:
     return value
 
 
-def beta_cdf(x: float, a: float, b: float) -> float:
+def beta_cdf(x: float, a: float, b: float, rest: float | None = None) -> float:
     """Regularised incomplete beta function I_x(a, b).
 
     Parameters
@@ -43,6 +43,8 @@ def beta_cdf(x: float, a: float, b: float) -> float:
         Argument, 0 to 1.
     a, b : float
         Parameters, positive.
+    rest : float, optional
+        1 - x, where the caller knows it to more digits than the difference has.
 
     Returns
     -------
@@ -53,10 +55,11 @@ def beta_cdf(x: float, a: float, b: float) -> float:
     -----
     Source: derived; the continued fraction stands in every handbook of functions.
     """
-    if x <= 0 or x >= 1:
-        return float(x >= 1)
+    rest = 1 - x if rest is None else rest
+    if x <= 0 or rest <= 0:
+        return float(rest <= 0)
     if x > (a + 1) / (a + b + 2):
-        return 1 - beta_cdf(1 - x, b, a)
+        return 1 - beta_cdf(rest, b, a, x)
 
     def terms() -> Iterator[tuple[float, float]]:
         yield 0.0, 1.0
@@ -65,7 +68,7 @@ def beta_cdf(x: float, a: float, b: float) -> float:
             yield m * (b - m) * x / ((a + 2 * m - 1) * (a + 2 * m)), 1.0
             yield -(a + m) * (a + b + m) * x / ((a + 2 * m) * (a + 2 * m + 1)), 1.0
 
-    front = exp(lgamma(a + b) - lgamma(a) - lgamma(b) + a * log(x) + b * log(1 - x)) / a
+    front = exp(lgamma(a + b) - lgamma(a) - lgamma(b) + a * log(x) + b * log(rest)) / a
     return front / _continued_fraction(terms())
 
 
@@ -142,7 +145,8 @@ def t_sf(t: float, dof: float) -> float:
     float
         Probability above t.
     """
-    return 0.5 * beta_cdf(dof / (dof + t * t), dof / 2, 0.5)
+    total = dof + t * t
+    return 0.5 * beta_cdf(dof / total, dof / 2, 0.5, t * t / total)
 
 
 def t_isf(tail: float, dof: float) -> float:
@@ -185,7 +189,8 @@ def f_sf(f: float, numerator: float, denominator: float) -> float:
     """
     if f <= 0:
         return 1.0
-    return beta_cdf(denominator / (denominator + numerator * f), denominator / 2, numerator / 2)
+    total = denominator + numerator * f
+    return beta_cdf(denominator / total, denominator / 2, numerator / 2, numerator * f / total)
 
 
 def chi2_ppf(probability: float, dof: float) -> float:
