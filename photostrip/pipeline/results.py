@@ -69,6 +69,8 @@ class StripResult:
         Mean distance of the points from the cameras along the viewing direction, metres.
     notes : tuple of Note
         What this strip's numbers say beside themselves.
+    screened : screening.Screened
+        The search for gross errors: log, zones, detectable errors; it holds ``orientation`` and ``rejections`` too.
     """
 
     strip: Strip
@@ -87,6 +89,7 @@ class StripResult:
     rows: Numbers
     depth: float
     notes: tuple[Note, ...]
+    screened: screening.Screened
 
     @property
     def scale_number(self) -> float:

@@ -57,8 +57,10 @@ def adjust_strip(
     """
     sigma = _sigma(strip, observations)
     pairs, point, pair_rows = relative.collect_pairs(observations, strip.photos, strip.camera.principal_distance)
-    oriented = relative.orient(pairs, point, pair_rows, strip.photos)
-    oriented, rejections = screening.screen(oriented, settings.relative, sigma)
+    first, converged = relative.attempt(pairs, point, pair_rows)
+    screened = screening.examine(first, settings.relative, sigma, converged)
+    oriented, rejections = screened.orientation, screened.rejections
+    relative.require(oriented, screened.converged, strip.photos)
     formed = formation.form(oriented, settings.formation, strip.photos)
 
     here, rows = _control_of(formed, control, observations)
@@ -94,7 +96,11 @@ def adjust_strip(
         resection,
         image_rows,
         _depth(strip, observations, image_rows, formed, adjusted, resection),
-        _notes(strip, oriented, formed, orientation, correction, adjusted, resection),
+        (
+            *_screening_notes(strip, screened, sigma),
+            *_notes(strip, oriented, formed, orientation, correction, adjusted, resection),
+        ),
+        screened,
     )
 
 
@@ -264,6 +270,27 @@ def _pair_notes(strip: Strip, oriented: relative.Orientation) -> list[Note]:
                 f"{oriented.condition[number]:.0f}); the points stand in a narrow band"
             )
             notes.append(Note("weak-pair", text, strip=strip.id, photos=names))
+    return notes
+
+
+def _screening_notes(strip: Strip, screened: screening.Screened, sigma: float) -> list[Note]:
+    """Say what the search for gross errors could not settle."""
+    notes = []
+    scatter = screened.scatter
+    if np.isfinite(scatter.found):
+        text = (
+            f"strip {strip.id}: the y parallaxes scatter as if image coordinates had a standard deviation of "
+            f"{scatter.found / np.sqrt(2.0) * 1000:.1f} µm, not the {sigma * 1000:.1f} µm stated; gross errors are "
+            "searched for with the larger one"
+        )
+        notes.append(Note("sigma-contradicted", text, severity="note", strip=strip.id))
+    for number in np.flatnonzero(screened.masked):
+        names = strip.photos[number : number + 2]
+        text = (
+            f"photos {names[0]} and {names[1]}: masked errors suspected: the y parallaxes are larger than their "
+            "standard deviation allows, and no further point can be rejected; measure the pair again or add points"
+        )
+        notes.append(Note("masked-errors", text, strip=strip.id, photos=names))
     return notes
 
 

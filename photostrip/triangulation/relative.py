@@ -558,6 +558,71 @@ def assess(elements: Floats, pairs: Pairs, point: Numbers, rows: Numbers, iterat
     )
 
 
+def attempt(pairs: Pairs, point: Numbers, rows: Numbers) -> tuple[Orientation, NDArray[np.bool_]]:
+    """Relative orientation of all pairs, whatever comes of it; gross errors may still be in it.
+
+    Parameters
+    ----------
+    pairs : Pairs
+        Measurements.
+    point, rows : ndarray
+        As :func:`collect_pairs` gives them.
+
+    Returns
+    -------
+    Orientation
+        The pairs.
+    converged : ndarray of bool, shape (p,)
+        Whether the iteration of each pair converged.
+    """
+    elements, converged, steps = solve(pairs)
+    return assess(elements, pairs, point, rows, steps), converged
+
+
+def doubtful(result: Orientation, converged: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Pairs that cannot be used as they are: degenerate, not converged or behind their cameras.
+
+    Parameters
+    ----------
+    result : Orientation
+        The pairs.
+    converged : ndarray of bool, shape (p,)
+        Whether the iteration of each pair converged.
+
+    Returns
+    -------
+    ndarray of bool, shape (p,)
+        True for those that :func:`require` refuses.
+    """
+    pairs = result.pairs
+    with np.errstate(all="ignore"):
+        front = in_front(result.elements, pairs) & result.used
+    share = pairs.sums(front.astype(float)) / np.maximum(result.points_used, 1)
+    bad: NDArray[np.bool_] = ~converged | ~(result.condition <= CONDITION_LIMIT) | (share <= 0.5)  # noqa: PLR2004  half of the points
+    return bad
+
+
+def require(result: Orientation, converged: NDArray[np.bool_], photos: Sequence[str]) -> None:
+    """Refuse pairs that cannot be oriented.
+
+    Parameters
+    ----------
+    result : Orientation
+        The pairs.
+    converged : ndarray of bool, shape (p,)
+        Whether the iteration of each pair converged.
+    photos : sequence of str
+        Photos of the strip, to name a pair that is refused.
+
+    Raises
+    ------
+    GeometryError
+        For the first pair that is degenerate, does not converge, or lies behind its cameras.
+    """
+    for number in np.flatnonzero(doubtful(result, converged)):
+        _refuse(result, int(number), photos, converged=bool(converged[number]))
+
+
 def orient(pairs: Pairs, point: Numbers, rows: Numbers, photos: Sequence[str]) -> Orientation:
     """Relative orientation of all pairs, refusing those that cannot be oriented.
 
@@ -580,14 +645,8 @@ def orient(pairs: Pairs, point: Numbers, rows: Numbers, photos: Sequence[str]) -
     GeometryError
         For the first pair that is degenerate, does not converge, or lies behind its cameras.
     """
-    elements, converged, steps = solve(pairs)
-    result = assess(elements, pairs, point, rows, steps)
-    front = in_front(elements, pairs)
-    count = np.maximum(pairs.sums((pairs.weight > 0).astype(float)), 1)
-    share = pairs.sums((front & (pairs.weight > 0)).astype(float)) / count
-    bad = ~converged | (result.condition > CONDITION_LIMIT) | (share <= 0.5)  # noqa: PLR2004  half of the points
-    for number in np.flatnonzero(bad):
-        _refuse(result, int(number), photos, converged=bool(converged[number]))
+    result, converged = attempt(pairs, point, rows)
+    require(result, converged, photos)
     return result
 
 
@@ -627,6 +686,34 @@ def refine(orientation: Orientation, weight: Floats, todo: Numbers) -> Orientati
         parallax=_put(orientation.parallax, rows, fresh.parallax),
         redundancy=_put(orientation.redundancy, rows, fresh.redundancy),
     )
+
+
+def restored(orientation: Orientation, earlier: Orientation, todo: Numbers) -> Orientation:
+    """Give some pairs back their earlier orientation.
+
+    Parameters
+    ----------
+    orientation, earlier : Orientation
+        The same pairs now and before.
+    todo : ndarray of int
+        Pairs to restore, ascending.
+
+    Returns
+    -------
+    Orientation
+        All pairs.
+    """
+    if not len(todo):
+        return orientation
+    _, rows = earlier.pairs.take(todo)
+    columns = ("elements", "sigmas", "sigma0", "condition", "iterations")
+    by_pair = {name: _put(getattr(orientation, name), todo, getattr(earlier, name)[todo]) for name in columns}
+    by_row = {
+        name: _put(getattr(orientation, name), rows, getattr(earlier, name)[rows])
+        for name in ("parallax", "redundancy")
+    }
+    weight = _put(orientation.pairs.weight, rows, earlier.pairs.weight[rows])
+    return replace(orientation, pairs=replace(orientation.pairs, weight=weight), **by_pair, **by_row)
 
 
 def _put(values: NDArray[Any], rows: Numbers, fresh: NDArray[Any]) -> NDArray[Any]:
