@@ -111,14 +111,14 @@ def experiment(seed: int, models: int, *, errors: bool = True) -> tuple[Orientat
     rng, n = np.random.default_rng(seed), sum(ZONES)
     left = gruber(rng, models, a=65, b=65, counts=ZONES, scatter=6.0)
     right = left - [65.0, 0.0]
-    error = np.zeros((models, n))
+    error: Floats = np.zeros((models, n))
     if errors:
         second = np.arange(models) % 34 < 10  # ten of 34 models have a second error
         for times, which in ((1, np.arange(models)), (2, np.flatnonzero(second))):
             for model in which:
                 free = np.flatnonzero(error[model] == 0)
-                assert len(free) == n - times + 1
-                error[model, rng.choice(free)] = float(rng.choice([-0.1, 0.1])) * int(rng.integers(1, 6))
+                assert len(free) == n - times + 1  # no point twice
+                error[model, rng.choice(free)] = rng.choice([-0.1, 0.1]) * rng.integers(1, 6)
     right[:, :, 1] -= error + rng.normal(0, 0.01, (models, n))
     pairs = batch(left, right, 100.0)
     rows = np.arange(models * n)
@@ -138,10 +138,10 @@ def experiment(seed: int, models: int, *, errors: bool = True) -> tuple[Orientat
 def test_the_shares_of_the_published_experiment(limit: float, published: dict[str, float]) -> None:
     oriented, error = experiment(1, 34 * 60)
     _, log = screening.screen(oriented, Settings("parallax+grubbs", 0.05, limit), 0.01)
-    wrong = np.count_nonzero(error)
+    wrong = int(np.count_nonzero(error))
     assert wrong == 44 * 60
     by_test = {test: {e.row for e in log if e.test == test and error[e.row] != 0} for test in ("parallax", "grubbs")}
-    found = {test: 100 * len(rows) / wrong for test, rows in by_test.items()}
+    found: dict[str, float] = {test: 100 * len(rows) / wrong for test, rows in by_test.items()}
     found["missed"] = 100 - sum(found.values())
     for name, share in published.items():
         assert found[name] == pytest.approx(share, abs=3.0), name
