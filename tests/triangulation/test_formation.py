@@ -1,0 +1,429 @@
+"""Forming a strip: printed examples, strips that come back to the truth, wrong and missing pass points."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from photostrip.errors import EXIT_GEOMETRY, GeometryError
+from photostrip.geometry.rotation import alpha_omega_kappa, from_alpha_omega_kappa
+from photostrip.geometry.similarity import Similarity
+from photostrip.points import PhotoPoints
+from photostrip.triangulation import formation, relative
+from photostrip.triangulation.formation import SCALE_TRANSFERS, FormedStrip, Settings
+from photostrip.triangulation.relative import Orientation
+from tests.strips import MICROMETRE, attitude, batch, fly, measured, photograph
+from tests.vectors import cases, section
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from tests.strips import Flown
+    from tests.vectors import Vector
+
+    Floats = NDArray[np.float64]
+
+TRANSFERS = pytest.mark.parametrize("transfer", SCALE_TRANSFERS)
+CLOSURE = 1e-12  # base lengths
+
+
+def formed(flown: Flown, transfer: str = "least_squares") -> FormedStrip:
+    return formation.form(flown.oriented(), Settings(transfer), flown.photos)
+
+
+def truth_in_strip(flown: Flown, strip: FormedStrip) -> tuple[Floats, Floats, Floats]:
+    """Centres, points and rotations of the truth in the frame and unit of the formed strip."""
+    base = np.linalg.norm(flown.centers[1] - flown.centers[0])
+    first = flown.rotations[0]
+    centers = (flown.centers - flown.centers[0]) @ first / base
+    points = (flown.xyz[strip.point] - flown.centers[0]) @ first / base
+    return centers, points, first.T @ flown.rotations
+
+
+def closure(flown: Flown, transfer: str = "least_squares") -> float:
+    """Largest error of a centre, point or direction, in base lengths."""
+    strip = formed(flown, transfer)
+    found = (strip.centers, strip.xyz, strip.rotations)
+    return max(float(np.abs(f - t).max()) for f, t in zip(found, truth_in_strip(flown, strip), strict=True))
+
+
+def only(observations: PhotoPoints, keep: NDArray[np.bool_]) -> PhotoPoints:
+    columns = (observations.photo[keep], observations.point[keep], observations.xy[keep], observations.sigma[keep])
+    return PhotoPoints(observations.photo_ids, observations.point_ids, *columns)
+
+
+def seen(flown: Flown, photo: int, name: str) -> NDArray[np.bool_]:
+    """Rows in which a photo shows a point."""
+    rows: NDArray[np.bool_] = (flown.observations.photo == photo) & (flown.observations.point == flown.at[name])
+    return rows
+
+
+# ------------------------------------------------------------------------------------------- published
+
+
+@TRANSFERS
+@pytest.mark.parametrize("example", cases("strip_local"))
+def test_the_strip_of_the_formula_book(example: Vector, transfer: str) -> None:
+    photos = {f"{number}": image for number, image in enumerate(example.input["photos"], start=1)}
+    observations = measured(photos)
+    names, tol = observations.photo_ids, example.tol
+    pairs, point, rows = relative.collect_pairs(observations, names, example.input["f"])
+    oriented = relative.orient(pairs, point, rows, names)
+    strip = formation.form(oriented, Settings(transfer), names)
+    first, base = attitude(example.input["eo1_deg"])[0], example.input["base"]
+    bases = np.diff(strip.centers, axis=0) @ first.T
+    for number, model in enumerate(example.expected["models"]):
+        degrees = np.degrees(oriented.elements[number])
+        assert np.allclose(degrees, model["elements_deg"], rtol=0, atol=tol["angles_deg"])
+        assert strip.scale[number] == pytest.approx(model["k"], abs=tol["k"])
+        bx, by, bz = bases[number]
+        assert np.degrees(np.arctan2(by, bx)) == pytest.approx(model["tau_deg"], abs=tol["angles_deg"])
+        assert np.degrees(np.arctan2(bz, np.hypot(bx, by))) == pytest.approx(model["nu_deg"], abs=tol["angles_deg"])
+        assert np.linalg.norm(bases[number]) == pytest.approx(model["k"], abs=tol["k"])
+    for number, camera in enumerate(example.expected["cameras"]):
+        degrees = np.degrees(alpha_omega_kappa(first @ strip.rotations[number]))
+        assert np.allclose(degrees, camera["alpha_omega_kappa_deg"], rtol=0, atol=tol["angles_deg"])
+        assert np.allclose(base * first @ strip.centers[number], camera["S"], rtol=0, atol=tol["coords"])
+    found = {
+        observations.point_ids[number]: base * first @ xyz for number, xyz in zip(strip.point, strip.xyz, strict=True)
+    }
+    assert found.keys() == example.expected["points"].keys()
+    for name, xyz in example.expected["points"].items():
+        assert np.allclose(found[name], xyz, rtol=0, atol=tol["coords"]), name
+
+
+@pytest.mark.parametrize("example", cases("base_chain"))
+def test_the_chain_of_the_formula_book(example: Vector) -> None:
+    given_, expected, tol = example.input, example.expected, example.tol["abs"]
+    elements = np.radians([[given_[f"{name}p_deg"] for name in ("alpha1", "kappa1", "alpha2", "omega2", "kappa2")]])
+    direction, rotation = oriented_as(elements).relative
+    first = from_alpha_omega_kappa(*np.radians([given_[f"{name}1_deg"] for name in ("alpha", "omega", "kappa")]))
+    assert np.allclose(first, expected["A1"], rtol=0, atol=tol)
+    base_frame = from_alpha_omega_kappa(elements[0, 0], 0.0, elements[0, 1])
+    assert np.allclose(base_frame, expected["A1p"], rtol=0, atol=tol)
+    assert np.allclose(first @ base_frame.T, expected["A_tau_nu"], rtol=0, atol=tol)
+    second = first @ formation.hand_on(rotation)[1]
+    assert np.allclose(second, expected["A2"], rtol=0, atol=tol)
+    degrees = np.degrees(alpha_omega_kappa(second))
+    assert np.allclose(degrees, expected["alpha2_omega2_kappa2_deg"], rtol=0, atol=tol * 10)
+    base = first @ direction[0] * given_["base"]
+    assert np.allclose(base, expected["B_XYZ"], rtol=0, atol=tol * given_["base"])
+    assert np.allclose(given_["S1"] + base, expected["S2"], rtol=0, atol=tol * given_["base"])
+    assert np.degrees(np.arctan2(base[1], base[0])) == pytest.approx(expected["tau_deg"], abs=tol)
+    assert np.degrees(np.arcsin(base[2] / given_["base"])) == pytest.approx(expected["nu_deg"], abs=tol)
+
+
+def oriented_as(elements: Floats, points: int = 6) -> Orientation:
+    """Pairs of given elements; what was measured is not looked at."""
+    p = len(elements)
+    nothing = np.zeros((p, points, 2))
+    ones, numbers = np.ones(p), np.zeros(p, int)
+    pairs = batch(nothing, nothing, 100.0)
+    rows = np.column_stack([np.arange(p * points)] * 2)
+    by_row = np.zeros(p * points)
+    point = np.tile(np.arange(points), p)
+    return Orientation(pairs, point, rows, elements, elements, ones, ones, numbers, by_row, by_row)
+
+
+@pytest.mark.parametrize("example", cases("scale_transfer"))
+def test_the_scale_factors_of_the_formula_book(example: Vector) -> None:
+    given_, expected, rel = example.input, example.expected, example.tol["rel"]
+    center = np.array(given_["S_common"])
+    after = np.array(given_["tie_current_model_increments"])
+    n = len(after)
+    oriented = oriented_as(np.zeros((2, 5)), n)
+    before = np.array(given_["tie_previous_model_strip_coords"]) - center + [1.0, 0, 0]  # from the left centre
+    vectors = np.concatenate([before, after])
+    sound = np.ones(2 * n, bool)
+    joined = formation.transfer_scale(oriented, vectors, sound, Settings("distances"), ("1", "2", "3"))
+    assert np.allclose(joined.ratio, expected["k_each"], rtol=rel, atol=0)
+    assert np.allclose(np.linalg.norm(after, axis=1) * joined.ratio, expected["D"], rtol=rel, atol=0)
+    assert joined.factor[0] == pytest.approx(expected["k_mean"], rel=rel)
+    assert joined.used.all()
+    joint = np.zeros(n, int)
+    weights = np.array(given_["weights"])
+    mean, spread = formation._factors(joined.ratio, weights, joint, 1, Settings())
+    assert mean[0] == pytest.approx(expected["k_weighted"], rel=rel)
+    assert spread[0] * mean[0] / np.sqrt(n) == pytest.approx(expected["sd_of_k_weighted"], rel=1e-9)
+    squares = np.array(expected["D_prime"]) ** 2
+    mean_of_squares, _ = formation._factors(joined.ratio, squares, joint, 1, Settings())
+    assert mean_of_squares[0] == pytest.approx(expected["k_least_squares"], rel=rel)
+    assert np.allclose(center + mean * given_["base_components"], expected["S_next"], rtol=rel, atol=0)
+    assert np.allclose(center + mean * given_["new_point_increment"], expected["new_point"], rtol=rel, atol=0)
+
+
+def test_all_examples_are_here() -> None:
+    assert [len(section(name)) for name in ("strip_local", "base_chain", "scale_transfer")] == [1, 2, 1]
+
+
+# --------------------------------------------------------------------------------- back to the truth
+
+
+@TRANSFERS
+def test_strips_without_noise_close(transfer: str) -> None:
+    """Twenty strips of 4 to 7 photos, any kappa, tilts, relief of 15 percent: 1.3e-14 base lengths were reached."""
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        photos, kappa = int(rng.integers(4, 8)), float(rng.uniform(-180, 180))
+        flown = fly(seed, photos, tilt_deg=3, kappa_deg=kappa, relief=0.15, extra=10)
+        assert closure(flown, transfer) < CLOSURE
+
+
+@pytest.mark.parametrize("kappa", [0.0, 90.0, 180.0, 270.0])
+def test_photos_may_hang_in_the_camera_in_any_way(kappa: float) -> None:
+    flown = fly(3, 6, kappa_deg=kappa, relief=0.1, extra=5)
+    assert closure(flown) < CLOSURE
+    turned = np.degrees(formed(flown).base_direction)
+    assert np.allclose((turned + kappa + 180) % 360 - 180, 0, atol=6)
+
+
+def test_long_strips_close() -> None:
+    assert closure(fly(3, 120, tilt_deg=3, relief=0.15)) < 1e-11
+
+
+def test_base_angles_scale_and_bases_are_those_of_the_centres() -> None:
+    strip = formed(fly(5, 6, sigma=5 * MICROMETRE, extra=20))
+    bases = np.diff(strip.centers, axis=0)
+    assert np.allclose(strip.scale, np.linalg.norm(bases, axis=1), rtol=1e-12, atol=0)
+    assert np.allclose(strip.base_direction, np.arctan2(bases[:, 1], bases[:, 0]), rtol=0, atol=1e-12)
+    inclination = np.arctan2(bases[:, 2], np.hypot(bases[:, 0], bases[:, 1]))
+    assert np.allclose(strip.base_inclination, inclination, rtol=0, atol=1e-12)
+    assert np.allclose(strip.scale[1:] / strip.scale[:-1], strip.junctions.factor, rtol=1e-12, atol=0)
+    assert np.array_equal(strip.rotations[0], np.eye(3))
+    assert np.array_equal(strip.centers[0], np.zeros(3))
+
+
+def test_orientations_are_handed_on() -> None:
+    turns = Rotation.random(6, random_state=1).as_matrix()
+    chain = formation.hand_on(turns)
+    assert np.array_equal(chain[0], np.eye(3))
+    for number, turn in enumerate(turns):
+        assert np.allclose(chain[number].T @ chain[number + 1], turn, rtol=0, atol=1e-14)
+
+
+@TRANSFERS
+@given(size=st.floats(0.01, 100.0))
+def test_the_size_of_the_photos_does_not_matter(transfer: str, size: float) -> None:
+    flown = fly(4, 5, sigma=5 * MICROMETRE, extra=10)
+    larger = replace(flown, observations=replace(flown.observations, xy=flown.observations.xy * size), focal=153 * size)
+    one, two = formed(flown, transfer), formed(larger, transfer)
+    assert np.allclose(one.xyz, two.xyz, rtol=0, atol=1e-9)
+    assert np.allclose(one.centers, two.centers, rtol=0, atol=1e-9)
+
+
+def test_the_scale_of_the_ground_does_not_matter() -> None:
+    """The same photos come from a world of any size: only angles are measured."""
+    small, large = fly(4, 5, scale=1_000), fly(4, 5, scale=100_000)
+    assert np.allclose(small.observations.xy, large.observations.xy, rtol=0, atol=1e-9)
+    assert np.allclose(formed(small).xyz, formed(large).xyz, rtol=0, atol=1e-10)
+
+
+def test_the_strip_flown_back_is_the_same_strip() -> None:
+    flown = fly(6, 5, sigma=5 * MICROMETRE, extra=20)
+    there = formed(flown)
+    pairs, point, rows = relative.collect_pairs(flown.observations, flown.photos[::-1], flown.focal)
+    back = formation.form(relative.orient(pairs, point, rows, flown.photos[::-1]), Settings(), flown.photos[::-1])
+    assert np.array_equal(there.point, back.point)
+    similarity = Similarity.from_points(back.xyz, there.xyz)
+    assert (
+        np.abs(similarity.residuals(back.xyz, there.xyz)).max() < 2e-4
+    )  # in bases, as the noise is; not the same sums
+
+
+# ------------------------------------------------------------------------------------------ with noise
+
+
+def scale_errors(overlap: float, transfer: str, strips: int = 40) -> float:
+    """Root mean square relative error of a scale ratio between neighbouring models."""
+    squares = []
+    for seed in range(strips):
+        flown = fly(seed, 6, overlap=overlap, sigma=5 * MICROMETRE, extra=15)
+        true = np.linalg.norm(np.diff(flown.centers, axis=0), axis=1)
+        found = formed(flown, transfer).junctions.factor
+        squares.append(((found * true[:-1] / true[1:] - 1) ** 2).mean())
+    return float(np.sqrt(np.mean(squares)))
+
+
+@pytest.mark.parametrize("overlap", [0.62, 0.8])
+def test_both_transfers_are_equally_good_over_all_common_points(overlap: float) -> None:
+    least_squares, distances = (scale_errors(overlap, transfer) for transfer in SCALE_TRANSFERS)
+    assert 1e-4 < least_squares < 8e-4
+    assert least_squares / distances == pytest.approx(1, abs=0.03)
+
+
+def test_the_spread_of_the_ratios_is_that_of_the_parallaxes() -> None:
+    """A ratio of two distances along one ray is known to sqrt(2) sigma_p / p at best, sigma_p = sqrt(2) sigma."""
+    sigma, spreads = 5 * MICROMETRE, []
+    for seed in range(30):
+        flown = fly(seed, 6, sigma=sigma, extra=30)
+        spreads.append(formed(flown).junctions.spread)
+    parallax = flown.focal * flown.base / flown.height
+    expected = 2 * sigma / parallax
+    found = float(np.sqrt(np.mean(np.array(spreads) ** 2)))
+    assert expected < found < 1.5 * expected  # the elements of both pairs have errors, too
+
+
+@TRANSFERS
+def test_a_wrong_pass_point_is_rejected_and_does_no_harm(transfer: str) -> None:
+    flown = fly(8, 5, sigma=2 * MICROMETRE, extra=150, tilt_deg=0.2)
+    strip = formed(flown, transfer)
+    xy = flown.observations.xy.copy()
+    wrong = np.flatnonzero(seen(flown, 3, "p2_1"))  # the third photo of the joint at photo 2
+    xy[wrong, 0] += 1.0  # along the base: no y parallax tells
+    spoiled = replace(flown, observations=replace(flown.observations, xy=xy))
+    found = formed(spoiled, transfer)
+    out = [(int(j), int(p)) for j, p in zip(found.junctions.joint, found.junctions.point, strict=True)]
+    rejected = [out[row] for row in np.flatnonzero(~found.junctions.used)]
+    number = flown.at["p2_1"]
+    assert set(rejected) <= {(1, number), (2, number)}
+    assert (1, number) in rejected
+    kept = np.flatnonzero(strip.junctions.used)
+    assert len(kept) == len(strip.junctions.used)
+    assert np.allclose(found.junctions.factor, strip.junctions.factor, rtol=3e-4, atol=0)
+    assert np.all(
+        np.abs(found.junctions.ratio / found.junctions.factor[found.junctions.joint] - 1)[found.junctions.used] < 0.01
+    )
+
+
+def test_small_deviations_are_never_rejected() -> None:
+    for seed in range(10):
+        assert formed(fly(seed, 6, sigma=3 * MICROMETRE, extra=20)).junctions.used.all()
+
+
+# ----------------------------------------------------------------------------- points on more or fewer photos
+
+
+def test_points_of_one_and_of_many_models() -> None:
+    flown = fly(9, 6, overlap=0.8, extra=10)
+    strip = formed(flown)
+    obs = flown.observations
+    rows = {int(point): row for row, point in enumerate(strip.point)}
+    for name, number in flown.at.items():
+        on = np.sort(obs.photo[obs.point == number])
+        models = int((np.diff(on) == 1).sum())
+        if models:
+            assert strip.models[rows[number]] == models, name
+        else:
+            assert number not in rows, name
+    assert len(set(strip.models)) >= 3
+
+
+def test_a_point_on_photos_one_and_three_only_has_no_coordinates() -> None:
+    flown = fly(9, 4, extra=10)
+    keep = ~seen(flown, 1, "p1_0")
+    assert seen(flown, 0, "p1_0").any()
+    assert seen(flown, 2, "p1_0").any()
+    less = replace(flown, observations=only(flown.observations, keep))
+    strip = formed(less)
+    assert flown.at["p1_0"] not in strip.point
+    assert closure(less) < CLOSURE
+
+
+def test_a_point_of_a_single_model_is_what_its_model_says() -> None:
+    flown = fly(9, 4, sigma=5 * MICROMETRE, extra=10)
+    less = replace(flown, observations=only(flown.observations, ~seen(flown, 2, "p1_0")))
+    strip = formed(less)
+    row = int(np.flatnonzero(strip.point == flown.at["p1_0"])[0])
+    assert strip.models[row] == 1
+    oriented = less.oriented()
+    inside = np.flatnonzero(oriented.point == flown.at["p1_0"])
+    assert oriented.pairs.pair[inside].tolist() == [0]
+    assert np.array_equal(strip.xyz[row], strip.model_xyz[inside[0]])
+
+
+def test_coordinates_are_means_over_the_models() -> None:
+    flown = fly(10, 6, sigma=5 * MICROMETRE, extra=10)
+    strip, oriented = formed(flown), flown.oriented()
+    for row, number in enumerate(strip.point):
+        models = strip.model_xyz[oriented.point == number]
+        assert np.allclose(strip.xyz[row], models.mean(axis=0), rtol=0, atol=1e-12)
+        assert strip.models[row] == len(models)
+
+
+@given(st.lists(st.tuples(st.integers(0, 5), st.booleans()), max_size=20))
+def test_means_by_hand(rows: list[tuple[int, bool]]) -> None:
+    point = np.array([number for number, _ in rows], int)
+    use = np.array([flag for _, flag in rows], bool)
+    xyz = np.random.default_rng(1).normal(0, 1, (len(rows), 3))
+    numbers, mean, count = formation.mean_points(point, xyz, use)
+    assert numbers.tolist() == sorted(set(point[use]))
+    for number, average, times in zip(numbers, mean, count, strict=True):
+        own = xyz[use & (point == number)]
+        assert np.allclose(average, own.mean(axis=0))
+        assert times == len(own)
+
+
+def test_a_rejected_point_joins_nothing_and_makes_no_mean() -> None:
+    flown = fly(10, 4, extra=10)
+    oriented = flown.oriented()
+    weight = oriented.pairs.weight.copy()
+    out = (oriented.point == flown.at["p1_0"]) & (oriented.pairs.pair == 0)
+    weight[out] = 0
+    without = relative.refine(oriented, weight, np.array([0]))
+    strip = formation.form(without, Settings(), flown.photos)
+    row = int(np.flatnonzero(strip.point == flown.at["p1_0"])[0])
+    assert strip.models[row] == 1
+    at_first = strip.junctions.point[strip.junctions.joint == 0]
+    assert flown.at["p1_0"] not in at_first
+    assert np.isfinite(strip.model_xyz[out]).all()  # where it would be is still told
+
+
+# ---------------------------------------------------------------------------------------------- refused
+
+
+def test_a_broken_joint_names_its_three_photos() -> None:
+    flown = fly(11, 6, extra=30)
+    obs = flown.observations
+    common = set(obs.point[obs.photo == 2]) & set(obs.point[obs.photo == 3]) & set(obs.point[obs.photo == 4])
+    keep = ~(np.isin(obs.point, list(common)) & (obs.photo == 4))
+    # photos 103 and 104, 104 and 105 still share points; no point lies on 103, 104 and 105
+    with pytest.raises(GeometryError) as caught:
+        formed(replace(flown, observations=only(obs, keep)))
+    error = caught.value
+    assert error.exit_code == EXIT_GEOMETRY
+    assert error.code == "broken-joint"
+    assert error.photos == ("103", "104", "105")
+    assert "no point is common to photos 103, 104 and 105" in str(error)
+    assert "at least one pass point" in str(error)
+
+
+def test_one_pass_point_joins_and_its_spread_is_unknown() -> None:
+    flown = fly(11, 4, extra=30)
+    obs = flown.observations
+    common = sorted(set(obs.point[obs.photo == 1]) & set(obs.point[obs.photo == 2]) & set(obs.point[obs.photo == 3]))
+    less = replace(flown, observations=only(obs, ~(np.isin(obs.point, common[1:]) & (obs.photo == 3))))
+    strip = formed(less)
+    assert np.isnan(strip.junctions.spread[1])
+    assert np.isfinite(strip.junctions.spread[0])
+    assert closure(less) < CLOSURE
+
+
+def test_a_base_along_the_view_is_refused() -> None:
+    """A camera that climbs straight up has no base to speak of."""
+    rng = np.random.default_rng(1)
+    points = np.column_stack([rng.uniform(-60, 60, (20, 2)), rng.uniform(-20, 0, 20)])
+    images = {}
+    for name, height in (("1", 150.0), ("2", 170.0), ("3", 190.0)):
+        xy = photograph(points, np.array([0.0, 0.0, height]), np.eye(3), 100.0)
+        images[name] = {f"p{number}": image for number, image in enumerate(xy)}
+    pairs, point, rows = relative.collect_pairs(measured(images), ("1", "2", "3"), 100.0)
+    with pytest.raises(GeometryError) as caught:
+        relative.orient(pairs, point, rows, ("1", "2", "3"))
+    assert caught.value.photos == ("1", "2")
+    assert caught.value.code in {"not-converged", "degenerate-pair"}
+
+
+def test_the_steep_base_is_named() -> None:
+    upright = np.array([[0.3, 0.0, 0.1], [1e-9, 0.0, 1.0]])
+    with pytest.raises(
+        GeometryError, match="the base from photo 2 to 3 is parallel to the viewing direction"
+    ) as caught:
+        formation._refuse_vertical_base(upright, ("1", "2", "3"))
+    assert caught.value.code == "vertical-base"
+    assert caught.value.photos == ("2", "3")
