@@ -7,7 +7,7 @@ SOURCES := photostrip tests $(wildcard benchmarks)
 DEMO_PROJECTS ?= $(wildcard sample_data/*/project.yaml)
 WORKERS ?= 2
 
-.PHONY: demo test check lint types lowest bench docs clean
+.PHONY: demo test check lint types lowest bench docs golden clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/photostrip.installed ## run the main job on every sample project and print its accuracy report
@@ -43,6 +43,9 @@ bench: $(VENV)/dev.installed ## tables of seconds, memory and accuracy
 
 docs: $(VENV)/dev.installed ## rewrite the printed output in README.md and docs/ by running the commands there
 	$(BIN)/python -m tests.renew_docs
+
+golden: $(VENV)/dev.installed ## compute the results of sample_data that the tests compare with anew
+	$(BIN)/python -m tests.renew_golden
 
 clean: ## remove everything that make has made
 	rm -rf $(VENV) .venv-lowest build dist .hypothesis .mypy_cache .pytest_cache .ruff_cache

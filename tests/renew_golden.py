@@ -1,0 +1,56 @@
+"""Compute the results that tests/golden keeps of every project in sample_data (``make golden``); review the diff.
+
+Simulated projects are written anew first, so that they are always those of the present program.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from photostrip.formats.result.document import document_of
+from photostrip.formats.result.files import to_json
+from photostrip.formats.simulation import project_files
+from photostrip.pipeline import triangulate
+from photostrip.project.loading import load_project
+from photostrip.project.simulation_spec import load_specification
+from tests.source_tree import ROOT
+
+SAMPLES = tuple(sorted(path.parent.name for path in (ROOT / "sample_data").glob("*/project.yaml")))
+GOLDEN = ROOT / "tests/golden"
+LEFT_OUT = ("version", "residuals", "parallaxes")  # a number of ours, and what the other numbers are made of
+
+
+def kept(name: str) -> dict[str, object]:
+    """Run a sample project and give what is kept of its result.
+
+    The path is relative, as a user types it, because messages name files as they were given.
+    """
+    project = load_project(Path("sample_data") / name / "project.yaml")
+    document = document_of(triangulate(project.inputs, project.settings), project.hints)
+    return {key: value for key, value in document.items() if key not in LEFT_OUT}
+
+
+def simulated(name: str) -> dict[str, str]:
+    """Simulate a sample from its specification: content by file name; nothing for a real strip."""
+    specification = ROOT / "sample_data" / name / "spec.yaml"
+    return project_files(load_specification(specification).simulate()) if specification.exists() else {}
+
+
+def renew(path: Path, text: str) -> None:
+    """Write a file when its content has changed."""
+    if not path.exists() or path.read_text(encoding="utf-8") != text:
+        path.write_text(text, encoding="utf-8", newline="\n")
+        print(f"renewed {path.relative_to(ROOT)}")  # noqa: T201
+
+
+def main() -> None:
+    os.chdir(ROOT)
+    for name in SAMPLES:
+        for file, text in simulated(name).items():
+            renew(ROOT / "sample_data" / name / file, text)
+        renew(GOLDEN / f"{name}.json", to_json(kept(name)))
+
+
+if __name__ == "__main__":
+    main()
