@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -59,7 +60,7 @@ class ControlTable:
     use: Flags
     check: Flags
 
-    @property
+    @cached_property
     def used(self) -> Flags:
         """Rows of which anything counts."""
         return np.asarray(self.use.any(axis=1), bool)
@@ -111,6 +112,9 @@ def read_control(file: str, up: int, findings: Findings, *, default_sigma: bool 
 def _refuse_empty(read: ControlTable, uses: Sequence[str], findings: Findings) -> None:
     """Refuse an empty cell where the coordinate counts."""
     for row, axis in np.argwhere(read.use & np.isnan(read.xyz)):
+        if findings.full(read.table.file):
+            findings.count(read.table.file, 1)
+            continue
         message = f"point {read.ids[row]} has no {AXES[axis]}, but its use is {uses[row]}"
         fix = "fill it in, or set use to xy, z or off"
         findings.add(read.table.fault(int(row), AXES[axis], message, "no-coordinate", fix=fix))

@@ -16,6 +16,7 @@ from photostrip.errors import Fault, InputError
 from photostrip.formats.findings import suggestion
 
 if TYPE_CHECKING:
+    from io import FileIO
     from typing import NoReturn
 
 MEGABYTE = 1_000_000
@@ -71,7 +72,7 @@ def read_bytes(file: str, limit: int) -> bytes:
         _explain(file, error)
 
 
-def _content(file: str, stream: BinaryIO, limit: int) -> bytes:
+def _content(file: str, stream: BinaryIO | FileIO, limit: int) -> bytes:
     """Read an open file and make sure that it stood still."""
     before = os.fstat(stream.fileno())
     if stat.S_ISDIR(before.st_mode):
@@ -81,7 +82,7 @@ def _content(file: str, stream: BinaryIO, limit: int) -> bytes:
     if before.st_size > limit:
         size = f"has {before.st_size / MEGABYTE:.0f} MB"
         refuse(file, "file-size", size, expected=f"at most {limit / MEGABYTE:.0f} MB; is it the right file?")
-    data = stream.read(limit + 1)
+    data = stream.read(before.st_size + 1)
     after = os.fstat(stream.fileno())
     if (before.st_mtime_ns, before.st_size) != (after.st_mtime_ns, after.st_size) or len(data) != before.st_size:
         refuse(file, "file-changed", "changed while it was read", fix="run again when it is complete")

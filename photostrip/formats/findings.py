@@ -32,6 +32,10 @@ class Findings:
     _faults: list[Fault] = field(default_factory=list)
     _count: Counter[str] = field(default_factory=Counter)
 
+    def meet(self, file: str) -> None:
+        """Remember that a file is read now: faults are told in the order in which files were read."""
+        self._count[file] += 0
+
     def add(self, *faults: Fault) -> None:
         """Keep faults; of a file that has too many they are only counted."""
         for fault in faults:
@@ -90,7 +94,7 @@ class Findings:
         InputError
             With every fault.
         """
-        if self._count:
+        if self._faults:
             raise InputError(self.faults)
 
 

@@ -12,7 +12,7 @@ _GROUPED = re.compile(r"[+-]?[0-9]{1,3}(?:[ '’_\u00a0\u202f][0-9]{3})+(?:\.[0-
 _WITH_UNIT = re.compile(rf"({NUMBER.pattern})\s*([^\W\d_]+|%|°)")
 _SEXAGESIMAL = re.compile(r"[+-]?[0-9]+[°: ][0-9]+(?:['′: ].*)?")
 _NOT_FINITE = {"nan", "inf", "infinity"}
-_MINUS_SIGNS = str.maketrans("−–—", "---")
+_MINUS_SIGNS = "−–—"
 
 
 class NotANumber(ValueError):  # noqa: N818 (the name of what it says)
@@ -60,7 +60,7 @@ def number(text: str) -> float:
 
 def _reason(word: str) -> NotANumber:
     """Say what a word is that is no number."""
-    plain = unicodedata.normalize("NFKC", word).translate(_MINUS_SIGNS)
+    plain = "".join(map(_ascii, unicodedata.normalize("NFKC", word)))
     unit = _WITH_UNIT.fullmatch(word)
     what, fix = "is not a number", ""
     if not word:
@@ -73,11 +73,19 @@ def _reason(word: str) -> NotANumber:
         what, fix = "has a decimal comma", f"write {word.replace(',', '.')}"
     elif plain != word and NUMBER.fullmatch(plain):
         what, fix = "is not written with ASCII characters", f"write {plain}"
+    elif NUMBER.fullmatch(word.replace("_", "")):
+        what, fix = "has an underscore in it", f"write {word.replace('_', '')}"
     elif _SEXAGESIMAL.fullmatch(word):
         what, fix = "is not one number", "write decimal degrees"
     elif unit:
         what, fix = "has a unit in it", f"write the number alone: {unit[1]}"
     return NotANumber(f"`{shown(word)}` {what}", fix)
+
+
+def _ascii(character: str) -> str:
+    """Give the ASCII form of a digit of any script, and of a minus sign."""
+    digit = unicodedata.decimal(character, None)
+    return str(digit) if digit is not None else "-" if character in _MINUS_SIGNS else character
 
 
 def shown(text: str, limit: int = 40) -> str:

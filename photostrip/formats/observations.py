@@ -59,7 +59,7 @@ class Measurements:
     sigma: Floats
 
     @cached_property
-    def photo_ids_set(self) -> frozenset[str]:
+    def photos_measured(self) -> frozenset[str]:
         """Photos on which anything is measured."""
         return frozenset(self.photo_ids)
 

@@ -7,12 +7,8 @@ so a clean table costs next to nothing and a wrong one is explained.
 from __future__ import annotations
 
 import csv
-import gzip
 import re
-import zlib
 from dataclasses import dataclass, field
-from functools import cached_property
-from io import BytesIO, StringIO
 from itertools import islice
 from operator import itemgetter
 from typing import TYPE_CHECKING
@@ -20,9 +16,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import Fault, InputError
-from photostrip.formats.files import GZIP, MEGABYTE, decode, read_bytes, refuse
 from photostrip.formats.findings import Findings, counted, listed, suggestion
 from photostrip.formats.numbers import NotANumber, number, shown
+from photostrip.formats.table_text import TableText, content
 from photostrip.notes import Note
 
 if TYPE_CHECKING:
@@ -34,9 +30,9 @@ if TYPE_CHECKING:
     Numbers = NDArray[np.intp]
     Cells = tuple[str, ...]
 
-LARGEST_TABLE = 200 * MEGABYTE  # unpacked; a million points are 50 MB
 CHUNK = 16_384  # rows turned into columns at a time, so that a big table never stands in memory cell by cell
 CONTROL_CHARACTER = re.compile(r"[\x00-\x1f\x7f]")
+STANDARD_DEVIATIONS = {"s", "sd", "std", "sigma", "stdev", "accuracy", "precision"}  # one column for all coordinates
 SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "vertical bars"}
 
 
@@ -94,7 +90,7 @@ class Table:
     numbers: dict[str, Floats]
     codes: dict[str, Numbers]
     ids: dict[str, tuple[str, ...]]
-    _source: _Source = field(repr=False)
+    _source: TableText = field(repr=False)
 
     def __len__(self) -> int:
         """Give the number of rows."""
@@ -129,41 +125,6 @@ class Table:
         return self._source.fault(int(self.lines[row]), column, message, code, expected=expected, fix=fix)
 
 
-@dataclass(eq=False)
-class _Source:
-    """The text of a table and where its columns stand: what positions are made from."""
-
-    file: str
-    text: str
-    where: dict[str, int] = field(default_factory=dict)  # column name -> number of the field in a row
-    header: dict[str, str] = field(default_factory=dict)  # column name -> name in the header
-
-    @cached_property
-    def _lines(self) -> list[str]:
-        return StringIO(self.text, newline="").readlines()
-
-    def fault(self, line: int, column: str, message: str, code: str, *, expected: str = "", fix: str = "") -> Fault:
-        position = self._position(line, self.where[column]) if column in self.where else 0
-        name = self.header.get(column, column)
-        return Fault(message, code, self.file, line, position, name, expected, fix)
-
-    def _position(self, line: int, wanted: int) -> int:
-        """Character, counted from 1, at which a field of a line begins; 0 when the line has not so many."""
-        text = self._lines[line - 1]
-        start, quoted, number_of_field = 0, False, 0
-        for position, character in enumerate(text):
-            if number_of_field == wanted:
-                break
-            if character == '"':
-                quoted = not quoted
-            elif character == "," and not quoted:
-                number_of_field, start = number_of_field + 1, position + 1
-        if number_of_field != wanted:
-            return 0
-        blanks = len(text[start:]) - len(text[start:].lstrip(" \t"))
-        return start + blanks + 1
-
-
 def read_table(file: str, layout: Sequence[Column], findings: Findings) -> Table | None:
     """Read a table.
 
@@ -181,38 +142,15 @@ def read_table(file: str, layout: Sequence[Column], findings: Findings) -> Table
     Table or None
         What could be read; None when not even the header could.
     """
+    findings.meet(file)
     try:
-        text, marked = _text(file)
+        data, marked = content(file)
     except InputError as error:
         findings.extend(error)
         return None
     if marked:
         findings.notes.append(Note("byte-order-mark", f"{file} begins with a byte order mark; it was skipped", "note"))
-    return _Reader(_Source(file, text), layout, findings).read()
-
-
-def _text(file: str) -> tuple[str, bool]:
-    """Read and unpack a file."""
-    data = read_bytes(file, LARGEST_TABLE)
-    packed = file.casefold().endswith(".gz")
-    if packed != data.startswith(GZIP):
-        what = "is compressed (gzip), but its name does not say so" if not packed else "is not compressed (gzip)"
-        refuse(file, "gzip", what, fix="name it .csv.gz" if not packed else "name it .csv")
-    return decode(file, _unpack(file, data) if packed else data)
-
-
-def _unpack(file: str, data: bytes) -> bytes:
-    try:
-        with gzip.GzipFile(fileobj=BytesIO(data)) as stream:
-            unpacked = stream.read(LARGEST_TABLE + 1)
-    except (EOFError, zlib.error, gzip.BadGzipFile) as error:
-        how = "ends too early" if isinstance(error, EOFError) else "is damaged"
-        refuse(file, "gzip", f"the compressed file {how}", fix="copy or pack it again")
-    if len(unpacked) > LARGEST_TABLE:
-        refuse(file, "file-size", f"unpacks to more than {LARGEST_TABLE // MEGABYTE} MB", expected="a table")
-    if not unpacked:
-        refuse(file, "file-empty", "is empty")
-    return unpacked
+    return _Reader(TableText(file, data), layout, findings).read()
 
 
 class _Codes(dict[str, int]):
@@ -226,9 +164,9 @@ class _Codes(dict[str, int]):
 class _Reader:
     """One pass over one table."""
 
-    def __init__(self, source: _Source, layout: Sequence[Column], findings: Findings) -> None:
+    def __init__(self, source: TableText, layout: Sequence[Column], findings: Findings) -> None:
         self.source, self.layout, self.findings = source, layout, findings
-        self.rows = csv.reader(StringIO(source.text, newline=""), strict=True, skipinitialspace=True)
+        self.rows = csv.reader(source.stream(), strict=True, skipinitialspace=True)
         self.width = 0
         self.columns: list[Column] = []
         self.lines: list[Numbers] = []
@@ -242,7 +180,7 @@ class _Reader:
         for rows, lines in self._chunks():
             self._take(rows, lines)
         places = np.concatenate([np.zeros(0, np.intp), *self.lines])
-        if not len(places) and not self.findings.full(self.source.file):
+        if not len(places) and not self.findings.number(self.source.file):
             fault = Fault("has a header but no rows", code="no-rows", file=self.source.file, line=1)
             self.findings.add(fault)
         numbers = {name: np.concatenate([np.zeros(0), *parts]) for name, parts in self.numbers.items()}
@@ -341,9 +279,9 @@ class _Reader:
             near = suggestion(name, [each for each in free if len(each) > 2])
             loose = re.sub(r"[\W_]", "", name.casefold())
             twin = next((each for each in free if each == loose), "")
-            if near or twin:
+            if near or twin or loose in STANDARD_DEVIATIONS:
                 self.source.where[name] = place
-                fix = near or f"did you mean `{twin}`?"
+                fix = near or (f"did you mean `{twin}`?" if twin else f"use the columns {', '.join(free)}")
                 self._add(line, name, f"column `{shown(name)}` is not known", "unknown-column", fix=fix)
             else:
                 others.append(shown(name) or "(no name)")
@@ -459,27 +397,26 @@ class _Reader:
             self._note_blanks(column, written, codes, lines)
         index = _Codes()
         renumbered = np.fromiter(map(index.__getitem__, stripped), np.intp, len(stripped))
-        for name, code in list(index.items()):
-            if column.words or (name and not CONTROL_CHARACTER.search(name)):
-                continue
-            what = (
-                f"the {column.name} has no id" if not name else f"the id `{shown(name)}` has a control character in it"
-            )
-            for row in np.flatnonzero(renumbered[codes] == code):
+        names, codes = tuple(index), renumbered[codes]
+        if not column.words:
+            wrong = np.array([not name or bool(CONTROL_CHARACTER.search(name)) for name in names], bool)
+            for row in np.flatnonzero(wrong[codes]):
+                name = names[codes[row]]
+                what = (
+                    f"the id `{shown(name)}` has a control character in it" if name else f"the {column.name} has no id"
+                )
                 self._add(int(lines[row]), column.name, what, "id", expected="an id on one line")
-        return renumbered[codes], tuple(index)
+        return codes, names
 
     def _words(self, column: Column, cells: list[str], codes: Numbers, lines: Numbers) -> list[str]:
         """Read words of a fixed list, whatever their case; an empty cell is the first of them."""
         words = [cell.casefold() or column.words[0] for cell in cells]
-        for code, word in enumerate(words):
-            if word in column.words:
-                continue
-            fix = suggestion(word, column.words)
-            for row in np.flatnonzero(codes == code):
-                message = f"`{shown(cells[code])}` is not known"
-                expected = f"one of {', '.join(column.words)}"
-                self._add(int(lines[row]), column.name, message, "word", expected=expected, fix=fix)
+        wrong = np.array([word not in column.words for word in words], bool)
+        for row in np.flatnonzero(wrong[codes]):
+            word = cells[codes[row]]
+            fix = "" if self.findings.full(self.source.file) else suggestion(word, column.words)
+            expected = f"one of {', '.join(column.words)}"
+            self._add(int(lines[row]), column.name, f"`{shown(word)}` is not known", "word", expected=expected, fix=fix)
         return words
 
     def _note_blanks(self, column: Column, written: list[str], codes: Numbers, lines: Numbers) -> None:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from photostrip.formats.findings import Findings
 
 LARGEST_PROJECT = 10 * MEGABYTE
-MOST_VALUES = 300_000
+MOST_VALUES = 100_000  # a strip of a thousand photos has two thousand
 DEEPEST = 20
 LOADER: Any = getattr(yaml, "CBaseLoader", yaml.BaseLoader)  # the C parser is ten times faster where it is there
 COMMAND_LINE = "--set"  # the place of values that stand in no file
@@ -167,6 +167,7 @@ def read_document(file: str, findings: Findings) -> Node | None:
     Node or None
         Its mapping; None when it cannot be read further.
     """
+    findings.meet(file)
     try:
         text, marked = decode(file, read_bytes(file, LARGEST_PROJECT))
     except InputError as error:
@@ -283,7 +284,8 @@ class _Builder:
         if event.anchor is not None:
             self._refuse(place, f"the anchor &{event.anchor} cannot be used", "anchor", "remove it")
         if event.tag is not None:
-            self._refuse(place, f"the tag {event.tag} cannot be used", "tag", "remove it")
+            tag = event.tag.replace("tag:yaml.org,2002:", "!!")
+            self._refuse(place, f"the tag {shown(tag)} cannot be used", "tag", "remove it")
 
     def _text(self, event: yaml.ScalarEvent, place: Place) -> str:
         text: str = event.value
@@ -361,8 +363,9 @@ def _syntax(error: yaml.YAMLError, text: str, file: str) -> Fault:
     lines = text.splitlines() or [""]
     if mark is None:
         return Fault(f"cannot be read as YAML: {problem}", "yaml", file)
-    if begun is not None and mark.line >= len(lines) - 1 and begun.line < mark.line:
-        mark = begun  # what was never closed is the better place than the end of the file
+    never_closed = "',' or" in problem or "end of stream" in problem or mark.line >= len(lines)
+    if begun is not None and never_closed:
+        mark = begun  # where something was opened is a better place than where its end is missed
     line = min(mark.line, len(lines) - 1)
     column = mark.column if line == mark.line else 0
     what, fix = _explained(problem, lines[line], column)

@@ -117,7 +117,8 @@ def told_where_named(fault: Fault, owner: Node, key: tuple[str | int, ...]) -> F
     if fault.line:
         return fault
     message = f"{shown(fault.file, 200)} {fault.message}"
-    return fault_at(owner, key, message, fault.code, expected=fault.expected, fix=fault.fix)
+    fix = fault.fix if fault.code != "file-directory" else ""  # there a project was looked for
+    return fault_at(owner, key, message, fault.code, expected=fault.expected, fix=fix)
 
 
 def merge(base: Node, own: Node) -> Node:

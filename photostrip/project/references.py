@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from photostrip.formats.findings import suggestion
 from photostrip.formats.numbers import shown
-from photostrip.project.document import fault_at
+from photostrip.project.document import COMMAND_LINE, fault_at
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -67,6 +67,7 @@ def check_references(root: Node, findings: Findings) -> None:
     _photos(root, findings)
     _cameras(root, findings)
     _system_of_coordinates(root, findings)
+    _units_of_sigma(root, findings)
     _curvature(root, findings)
 
 
@@ -141,6 +142,16 @@ def _system_of_coordinates(root: Node, findings: Findings) -> None:
     if root.has("fiducial_measurements") and root.has("observations", "origin"):
         message = "an origin means nothing here: the measured fiducial marks say where the photo lies"
         findings.add(fault_at(root, ("observations", "origin"), message, "origin", fix="remove it"))
+
+
+def _units_of_sigma(root: Node, findings: Findings) -> None:
+    """Refuse a standard deviation that would take its unit from another file, as when a preset changes below it."""
+    for section in ("observations", "fiducial_measurements"):
+        sigma, unit = root.find(section, "sigma"), root.find(section, "unit")
+        if sigma is None or unit is None or sigma.place.file in {unit.place.file, COMMAND_LINE}:
+            continue
+        message = f"sigma stands in {sigma.place.file}, its unit in {unit.place.file}"
+        findings.add(fault_at(root, (section, "sigma"), message, "unit-elsewhere", fix="write both in one file"))
 
 
 def _curvature(root: Node, findings: Findings) -> None:

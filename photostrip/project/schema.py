@@ -161,6 +161,12 @@ YAxis = Annotated[str, *_choice(("up", "down"))]
 Height = Annotated[str, *_choice(("ellipsoidal", "orthometric"))]
 
 
+def _or(words: tuple[str, ...]) -> str:
+    """List words as a sentence does."""
+    quoted = [f"`{word}`" for word in words]
+    return f"{', '.join(quoted[:-1])} or {quoted[-1]}"
+
+
 def key(description: str, default: Any = ..., *, unit: str = "") -> Any:  # noqa: ANN401 (pydantic's own manner)
     """Describe one key.
 
@@ -342,7 +348,7 @@ class Relative(Section):
     """Relative orientation and its search for gross errors."""
 
     screening: Annotated[str, *_choice(METHODS, "deletion", "robust")] = key(
-        "`auto` (parallax+grubbs), `parallax+grubbs`, `tau` or `none`", DEFAULTS.relative.screening
+        f"How gross errors are searched for: {_or(METHODS)}", DEFAULTS.relative.screening
     )
     grubbs_alpha: Fraction = key(
         "Probability of rejecting a good point of a pair without gross errors", DEFAULTS.relative.grubbs_alpha

@@ -17,8 +17,10 @@ if TYPE_CHECKING:
     from photostrip.formats.findings import Findings
 
     Path = tuple[str | int, ...]
+    Model = type[Section]
 
 T = TypeVar("T", bound=Section)
+MOST_EXPLAINED = 1000  # errors of one file; more of them are only counted
 EXPECTED = {
     "model_type": type_names[dict],
     "dict_type": type_names[dict],
@@ -47,13 +49,35 @@ def validate(root: Node, findings: Findings) -> ProjectFile | None:
         place = root.keys[name]
         message = f"`{name}` is not available yet: it {NOT_YET[name]}"
         findings.add(Fault(message, "not-available", place.file, place.line, place.column, name, fix="remove it"))
-    plain = {name: node.plain for name, node in root.entries.items() if name not in NOT_YET}
-    try:
-        project = ProjectFile.model_validate(plain)
-    except ValidationError as error:
-        findings.add(*dict.fromkeys(_fault(root, each) for each in error.errors(include_url=False)))
-        return None
+    usable = Node({name: node for name, node in root.entries.items() if name not in NOT_YET}, root.place, root.keys)
+    project = checked(ProjectFile, usable, findings)
     return None if waiting else project
+
+
+def checked(kind: type[T], root: Node, findings: Findings) -> T | None:
+    """Check a file against its schema.
+
+    Parameters
+    ----------
+    kind : type
+        The schema.
+    root : Node
+        The file.
+    findings : Findings
+        Where faults go.
+
+    Returns
+    -------
+    Section or None
+        The file with types and defaults; None when there are faults.
+    """
+    try:
+        return kind.model_validate(root.plain)
+    except ValidationError as error:
+        found = error.errors(include_url=False, include_input=False)
+        findings.add(*dict.fromkeys(_fault(kind, root, each) for each in found[:MOST_EXPLAINED]))
+        findings.count(root.place.file, len(found[MOST_EXPLAINED:]))
+        return None
 
 
 def valid_section(kind: type[T], node: Node | None) -> T | None:
@@ -77,7 +101,7 @@ def valid_section(kind: type[T], node: Node | None) -> T | None:
         return None
 
 
-def _fault(root: Node, error: Any) -> Fault:  # noqa: ANN401 (pydantic's dictionary of an error)
+def _fault(schema: Model, root: Node, error: Any) -> Fault:  # noqa: ANN401 (pydantic's dictionary of an error)
     """Turn one of pydantic's errors into a fault."""
     path: Path = error["loc"]
     kind: str = error["type"]
@@ -88,26 +112,26 @@ def _fault(root: Node, error: Any) -> Fault:  # noqa: ANN401 (pydantic's diction
         words = {"expected": context["expected"], "fix": context["fix"]}
         return fault_at(root, path, context["message"], context["code"], **words)
     if kind == "extra_forbidden":
-        return _unknown(root, path)
+        return _unknown(schema, root, path)
     if kind == "missing" and isinstance(path[-1], str):
-        expected = describe(path)
+        expected = _described(schema, path)
         return fault_at(root, path, f"`{path[-1]}` is missing", "missing-key", expected=expected)
     if kind in EXPECTED:
         return _wrong_type(root, path, EXPECTED[kind])
     if kind in {"missing", "too_long", "too_short"}:
-        return _wrong_length(root, path[:-1] if kind == "missing" else path)
+        return _wrong_length(schema, root, path[:-1] if kind == "missing" else path)
     return fault_at(root, path, f"the value is not understood ({error['msg']})", "value")
 
 
-def _unknown(root: Node, path: Path) -> Fault:
+def _unknown(schema: Model, root: Node, path: Path) -> Fault:
     """Refuse a key that the schema does not have."""
     name = str(path[-1])
     owner = root.find(*path[:-1])
     place = owner.keys[name] if owner is not None and name in owner.keys else root.place_of(path)
-    known = _keys_at(path[:-1])
+    known = _keys_at(schema, path[:-1])
     fix = suggestion(name, known)
-    if not fix and name in homes():
-        fix = f"`{name}` belongs into `{homes()[name]}`"
+    if not fix and name in homes(schema):
+        fix = f"`{name}` belongs into `{homes(schema)[name]}`"
     message = f"the key `{shown(name)}` is not known"
     expected = "" if fix else f"one of {', '.join(known)}"
     return Fault(message, "unknown-key", place.file, place.line, place.column, key_path(path), expected, fix)
@@ -120,11 +144,11 @@ def _wrong_type(root: Node, path: Path, expected: str) -> Fault:
     return fault_at(root, path, message, "type", expected=expected)
 
 
-def _wrong_length(root: Node, path: Path) -> Fault:
+def _wrong_length(schema: Model, root: Node, path: Path) -> Fault:
     node = root.find(*path)
     number = len(node.value) if node is not None else 0
-    wanted = [each for each in get_args(_annotation(path)) if each is not Ellipsis]
-    if get_origin(_annotation(path)) is tuple:
+    wanted = [each for each in get_args(_annotation(schema, path)) if each is not Ellipsis]
+    if get_origin(_annotation(schema, path)) is tuple:
         return fault_at(
             root, path, f"{counted(number, 'value')} in the list", "length", expected=f"{len(wanted)} values"
         )
@@ -139,9 +163,9 @@ def _wrong_length(root: Node, path: Path) -> Fault:
 # ---------------------------------------------------------------------------------- looking into the schema
 
 
-def _annotation(path: Path) -> Any:  # noqa: ANN401 (a type)
+def _annotation(schema: Model, path: Path) -> Any:  # noqa: ANN401 (a type)
     """Type that the schema wants at a path; None where the schema ends."""
-    current: Any = ProjectFile
+    current: Any = schema
     for step in path:
         current = _bare(current)
         if isinstance(current, type) and issubclass(current, BaseModel):
@@ -164,34 +188,28 @@ def _bare(annotation: Any) -> Any:  # noqa: ANN401 (a type)
             return annotation
 
 
-def _keys_at(path: Path) -> list[str]:
+def _keys_at(schema: Model, path: Path) -> list[str]:
     """Keys that the schema has at a path."""
-    annotation = _annotation(path)
+    annotation = _annotation(schema, path)
     return list(annotation.model_fields) if isinstance(annotation, type) and issubclass(annotation, Section) else []
 
 
-def describe(path: Path) -> str:
-    """Say what the schema wants at a path.
-
-    Parameters
-    ----------
-    path : tuple of str or int
-        Keys and numbers.
-
-    Returns
-    -------
-    str
-        The description of the key, which ends with its unit.
-    """
-    owner = _annotation(path[:-1])
+def _described(schema: Model, path: Path) -> str:
+    """Say what the schema wants at a path: the description of the key, which ends with its unit."""
+    owner = _annotation(schema, path[:-1])
     field = owner.model_fields.get(str(path[-1])) if isinstance(owner, type) and issubclass(owner, Section) else None
     description = (field.description or "") if field is not None else ""
     return description[:1].lower() + description[1:] if description[1:2].islower() else description
 
 
 @cache
-def homes() -> dict[str, str]:
+def homes(schema: Model) -> dict[str, str]:
     """Where keys belong that stand below another one: name of the key to the path above it.
+
+    Parameters
+    ----------
+    schema : type
+        The schema.
 
     Returns
     -------
@@ -208,5 +226,5 @@ def homes() -> dict[str, str]:
             if isinstance(inner, type) and issubclass(inner, BaseModel):
                 walk(inner, f"{above}.{name}" if above else name)
 
-    walk(ProjectFile, "")
+    walk(schema, "")
     return found

@@ -1,0 +1,135 @@
+"""Ids are text: whatever a surveyor calls a photo or a point, it comes out as it went in."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+import tempfile
+from pathlib import Path
+
+import pytest
+import yaml
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from photostrip.project.loading import Project, load_project
+
+ODD = [
+    "0123",
+    "NO",
+    "yes",
+    "1:20",
+    "1e3",
+    "0x1F",
+    "0o17",
+    "~",
+    "null",
+    "-1",
+    "+7",
+    "1_000",
+    "1.0",
+    ".5",
+    "=",
+    "Точка-7",
+    "точка",
+    "点12",
+    "🛩️",
+    "👨‍👩‍👧",
+    "x" * 200,
+    "-",
+    "--",
+    "a,b",
+    'say "x"',
+    "it's",
+    "#1",
+    "# 1",
+    "P 1",
+    "a: b",
+    "[a]",
+    "{a}",
+    "*a",
+    "&a",
+    "!a",
+    "%a",
+    "@a",
+    "`a",
+    "2024-01-01",
+    "1 000",
+    "Ǆ",
+    "e\u0301",
+    "é",
+    "a\u2028b",
+    "\u200bz",
+    "ﬁ",
+    "nan",
+    "inf",
+]
+ids = (
+    st.text(st.characters(exclude_categories=["Cs", "Cc"]), min_size=1, max_size=30)
+    .map(str.strip)
+    .filter(lambda text: text and not re.search(r"[\ufffe\uffff]", text))
+)
+
+
+def table(rows: list[list[str]]) -> str:
+    """Write CSV as the standard library does."""
+    stream = io.StringIO()
+    csv.writer(stream).writerows(rows)
+    return stream.getvalue()
+
+
+def write(folder: Path, photos: list[str], points: list[str], names: list[str]) -> Path:
+    """Write a project with any ids, by programs that are not ours."""
+    project = {
+        "photostrip": 1,
+        "name": names[0],
+        "cameras": {names[1]: {"principal_distance": 100}},
+        "strips": [{"id": names[2], "camera": names[1], "photos": photos}],
+        "observations": {"file": "o.csv", "unit": "mm", "sigma": 0.005},
+        "control": [{"file": "c.csv", "crs": "local", "axes": ["east", "north", "up"], "sigma": [1, 1, 1]}],
+    }
+    rows = [[photo, point, "1", "2"] for photo in photos for point in points]
+    folder.mkdir(exist_ok=True)
+    (folder / "project.yaml").write_text(yaml.safe_dump(project, allow_unicode=True), encoding="utf-8")
+    (folder / "o.csv").write_text(table([["photo", "point", "x", "y"], *rows]), encoding="utf-8", newline="")
+    given_points = [[point, "1", "2", "3"] for point in points]
+    (folder / "c.csv").write_text(table([["point", "x", "y", "z"], *given_points]), encoding="utf-8", newline="")
+    return folder / "project.yaml"
+
+
+def check(project: Project, photos: list[str], points: list[str], names: list[str]) -> None:
+    inputs = project.inputs
+    assert (inputs.name, inputs.strips[0].camera.name, inputs.strips[0].id) == tuple(names)
+    assert inputs.strips[0].photos == tuple(photos)
+    assert inputs.observations.photo_ids == tuple(photos)
+    assert inputs.observations.point_ids == tuple(points)
+    assert inputs.control.ids == tuple(points)
+
+
+@given(
+    photos=st.lists(ids, min_size=2, max_size=5, unique=True),
+    points=st.lists(ids, min_size=1, max_size=5, unique=True),
+    names=st.lists(ids, min_size=3, max_size=3),
+)
+@example(photos=ODD, points=ODD[::-1], names=ODD[:3])
+@example(photos=ODD[:2], points=ODD, names=ODD[5:8])
+def test_ids_survive_reading_and_the_resolved_project(photos: list[str], points: list[str], names: list[str]) -> None:
+    with tempfile.TemporaryDirectory() as place:
+        path = write(Path(place), photos, points, names)
+        first = load_project(path)
+        check(first, photos, points, names)
+        path.write_text(first.resolved, encoding="utf-8")
+        again = load_project(path)
+        check(again, photos, points, names)
+        assert again.resolved == first.resolved
+
+
+@pytest.mark.parametrize(
+    "name", ["0123", "NO", "1:20", "1e3", "~", "null", "-7", "+7", "1_000", "Точка", "🛩️", "x" * 200]
+)
+def test_ids_need_no_quotation_marks_in_yaml(tmp_path: Path, name: str) -> None:
+    path = write(tmp_path, [name, "other"], ["P"], ["n", "c", "s"])
+    text = re.sub(r"(?ms)  photos:.*", f"  photos: [{name}, other]\n", path.read_text(encoding="utf-8"))
+    path.write_text(text, encoding="utf-8")
+    assert load_project(path).inputs.strips[0].photos == (name, "other")

@@ -1,0 +1,177 @@
+"""The resolved project: nothing left unsaid, the same project, the same text everywhere."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+import yaml
+
+from tests.project.samples import MARKED_FILES, Sample, sample
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+EXPECTED = """\
+# A project of photostrip with all defaults filled in. Paths are relative to the folder of the project file.
+photostrip: 1
+name: "sample"
+cameras:
+  "RC30":
+    principal_distance: 153.217
+    principal_point: [0.012, -0.004]
+    format: [230.0, 230.0]
+    distortion:
+      model: brown
+      direction: image_to_ideal
+      k: [1.0e-08, 0.0, 0.0]
+      p: [0.0, 0.0]
+strips:
+  - id: "A"
+    camera: "RC30"
+    photos: ["1001", "1002"]
+  - id: "B"
+    camera: "RC30"
+    photos: ["2001", "2002"]
+observations:
+  file: "observations.csv"
+  unit: mm
+  y_axis: up
+  origin: center
+  sigma: 0.005
+control:
+  - file: "control.csv"
+    crs: "EPSG:32633"
+    axes: [east, north, up]
+    height: ellipsoidal
+    sigma: [0.05, 0.06, 0.08]
+output:
+  crs: "EPSG:32633"
+  axes: [east, north, up]
+  height: ellipsoidal
+  angles:
+    system: omega-phi-kappa
+    unit: gon
+processing:
+  adjustment: polynomial
+  polynomial:
+    degree: auto
+  relative:
+    screening: auto
+    grubbs_alpha: 0.05
+    parallax_limit: auto
+  scale_transfer: least_squares
+  earth_curvature: auto
+  earth_radius: 6371000.0
+  refraction: false
+  flying_height: auto
+  ground_height: auto
+  interior:
+    transform: auto
+tolerances:
+  check_rms_xy: 0.4
+"""
+
+VARIANTS = {
+    "plain": [],
+    "radial table": [
+        ("model: brown, k: [1e-8, 0, 0]", "model: radial-table, radius: [0, 50, 100], distortion: [0, 1e-3, -2e-3]")
+    ],
+    "geocentric": [
+        ("EPSG:32633\n    axes: [east, north, up]", "geocentric"),
+        ("height: ellipsoidal", "ellipsoid: {a: 1737400, b: 1737400}"),
+    ],
+    "pixels": [
+        ("format: [230, 230]", "format: [230, 230]\n    pixel_size: 0.006"),
+        ("unit: mm\n  y_axis: up", "unit: px\n  y_axis: down"),
+    ],
+    "orthometric": [("height: ellipsoidal", "height: orthometric\n    geoid_undulation: 44")],
+    "output": [("output:", "output:\n  crs: EPSG:4326\n  axes: [north, east, up]")],
+    "no tolerances": [("tolerances: {check_rms_xy: 0.40}", "tolerances: {}")],
+}
+
+
+def same(first: Sample, second: Sample) -> None:
+    one, two = first.load(), second.load()
+    assert one.settings == two.settings
+    assert (one.inputs.name, one.inputs.strips, one.inputs.frames) == (
+        two.inputs.name,
+        two.inputs.strips,
+        two.inputs.frames,
+    )
+    assert one.inputs.output == two.inputs.output
+    for table in ("observations", "fiducials"):
+        a, b = getattr(one.inputs, table), getattr(two.inputs, table)
+        if a is not None:
+            np.testing.assert_array_equal(a.xy, b.xy)
+            np.testing.assert_array_equal(a.sigma, b.sigma)
+    np.testing.assert_array_equal(one.inputs.control.enu, two.inputs.control.enu)
+    assert one.resolved == two.resolved
+
+
+def test_the_text(tmp_path: Path) -> None:
+    assert sample(tmp_path).load().resolved == EXPECTED
+
+
+@pytest.mark.parametrize("changes", VARIANTS.values(), ids=VARIANTS)
+def test_it_is_the_same_project(tmp_path: Path, changes: list[tuple[str, str]]) -> None:
+    first, second = sample(tmp_path / "a"), sample(tmp_path / "b")
+    for old, new in changes:
+        first.change("project.yaml", old, new)
+    second.write("project.yaml", first.load().resolved)
+    same(first, second)
+
+
+@pytest.mark.parametrize("unit", ["{file: fiducials.csv}", "{file: fiducials.csv, unit: um, sigma: 3, y_axis: down}"])
+def test_with_fiducial_marks(tmp_path: Path, unit: str) -> None:
+    first, second = sample(tmp_path / "a", MARKED_FILES), sample(tmp_path / "b", MARKED_FILES)
+    first.change("project.yaml", "{file: fiducials.csv}", unit)
+    second.write("project.yaml", first.load().resolved)
+    same(first, second)
+
+
+def test_presets_and_overrides_are_in_it(tmp_path: Path) -> None:
+    project = sample(tmp_path)
+    project.write("preset.yaml", "processing: {refraction: true}\n")
+    project.change("project.yaml", "name: sample", "extends: preset.yaml")
+    resolved = project.load(["processing.relative.grubbs_alpha=1e-7"]).resolved
+    assert "extends" not in resolved
+    assert "  refraction: true\n" in resolved
+    assert "    grubbs_alpha: 1.0e-07\n" in resolved
+    assert 'name: "project"\n' in resolved
+
+
+def test_it_does_not_depend_on_the_place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    texts = set()
+    for name in ("a", "b"):
+        project = sample(tmp_path / name)
+        project.change("project.yaml", "file: observations.csv", f"file: {tmp_path / name / 'observations.csv'}")
+        texts.add(project.load().resolved)
+        monkeypatch.chdir(tmp_path / name)
+        texts.add(project.load().resolved)
+    assert texts == {EXPECTED}
+
+
+def test_other_programs_read_the_same_from_it(tmp_path: Path) -> None:
+    project = sample(tmp_path)
+    text = (tmp_path / "project.yaml").read_text(encoding="utf-8").replace("RC30", "0123").replace("id: B", "id: NO")
+    project.write("project.yaml", text)
+    read = yaml.safe_load(project.load().resolved)
+    assert list(read["cameras"]) == ["0123"]
+    assert [strip["id"] for strip in read["strips"]] == ["A", "NO"]
+    assert read["strips"][0]["photos"] == ["1001", "1002"]
+    assert read["cameras"]["0123"]["distortion"]["k"] == [1e-8, 0.0, 0.0]
+    assert read["processing"]["refraction"] is False
+
+
+def test_long_lists_of_photos_are_broken_into_lines(tmp_path: Path) -> None:
+    project = sample(tmp_path)
+    names = [f"photo-{number:04d}" for number in range(200)]
+    rows = "".join(f"{name},P,1,2\n" for name in names)
+    project.change("project.yaml", "[1001, 1002]", f"[{', '.join(names)}]")
+    text = (tmp_path / "observations.csv").read_text(encoding="utf-8")
+    project.write("observations.csv", text + rows)
+    resolved = project.load().resolved
+    assert max(map(len, resolved.splitlines())) <= 110
+    assert yaml.safe_load(resolved)["strips"][0]["photos"] == names

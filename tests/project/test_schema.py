@@ -1,0 +1,155 @@
+"""The schema: defaults that stand in one place only, a description and a unit for every key."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, fields
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from photostrip.pipeline import Settings
+from photostrip.project import validation
+from photostrip.project.loading import json_schema
+from photostrip.project.schema import Output, Processing, ProjectFile, Section, Tolerances
+from tests.source_tree import ROOT
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from pydantic import BaseModel
+
+UNITS = {"principal_distance": "mm", "sigma0_um": "um", "check_rms_z": "m", "parallax_limit": "mm", "earth_radius": "m"}
+
+
+def keys(schema: dict[str, Any], definitions: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Give every key that the JSON Schema describes, with its description."""
+    for name, each in schema.get("properties", {}).items():
+        yield name, each
+        for inner in (each, each.get("items", {}), each.get("additionalProperties") or {}):
+            if isinstance(inner, dict) and "$ref" in inner:
+                yield from keys(definitions[inner["$ref"].rpartition("/")[2]], definitions)
+
+
+def every_key() -> list[tuple[str, dict[str, Any]]]:
+    schema = json_schema()
+    return list(keys(schema, schema["$defs"]))
+
+
+def test_every_key_is_described() -> None:
+    found = every_key()
+    assert len(found) > 60
+    assert [name for name, each in found if not each.get("description")] == []
+
+
+def test_units_stand_in_the_description_and_by_themselves() -> None:
+    found = dict(every_key())
+    assert {name: found[name]["unit"] for name in UNITS} == UNITS
+    assert [
+        name for name, each in found.items() if "unit" in each and f"[{each['unit']}]" not in each["description"]
+    ] == []
+
+
+def test_editors_are_told_what_is_read() -> None:
+    schema = json_schema()
+    definitions = schema["$defs"]
+    assert schema["required"] == ["photostrip", "cameras", "strips", "observations", "control"]
+    assert schema["additionalProperties"] is False
+    assert [name for name, each in definitions.items() if each.get("additionalProperties") is not False] == []
+    assert definitions["Relative"]["properties"]["parallax_limit"]["default"] == "auto"
+    assert definitions["Polynomial"]["properties"]["degree"]["enum"] == ["auto", 1, 2, 3]
+    assert "number" in definitions["Strip"]["properties"]["photos"]["items"]["type"]
+    text = json.dumps(schema)
+    assert '"default": null' not in text
+    assert '{"type": "null"}' not in text
+
+
+def test_the_schema_is_the_same_on_every_call() -> None:
+    assert json.dumps(json_schema()) == json.dumps(json_schema())
+
+
+@pytest.mark.parametrize(
+    ("given", "part"),
+    [
+        (Processing.model_validate({}).relative.model_dump(), "relative"),
+        ({"degree": Processing.model_validate({}).polynomial.degree}, "polynomial"),
+        ({"transform": Processing.model_validate({}).interior.transform}, "interior"),
+    ],
+)
+def test_defaults_are_those_of_the_mathematics(given: dict[str, object], part: str) -> None:
+    usual = asdict(getattr(Settings(), part))
+    assert given == {name: usual[name] for name in given}
+
+
+def test_every_setting_of_the_mathematics_has_a_key() -> None:
+    settings = Settings()
+    names = {field.name for part in ("relative", "formation", "absolute", "polynomial", "interior", "refinement")
+             for field in fields(getattr(settings, part))}  # fmt: skip
+    known = {name for name, _ in every_key()}
+    assert names - known == set()
+
+
+def test_all_of_tolerances_and_output_may_be_left_out() -> None:
+    assert set(Tolerances.model_validate({}).model_dump().values()) == {None}
+    assert Output.model_validate({}).crs is None
+
+
+def test_every_section_refuses_unknown_keys() -> None:
+    waiting: list[type[BaseModel]] = [Section]
+    while waiting:
+        model = waiting.pop()
+        waiting += model.__subclasses__()
+        assert model.model_config["extra"] == "forbid"
+
+
+def test_keys_know_their_home() -> None:
+    assert validation.homes(ProjectFile)["grubbs_alpha"] == "processing.relative"
+    assert validation.homes(ProjectFile)["y_axis"] == "observations"
+    assert "cameras" not in validation.homes(ProjectFile)
+
+
+def test_descriptions_are_found_through_lists_and_names() -> None:
+    assert validation._described(ProjectFile, ("cameras", "format", "principal_distance")) == "principal distance [mm]"
+    assert validation._described(ProjectFile, ("control", 3, "sigma")).endswith("[m]")
+    assert validation._described(ProjectFile, ("nothing", "here")) == ""
+
+
+def test_the_page_of_the_project_file_names_every_key() -> None:
+    page = (ROOT / "docs" / "files" / "project.md").read_text(encoding="utf-8")
+    assert [name for name, _ in every_key() if f"`{name}`" not in page] == []
+
+
+def test_the_page_tells_every_default_and_unit() -> None:
+    lines = (ROOT / "docs" / "files" / "project.md").read_text(encoding="utf-8").splitlines()
+    for name, each in every_key():
+        rows = [line for line in lines if line.startswith(f"| `{name}` |")]
+        assert rows, name
+        words = [str(word) for word in each.get("enum", [])]
+        default = each.get("default")
+        if isinstance(default, str | int | float):
+            words.append(
+                str(default).lower()
+                if isinstance(default, bool)
+                else f"{default:.10g}"
+                if isinstance(default, float)
+                else str(default)
+            )
+        if "unit" in each:
+            words.append(each["unit"])
+        assert any(all(word in row for word in words) for row in rows), (name, words)
+
+
+def test_the_model_is_the_contract() -> None:
+    assert list(ProjectFile.model_fields) == [
+        "photostrip",
+        "name",
+        "extends",
+        "cameras",
+        "strips",
+        "observations",
+        "fiducial_measurements",
+        "control",
+        "output",
+        "processing",
+        "tolerances",
+    ]
