@@ -92,6 +92,7 @@ def require_complete(document: Document, file: str) -> None:
         When something that the report shows is missing or of another kind.
     """
     try:
+        title_of(document)
         sections_of(document, everything=True)
     except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         what = f"key {error} is missing" if isinstance(error, KeyError) else f"a value is of another kind ({error})"
@@ -209,13 +210,13 @@ def _interior(interior: Document) -> str:
 
 
 def _screening(settings: Document) -> str:
-    text = settings["screening"].replace("auto", "parallax+grubbs (auto)")
-    if settings["screening"] == "none":
-        return "none"
-    if "tau" not in text:
-        limit = settings["parallax_limit"]
+    method, limit = settings["screening"], settings["parallax_limit"]
+    if method not in {"parallax+grubbs", "tau"}:
+        return str(method)
+    text = f"{method}, level {settings['grubbs_alpha']:g}"
+    if method == "parallax+grubbs":
         text += f", y parallax up to {'4 of its standard deviations' if limit is None else f'{limit * 1000:g} µm'}"
-    return f"{text}, level {settings['grubbs_alpha']:g}"
+    return text
 
 
 def counts_section(document: Document) -> Section:

@@ -128,13 +128,17 @@ def _table(table: Table, width: int, plain: Plain) -> Iterator[Line]:
 
 
 def _fitting(columns: Sequence[Column], sizes: Sequence[int], width: int) -> list[int]:
-    """Choose the columns that fit; those of one rank stay or go together."""
+    """Choose the columns that fit; those of one rank stay or go together, those of rank 0 as far as they can."""
     shown = list(range(len(columns)))
     while _total(sizes, shown) > width:
         rank = max(columns[column].rank for column in shown)
-        if rank == 0:
+        fewer = [column for column in shown if columns[column].rank < rank]
+        if not fewer:
             break
-        shown = [column for column in shown if columns[column].rank < rank]
+        shown = fewer
+    least = [min(size, SHORTEST_WORD) if column.left else size for column, size in zip(columns, sizes, strict=True)]
+    while _total(least, shown) > width and len(shown) > 1:
+        shown.pop()
     return shown
 
 
@@ -148,8 +152,8 @@ def _shorten(columns: Sequence[Column], sizes: list[int], shown: Sequence[int], 
     while words and (excess := _total(sizes, shown) - width) > 0:
         widest = max(words, key=sizes.__getitem__)
         others = max((sizes[column] for column in words if column != widest), default=0)
-        less = min(excess, max(sizes[widest] - others, 1))
-        if sizes[widest] - less < SHORTEST_WORD:
+        less = min(excess, max(sizes[widest] - others, 1), sizes[widest] - SHORTEST_WORD)
+        if less < 1:
             break
         sizes[widest] -= less
 

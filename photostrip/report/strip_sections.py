@@ -80,8 +80,8 @@ def _pairs(models: Sequence[Document], note: str) -> Table:
         Column("at point", left=True),
         Column("condition", rank=2),
         Column("base", "m", rank=1),
-        Column("τ", "deg", rank=3),
-        Column("ν", "deg", rank=3),
+        Column("direction", "deg", rank=3),
+        Column("inclin.", "deg", rank=3),
         Column("strip", left=True, rank=4),
     )
     rows = tuple(
@@ -101,16 +101,14 @@ def _pairs(models: Sequence[Document], note: str) -> Table:
         )
         for m in models
     )
-    return Table(
-        columns, rows, note=note or "q: y parallax of the points used; τ, ν: direction and inclination of the base"
-    )
+    return Table(columns, rows, note=note or "q: y parallax of the points used")
 
 
 def _elements(models: Sequence[Document], note: str) -> Table:
     columns = (
         Column("photos", left=True),
         *(Column(name, "deg") for _, name in ELEMENTS),
-        Column("largest σ", "deg"),
+        Column("largest σ", "deg", rank=1),
     )
     rows = tuple(
         (
@@ -278,11 +276,11 @@ def _evidence(block: Document) -> Table:
     columns = (
         Column("for", left=True),
         Column("degree"),
-        Column("terms"),
+        Column("terms", rank=1),
         Column("redund."),
         Column("rms", "m"),
         Column("left out", "m"),
-        Column("F", rank=1),
+        Column("F"),
         Column("p"),
         Column("taken", left=True),
     )

@@ -211,8 +211,9 @@ def rejected_of(result: Result) -> list[Document]:
     found = []
     for strip in result.strips:
         oriented = strip.orientation
-        order = sorted(range(len(strip.rejections)), key=lambda n: int(oriented.pairs.pair[strip.rejections[n].row]))
-        found += [_from_pair(strip, strip.rejections[number], ids) for number in order]
+        gone = [rejection for rejection in strip.rejections if not rejection.readmitted]
+        gone.sort(key=lambda rejection: int(oriented.pairs.pair[rejection.row]))
+        found += [_from_pair(strip, rejection, ids) for rejection in gone]
         found += [_from_joint(strip, int(row), ids) for row in np.flatnonzero(~strip.formed.junctions.used)]
     return found
 
@@ -220,14 +221,13 @@ def rejected_of(result: Result) -> list[Document]:
 def _from_pair(strip: StripResult, rejection: Rejection, ids: Sequence[str]) -> Document:
     pair = int(strip.orientation.pairs.pair[rejection.row])
     left, right = strip.strip.photos[pair : pair + 2]
-    parallax = rejection.parallax * 1000
-    reason, unit, value, limit = f"y parallax {parallax:.1f} µm", "", rejection.value, rejection.limit
+    size = rejection.size * 1000
+    reason = f"y parallax {size:.1f} µm in the pair oriented without it"
+    unit, value, limit = "", rejection.value, rejection.limit
     if rejection.test == "in front":
         reason = "the rays do not meet in front of the cameras"
     elif rejection.test == "parallax":
         unit, value, limit = "um", value * 1000, limit * 1000
-    else:
-        reason += f", {value:.2f} standard deviations"
     return {
         "strip": strip.strip.id,
         "photo": left,
@@ -238,7 +238,8 @@ def _from_pair(strip: StripResult, rejection: Rejection, ids: Sequence[str]) -> 
         "value": rounded(value, 2),
         "limit": rounded(limit, 2),
         "unit": unit,
-        "parallax_um": rounded(parallax, 2),
+        "parallax_um": rounded(size, 2),
+        "zone": rejection.zone or None,
         "reason": reason,
     }
 
@@ -258,5 +259,6 @@ def _from_joint(strip: StripResult, row: int, ids: Sequence[str]) -> Document:
         "limit": rounded(joined.limit[joint] * PPM, RATIO_DECIMALS),
         "unit": "ppm",
         "parallax_um": None,
+        "zone": None,
         "reason": f"scale ratio {value:.0f} ppm from that of the other pass points",
     }

@@ -60,7 +60,7 @@ def counts_of(result: Result, measurements: int) -> Document:
         "image_points": measurements,
         "image_points_used": sum(len(s.rows) for s in strips),
         "pass_point_transfers": sum(int(s.formed.junctions.used.sum()) for s in strips),
-        "rejected_in_pairs": sum(len(s.rejections) for s in strips),
+        "rejected_in_pairs": sum(not rejection.readmitted for s in strips for rejection in s.rejections),
         "rejected_in_scale_transfer": sum(int((~s.formed.junctions.used).sum()) for s in strips),
         "not_determined": len(result.not_determined),
         "ties": len(result.ties.number),

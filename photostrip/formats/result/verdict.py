@@ -26,7 +26,7 @@ POOR_CONTROL = (
     5.0  # rms of the control's residuals in units of their standard deviation; a long strip bends by that much
 )
 ODD_POINT = 4.0  # difference at a given point against the rms of the others
-ODD_CONTROL = 3.0  # and, of a control point, against its standard deviation
+ODD_RATIO = 3.0  # and against its standard deviation: a few good points can be better than they should be
 FEW = 4  # given points below which none can stand out
 MANY_REJECTED = 0.05  # share of the points in pairs
 NAMED = 3  # things of one kind that are named
@@ -92,15 +92,15 @@ def _control(document: Document) -> Iterator[str]:
             "model let expect: control that is not as good as stated, or a deformation of the strip that is left"
         )
     rows = [row for row in document["control"] if row["role"] == "control"]
-    yield from _odd(rows, "control", ODD_CONTROL)
+    yield from _odd(rows, "control")
 
 
 def _check(document: Document) -> Iterator[str]:
     rows = [row for row in document["control"] if row["role"] == "check"]
-    yield from _odd(rows, "check", 0.0)
+    yield from _odd(rows, "check")
 
 
-def _odd(rows: list[Document], role: str, least: float) -> Iterator[str]:
+def _odd(rows: list[Document], role: str) -> Iterator[str]:
     """Name the point that does not go with the others, in plan and in height."""
     for name in ("plan", "height"):
         known = sorted((row for row in rows if row[name] is not None), key=lambda row: abs(row[name]), reverse=True)
@@ -108,7 +108,7 @@ def _odd(rows: list[Document], role: str, least: float) -> Iterator[str]:
             continue
         worst, rest = known[0], known[1:]
         others = (sum(row[name] ** 2 for row in rest) / len(rest)) ** 0.5
-        if abs(worst[name]) > ODD_POINT * others and (worst["normalised"] or 0.0) > least:
+        if abs(worst[name]) > ODD_POINT * others and (worst["normalised"] or 0.0) > ODD_RATIO:
             yield (
                 f"{role} point {worst['id']} stands out: {abs(worst[name]):.3f} m in {name}, "
                 f"the others have an rms of {others:.3f} m"

@@ -1,0 +1,291 @@
+"""``photostrip run`` and ``photostrip report`` as a user calls them."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from photostrip.cli.main import main
+from photostrip.formats.result.files import to_json
+from tests.results import spec, write_project
+from tests.source_tree import ROOT
+
+if TYPE_CHECKING:
+    from tests.results import Document
+
+TABLES = ("points", "photos", "residuals", "parallaxes", "rejected")
+FILES = {*(f"{name}.csv" for name in TABLES), "project.resolved.yaml", "result.json"}
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_project(tmp_path_factory.mktemp("project"), spec("north first", 2))
+
+
+@pytest.fixture(scope="module")
+def result(project: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("result")
+    assert main(["run", str(project), "-o", str(folder), "--quiet"]) == 0
+    return folder
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
+    code = main([str(argument) for argument in arguments])
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+# --------------------------------------------------------------------------------------------- what comes out where
+
+
+def test_the_report_is_printed_and_nothing_else(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = sorted(project.parent.iterdir())
+    code, out, err = run(capsys, "run", project)
+    assert (code, err) == (0, "")
+    assert out.startswith("Accuracy report: small\n\n── Verdict ──")
+    assert out.count("── Check points ──") == 1
+    assert sorted(project.parent.iterdir()) == before
+
+
+def test_the_files_of_the_result(result: Path) -> None:
+    assert {path.name for path in result.iterdir()} == FILES
+    document = json.loads((result / "result.json").read_text(encoding="utf-8"))
+    assert document["frame"]["axes"] == ["north", "east", "up"]
+    assert document["name"] == "small"
+
+
+def test_talk_goes_to_stderr(project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(capsys, "run", project, "-o", tmp_path / "out")
+    assert code == 0
+    assert err == f"wrote 7 files to {tmp_path / 'out'}\n"
+    assert "wrote" not in out
+    _, _, err = run(capsys, "run", project, "-o", tmp_path / "out", "--verbose")
+    assert [line.split()[0] for line in err.splitlines()] == ["read", "adjusted", "wrote"]
+
+
+def test_quiet_prints_the_verdict(project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = run(capsys, "run", project, "-o", tmp_path / "out", "--quiet")
+    assert (code, err) == (0, "")
+    assert out.startswith(("GOOD: ", "LOOK "))
+    assert out.count("Rms ") == 1
+    assert len(out.splitlines()) < 5
+
+
+def test_json_is_the_content_of_result_json(project: Path, result: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for quiet in ([], ["--quiet"]):
+        code, out, _ = run(capsys, "run", project, "--format", "json", *quiet)
+        assert code == 0
+        assert out == (result / "result.json").read_text(encoding="utf-8")
+
+
+def test_markdown(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = run(capsys, "run", project, "--format", "md")
+    assert out.startswith("# Accuracy report: small\n\n## Verdict\n\n**")
+
+
+@pytest.mark.parametrize("width", [60, 120])
+def test_the_width_is_respected(project: Path, width: int, capsys: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = run(capsys, "run", project, "--width", width)
+    widths = [len(line) for line in out.splitlines()]
+    assert max(widths) == width
+
+
+def test_a_key_of_the_project_can_be_overridden(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = run(capsys, "run", project, "--format", "json", "--set", "processing.adjustment=similarity",
+                       "--set", "output.angles={system: omega-phi-kappa, unit: gon}")  # fmt: skip
+    document = json.loads(out)
+    assert code == 0
+    assert document["adjustment"] == "similarity"
+    assert document["photos"][0]["angles"]["system"] == "omega-phi-kappa"
+    assert document["photos"][0]["angles"]["unit"] == "gon"
+
+
+# -------------------------------------------------------------------------------------------------- exit codes
+
+
+def test_a_tolerance_that_is_not_kept_gives_1_and_the_whole_result(
+    project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for form in ("text", "json", "md"):
+        arguments = ["run", project, "-o", tmp_path / form, "--format", form, "--set", "tolerances.check_rms_xy=0.001"]
+        code, _, _ = run(capsys, *arguments)
+        assert code == 1
+        assert {path.name for path in (tmp_path / form).iterdir()} == FILES
+    code, out, _ = run(capsys, *arguments[:2], "--quiet", *arguments[-2:])
+    assert code == 1
+    assert out.startswith("FAILED: 1 of 1 tolerance not kept.")
+
+
+def test_tolerances_that_are_kept_give_0(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = run(
+        capsys, "run", project, "--set", "tolerances.check_rms_xy=5", "--set", "tolerances.check_rms_z=5"
+    )
+    assert code == 0
+    assert "check_rms_z" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (["nowhere.yaml"], 2, "nowhere.yaml: does not exist"),
+        ([], 2, "Missing argument 'PROJECT'"),
+        (["{project}", "--format", "xml"], 2, "'xml' is not one of"),
+        (["{project}", "--depfile", "x.d"], 2, "give --output as well"),
+        (["{project}", "--width", "wide"], 2, "--width"),
+        (["{project}", "--set", "processing.nonsense=1"], 2, "nonsense"),
+        (["{project}", "-o", "{project}"], 2, "project.yaml: is a file; expected a folder"),
+    ],
+)
+def test_wrong_usage_is_told_in_a_line(
+    project: Path, arguments: list[str], code: int, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found, out, err = run(capsys, "run", *(argument.format(project=project) for argument in arguments))
+    assert found == code
+    assert out == ""
+    assert words in err
+    assert err.startswith("error: ")
+    assert "Traceback" not in err
+
+
+def test_weak_geometry_gives_3(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    project = write_project(tmp_path, spec("local"))
+    control = (tmp_path / "control.csv").read_text(encoding="utf-8").splitlines()
+    (tmp_path / "control.csv").write_text("\n".join(control[:2]) + "\n", encoding="utf-8")
+    code, out, err = run(capsys, "run", project, "-o", tmp_path / "out")
+    assert (code, out) == (3, "")
+    assert "at least 2 control points" in err
+    assert not (tmp_path / "out").exists()
+
+
+# ----------------------------------------------------------------------------------------------- whole or not at all
+
+
+def test_two_runs_write_the_same_bytes_wherever_they_are(project: Path, result: Path, tmp_path: Path) -> None:
+    """Other processes, another folder, another order of sets, another name of the folder of the project."""
+    moved = tmp_path / "elsewhere"
+    moved.mkdir()
+    for path in project.parent.iterdir():
+        (moved / path.name).write_bytes(path.read_bytes())
+    environment = {**os.environ, "PYTHONHASHSEED": "7", "PYTHONPATH": str(ROOT), "TZ": "Asia/Tokyo", "COLUMNS": "60"}
+    subprocess.run(
+        [sys.executable, "-m", "photostrip", "run", "elsewhere/project.yaml", "-o", "again"],
+        cwd=tmp_path, env=environment, check=True, capture_output=True,
+    )  # fmt: skip
+    for name in FILES:
+        assert (tmp_path / "again" / name).read_bytes() == (result / name).read_bytes(), name
+        assert str(tmp_path) not in (tmp_path / "again" / name).read_text(encoding="utf-8")
+
+
+def test_a_run_that_fails_leaves_the_earlier_result(
+    project: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert run(capsys, "run", project, "-o", out)[0] == 0
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    write = Path.write_bytes
+
+    def full(self: Path, data: bytes) -> int:
+        if "result.json" in self.name:
+            raise OSError(28, "No space left on device", str(self))
+        return write(self, data)
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    code, _, err = run(capsys, "run", project, "-o", out, "--set", "processing.adjustment=similarity")
+    assert code == 2
+    assert "No space left on device" in err
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+
+
+def test_the_rule_for_make_names_every_file_read(
+    project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out, rule = tmp_path / "out", tmp_path / "deps" / "out.d"
+    assert run(capsys, "run", project, "-o", out, "--depfile", rule)[0] == 0
+    first = rule.read_text(encoding="utf-8").splitlines()[0]
+    sources = [str(project.parent / name) for name in ("project.yaml", "observations.csv", "control.csv")]
+    assert first == f"{out / 'result.json'}: {' '.join(sources)}"
+
+
+# ----------------------------------------------------------------------------------------------- photostrip report
+
+
+@pytest.mark.parametrize("options", [[], ["--width", "60"], ["--format", "md"], ["--quiet"], ["--verbose"]])
+def test_report_prints_what_run_printed(
+    project: Path, result: Path, options: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, expected, _ = run(capsys, "run", project, *options)
+    for place in (result, result / "result.json"):
+        assert run(capsys, "report", place, *options) == (0, expected, "")
+
+
+def test_report_into_a_file(result: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name, option, begin in (
+        ("r.md", [], "# Accuracy report"),
+        ("r.txt", [], "Accuracy report"),
+        ("R.TXT", [], "Accuracy report"),
+        ("report", [], "Accuracy report"),
+        ("r.html", ["--format", "text"], "Accuracy report"),
+        ("r.json", [], '{\n"photostrip_result": 1'),
+    ):
+        assert run(capsys, "report", result, "-o", tmp_path / name, *option) == (0, "", "")
+        assert (tmp_path / name).read_text(encoding="utf-8").startswith(begin)
+
+
+def test_report_into_a_file_of_unknown_kind(result: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, _, err = run(capsys, "report", result, "-o", tmp_path / "r.doc")
+    assert code == 2
+    assert "no report is written as '.doc'" in err
+
+
+def test_the_report_of_a_failed_result_is_a_report(
+    project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run(capsys, "run", project, "-o", tmp_path / "out", "--set", "tolerances.check_rms_xy=0.001")
+    code, out, _ = run(capsys, "report", tmp_path / "out")
+    assert code == 0
+    assert "FAILED: 1 of 1 tolerance not kept." in out
+
+
+def damaged(document: Document) -> Document:
+    document["models"][0].pop("sigma0_um")
+    return document
+
+
+def test_a_damaged_result_is_refused_in_words(result: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "result.json"
+    file.write_text(
+        to_json(damaged(json.loads((result / "result.json").read_text(encoding="utf-8")))), encoding="utf-8"
+    )
+    code, out, err = run(capsys, "report", file)
+    assert (code, out) == (2, "")
+    assert err == (
+        f"error: {file}: cannot be reported: key 'sigma0_um' is missing; expected a whole result.json; "
+        "run the project again\n"
+    )
+
+
+def test_report_needs_no_mathematics(result: Path) -> None:
+    code = (
+        "import sys\nfrom photostrip.cli.main import main\n"
+        f"assert main(['report', {str(result)!r}]) == 0\n"
+        "sys.exit(str({'numpy', 'scipy', 'pyproj', 'yaml', 'rich'} & sys.modules.keys()))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.stderr.strip() == "set()"
+
+
+def test_ascii_terminals_get_ascii(project: Path, result: Path) -> None:
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
+    for arguments in (["run", str(project)], ["report", str(result)], ["report", str(result), "--format", "md"]):
+        done = subprocess.run(
+            [sys.executable, "-m", "photostrip", *arguments], env=environment, capture_output=True, check=True
+        )
+        assert done.stdout.isascii()
+        assert b"sigma0" in done.stdout
+        assert b"?" not in done.stdout

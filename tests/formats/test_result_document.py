@@ -1,0 +1,720 @@
+"""The document of a result against other libraries, the measurements, and what each key is defined to be."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+import pytest
+from pyproj import CRS, Transformer
+from scipy.spatial.transform import Rotation
+
+from photostrip.formats.result.document import document_of
+from photostrip.formats.result.numbers import natural, rounded, significant
+from photostrip.formats.result.summary import TOLERANCES
+from photostrip.formats.simulation import inputs_of
+from photostrip.notes import Note
+from photostrip.pipeline import Settings
+from photostrip.simulate.simulation import simulate
+from photostrip.simulate.spec import GrossError
+from tests.results import FRAMES, NORTH_FIRST, Case, case, solved, spec, written_to
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from photostrip.points import PhotoPoints
+    from tests.results import Document
+
+    Floats = NDArray[np.float64]
+
+GEOCENTRIC = CRS.from_epsg(4978)
+OTHER_ZONE = "+proj=tmerc +lon_0=12 +k=1 +x_0=4500000 +datum=WGS84 +units=m"
+GROUND_STEP = 1e-4  # m, the last digit that is written
+MICROMETRE_STEP = 0.03  # um: last digits of residuals, and of two ground points 1500 m apart, seen in the photo
+
+
+def xyz(row: Document) -> list[float]:
+    return [row["x"], row["y"], row["z"]]
+
+
+def in_order(document: Document, values: list[float]) -> Floats:
+    """Bring coordinates in the order of frame.axes into east, north, up."""
+    axes = document["frame"]["axes"]
+    names = NORTH_FIRST[1], NORTH_FIRST[0], "up"
+    return np.array([values[axes.index(name)] for name in names]) if "east" in axes else np.array(values)
+
+
+def leaves(value: object) -> Iterator[object]:
+    if isinstance(value, dict):
+        for each in value.values():
+            yield from leaves(each)
+    elif isinstance(value, list | tuple):
+        for each in value:
+            yield from leaves(each)
+    else:
+        yield value
+
+
+# ------------------------------------------------------------------------------------------- the fixed contract
+
+
+FIXED = {
+    "photostrip_result": int,
+    "name": str,
+    "status": str,
+    "adjustment": str,
+    "frame": {"crs": str, "axes": list},
+    "photos": [{"id": str, "strip": str, "x": float, "y": float, "z": float, "rotation": list, "angles": dict}],
+    "points": [{"id": str, "role": str, "x": float, "y": float, "z": float, "rays": int}],
+    "models": [
+        {
+            "left": str,
+            "right": str,
+            "elements": dict,
+            "sigma0_um": float,
+            "max_parallax_um": float,
+            "points_used": int,
+            "scale_factor": float,
+        }
+    ],
+    "control": [{"id": str, "role": str, "use": str, "dx": float, "dy": float, "dz": float}],
+    "summary": {
+        "sigma0_um": float,
+        "control_rms": {"x": float, "y": float, "z": float},
+        "check_rms": {"x": float, "y": float, "z": float},
+        "photo_scale": float,
+    },
+    "polynomial": {"degree": int, "terms": dict, "coefficients": dict, "sigmas": dict, "evidence": list},
+}
+
+
+def check_shape(value: object, shape: object, path: str) -> None:
+    if isinstance(shape, dict):
+        assert isinstance(value, dict), path
+        for key, each in shape.items():
+            assert key in value, f"{path}.{key}"
+            check_shape(value[key], each, f"{path}.{key}")
+    elif isinstance(shape, list):
+        assert isinstance(value, list), path
+        assert value, path
+        for each in value:
+            check_shape(each, shape[0], path)
+    elif isinstance(shape, type):
+        assert isinstance(value, shape), f"{path} is {value!r}"
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+def test_the_fixed_keys_are_there(frame: str) -> None:
+    document = case(frame).document
+    check_shape(document, FIXED, "result")
+    assert document["photostrip_result"] == 1
+    assert document["frame"]["crs"] == FRAMES[frame].crs
+    assert document["frame"]["axes"] == list(FRAMES[frame].axes)
+    assert {row["role"] for row in document["points"]} == {"new", "control", "check"}
+    assert all(len(photo["rotation"]) == 9 for photo in document["photos"])
+
+
+def test_a_rejection_has_its_fixed_keys() -> None:
+    document = case("local", 1, 5.0, GrossError("image", axis="y")).document
+    for row in document["rejected"]:
+        assert row.keys() >= {"photo", "point", "stage", "test", "value", "limit", "reason"}
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+def test_numbers_are_finite_and_never_minus_zero(frame: str) -> None:
+    document = case(frame).document
+    for leaf in leaves(document):
+        assert leaf is None or isinstance(leaf, str | bool | int | float)
+        if isinstance(leaf, float):
+            assert math.isfinite(leaf)
+            assert leaf != 0 or math.copysign(1, leaf) > 0
+    json.dumps(document, allow_nan=False)
+
+
+# --------------------------------------------------------------------- photos and points belong together, anywhere
+
+
+def geocentric(document: Document, places: Floats) -> Floats:
+    """Cartesian coordinates by pyproj; a local frame has its own."""
+    crs = document["frame"]["crs"]
+    if crs == "local":
+        return places
+    source = GEOCENTRIC if crs == "geocentric" else CRS.from_user_input(crs)
+    if not source.is_geocentric:
+        source = source.to_3d()
+    transformer = Transformer.from_crs(source, GEOCENTRIC, always_xy=True)
+    return np.column_stack(transformer.transform(*places.T))
+
+
+def axes_at(document: Document, place: Floats) -> Floats:
+    """Rows east, north, up at a place: where one gets by going along the coordinate lines, by pyproj."""
+    crs = document["frame"]["crs"]
+    if crs in {"local", "geocentric"}:
+        return np.eye(3)
+    way = Transformer.from_crs(CRS.from_user_input(crs).to_3d(), GEOCENTRIC, always_xy=True)
+    middle = np.array(way.transform(place[0], place[1], place[2], direction="INVERSE"))
+    step = 100.0 if CRS.from_user_input(crs).is_projected else 1e-3
+    east, north = (
+        np.subtract(way.transform(*(middle + step * axis)), way.transform(*(middle - step * axis)))
+        for axis in np.eye(3)[:2]
+    )
+    east /= np.linalg.norm(east)
+    up = np.cross(east, north / np.linalg.norm(north))
+    return np.array([east, np.cross(up, east), up])
+
+
+def worst_reprojection(found: Case) -> float:
+    """Largest difference, um, of points projected through photos[], and what was measured and left over."""
+    document, focal = found.document, found.inputs.strips[0].camera.principal_distance
+    ground = {row["id"]: in_order(document, xyz(row)) for row in document["points"]}
+    names = list(ground)
+    place = dict(zip(names, geocentric(document, np.array([ground[name] for name in names])), strict=True))
+    measured, worst, rays = found.measured, 0.0, 0
+    photos = {photo["id"]: photo for photo in document["photos"]}
+    for group in document["residuals"]:
+        photo = photos[group["photo"]]
+        center = geocentric(document, in_order(document, xyz(photo))[None])[0]
+        rotation = np.array(photo["rotation"]).reshape(3, 3)
+        for point, vx, vy in zip(group["points"], group["vx_um"], group["vy_um"], strict=True):
+            x, y, z = rotation.T @ axes_at(document, center) @ (place[point] - center)
+            assert z < 0, "the camera looks along -z"
+            projected = -focal * np.array([x, y]) / z
+            residual = (measured[group["photo"], point] - projected) * 1000
+            worst = max(worst, float(np.abs(residual - [vx, vy]).max()))
+            rays += 1
+    assert rays > 50
+    return worst
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+def test_points_project_through_the_photos_to_where_they_were_measured(frame: str) -> None:
+    assert worst_reprojection(case(frame)) < MICROMETRE_STEP
+
+
+@pytest.mark.parametrize(
+    ("crs", "axes"),
+    [
+        ("EPSG:32632", NORTH_FIRST),
+        (OTHER_ZONE, NORTH_FIRST),
+        ("EPSG:4979", NORTH_FIRST),
+        ("geocentric", ("x", "y", "z")),
+    ],
+)
+def test_the_same_holds_in_a_frame_that_is_not_that_of_the_control(crs: str, axes: tuple[str, str, str]) -> None:
+    found = written_to(crs, axes)
+    assert found.document["frame"]["axes"] == list(axes)
+    assert worst_reprojection(found) < MICROMETRE_STEP
+
+
+def test_axes_turn_over_what_is_written_and_nothing_else() -> None:
+    east, north = case("projected").document, case("north first").document
+    for key in ("photos", "points"):
+        for a, b in zip(east[key], north[key], strict=True):
+            assert a["id"] == b["id"]
+            assert xyz(a) == [b["y"], b["x"], b["z"]]
+    for a, b in zip(east["control"], north["control"], strict=True):
+        assert (a["dx"], a["dy"], a["dz"]) == (b["dy"], b["dx"], b["dz"])
+        assert a["sigma"] == [b["sigma"][1], b["sigma"][0], b["sigma"][2]]
+    for key in ("control_rms", "check_rms"):
+        a, b = east["summary"][key], north["summary"][key]
+        assert (a["x"], a["y"], a["z"]) == (b["y"], b["x"], b["z"])
+    assert [photo["rotation"] for photo in east["photos"]] == [photo["rotation"] for photo in north["photos"]]
+    assert east["summary"]["check"] == north["summary"]["check"]
+
+
+@pytest.mark.parametrize("unit", ["deg", "gon", "rad"])
+@pytest.mark.parametrize(
+    ("system", "moved", "sign"),
+    [("alpha-omega-kappa", "YXZ", -1), ("phi-omega-kappa", "YXZ", 1), ("omega-phi-kappa", "XYZ", 1)],
+)
+def test_angles_are_those_of_the_rotation(system: str, moved: Literal["YXZ", "XYZ"], sign: int, unit: str) -> None:
+    document = solved(case("local").inputs, Settings(angle_system=system, angle_unit=unit)).document
+    per_radian = {"deg": 180 / math.pi, "gon": 200 / math.pi, "rad": 1.0}[unit]
+    for photo in document["photos"]:
+        expected = Rotation.from_matrix(np.array(photo["rotation"]).reshape(3, 3)).as_euler(moved)
+        expected[0] *= sign
+        assert photo["angles"]["system"] == system
+        assert photo["angles"]["unit"] == unit
+        assert photo["angles"]["values"] == pytest.approx(expected * per_radian, abs=1e-6)
+
+
+# ------------------------------------------------------------------------------------------------- given points
+
+
+@pytest.mark.parametrize("frame", ["local", "projected", "north first", "geocentric"])
+def test_differences_are_adjusted_minus_given(frame: str) -> None:
+    found = case(frame)
+    points = {row["id"]: in_order(found.document, xyz(row)) for row in found.document["points"]}
+    given = dict(zip(found.inputs.control.ids, found.inputs.control.enu, strict=True))
+    for row in found.document["control"]:
+        difference = in_order(found.document, [row["dx"], row["dy"], row["dz"]])
+        assert difference == pytest.approx(points[row["id"]] - given[row["id"]], abs=2 * GROUND_STEP)
+
+
+def test_differences_of_longitudes_are_metres_on_the_ground() -> None:
+    document = case("geographic").document
+    to_utm = Transformer.from_crs("EPSG:4326", "EPSG:32633", always_xy=True)
+    found = case("geographic")
+    points = {row["id"]: row for row in document["points"]}
+    given = dict(zip(found.inputs.control.ids, found.inputs.control.enu, strict=True))
+    for row in document["control"]:
+        point = points[row["id"]]
+        a = np.array(to_utm.transform(point["x"], point["y"]))
+        b = np.array(to_utm.transform(*given[row["id"]][:2]))
+        assert math.hypot(row["dx"], row["dy"]) == pytest.approx(np.linalg.norm(a - b), abs=1e-3)
+        assert row["dz"] == pytest.approx(point["z"] - given[row["id"]][2], abs=2 * GROUND_STEP)
+
+
+def test_control_in_a_grid_and_a_geocentric_result_give_the_same_plan_and_height() -> None:
+    grid, space = case("projected").document, written_to("geocentric", ("x", "y", "z")).document
+    for a, b in zip(grid["control"], space["control"], strict=True):
+        assert b["plan"] == pytest.approx(a["plan"], abs=2 * GROUND_STEP)
+        assert b["height"] == pytest.approx(a["height"], abs=2 * GROUND_STEP)
+        length = math.hypot(a["dx"], a["dy"], a["dz"])
+        assert math.hypot(b["dx"], b["dy"], b["dz"]) == pytest.approx(length, abs=2 * GROUND_STEP)
+    assert space["summary"]["check"]["height"]["rms"] == pytest.approx(
+        grid["summary"]["check"]["height"]["rms"], abs=2 * GROUND_STEP
+    )
+
+
+def test_plan_and_height_of_geocentric_control() -> None:
+    """Height is along the normal: it grows when the point moves away from the centre of the Earth."""
+    document = case("geocentric").document
+    for row in document["control"]:
+        point = next(p for p in document["points"] if p["id"] == row["id"])
+        up = np.array(xyz(point)) / np.linalg.norm(xyz(point))
+        radial = float(up @ [row["dx"], row["dy"], row["dz"]])
+        assert row["height"] == pytest.approx(radial, abs=0.004 * row["plan"] + 2 * GROUND_STEP)
+
+
+def partial() -> Case:
+    """A point for each way in which coordinates may count."""
+    inputs = inputs_of(simulate(spec("projected", 1, 5.0, bands=4)))
+    control = inputs.control
+    use = control.use.copy()
+    use[0] = [True, True, False]
+    use[1] = [False, False, True]
+    use[2] = False
+    ids = (*control.ids[:3], "nowhere", *control.ids[4:])
+    enu = np.where(use, control.enu, np.nan)
+    return solved(replace(inputs, control=replace(control, ids=ids, use=use, enu=enu)))
+
+
+def test_what_does_not_count_has_no_difference() -> None:
+    found = partial()
+    rows = {row["id"]: row for row in found.document["control"]}
+    plan, height, off = (rows[found.inputs.control.ids[n]] for n in range(3))
+    assert (plan["use"], plan["dz"], plan["height"], plan["height_um"]) == ("xy", None, None, None)
+    assert plan["dx"] is not None
+    assert (height["use"], height["dx"], height["dy"], height["plan"]) == ("z", None, None, None)
+    assert height["dz"] == height["height"]
+    assert (off["use"], off["dx"], off["dy"], off["dz"]) == ("off", None, None, None)
+    assert rows["nowhere"]["measured"] is False
+    assert rows["nowhere"]["strips"] == []
+    assert rows["nowhere"]["dx"] is None
+    counts = found.document["counts"]
+    assert counts["given_not_measured"] == 1
+    assert (counts["control_plan"], counts["control_height"], counts["control_points"]) == (9, 9, 10)
+    summary = found.document["summary"]["control"]
+    assert (summary["plan"]["count"], summary["height"]["count"]) == (9, 9)
+
+
+@pytest.mark.parametrize("role", ["control", "check"])
+def test_the_summary_is_that_of_the_rows(role: str) -> None:
+    document = case("projected", 2).document
+    rows = [row for row in document["control"] if row["role"] == role]
+    summary = document["summary"]
+    for axis in "xyz":
+        values = np.array([row[f"d{axis}"] for row in rows])
+        assert summary[f"{role}_rms"][axis] == pytest.approx(math.sqrt(np.mean(values**2)), abs=2 * GROUND_STEP)
+        assert summary[f"{role}_mean"][axis] == pytest.approx(values.mean(), abs=2 * GROUND_STEP)
+    for part in ("plan", "height"):
+        worst = max(rows, key=lambda row: abs(row[part]))
+        assert summary[role][part]["worst"] == worst["id"]
+        assert summary[role][part]["max"] == abs(worst[part])
+        assert summary[role][part]["max_um"] == pytest.approx(abs(worst[f"{part}_um"]))
+        squares = [row[f"{part}_um"] ** 2 for row in rows]
+        assert summary[role][part]["rms_um"] == pytest.approx(math.sqrt(np.mean(squares)), abs=0.1)
+
+
+def test_micrometres_at_photo_scale() -> None:
+    document = case("local").document
+    (strip,) = document["strips"]
+    for row in document["control"]:
+        assert row["plan_um"] == pytest.approx(math.hypot(row["dx"], row["dy"]) / strip["photo_scale"] * 1e6, abs=0.1)
+    f = case("local").inputs.strips[0].camera.principal_distance / 1000
+    assert strip["photo_scale"] == pytest.approx(strip["flying_height"] / f, abs=0.1)
+    assert strip["photo_scale"] == pytest.approx(10_000, rel=0.03)
+
+
+def test_the_ratio_counts_the_point_and_the_model() -> None:
+    document = case("local").document
+    precision = document["strips"][0]["precision"]
+    for row in document["control"]:
+        point = (precision["plan"], precision["plan"], precision["height"])
+        expected = [math.hypot(a, b) for a, b in zip(row["sigma"], point, strict=True)]
+        assert row["sigma_fit"] == pytest.approx(expected, abs=2 * GROUND_STEP)
+        found = max(abs(row[k]) / s for k, s in zip(("dx", "dy", "dz"), expected, strict=True))
+        assert row["normalised"] == pytest.approx(found, abs=0.02)
+
+
+# ------------------------------------------------------------------------------------------------- pairs, joints
+
+
+def test_sigma0_follows_from_the_parallaxes() -> None:
+    document = case("projected", 2).document
+    squares = sum(
+        q**2 for pair in document["parallaxes"] for q, used in zip(pair["q_um"], pair["used"], strict=True) if used
+    )
+    points = sum(sum(pair["used"]) for pair in document["parallaxes"])
+    redundancy = points - 5 * len(document["parallaxes"])
+    assert document["summary"]["redundancy"] == redundancy
+    assert document["summary"]["sigma0_um"] == pytest.approx(math.sqrt(squares / 2 / redundancy), abs=0.02)
+    assert document["summary"]["sigma0_um"] == pytest.approx(5.0, rel=0.35)
+
+
+def test_models_are_summed_up_from_their_parallaxes() -> None:
+    document = case("projected", 2).document
+    for model, pair in zip(document["models"], document["parallaxes"], strict=True):
+        assert (model["left"], model["right"], model["strip"]) == (pair["left"], pair["right"], pair["strip"])
+        used = {p: q for p, q, yes in zip(pair["points"], pair["q_um"], pair["used"], strict=True) if yes}
+        assert model["points_used"] == len(used)
+        assert model["points_rejected"] == len(pair["points"]) - len(used)
+        assert model["max_parallax_um"] == max(map(abs, used.values()))
+        assert abs(used[model["max_parallax_point"]]) == model["max_parallax_um"]
+        assert model["rms_parallax_um"] == pytest.approx(math.sqrt(np.mean(np.square(list(used.values())))), abs=0.02)
+        assert model["elements"]["unit"] == "deg"
+
+
+def test_bases_are_the_distances_of_the_photos() -> None:
+    document = case("local").document
+    photos = {photo["id"]: np.array(xyz(photo)) for photo in document["photos"]}
+    for model in document["models"]:
+        distance = np.linalg.norm(photos[model["right"]] - photos[model["left"]])
+        assert model["base"] == pytest.approx(distance, abs=2 * GROUND_STEP)
+
+
+def test_scale_factors_are_products_of_the_ratios() -> None:
+    document = case("local").document
+    factors = [model["scale_factor"] for model in document["models"]]
+    assert factors[0] == 1.0
+    for (before, after), joint in zip(pairwise(factors), document["junctions"], strict=True):
+        assert after / before == pytest.approx(joint["factor"], rel=1e-9)
+
+
+def test_models_without_errors_agree() -> None:
+    document = case("local", 1, 0.0).document
+    for joint in document["junctions"]:
+        assert joint["spread_ppm"] < 0.1
+        assert max(joint["discrepancy"].values()) < GROUND_STEP
+    assert document["summary"]["image_rms_um"] < 0.01
+
+
+def test_models_with_errors_disagree_most_in_height() -> None:
+    """A height comes from a parallax over the base: it is worse than plan by depth over base and the root of two."""
+    joints = case("projected", 2).document["junctions"]
+    up = math.sqrt(np.mean([joint["discrepancy"]["up"] ** 2 for joint in joints]))
+    along = math.sqrt(np.mean([joint["discrepancy"]["along"] ** 2 for joint in joints]))
+    assert 0.05 < up < 0.6
+    assert along < up / 3
+    for joint in joints:
+        scale = next(s["photo_scale"] for s in case("projected", 2).document["strips"] if s["id"] == joint["strip"])
+        assert joint["discrepancy_um"]["up"] == pytest.approx(joint["discrepancy"]["up"] / scale * 1e6, abs=0.1)
+
+
+def test_a_gross_error_is_rejected_and_its_size_stands_in_the_residuals() -> None:
+    inputs = inputs_of(simulate(spec("local", 1, 5.0, GrossError("image", size_um=300.0, axis="y"))))
+    document = solved(inputs, Settings(relative=replace(Settings().relative, screening="parallax+grubbs"))).document
+    big = [row for row in document["rejected"] if abs(row["parallax_um"] or 0) > 100]
+    assert big
+    (point,) = {row["point"] for row in big}
+    for row in big:
+        assert (row["stage"], row["test"], row["unit"]) == ("relative", "parallax", "um")
+        assert row["value"] > row["limit"]
+    unused = [
+        (group["photo"], vy)
+        for group in document["residuals"]
+        for name, vy, used in zip(group["points"], group["vy_um"], group["used"], strict=True)
+        if name == point and not used and vy is not None
+    ]
+    shown = {row["photo"] for row in big} | {row["other_photo"] for row in big}
+    assert all(photo in shown and abs(vy) == pytest.approx(300, abs=60) for photo, vy in unused)
+    counts = document["counts"]
+    assert counts["rejected_in_pairs"] == len([r for r in document["rejected"] if r["stage"] == "relative"])
+
+
+# ----------------------------------------------------------------------------------------------- strips and ties
+
+
+def only(observations: PhotoPoints, photos: tuple[str, ...]) -> PhotoPoints:
+    kept = np.array([photo in photos for photo in observations.photo_ids])[observations.photo]
+    place = {photo: n for n, photo in enumerate(photos)}
+    number = np.array([place.get(photo, -1) for photo in observations.photo_ids])
+    o = observations
+    return replace(
+        o, photo_ids=photos, photo=number[o.photo[kept]], point=o.point[kept], xy=o.xy[kept], sigma=o.sigma[kept]
+    )
+
+
+def test_ties_are_the_differences_of_strips_computed_alone() -> None:
+    """Each strip is run as a project of its own."""
+    both = case("projected", 2)
+    alone = []
+    for strip in both.inputs.strips:
+        single = solved(
+            replace(both.inputs, strips=(strip,), observations=only(both.inputs.observations, strip.photos))
+        ).document
+        alone.append({row["id"]: np.array(xyz(row)) for row in single["points"]})
+    points = {row["id"]: np.array(xyz(row)) for row in both.document["points"]}
+    ties = both.document["ties"]
+    assert {tie["id"] for tie in ties} == alone[0].keys() & alone[1].keys()
+    for tie in ties:
+        first, second = alone[0][tie["id"]], alone[1][tie["id"]]
+        assert [tie["dx"], tie["dy"], tie["dz"]] == pytest.approx(second - first, abs=0.0015)  # scale of the map
+        assert points[tie["id"]] == pytest.approx((first + second) / 2, abs=2 * GROUND_STEP)
+        assert tie["plan"] == pytest.approx(math.hypot(tie["dx"], tie["dy"]), abs=2 * GROUND_STEP)
+
+
+def test_the_polynomial_moves_the_control_by_the_stated_misclosures() -> None:
+    """Misclosure plus polynomial at a control point is what is left there: plan along the strip's own axes."""
+    found = solved(case("local").inputs)
+    document = found.document
+    (block,), (absolute,) = document["polynomials"], document["absolute"]
+    axes, origin = np.array(absolute["axes"]).reshape(3, 3), np.array(absolute["origin"])
+    points = {row["id"]: np.array(xyz(row)) for row in document["points"]}
+    left = {row["id"]: np.array([row["dx"], row["dy"], row["dz"]]) for row in document["control"]}
+    for row in document["misclosures"]:
+        before = np.array([row["dx"], row["dy"], row["dz"]])
+        place = axes.T @ (points[row["id"]] - (left[row["id"]] - before) - origin)
+        correction = [polynomial(block, axis, place[0], place[1]) for axis in "xyz"]
+        assert axes @ correction == pytest.approx(left[row["id"]] - before, abs=5 * GROUND_STEP)
+
+
+def polynomial(block: Document, axis: str, x: float, y: float) -> float:
+    powers = {"1": (0, 0), "X": (1, 0), "Y": (0, 1), "XY": (1, 1), "X^2": (2, 0), "X^3": (3, 0)}
+    terms = zip(block["terms"][axis], block["coefficients"][axis], strict=True)
+    return float(sum(c * x ** powers[term][0] * y ** powers[term][1] for term, c in terms))
+
+
+def test_the_drift_found_is_the_slope_of_the_polynomial() -> None:
+    inputs = case("local").inputs
+    document = solved(inputs, Settings(polynomial=replace(Settings().polynomial, degree="2"))).document
+    (block,), (absolute,), (strip,) = document["polynomials"], document["absolute"], document["strips"]
+    axes, origin = np.array(absolute["axes"]).reshape(3, 3), np.array(absolute["origin"])
+    start, end = (axes.T @ (np.array(xyz(document["photos"][n])) - origin) for n in (0, -1))
+    slope = dict(zip(block["terms"]["x"], block["coefficients"]["x"], strict=True))
+    assert "X^2" in slope
+    assert strip["scale_drift"]["found_ppm"] == pytest.approx(2e6 * slope["X^2"] * (end[0] - start[0]), abs=0.2)
+    assert block["t"]["x"] == pytest.approx(
+        [c / s for c, s in zip(block["coefficients"]["x"], block["sigmas"]["x"], strict=True)], rel=1e-2, abs=0.01
+    )
+
+
+def test_without_a_polynomial_there_is_no_block() -> None:
+    document = solved(case("local").inputs, Settings(adjustment="similarity")).document
+    assert document["adjustment"] == "similarity"
+    assert "polynomial" not in document
+    assert "polynomials" not in document
+    assert document["strips"][0]["scale_drift"]["found_ppm"] is None
+
+
+def test_one_polynomial_for_each_strip() -> None:
+    document = case("projected", 2).document
+    assert [block["strip"] for block in document["polynomials"]] == [strip["id"] for strip in document["strips"]]
+    assert document["polynomial"] == document["polynomials"][0]
+
+
+# -------------------------------------------------------------------------------------------------- order, notes
+
+
+def test_photos_stand_in_flight_order_and_points_in_natural_order() -> None:
+    found = case("projected", 2)
+    flown = [photo for strip in found.inputs.strips for photo in strip.photos]
+    assert [photo["id"] for photo in found.document["photos"]] == flown
+    assert [group["photo"] for group in found.document["residuals"]] == flown
+    for names in (
+        [row["id"] for row in found.document["points"]],
+        [row["id"] for row in found.document["control"]],
+        *(group["points"] for group in found.document["residuals"]),
+        *(pair["points"] for pair in found.document["parallaxes"]),
+    ):
+        assert names == sorted(names, key=natural)
+
+
+def test_natural_order() -> None:
+    names = ["P10", "P2", "P02", "p1", "10", "9", "", "P2a", "P2-10", "P2-9", "9" * 5000]
+    assert sorted(names, key=natural) == [
+        "", "9", "10", "9" * 5000, "P02", "P2", "P2-9", "P2-10", "P2a", "P10", "p1",
+    ]  # fmt: skip
+
+
+def test_the_order_of_the_rows_does_not_matter() -> None:
+    inputs = case("projected", 2).inputs
+    o = inputs.observations
+    order = np.random.default_rng(1).permutation(len(o))
+    shuffled = replace(o, photo=o.photo[order], point=o.point[order], xy=o.xy[order], sigma=o.sigma[order])
+    a, b = case("projected", 2).document, solved(replace(inputs, observations=shuffled)).document
+    for key in ("points", "photos", "control", "models"):
+        for first, second in zip(a[key], b[key], strict=True):
+            for x, y in zip(leaves(first), leaves(second), strict=True):
+                assert x == (pytest.approx(y, abs=1e-3, rel=1e-3) if isinstance(y, float) else y)
+
+
+def test_points_without_coordinates_are_named_with_the_reason() -> None:
+    inputs = case("local").inputs
+    o = inputs.observations
+    once = replace(
+        o,
+        point_ids=(*o.point_ids, "lonely"),
+        photo=np.append(o.photo, 0),
+        point=np.append(o.point, len(o.point_ids)),
+        xy=np.vstack([o.xy, [10.0, 10.0]]),
+        sigma=np.vstack([o.sigma, [0.005, 0.005]]),
+    )
+    document = solved(replace(inputs, observations=once)).document
+    assert {"id": "lonely", "reason": "measured on one photo"} in document["not_determined"]
+    assert "lonely" not in {row["id"] for row in document["points"]}
+    group = document["residuals"][0]
+    place = group["points"].index("lonely")
+    assert (group["vx_um"][place], group["vy_um"][place], group["used"][place]) == (None, None, False)
+
+
+def test_notes_of_the_reading_come_first() -> None:
+    note = Note("hint", "something about a file", severity="note", points=("A",))
+    document = document_of(case("local").result, [note])
+    assert document["notes"][0] == {
+        "code": "hint",
+        "severity": "note",
+        "message": "something about a file",
+        "strip": "",
+        "photos": [],
+        "points": ["A"],
+    }
+    assert document["notes"][1:] == case("local").document["notes"]
+
+
+# ------------------------------------------------------------------------------------------ tolerances and verdict
+
+
+def judged(**tolerances: float) -> Document:
+    return solved(case("local").inputs, Settings(tolerances=tolerances)).document
+
+
+def test_tolerances_that_are_kept() -> None:
+    document = judged(check_rms_xy=5.0, check_rms_z=5.0, sigma0_um=50.0)
+    assert [row["passed"] for row in document["tolerances"]] == [True, True, True]
+    assert document["status"] != "failed"
+    values = {row["name"]: row["value"] for row in document["tolerances"]}
+    assert values["check_rms_xy"] == document["summary"]["check"]["plan"]["rms"]
+    assert values["check_rms_z"] == document["summary"]["check_rms"]["z"]
+    assert values["sigma0_um"] == document["summary"]["sigma0_um"]
+
+
+def test_a_tolerance_that_is_not_kept_comes_first() -> None:
+    document = judged(check_rms_xy=5.0, check_max_z=0.0001)
+    assert [row["passed"] for row in document["tolerances"]] == [False, True]
+    assert document["status"] == "failed"
+    assert document["verdict"]["look_at"][0].startswith("check_max_z is ")
+
+
+def test_the_limit_itself_is_allowed() -> None:
+    found = case("local").document["summary"]["check"]["plan"]["rms"]
+    assert judged(check_rms_xy=found)["tolerances"][0]["passed"] is True
+
+
+def test_a_tolerance_that_cannot_be_tested_is_not_kept() -> None:
+    inputs = case("local").inputs
+    control = inputs.control.take(np.flatnonzero(~inputs.control.check))
+    document = solved(replace(inputs, control=control), Settings(tolerances={"check_rms_xy": 1.0})).document
+    assert document["tolerances"] == [
+        {"name": "check_rms_xy", "value": None, "limit": 1.0, "unit": "m", "passed": False}
+    ]
+    assert document["status"] == "failed"
+    assert "cannot be tested" in document["verdict"]["look_at"][0]
+    assert "no check points" in document["verdict"]["accuracy"]
+
+
+def test_every_tolerance_has_a_value() -> None:
+    document = judged(**dict.fromkeys(TOLERANCES, 1e6))
+    assert len(document["tolerances"]) == len(TOLERANCES)
+    assert all(row["value"] > 0 for row in document["tolerances"])
+
+
+def test_a_sound_project_is_good() -> None:
+    document = case("projected", 2).document
+    assert document["status"] == "good", document["verdict"]
+    assert document["verdict"]["look_at"] == []
+
+
+def displaced(role: str, metres: float) -> Document:
+    """Displace the third given point of a role to the east."""
+    inputs = case("projected").inputs
+    control = inputs.control
+    enu = control.enu.copy()
+    enu[np.flatnonzero(control.check == (role == "check"))[2], 0] += metres
+    return solved(replace(inputs, control=replace(control, enu=enu))).document
+
+
+def test_a_wrong_check_point_is_worth_a_look_and_changes_nothing() -> None:
+    document = displaced("check", 20.0)
+    assert document["status"] == "look"
+    (text,) = document["verdict"]["look_at"]
+    assert "check point K03 stands out: 20." in text or "check point K03 stands out: 19." in text
+    assert document["points"] == case("projected").document["points"]
+    assert document["photos"] == case("projected").document["photos"]
+
+
+def test_wrong_control_is_worth_a_look() -> None:
+    document = displaced("control", 20.0)
+    assert document["status"] == "look"
+    assert document["verdict"]["look_at"][0].startswith("the control points fit ")
+
+
+def test_coordinates_worse_than_stated_are_worth_a_look() -> None:
+    inputs = case("projected", 2).inputs
+    o = inputs.observations
+    document = solved(replace(inputs, observations=replace(o, sigma=o.sigma / 4))).document
+    assert any("times worse than stated" in text for text in document["verdict"]["look_at"])
+
+
+# --------------------------------------------------------------------------------------------------- corrections
+
+
+def test_curvature_says_how_it_was_treated() -> None:
+    local = case("local").document["corrections"]["earth_curvature"]
+    assert local == {
+        "asked": "auto",
+        "treatment": "none: the local frame is taken as truly Cartesian",
+        "largest": 0.0,
+    }
+    grid = case("projected").document["corrections"]["earth_curvature"]
+    assert grid["treatment"].startswith("carried by the frames")
+    assert 0.05 < grid["largest"] < 1.0  # D^2 / 2R for 0.8 to 3.5 km
+
+
+def test_curvature_by_formula_has_its_size() -> None:
+    settings = Settings(absolute=replace(Settings().absolute, earth_curvature="model"))
+    document = solved(case("local").inputs, settings).document
+    found = document["corrections"]["earth_curvature"]
+    control = [row for row in document["control"] if row["role"] == "control"]
+    points = {row["id"]: np.array(xyz(row)[:2]) for row in document["points"]}
+    middle = np.mean([points[row["id"]] for row in control], axis=0)
+    largest = max(float(((place - middle) ** 2).sum()) for place in points.values()) / 2 / 6_371_000
+    assert found["largest"] == pytest.approx(largest, abs=0.002)
+    assert "6371000 m" in found["treatment"]
+
+
+# ------------------------------------------------------------------------------------------------------- rounding
+
+
+def test_rounding() -> None:
+    assert rounded([1 / 3, math.nan, -1e-9, math.inf], 4) == [0.3333, None, 0.0, None]
+    assert rounded(math.nan, 2) is None
+    assert rounded([[500100.123456]], 4) == [[500100.1235]]
+    assert significant([0.000123456, 0.0, math.nan, 98765.4]) == [0.0001235, 0.0, None, 98770.0]

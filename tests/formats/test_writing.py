@@ -1,0 +1,136 @@
+"""A file is written whole or not at all, and what was there before stays until then."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from photostrip.errors import InputError
+from photostrip.formats.writing import make_rule, write_files, write_text
+
+
+def content(folder: Path) -> dict[str, str]:
+    return {path.name: path.read_text(encoding="utf-8") for path in folder.iterdir()}
+
+
+def test_files_are_written_and_missing_folders_made(tmp_path: Path) -> None:
+    folder = tmp_path / "a" / "b"
+    write_files(folder, {"one.csv": "1\n", "two.json": "µ\r\n"})
+    assert (folder / "two.json").read_bytes() == "µ\r\n".encode()
+    assert sorted(content(folder)) == ["one.csv", "two.json"]
+
+
+def test_other_files_of_the_folder_stay(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
+    write_files(tmp_path, {"one.csv": "1"})
+    assert content(tmp_path) == {"notes.txt": "mine", "one.csv": "1"}
+
+
+def test_a_failure_in_the_middle_leaves_everything_as_it_was(tmp_path: Path) -> None:
+    write_files(tmp_path, {"one.csv": "old", "two.csv": "old"})
+    with pytest.raises(UnicodeEncodeError):
+        write_files(tmp_path, {"one.csv": "new", "two.csv": "\ud800"})
+    assert content(tmp_path) == {"one.csv": "old", "two.csv": "old"}
+
+
+def test_a_full_disk_leaves_everything_as_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_files(tmp_path, {"one.csv": "old", "two.csv": "old"})
+    write = Path.write_bytes
+
+    def full(self: Path, data: bytes) -> int:
+        if "two.csv" in self.name:
+            write(self, data[:1])
+            raise OSError(28, "No space left on device", str(self))
+        return write(self, data)
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(OSError, match="No space left"):
+        write_files(tmp_path, {"one.csv": "new", "two.csv": "new"})
+    assert content(tmp_path) == {"one.csv": "old", "two.csv": "old"}
+
+
+def test_an_interrupt_leaves_no_temporary_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write = Path.write_bytes
+
+    def interrupted(self: Path, data: bytes) -> int:
+        write(self, data)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Path, "write_bytes", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        write_text(tmp_path / "one.csv", "new")
+    assert content(tmp_path) == {}
+
+
+@pytest.mark.parametrize("place", ["file", "file/below"])
+def test_a_file_where_a_folder_should_be_is_refused(tmp_path: Path, place: str) -> None:
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    with pytest.raises(InputError, match="file: is a file; expected a folder"):
+        write_files(tmp_path / place, {"one.csv": ""})
+
+
+def test_a_folder_where_a_file_should_be_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "one.csv").mkdir()
+    with pytest.raises(InputError, match=r"one\.csv: is a folder; expected a file"):
+        write_files(tmp_path, {"zero.csv": "", "one.csv": ""})
+    assert [path.name for path in tmp_path.iterdir()] == ["one.csv"]
+
+
+def test_a_link_stays_a_link(tmp_path: Path) -> None:
+    target = tmp_path / "elsewhere" / "real.txt"
+    write_text(target, "old")
+    (tmp_path / "link.txt").symlink_to(target)
+    write_text(tmp_path / "link.txt", "new")
+    assert (tmp_path / "link.txt").is_symlink()
+    assert target.read_text(encoding="utf-8") == "new"
+
+
+def test_a_device_is_written_to_and_stays_a_device() -> None:
+    write_text(Path(os.devnull), "text")
+    assert not Path(os.devnull).is_file()
+
+
+def test_a_written_file_is_readable_by_others_as_the_user_wants(tmp_path: Path) -> None:
+    before = os.umask(0o027)
+    try:
+        write_text(tmp_path / "one.csv", "")
+    finally:
+        os.umask(before)
+    assert (tmp_path / "one.csv").stat().st_mode & 0o777 == 0o640
+
+
+# -------------------------------------------------------------------------------------------------- rules of make
+
+
+def test_a_rule_names_target_and_sources() -> None:
+    assert make_rule("out/result.json", ["p.yaml", "o.csv", "p.yaml"]) == (
+        "out/result.json: p.yaml o.csv\n\np.yaml:\n\no.csv:\n"
+    )
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="make is not installed")
+def test_make_understands_odd_names(tmp_path: Path) -> None:
+    names = ["with blank.csv", "with#hash.csv", "with$dollar.csv", "straße.csv"]
+    for name in names:
+        (tmp_path / name).write_text("", encoding="utf-8")
+    rule = make_rule("target", names)
+    (tmp_path / "Makefile").write_text(f"target:\n\t@echo made\n{rule}", encoding="utf-8")
+
+    def made() -> str:
+        return subprocess.run(["make"], cwd=tmp_path, capture_output=True, text=True, check=True).stdout
+
+    (tmp_path / "target").write_text("", encoding="utf-8")
+    for path in tmp_path.iterdir():
+        os.utime(path, (1000, 1000))
+    os.utime(tmp_path / "target", (2000, 2000))
+    assert "made" not in made()
+    for name in names:
+        os.utime(tmp_path / name, (3000, 3000))
+        assert made() == "made\n", name
+        os.utime(tmp_path / name, (1000, 1000))
+    (tmp_path / names[0]).unlink()
+    assert made() == "made\n"

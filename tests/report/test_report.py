@@ -1,0 +1,324 @@
+"""The report says what the result says: from the file as from the run, worst things first, units everywhere."""
+
+from __future__ import annotations
+
+import copy
+import json
+import re
+from typing import TYPE_CHECKING
+
+import pytest
+
+from photostrip.errors import InputError
+from photostrip.formats.result.files import to_json
+from photostrip.report import chosen_sections, require_complete, sections_of, title_of
+from photostrip.report.layout import cells
+from photostrip.report.parts import Column, Facts, Section, Table, Words
+from photostrip.report.strip_sections import ALL_SHOWN, WORST_SHOWN
+from photostrip.report.text import to_markdown, to_text
+from tests.reports import FOLDER, SNAPSHOTS, fresh, saved
+from tests.results import FRAMES, case
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from tests.results import Document
+
+
+def printed(document: Document, width: int = 100, *, everything: bool = False) -> str:
+    return to_text(title_of(document), sections_of(document, everything=everything), width)
+
+
+def changed(**keys: object) -> Document:
+    return {**copy.deepcopy(saved()), **keys}
+
+
+def section(document: Document, title: str) -> Section:
+    return next(each for each in sections_of(document) if each.title == title)
+
+
+def words(found: Section) -> str:
+    parts = [part.text for part in found.parts if isinstance(part, Words)]
+    return " ".join([*parts, *(f"{a}: {b}" for part in found.parts if isinstance(part, Facts) for a, b in part.rows)])
+
+
+def tables(found: Section) -> list[Table]:
+    return [part for part in found.parts if isinstance(part, Table)]
+
+
+# ---------------------------------------------------------------------------------------------------- snapshots
+
+
+@pytest.mark.parametrize("name", SNAPSHOTS)
+def test_the_report_looks_as_it_did(name: str) -> None:
+    """Renew with ``python -m tests.reports`` and review the difference."""
+    assert SNAPSHOTS[name]() == (FOLDER / name).read_text(encoding="utf-8")
+
+
+def paths(value: object, path: str = "") -> Iterator[str]:
+    if isinstance(value, dict):
+        for key, each in value.items():
+            yield from paths(each, f"{path}.{key}")
+    elif isinstance(value, list) and value and isinstance(value[0], dict):
+        for each in value:
+            yield from paths(each, f"{path}[]")
+    else:
+        yield path
+
+
+def test_the_saved_result_has_the_keys_of_a_fresh_one() -> None:
+    """If not, renew with ``python -m tests.reports result``."""
+    assert set(paths(saved())) == set(paths(fresh()))
+
+
+# ------------------------------------------------------------------------------------------------ from the file
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+@pytest.mark.parametrize("width", [60, 100, 200])
+def test_the_report_of_the_file_is_that_of_the_run(frame: str, width: int) -> None:
+    document = case(frame).document
+    assert printed(json.loads(to_json(document)), width) == printed(document, width)
+
+
+@pytest.mark.parametrize("width", [60, 80, 140, 200])
+@pytest.mark.parametrize("frame", FRAMES)
+def test_no_line_is_wider_than_the_page(frame: str, width: int) -> None:
+    assert max(cells(line) for line in printed(case(frame).document, width).splitlines()) <= width
+
+
+@pytest.mark.parametrize("strips", [1, 2])
+@pytest.mark.parametrize("key", sorted(saved()))
+def test_an_incomplete_file_is_refused_in_words(key: str, strips: int) -> None:
+    document = json.loads(to_json(case("projected", strips).document))
+    del document[key]
+    needless = {"photostrip_result", "version", "polynomial", "misclosures", "residuals", "parallaxes", "polynomials"}
+    if key in needless or (key == "ties" and strips == 1):
+        require_complete(document, "result.json")
+    else:
+        with pytest.raises(InputError, match=rf"result\.json: cannot be reported: key '{key}' is missing"):
+            require_complete(document, "result.json")
+
+
+@pytest.mark.parametrize("value", [None, 1, "text", [1], [{}]])
+@pytest.mark.parametrize("key", ["strips", "models", "summary", "photos", "control", "verdict", "status", "frame"])
+def test_a_file_with_something_else_in_it_is_refused_in_words(key: str, value: object) -> None:
+    with pytest.raises(InputError, match="cannot be reported"):
+        require_complete(changed(**{key: value}), "result.json")
+
+
+# ---------------------------------------------------------------------------------------------------- the verdict
+
+
+def judged(status: str, *look_at: str, tolerances: tuple[bool, ...] = ()) -> str:
+    rows = [
+        {"name": f"t{n}", "value": 1.0, "limit": 1.0, "unit": "m", "passed": passed}
+        for n, passed in enumerate(tolerances)
+    ]
+    verdict = {"accuracy": "rms 0.1 m", "look_at": list(look_at)}
+    return printed(changed(status=status, verdict=verdict, tolerances=rows))
+
+
+def test_a_good_result_says_so_first_and_last() -> None:
+    lines = judged("good").splitlines()
+    assert lines[0] == "Accuracy report: small"
+    assert lines[3] == "GOOD: nothing calls for a second look."
+    assert lines[4] == lines[-1] == "Rms 0.1 m."
+    assert lines[-2] == lines[3]
+
+
+def test_what_to_look_at_is_listed_first() -> None:
+    text = judged("look", "the first thing", "the second thing")
+    assert "LOOK at 2 things before you use this:\nRms 0.1 m.\n1. the first thing\n2. the second thing\n" in text
+    assert "LOOK at 1 thing " in judged("look", "a thing")
+
+
+def test_failed_tolerances_are_counted() -> None:
+    text = judged("failed", "t1 is", tolerances=(True, False, True))
+    assert "FAILED: 1 of 3 tolerances not kept." in text
+    assert text.count("NOT KEPT") == 1
+    assert text.count("  kept\n") == 2
+
+
+def test_quiet_is_the_verdict_alone() -> None:
+    (only,) = chosen_sections(saved(), quiet=True)
+    assert to_text("", [only], 100).splitlines()[0] == "FAILED: 1 of 3 tolerances not kept."
+    assert chosen_sections(saved()) == sections_of(saved())
+
+
+def test_warnings_are_said_again_at_the_end() -> None:
+    note = {"code": "c", "severity": "warning", "message": "mind this", "strip": "", "photos": [], "points": []}
+    found = sections_of(changed(notes=[note]))
+    assert found[-2].title == "Notes"
+    assert found[-2].parts == (Words("warning: mind this", "look", "-"),)
+
+
+# -------------------------------------------------------------------------------------------------- long projects
+
+
+def long_project(models: int) -> Document:
+    base = saved()["models"][0]
+    rows = [
+        {**base, "left": f"L{n}", "right": f"R{n}", "sigma0_um": float(n % 500), "max_parallax_um": 9.0}
+        for n in range(models)
+    ]
+    return changed(models=rows)
+
+
+def test_a_long_strip_shows_its_worst_pairs_and_counts_the_rest() -> None:
+    text = printed(long_project(1000))
+    assert text.count("L499 – R499") == 2  # once with its parallaxes, once with its elements
+    assert f"worst first; {1000 - WORST_SHOWN} more pairs in `models` of result.json" in text
+    assert len(text.splitlines()) < 400
+    pairs = tables(section(long_project(1000), "Relative orientation"))[0]
+    sizes = [float(row[3]) for row in pairs.rows]
+    assert sizes == sorted(sizes, reverse=True)
+
+
+def test_a_short_strip_shows_all_pairs_in_flight_order() -> None:
+    pairs = tables(section(long_project(ALL_SHOWN), "Relative orientation"))[0]
+    assert [row[0] for row in pairs.rows] == [f"L{n} – R{n}" for n in range(ALL_SHOWN)]
+
+
+def test_everything_is_everything() -> None:
+    text = printed(long_project(1000), everything=True)
+    assert text.count("– R1 ") == 2
+    assert "more pairs" not in text
+
+
+def test_many_strips_have_one_line_each() -> None:
+    blocks = [{**saved()["polynomials"][0], "strip": f"S{n}"} for n in range(9)]
+    found = section(changed(polynomials=blocks), "Polynomial adjustment")
+    assert [row[0] for row in tables(found)[0].rows] == [f"S{n}" for n in range(9)]
+    assert len(found.parts) == 1
+
+
+# --------------------------------------------------------------------------------------------- numbers and units
+
+
+def test_every_number_of_a_table_has_its_unit() -> None:
+    """A column of numbers has a unit, or counts something, or is a ratio, which its name says."""
+    without = {
+        "points", "rej.", "condition", "scale ratio", "σ0", "redund.", "degree", "terms", "F", "p", "coefficient", "σ",
+        "t", "ratio", "photos", "scale 1:", "value", "limit", "found", "allowed", "asked",
+    }  # fmt: skip
+    for found in sections_of(saved()):
+        for table in tables(found):
+            assert all(c.unit or c.left or c.name in without for c in table.columns), found.title
+
+
+def test_ranks_keep_the_point_and_its_differences() -> None:
+    for title in ("Control points", "Check points"):
+        (table,) = tables(section(saved(), title))
+        always = [column.name for column in table.columns if column.rank == 0]
+        assert always == ["point", "use", "d north", "d east", "d up", "plan", "height"]
+
+
+def test_rows_of_a_table_have_all_its_columns() -> None:
+    for found in sections_of(saved(), everything=True):
+        for table in tables(found):
+            assert all(len(row) == len(table.columns) for row in (*table.rows, *table.foot)), found.title
+
+
+def test_check_points_stand_apart_from_the_control() -> None:
+    control, check = (tables(section(saved(), title))[0] for title in ("Control points", "Check points"))
+    roles = {row["id"]: row["role"] for row in saved()["control"]}
+    assert {roles[row[0]] for row in control.rows} == {"control"}
+    assert {roles[row[0]] for row in check.rows} == {"check"}
+    assert [row[0] for row in check.foot] == ["rms", "mean", "largest"]
+
+
+def test_numbers_are_those_of_the_result() -> None:
+    (table,) = tables(section(saved(), "Check points"))
+    rows = [row for row in saved()["control"] if row["role"] == "check"]
+    for shown, row in zip(table.rows, rows, strict=True):
+        assert shown[:7] == (
+            row["id"], "xyz", *(f"{row[key]:+.3f}" for key in ("dx", "dy", "dz")),
+            f"{row['plan_um']:.1f}", f"{row['height_um']:.1f}",
+        )  # fmt: skip
+    assert table.foot[0][2:5] == tuple(f"{saved()['summary']['check_rms'][axis]:.3f}" for axis in "xyz")
+
+
+def test_given_points_that_were_not_measured_are_named() -> None:
+    assert "given, but not in the strips: G4 bis" in words(section(saved(), "Control points"))
+
+
+def test_without_check_points_the_report_says_what_that_means() -> None:
+    control = [row for row in saved()["control"] if row["role"] == "control"]
+    assert words(section(changed(control=control), "Check points")).startswith("None. What lies between")
+
+
+def test_rejections_give_their_reason() -> None:
+    (table,) = tables(section(saved(), "Rejected"))
+    assert len(table.rows) == len(saved()["rejected"])
+    for shown, row in zip(table.rows, saved()["rejected"], strict=True):
+        assert (shown[0], shown[2], shown[-1]) == (row["point"], row["test"], row["reason"])
+
+
+def test_nothing_rejected_is_said_too() -> None:
+    assert words(section(changed(rejected=[]), "Rejected")) == "Nothing was rejected."
+
+
+def test_points_without_coordinates_are_grouped_by_reason() -> None:
+    missing = [{"id": f"P{n}", "reason": "measured on one photo"} for n in range(15)]
+    missing.append({"id": "Q", "reason": "rejected in every pair"})
+    text = words(section(changed(not_determined=missing), "Points without coordinates"))
+    assert "15 points measured on one photo: P0, P1" in text
+    assert "P11 and 3 more" in text
+    assert "1 point rejected in every pair: Q" in text
+
+
+def test_a_strip_without_joints() -> None:
+    assert "One model: no scale was transferred." in words(
+        section(changed(junctions=[]), "Scale transfer and junctions")
+    )
+
+
+def test_corrections_are_stated_with_their_size() -> None:
+    corrections = copy.deepcopy(saved()["corrections"])
+    corrections["distortion"] = {"applied": True, "largest_um": 7.25}
+    corrections["interior"] = {
+        "photos": 10, "transforms": ["affine"], "rms_um": 4.2, "largest_um": 9.1, "largest_photo": "1003",
+        "largest_mark": "F2", "without_marks": [],
+    }  # fmt: skip
+    text = words(section(changed(corrections=corrections), "Project"))
+    assert "lens distortion up to 7.2 µm" in text
+    assert "refraction none" in text
+    assert "affine transformation of 10 photos; residuals rms 4.2 µm, largest 9.1 µm, at mark F2 of photo 1003" in text
+    assert "carried by the frames: coordinates go through geocentric space, up to 0.369 m in height" in text
+
+
+@pytest.mark.parametrize(
+    ("settings", "text"),
+    [
+        ({"screening": "auto"}, "screening: auto"),
+        ({"screening": "none"}, "screening: none"),
+        ({"screening": "tau"}, "screening: tau, level 0.05"),
+        ({"screening": "parallax+grubbs"}, "level 0.05, y parallax up to 4 of its standard deviations"),
+        ({"screening": "parallax+grubbs", "parallax_limit": 0.03}, "level 0.05, y parallax up to 30 µm"),
+    ],
+)
+def test_screening_is_stated(settings: Document, text: str) -> None:
+    document = changed()
+    document["settings"]["relative"] = {"grubbs_alpha": 0.05, "parallax_limit": None} | settings
+    assert text in words(section(document, "Project"))
+
+
+# ------------------------------------------------------------------------------------------------------ Markdown
+
+
+def test_markdown_tables_are_whole() -> None:
+    text = to_markdown("T", sections_of(saved()))
+    blocks = re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE)
+    assert len(blocks) == sum(len(tables(each)) for each in sections_of(saved()))
+    for block in blocks:
+        assert len({len(re.findall(r"(?<!\\)\|", line)) for line in block.splitlines()}) == 1
+
+
+def test_markdown_escapes_ids() -> None:
+    table = Table((Column("point", left=True), Column("x", "m")), (("a|b*c_d", "1"),), note="`k` of <x>")
+    text = to_markdown("A #1", [Section("S", (table, Words("w", "good", "-"), Facts((("l", "v"),))))])
+    assert "# A \\#1\n\n## S\n\n| point | x, m |\n|:--|--:|\n| a\\|b\\*c\\_d | 1 |\n" in text
+    assert "\\`k\\` of \\<x\\>" in text
+    assert "- **w**" in text
+    assert text.endswith("- l: v\n")

@@ -1,0 +1,91 @@
+"""Results of small simulated projects, shared by the tests of what is made from results."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+from photostrip.formats.result.document import document_of
+from photostrip.formats.simulation import inputs_of, project_files
+from photostrip.geodesy.frame_spec import FrameSpec
+from photostrip.pipeline import Settings, triangulate
+from photostrip.simulate.simulation import simulate
+from photostrip.simulate.spec import Control, Flight, GrossError, Ground, Image, Points, Spec
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from photostrip.pipeline import Inputs, Result
+
+Document = dict[str, Any]
+
+EAST_FIRST, NORTH_FIRST = ("east", "north", "up"), ("north", "east", "up")
+FRAMES = {
+    "local": Ground("local"),
+    "projected": Ground("EPSG:32633"),
+    "north first": Ground("EPSG:32633", NORTH_FIRST),
+    "geographic": Ground("EPSG:4326"),
+    "geocentric": Ground("geocentric", ("x", "y", "z")),
+    "south": Ground("EPSG:32719", center_deg=(-68.0, -33.0)),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A project, its result and the document of that."""
+
+    inputs: Inputs
+    result: Result
+    document: Document
+
+    @property
+    def measured(self) -> dict[tuple[str, str], NDArray[np.float64]]:
+        """Measured image coordinates by photo and point, mm."""
+        o = self.inputs.observations
+        return {
+            (o.photo_ids[photo], o.point_ids[point]): xy
+            for photo, point, xy in zip(o.photo, o.point, o.xy, strict=True)
+        }
+
+
+def spec(frame: str = "projected", strips: int = 1, sigma_um: float = 5.0, *errors: GrossError, bands: int = 3) -> Spec:
+    """Give a small project: five photos to a strip."""
+    return Spec(
+        name="small",
+        ground=FRAMES[frame],
+        flight=Flight(photos=5, strips=strips, heading_deg=70.0),
+        points=Points(extra_per_model=4),
+        control=Control(per_band=3, bands=bands, check=4),
+        image=Image(sigma_um),
+        gross_errors=errors,
+    )
+
+
+def solved(inputs: Inputs, settings: Settings | None = None) -> Case:
+    """Run a project."""
+    result = triangulate(inputs, settings or Settings())
+    return Case(inputs, result, document_of(result))
+
+
+@cache
+def case(frame: str = "projected", strips: int = 1, sigma_um: float = 5.0, *errors: GrossError) -> Case:
+    """Run a simulated project; every other one is run once only."""
+    return solved(inputs_of(simulate(spec(frame, strips, sigma_um, *errors))))
+
+
+def written_to(crs: str, axes: tuple[str, str, str], source: str = "projected", strips: int = 1) -> Case:
+    """Run a project whose result is wanted in another frame than its control has."""
+    inputs = inputs_of(simulate(spec(source, strips)))
+    return solved(replace(inputs, output=FrameSpec(crs, axes)))
+
+
+def write_project(folder: Path, spec: Spec, more: str = "") -> Path:
+    """Write a simulated project as files, with more lines at its end."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in project_files(simulate(spec)).items():
+        (folder / name).write_text(text + (more if name == "project.yaml" else ""), encoding="utf-8")
+    return folder / "project.yaml"
