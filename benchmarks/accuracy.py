@@ -1,0 +1,539 @@
+"""How accurate strips are: many simulated strips with known truth, all degrees of polynomial, against limits.
+
+Errors are those of all adjusted points that are not control, root mean square over all strips, in the directions
+along the strip (X), across it (Y) and up (Z). Beside the strip method stands a rigorous bundle adjustment of the same
+measurements, written apart from the program: it shows what the measurements hold.
+
+Usage: python benchmarks/accuracy.py [--seeds N] [--cases a b length long layout] [--workers N]
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import time
+from collections import Counter
+from dataclasses import dataclass, replace
+from itertools import product
+from multiprocessing import get_context
+from typing import TYPE_CHECKING
+
+from photostrip.threads import limit_threads
+
+limit_threads()  # before numpy is imported, also in the processes that are started here
+
+import numpy as np  # noqa: E402
+
+from photostrip.formats.simulation import inputs_of, settings_of  # noqa: E402
+from photostrip.geodesy.crs import tie_frames  # noqa: E402
+from photostrip.geometry.rotation import from_vector  # noqa: E402
+from photostrip.pipeline import triangulate  # noqa: E402
+from photostrip.simulate.simulation import simulate  # noqa: E402
+from photostrip.simulate.spec import FILM, Control, Flight, Points, Spec  # noqa: E402
+from photostrip.triangulation import polynomial  # noqa: E402
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+    from multiprocessing.pool import Pool
+
+    from numpy.typing import NDArray
+
+    from photostrip.pipeline import Result
+    from photostrip.simulate.simulation import Simulation
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+SIGMA = 5e-6 * 10_000  # metres: 5 micrometres at the photo scale 1:10 000
+CONTROL_SIGMA = (0.02, 0.02, 0.02)  # metres, stated and real
+SIMILARITY, AUTO, BUNDLE = "similarity", "auto", "bundle"
+FIXED = (SIMILARITY, "2", "3")
+CHOICES = (*FIXED, AUTO)
+TITLES = {SIMILARITY: "similarity", "2": "degree 2", "3": "degree 3", AUTO: "auto", BUNDLE: "bundle"}
+AUTO_LIMIT = 1.10  # auto against the best fixed choice
+BUNDLE_PASSES = 2  # it starts from the truth
+
+
+# ------------------------------------------------------------------------------------------- which strips
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where the points of a photo lie: rows across the flight at each nadir, and further points anywhere in the models.
+
+    Parameters
+    ----------
+    title : str
+        Its name.
+    rows, more : int
+        Points at the nadir of each photo, and further points in each model.
+    reach, scatter : float
+        Place of the outermost rows in percent of half the width of the photo; scatter along the flight, percent.
+    lap : float or None
+        Overlap in percent; None: as the case has it.
+    """
+
+    title: str
+    rows: int = 5
+    more: int = 2
+    reach: float = 75.0
+    scatter: float = 25.0
+    lap: float | None = None
+
+    @property
+    def points(self) -> Points:
+        """The same for the simulation."""
+        return Points(self.rows, self.reach, self.scatter, self.more)
+
+
+USUAL = Layout("5 rows and 2 more")
+SPARSE = Layout("5 rows", more=0)
+
+
+def strip(models: int, bands: int, layout: Layout = USUAL, *, every: int | None = None) -> Spec:
+    """Specify a film strip of case (a): f = 153 mm, 1:10 000, 64 % overlap, bands of three control points.
+
+    Parameters
+    ----------
+    models : int
+        Models, one less than photos.
+    bands : int
+        Bands of control points, spread evenly.
+    layout : Layout
+        Places of the points.
+    every : int or None
+        Models from one band to the next, instead of `bands`.
+
+    Returns
+    -------
+    Spec
+        The specification.
+    """
+    return Spec(
+        camera=replace(FILM, principal_distance=153.0),
+        flight=Flight(photos=models + 1, end_lap_percent=layout.lap or 64.0),
+        points=layout.points,
+        control=Control(bands=bands, every=every, per_band=3, sigma=CONTROL_SIGMA),
+    )
+
+
+def pairs_of_control(photos: int, layout: Layout = USUAL) -> Spec:
+    """Specify a film strip of case (b): f = 153.124 mm, 60 % overlap, two control points every five models.
+
+    Parameters
+    ----------
+    photos : int
+        Photos.
+    layout : Layout
+        Places of the points.
+
+    Returns
+    -------
+    Spec
+        The specification.
+    """
+    return Spec(
+        camera=replace(FILM, principal_distance=153.124),
+        flight=Flight(photos=photos, end_lap_percent=layout.lap or 60.0),
+        points=layout.points,
+        control=Control(every=5, per_band=2, sigma=CONTROL_SIGMA),
+    )
+
+
+# --------------------------------------------------------------------------------------- one strip at a time
+
+
+@dataclass(frozen=True)
+class Task:
+    """One strip to simulate and to adjust in several ways."""
+
+    spec: Spec
+    choices: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of one strip: mean squares (3,) and degrees in plan and height of each choice; points per model."""
+
+    squares: dict[str, Floats]
+    degrees: dict[str, tuple[int, int]]
+    per_model: float
+
+
+def run(task: Task) -> Outcome:
+    """Simulate one strip and adjust it in every way asked for."""
+    simulation = simulate(task.spec)
+    inputs, settings = inputs_of(simulation), settings_of(simulation)
+    squares, degrees = {}, {}
+    for choice in task.choices:
+        if choice == BUNDLE:
+            continue
+        simple = choice == SIMILARITY
+        wanted = replace(
+            settings,
+            adjustment="similarity" if simple else "polynomial",
+            polynomial=polynomial.Settings(AUTO if simple else choice),
+        )
+        result = triangulate(inputs, wanted)
+        squares[choice] = _mean_squares(simulation, result, result.points.cartesian)
+        degrees[choice] = _degrees(result)
+    if BUNDLE in task.choices:
+        squares[BUNDLE] = _mean_squares(simulation, result, bundle(simulation)[result.points.number])
+    pairs = result.strips[0].orientation.pairs
+    return Outcome(squares, degrees, len(pairs.pair) / pairs.size)
+
+
+def _mean_squares(simulation: Simulation, result: Result, found: Floats) -> Floats:
+    """Give the mean square error of the points that are not control, along, across and up, in square metres."""
+    number = result.points.number
+    fixed = {name for name, check in zip(simulation.control.ids, simulation.control.check, strict=True) if not check}
+    free = np.array([simulation.observations.point_ids[n] not in fixed for n in number])
+    error = (found - simulation.truth.points.xyz[number]) @ result.strips[0].intermediate.axes
+    mean: Floats = (error[free] ** 2).mean(axis=0)
+    return mean
+
+
+def _degrees(result: Result) -> tuple[int, int]:
+    """Highest powers of X in plan and in height."""
+    found = result.strips[0].polynomial
+    if found is None:
+        return 0, 0
+    plan, _, height = ([polynomial.POWERS[term][0] for term in axis.terms] for axis in found.axes)
+    return max(plan, default=0), max(height, default=0)
+
+
+# --------------------------------------------------------------------------------- the rigorous bundle beside
+
+
+def bundle(simulation: Simulation) -> Floats:
+    """Adjust all rays of a strip with its control in one least-squares solution, from the truth as start.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        One strip without distortion, film deformation and refraction.
+
+    Returns
+    -------
+    ndarray, shape (q, 3)
+        Adjusted points in the Cartesian frame, metres; meaningless where a point has one ray only.
+    """
+    truth, control = simulation.truth, simulation.control
+    origin = truth.points.xyz.mean(axis=0)
+    centers, rotations, points = truth.centers - origin, truth.rotations, truth.points.xyz - origin
+    frames, _ = tie_frames(simulation.frames)
+    rows = np.flatnonzero(~control.check)
+    at = {name: n for n, name in enumerate(truth.points.ids)}
+    fixed = np.array([at[control.ids[row]] for row in rows])
+    given = frames[0].cartesian_from_ground(control.enu[rows]) - origin
+    for _ in range(BUNDLE_PASSES):
+        moves, shifts = _bundle_step(simulation, (centers, rotations, points), fixed, given)
+        centers, points = centers + moves[:, :3], points + shifts
+        rotations = from_vector(moves[:, 3:]) @ rotations
+    result: Floats = points + origin
+    return result
+
+
+def _bundle_step(
+    simulation: Simulation, state: tuple[Floats, Floats, Floats], fixed: Numbers, given: Floats
+) -> tuple[Floats, Floats]:
+    """Solve one step: the normal equations reduced to the photos, then the points."""
+    misfit, by_photo, by_point = _linearised(simulation, state)
+    photo, point = simulation.observations.photo, simulation.observations.point
+    photos, points = len(state[0]), len(state[2])
+    weight = 1.0 / simulation.control.sigma[0, 0] ** 2
+    of_points, right_points = _sums(by_point, misfit, point, points)
+    of_points[fixed] += weight * np.eye(3)
+    right_points[fixed] += weight * (given - state[2][fixed])
+    of_points += 1e-9 * np.eye(3)  # keeps points with one ray from stopping the rest
+    of_photos, right_photos = _sums(by_photo, misfit, photo, photos)
+    mixed = np.zeros((photos, 6, points, 3))
+    mixed[photo, :, point] = np.einsum("mai,maj->mij", by_photo, by_point)  # a point is measured once on a photo
+
+    n, inverse = 6 * photos, np.linalg.inv(of_points)
+    carried = np.einsum("nips,pst->nipt", mixed, inverse).reshape(n, -1)
+    flat = mixed.reshape(n, -1)
+    reduced = -carried @ flat.T
+    diagonal = np.arange(n).reshape(-1, 6)
+    reduced[diagonal[:, :, None], diagonal[:, None, :]] += of_photos
+    scale = 1.0 / np.sqrt(np.diag(reduced))  # metres and radians side by side
+    right = (right_photos.ravel() - carried @ right_points.ravel()) * scale
+    moves = np.linalg.solve(reduced * scale * scale[:, None], right) * scale
+    shifts = np.einsum("pst,pt->ps", inverse, right_points - (moves @ flat).reshape(-1, 3))
+    return moves.reshape(-1, 6), shifts
+
+
+def _linearised(simulation: Simulation, state: tuple[Floats, Floats, Floats]) -> tuple[Floats, Floats, Floats]:
+    """Give misfits of image coordinates and their derivatives by photos and points, all in units of sigma."""
+    seen, (centers, rotations, points) = simulation.observations, state
+    focal, turn = simulation.camera.principal_distance, rotations[seen.photo]
+    arm = points[seen.point] - centers[seen.photo]
+    ray = np.einsum("mi,mij->mj", arm, turn)
+    xy = -focal * ray[:, :2] / ray[:, 2:]
+    by_ray = np.zeros((len(seen), 2, 3))
+    by_ray[:, 0, 0] = by_ray[:, 1, 1] = -focal / ray[:, 2]
+    by_ray[:, :, 2] = -xy / ray[:, 2:]
+    by_point = np.einsum("mij,mkj->mik", by_ray / seen.sigma[:, :, None], turn)
+    # A camera turned by theta sees the arm turned by -theta.
+    by_photo = np.concatenate([-by_point, -np.cross(arm[:, None, :], by_point)], axis=2)
+    return (seen.xy - xy) / seen.sigma, by_photo, by_point
+
+
+def _sums(derivatives: Floats, misfit: Floats, group: Numbers, groups: int) -> tuple[Floats, Floats]:
+    """Sum normal matrices and right sides of photos, or of points."""
+    size = derivatives.shape[2]
+    normal, right = np.zeros((groups, size, size)), np.zeros((groups, size))
+    np.add.at(normal, group, np.einsum("mai,maj->mij", derivatives, derivatives))
+    np.add.at(right, group, np.einsum("mai,ma->mi", derivatives, misfit))
+    return normal, right
+
+
+# ------------------------------------------------------------------------------------------ many strips
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Errors of one choice over all strips: rms along, across and up, their standard errors, degrees in use."""
+
+    rms: Floats
+    doubt: Floats
+    degrees: Counter[tuple[int, int]]
+    per_model: float
+
+    @property
+    def plan_height(self) -> Floats:
+        """Rms of a plan coordinate and of the height, metres."""
+        x, y, z = self.rms
+        return np.array([np.hypot(x, y) / np.sqrt(2.0), z])
+
+    @property
+    def plan_height_doubt(self) -> Floats:
+        """Their standard errors, metres."""
+        x, y, z = self.rms * self.doubt
+        return np.array([(x + y) / 2.0 / self.plan_height[0], z / self.rms[2]])
+
+    @property
+    def degree(self) -> tuple[int, int]:
+        """Degrees in plan and height that most strips got."""
+        return self.degrees.most_common(1)[0][0] if self.degrees else (0, 0)
+
+
+def measure(pool: Pool, spec: Spec, seeds: int, choices: Iterable[str]) -> dict[str, Measured]:
+    """Adjust strips of one kind with seeds 1, 2, ... and sum up."""
+    tasks = [Task(replace(spec, seed=seed), tuple(choices)) for seed in range(1, seeds + 1)]
+    outcomes = pool.map(run, tasks, chunksize=4)
+    found = {}
+    for choice in choices:
+        squares = np.array([outcome.squares[choice] for outcome in outcomes])
+        rms = np.sqrt(squares.mean(axis=0))
+        doubt = squares.std(axis=0, ddof=1) / np.sqrt(seeds) / (2.0 * rms)
+        degrees = Counter(outcome.degrees[choice] for outcome in outcomes if choice in outcome.degrees)
+        found[choice] = Measured(rms, doubt, degrees, float(np.mean([outcome.per_model for outcome in outcomes])))
+    return found
+
+
+# ------------------------------------------------------------------------------------------------ printing
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Print columns, the first to the left, the others to the right."""
+    lines = [tuple(head), *map(tuple, rows)]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    lines.insert(1, tuple("-" * width for width in widths))
+    for first, *others in lines:
+        cells = [cell.rjust(width) for cell, width in zip(others, widths[1:], strict=True)]
+        print("  ".join([first.ljust(widths[0]), *cells]).rstrip())
+    print(flush=True)
+
+
+def slashed(values: Iterable[float], decimals: int = 2) -> str:
+    """Write numbers with slashes between them."""
+    return "/".join(f"{value:.{decimals}f}" for value in values)
+
+
+def verdict(values: Floats, doubt: Floats, limits: Floats) -> str:
+    """Say whether errors stay below limits."""
+    above = values - limits
+    if (above <= 0.0).all():
+        return "yes"
+    return "open" if (above <= 2.0 * doubt).all() else "no"
+
+
+def best_fixed(found: dict[str, Measured]) -> Floats:
+    """Smallest rms in plan and in height over the fixed choices, metres."""
+    best: Floats = np.min([found[choice].plan_height for choice in FIXED if choice in found], axis=0)
+    return best
+
+
+def print_auto(rows: Iterable[tuple[str, dict[str, Measured]]]) -> None:
+    """Print how far auto stays behind the best fixed choice."""
+    lines = []
+    for title, found in rows:
+        ratio = found[AUTO].plan_height / best_fixed(found)
+        lines.append(
+            (
+                title,
+                slashed(found[AUTO].plan_height, 3),
+                slashed(best_fixed(found), 3),
+                slashed(ratio),
+                "yes" if (ratio <= AUTO_LIMIT).all() else "no",
+            )
+        )
+    print(f"auto against the best fixed choice, plan/height, m (limit {AUTO_LIMIT:.2f})")
+    table(("strip", "auto", "best fixed", "ratio", "within"), lines)
+
+
+# --------------------------------------------------------------------------------------------- the cases
+
+CASES_A = (
+    (20, 3, "2", (4.8, 4.4, 9.2)),
+    (20, 4, "3", (2.9, 2.9, 5.9)),
+    (10, 3, "2", (2.1, 2.3, 4.5)),
+    (10, 3, SIMILARITY, (3.4, 3.2, 7.0)),
+)
+LIMITS_B = {SIMILARITY: (0.325, 0.665), "2": (0.152, 0.330), "3": (0.112, 0.230), BUNDLE: (0.062, 0.163)}
+
+
+def case_a(pool: Pool, seeds: int) -> None:
+    """Bands of three control points: X/Y/Z in units of sigma at photo scale, against limits."""
+    print(f"(a) f 153 mm, 1:10 000, 64 % overlap, bands of 3 control points (2 cm), 5 um; {seeds} strips of each kind")
+    print("    rms along/across/up at points that are not control, in units of 5 um at photo scale = 0.05 m\n")
+    rows, autos = [], []
+    for layout in (USUAL, SPARSE):
+        for models, bands in dict.fromkeys(case[:2] for case in CASES_A):
+            found = measure(pool, strip(models, bands, layout), seeds, (*CHOICES, BUNDLE))
+            title = f"{models} models, {bands} bands, {layout.title}"
+            autos.append((title, found))
+            for _, _, choice, limits in (case for case in CASES_A if case[:2] == (models, bands)):
+                of, limit = found[choice], np.array(limits)
+                values, doubt = of.rms / SIGMA, of.doubt / SIGMA
+                head = (title, f"{of.per_model:.1f}", TITLES[choice], slashed(limits, 1), slashed(values))
+                tail = (slashed(values / limit), verdict(values, doubt, limit), slashed(found[BUNDLE].rms / SIGMA))
+                rows.append((*head, slashed(doubt), *tail))
+    table(("strip", "per model", "adjustment", "limit", "measured", "s.e.", "ratio", "below", "bundle"), rows)
+    print_auto(autos)
+
+
+def case_b(pool: Pool, seeds: int) -> None:
+    """Two control points every five models: plan and height in metres, against limits."""
+    print("(b) f 153.124 mm, 1:10 000, 60 % overlap, 20 photos, two control points (2 cm) every 5 models, 5 um;")
+    print(
+        f"    {seeds} strips of each kind; rms in plan (of one coordinate) and height at points that are not control, m"
+    )
+    print("    on the right limits and measured values, both divided by those of the bundle\n")
+    rows, autos = [], []
+    for layout in (USUAL, replace(SPARSE, title="5 rows and 1 more", more=1), SPARSE):
+        found = measure(pool, pairs_of_control(20, layout), seeds, (*CHOICES, BUNDLE))
+        autos.append((layout.title, found))
+        rigorous = found[BUNDLE].plan_height
+        for choice, limits in LIMITS_B.items():
+            of, limit = found[choice], np.array(limits)
+            values, doubt = of.plan_height, of.plan_height_doubt
+            head = (layout.title, f"{of.per_model:.1f}", TITLES[choice], slashed(limits, 3), slashed(values, 3))
+            tail = (slashed(limit / LIMITS_B[BUNDLE]), slashed(values / rigorous))
+            rows.append((*head, slashed(doubt, 3), slashed(values / limit), verdict(values, doubt, limit), *tail))
+    heads = ("points", "per model", "adjustment", "limit", "measured", "s.e.", "ratio", "below")
+    table((*heads, "limit/bundle", "measured/bundle"), rows)
+    print_auto(autos)
+
+
+def case_length(pool: Pool, seeds: int) -> None:
+    """Print a table over lengths and bands."""
+    print(f"(length) strips as in (a), {seeds} of each kind; rms along/across/up in units of 5 um at photo scale")
+    print("    -: the control does not carry that degree; took: degrees in plan/height that auto took most often\n")
+    rows, autos = [], []
+    for models, bands in product((6, 10, 14, 20, 30, 40), (2, 3, 4, 5, 0)):
+        if models <= 20 and not bands:
+            continue  # the same as one of the others
+        found = measure(pool, strip(models, bands or 2, every=None if bands else 5), seeds, (*CHOICES, BUNDLE))
+        for choice in ("2", "3"):
+            if found[choice].degree != (int(choice), int(choice)):
+                del found[choice]
+        title = f"{models:2d} models, {f'{bands} bands' if bands else 'every 5'}"
+        autos.append((title, found))
+        cells = [slashed(found[c].rms / SIGMA, 1) if c in found else "-" for c in (*CHOICES, BUNDLE)]
+        ratio = found[AUTO].plan_height / found[BUNDLE].plan_height
+        rows.append((title, *cells[:-1], "{}/{}".format(*found[AUTO].degree), cells[-1], slashed(ratio, 1)))
+    table(("strip", *(TITLES[c] for c in CHOICES), "took", "bundle", "auto/bundle"), rows)
+    print_auto(autos)
+
+
+def case_long(pool: Pool, seeds: int) -> None:
+    """Print how polynomials fall behind a bundle on long strips."""
+    print("(long) strips as in (b), two control points every 5 models; rms in plan/height, m, and the same divided by")
+    print(f"    that of the bundle; {seeds} strips up to 20 photos, fewer of longer ones\n")
+    rows = []
+    for photos in (10, 20, 30, 40, 60, 100):
+        count = max(2, min(seeds, seeds * 20 // photos))
+        found = measure(pool, pairs_of_control(photos), count, (*CHOICES, BUNDLE))
+        cells = [slashed(found[choice].plan_height, 3) for choice in (*CHOICES, BUNDLE)]
+        ratios = [slashed(found[choice].plan_height / found[BUNDLE].plan_height, 1) for choice in CHOICES]
+        rows.append((f"{photos} photos", *cells, *ratios))
+    heads = [TITLES[choice] for choice in (*CHOICES, BUNDLE)]
+    table(("strip", *heads, *(f"{TITLES[choice]}/b." for choice in CHOICES)), rows)
+
+
+LAYOUTS = (
+    USUAL,
+    Layout("reach 65 %", reach=65.0),
+    Layout("reach 70 %", reach=70.0),
+    Layout("reach 80 %", reach=80.0),
+    Layout("reach 85 %", reach=85.0),
+    Layout("no scatter", scatter=0.0),
+    Layout("scatter 50 %", scatter=50.0),
+    Layout("overlap 62 %", lap=62.0),
+    Layout("overlap 67 %", lap=67.0),
+    Layout("3 rows and 3 more", rows=3, more=3),
+    Layout("3 rows and 4 more", rows=3, more=4),
+    Layout("3 rows and 6 more", rows=3, more=6),
+    Layout("4 rows and 2 more", rows=4, more=2),
+    SPARSE,
+    Layout("5 rows and 4 more", more=4),
+)
+
+
+def case_layout(pool: Pool, seeds: int) -> None:
+    """Print how the numbers of (a) and (b) depend on where the points lie."""
+    print(
+        "(layout) measured values divided by their limits, (a) along/across/up and (b) plan/height, for other places of"
+    )
+    print(f"    the points; {seeds} strips of each kind; per model: points common to two photos in (a)\n")
+    rows = []
+    for layout in LAYOUTS:
+        cells, per_model = [], 0.0
+        for models, bands, choice, limits in CASES_A:
+            of = measure(pool, strip(models, bands, layout), seeds, (choice,))[choice]
+            cells.append(slashed(of.rms / SIGMA / np.array(limits)))
+            per_model = of.per_model
+        of = measure(pool, pairs_of_control(20, layout), seeds, ("3",))["3"]
+        rows.append((layout.title, f"{per_model:.1f}", *cells, slashed(of.plan_height / np.array(LIMITS_B["3"]))))
+    heads = [f"{models}/{bands} {TITLES[choice]}" for models, bands, choice, _ in CASES_A]
+    table(("points", "per model", *heads, "(b) degree 3"), rows)
+
+
+CASES: dict[str, Callable[[Pool, int], None]] = {
+    "a": case_a,
+    "b": case_b,
+    "length": case_length,
+    "long": case_long,
+    "layout": case_layout,
+}
+
+
+def main() -> None:
+    """Read the options and print the tables."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", maxsplit=1)[0])
+    parser.add_argument("--seeds", type=int, default=20, help="strips of each kind (default 20; 200 for firm numbers)")
+    parser.add_argument("--cases", nargs="+", choices=CASES, default=["a", "b", "length"], help="tables to print")
+    parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes (default: one for each core)")
+    options = parser.parse_args()
+    with get_context("spawn").Pool(options.workers) as pool:
+        for case in options.cases:
+            start = time.perf_counter()
+            CASES[case](pool, options.seeds)
+            print(f"case {case}: {time.perf_counter() - start:.0f} s", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    main()

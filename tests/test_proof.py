@@ -1,0 +1,598 @@
+"""The whole method against known truth: free of errors it comes back exactly, with errors as theory says, and what must
+not influence the result does not.
+
+The photos are made by the collinearity equations in geocentric space (:mod:`photostrip.simulate`, which has its own
+proof against formulas written apart); nothing of the method is used in making them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import settings as hypothesis_settings
+from hypothesis import strategies as st
+from pyproj import Proj
+
+from photostrip.camera import Camera, Distortion
+from photostrip.formats.result.document import document_of
+from photostrip.formats.simulation import inputs_of, settings_of
+from photostrip.geometry.rotation import angle_between
+from photostrip.pipeline import Inputs, Settings, triangulate
+from photostrip.points import ControlPoints, PhotoPoints
+from photostrip.simulate import (
+    DIGITAL,
+    FILM,
+    Control,
+    Film,
+    Flight,
+    Ground,
+    Image,
+    Points,
+    Simulation,
+    Spec,
+    Terrain,
+    simulate,
+)
+from photostrip.triangulation import formation, polynomial, relative
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.pipeline import Result
+
+    Floats = NDArray[np.float64]
+
+MICRON = 1e-6  # metres, and radians: what exact means; geocentric coordinates are stored to 1e-9 m
+SIGMA = 5e-6 * 10_000  # metres: 5 micrometres at the photo scale 1:10 000
+EXACT_CONTROL = (0.0, 0.0, 0.0)
+
+
+def exact(spec: Spec, **control: str) -> Spec:
+    """The same without any error of measurement."""
+    given_exactly = replace(spec.control, noise=EXACT_CONTROL, second_crs=control.get("second_crs"))
+    return replace(spec, image=replace(spec.image, sigma_um=0.0), control=given_exactly)
+
+
+@dataclass(frozen=True, eq=False)
+class Recovery:
+    """How far a run stays from the truth."""
+
+    simulation: Simulation
+    result: Result
+
+    @property
+    def errors(self) -> Floats:
+        """Of all adjusted points, Cartesian frame, metres."""
+        return self.result.points.cartesian - self.simulation.truth.points.xyz[self.result.points.number]
+
+    @property
+    def points(self) -> float:
+        """Largest error of a coordinate, metres."""
+        return float(np.abs(self.errors).max())
+
+    @property
+    def centers(self) -> float:
+        """Largest error of a coordinate of a perspective centre, metres."""
+        return max(
+            float(np.abs(strip.intermediate.cartesian_from_intermediate(strip.resection.centers) - true).max())
+            for strip, true in zip(self.result.strips, self._of_photos(self.simulation.truth.centers), strict=True)
+        )
+
+    @property
+    def rotations(self) -> float:
+        """Largest angle between a photo's orientation and the true one, radians."""
+        return max(
+            float(angle_between(strip.intermediate.cartesian_rotations(strip.resection.rotations), true).max())
+            for strip, true in zip(self.result.strips, self._of_photos(self.simulation.truth.rotations), strict=True)
+        )
+
+    def _of_photos(self, values: Floats) -> list[Floats]:
+        """True values by strip."""
+        place = {photo: n for n, photo in enumerate(self.simulation.truth.photo_ids)}
+        return [values[[place[photo] for photo in strip.strip.photos]] for strip in self.result.strips]
+
+    def along_across_up(self) -> Floats:
+        """Mean square errors of the points that are not control, along, across and up, metres squared."""
+        control = self.simulation.control
+        fixed = {name for name, check in zip(control.ids, control.check, strict=True) if not check}
+        ids = self.simulation.observations.point_ids
+        free = np.array([ids[number] not in fixed for number in self.result.points.number])
+        mean: Floats = ((self.errors[free] @ self.result.strips[0].intermediate.axes) ** 2).mean(axis=0)
+        return mean
+
+
+def recovered(spec: Spec, settings: Settings | None = None) -> Recovery:
+    done = simulate(spec)
+    return Recovery(done, triangulate(inputs_of(done), settings or settings_of(done)))
+
+
+def assert_exact(found: Recovery) -> None:
+    assert found.points < MICRON
+    assert found.centers < MICRON
+    assert found.rotations < MICRON
+    assert found.result.not_determined == {}
+    assert len(found.result.points.number) == len(found.simulation.observations.point_ids)
+    assert not any(strip.rejections for strip in found.result.strips)
+    assert all(strip.resection.solved.all() for strip in found.result.strips)
+    given_differences = found.result.control_differences[found.simulation.control.use]
+    assert np.abs(given_differences).max() < MICRON
+
+
+# ------------------------------------------------------------------------------------------------ free of errors
+
+
+@pytest.mark.parametrize("photos", [3, 10, 50, 200])
+def test_a_strip_of_any_length_comes_back(photos: int) -> None:
+    assert_exact(recovered(exact(Spec(flight=Flight(photos=photos)))))
+
+
+@pytest.mark.parametrize("rotation", [0.0, 90.0, 180.0, 270.0, 33.0])
+@pytest.mark.parametrize("heading", [0.0, 45.0, 90.0, 197.0, 300.0])
+def test_photos_turned_in_any_way_and_flown_anywhere_come_back(heading: float, rotation: float) -> None:
+    assert_exact(recovered(exact(Spec(flight=Flight(photos=6, heading_deg=heading, photo_rotation_deg=rotation)))))
+
+
+@pytest.mark.parametrize(
+    "terrain",
+    [
+        Terrain(relief=0.0),
+        Terrain(relief=500.0, wavelength=2000.0),  # a third of the flying height
+        Terrain(height=3500.0, relief=300.0, slope_percent=(10.0, -15.0)),
+    ],
+    ids=["flat", "mountains", "slope"],
+)
+def test_any_terrain_comes_back(terrain: Terrain) -> None:
+    assert_exact(recovered(exact(Spec(terrain=terrain, flight=Flight(end_lap_percent=68.0)))))
+
+
+@pytest.mark.parametrize(
+    "flight",
+    [
+        Flight(attitude_sigma_deg=(5.0, 5.0, 5.0), end_lap_percent=75.0),
+        Flight(end_lap_percent=80.0),
+        Flight(photos=8, strips=3, side_lap_percent=35.0),
+        Flight(photos=7, strips=2, side_lap_percent=35.0, alternate=True),
+        Flight(scale=50_000.0),
+        Flight(scale=4000.0),
+    ],
+    ids=["tilted", "80 percent", "three strips", "there and back", "small scale", "large scale"],
+)
+def test_any_flight_comes_back(flight: Flight) -> None:
+    assert_exact(recovered(exact(Spec(flight=flight))))
+
+
+MOON = "+proj=longlat +a=1737400 +b=1737400 +no_defs"
+
+
+@pytest.mark.parametrize(
+    ("ground", "control"),
+    [
+        (Ground(crs="EPSG:32733", center_deg=(15.3, -33.0)), {}),
+        (Ground(crs="EPSG:32633", center_deg=(17.9, 70.0)), {}),  # convergence 2.7 degrees
+        (Ground(crs="EPSG:32660", center_deg=(180.0, 52.0)), {}),
+        (Ground(crs="EPSG:4979", center_deg=(180.0, -17.0)), {}),
+        (Ground(crs="EPSG:32633", center_deg=(18.0, 49.0)), {"second_crs": "EPSG:32634"}),
+        (Ground(crs="EPSG:32760", center_deg=(180.0, -17.0)), {"second_crs": "EPSG:32701"}),
+        (Ground(crs="EPSG:31467", axes=("north", "east", "up"), center_deg=(9.4, 48.0)), {}),
+        (Ground(crs="EPSG:4326", axes=("north", "east", "up")), {}),
+        (Ground(height="orthometric", geoid_undulation=44.7), {}),
+        (Ground(crs="geocentric", axes=("x", "y", "z")), {}),
+        (Ground(crs="local"), {}),
+        (Ground(crs=MOON, center_deg=(-23.5, 0.7)), {}),
+        (Ground(crs="geocentric", axes=("x", "y", "z"), ellipsoid=(1_737_400.0, 1_737_400.0)), {}),
+        (Ground(crs="EPSG:3413", center_deg=(-45.0, 88.0)), {}),
+        (Ground(crs="EPSG:2263", center_deg=(-74.0, 40.7)), {}),  # plan in US survey feet
+    ],
+    ids=[
+        "south",
+        "edge of a zone",
+        "UTM at 180",
+        "degrees across 180",
+        "two zones",
+        "two zones at 180",
+        "Gauss-Krueger, north first",
+        "latitude, longitude",
+        "heights above the geoid",
+        "geocentric",
+        "local",
+        "moon, degrees",
+        "moon, geocentric",
+        "near the pole",
+        "feet",
+    ],
+)
+def test_any_ground_frame_comes_back(ground: Ground, control: dict[str, str]) -> None:
+    found = recovered(exact(Spec(ground=ground, flight=Flight(photos=8)), **control))
+    assert_exact(found)
+    assert len(set(found.simulation.control.frame.tolist())) == 1 + len(control)
+    ground_error = found.result.output.difference(
+        found.result.points.ground, found.simulation.truth.ground.xyz[found.result.points.number]
+    )
+    assert np.abs(ground_error).max() < MICRON
+
+
+@pytest.mark.parametrize(
+    "control",
+    [
+        Control(layout="corners"),
+        Control(layout="corners+centre"),
+        Control(layout="random", count=6),
+        Control(bands=4, use={"xyz": 0.5, "xy": 0.25, "z": 0.25}),
+        Control(bands=4, use={"xy": 0.4, "z": 0.6}),
+        Control(bands=2, per_band=2),
+    ],
+    ids=["corners", "corners and centre", "anywhere", "mixed", "plan or height", "two bands of two"],
+)
+@pytest.mark.parametrize("crs", ["EPSG:32633", "local"])
+def test_any_control_that_determines_the_strip_brings_it_back(control: Control, crs: str) -> None:
+    assert_exact(recovered(exact(Spec(ground=Ground(crs=crs, center_deg=(16.5, 49.2)), control=control))))
+
+
+@pytest.mark.parametrize("adjustment", ["similarity", "polynomial"])
+@pytest.mark.parametrize("degree", ["1", "2", "3"])
+def test_no_adjustment_spoils_what_is_exact(adjustment: str, degree: str) -> None:
+    spec = exact(Spec(flight=Flight(photos=15), control=Control(bands=4)))
+    asked = Settings(adjustment=adjustment, polynomial=polynomial.Settings(degree))
+    found = recovered(spec, asked)
+    assert_exact(found)
+    used = found.result.strips[0].polynomial
+    assert (used is None) == (adjustment == "similarity")
+    assert used is None or used.degree == int(degree)
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        Settings(formation=formation.Settings("distances")),
+        Settings(relative=relative.Settings(screening="tau")),
+        Settings(relative=relative.Settings(screening="none")),
+    ],
+    ids=["distances", "tau", "no screening"],
+)
+def test_no_way_of_working_spoils_what_is_exact(asked: Settings) -> None:
+    assert_exact(recovered(exact(Spec()), asked))
+
+
+def distorted(direction: str) -> Camera:
+    return replace(FILM, distortion=Distortion("brown", direction, k=(4e-8, -2e-12, 0.0), p=(2e-7, -1e-7)))
+
+
+@pytest.mark.parametrize(
+    "spec",
+    [
+        Spec(camera=DIGITAL),
+        Spec(camera=replace(FILM, principal_point=(0.35, -0.21))),
+        Spec(camera=distorted("image_to_ideal")),
+        Spec(camera=distorted("ideal_to_image")),
+        Spec(film=Film()),
+    ],
+    ids=["digital", "principal point", "distortion", "distortion the other way", "film"],
+)
+def test_any_camera_comes_back(spec: Spec) -> None:
+    assert_exact(recovered(exact(spec)))
+
+
+@pytest.mark.parametrize(("tilt_deg", "left"), [(0.0, 0.02), (1.0, 0.5)])
+def test_refraction_is_taken_out(tilt_deg: float, left: float) -> None:
+    """The correction takes photos as level and all heights as their mean: with tilts of a degree it leaves a part.
+
+    Most of the effect is taken up by the orientation whether it is corrected or not.
+    """
+    flight = Flight(scale=30_000.0, end_lap_percent=65.0, attitude_sigma_deg=(tilt_deg, tilt_deg, tilt_deg))
+    spec = exact(Spec(flight=flight, terrain=Terrain(relief=0.0), refraction=True))
+    corrected, uncorrected = recovered(spec), recovered(spec, Settings())
+    assert uncorrected.points > 0.03
+    assert uncorrected.centers > 0.2
+    assert corrected.points < left * uncorrected.points
+    assert corrected.centers < 0.05 * uncorrected.centers
+
+
+@hypothesis_settings(max_examples=40)
+@given(
+    seed=st.integers(0, 10_000),
+    photos=st.integers(3, 14),
+    lap=st.floats(60.0, 80.0),
+    heading=st.floats(0.0, 360.0),
+    rotation=st.floats(-180.0, 180.0),
+    relief=st.floats(0.0, 200.0),
+    latitude=st.floats(-80.0, 80.0),
+    longitude=st.floats(-180.0, 180.0),
+)
+def test_whatever_is_flown_comes_back(
+    seed: int,
+    photos: int,
+    lap: float,
+    heading: float,
+    rotation: float,
+    relief: float,
+    latitude: float,
+    longitude: float,
+) -> None:
+    spec = Spec(
+        seed=seed,
+        ground=Ground(crs="EPSG:4979", center_deg=(longitude, latitude)),
+        flight=Flight(photos=photos, end_lap_percent=lap, heading_deg=heading, photo_rotation_deg=rotation),
+        terrain=Terrain(relief=relief),
+    )
+    assert_exact(recovered(exact(spec)))
+
+
+def test_points_common_to_strips_agree() -> None:
+    found = recovered(exact(Spec(flight=Flight(photos=8, strips=3, side_lap_percent=35.0))))
+    ties = found.result.ties
+    assert len(ties.number) >= 30
+    assert {tuple(pair) for pair in ties.strips.tolist()} == {(0, 1), (1, 2)}
+    assert np.abs(ties.difference).max() < MICRON
+
+
+def test_the_final_orientations_fit_the_adjusted_points() -> None:
+    strip = recovered(exact(Spec(flight=Flight(photos=30)))).result.strips[0]
+    assert np.abs(strip.resection.residuals).max() < 1e-9  # mm
+    assert strip.scale_number == pytest.approx(10_000.0, rel=0.01)
+
+
+# ------------------------------------------------------------------------------------------- rotations and frames
+
+
+def test_rotation_rows_are_east_north_up_at_the_perspective_centre() -> None:
+    """True axes from longitude and latitude of each centre by their textbook formulas."""
+    spec = exact(
+        Spec(ground=Ground(crs="EPSG:4979", center_deg=(15.3, 49.2)), flight=Flight(photos=40, heading_deg=60))
+    )
+    found = recovered(spec)
+    photos = document_of(found.result)["photos"]
+    assert [photo["id"] for photo in photos] == list(found.simulation.truth.photo_ids)
+    lon, lat = np.radians([[photo["x"], photo["y"]] for photo in photos]).T
+    east = np.column_stack([-np.sin(lon), np.cos(lon), 0 * lon])
+    up = np.column_stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)])
+    expected = np.stack([east, np.cross(up, east), up], axis=1) @ found.simulation.truth.rotations
+    written = np.array([photo["rotation"] for photo in photos]).reshape(-1, 3, 3)
+    np.testing.assert_allclose(written, expected, rtol=0, atol=2e-9)
+    assert np.degrees(np.arccos(up[0] @ up[-1])) > 0.25  # so that the place where the axes stand matters
+
+
+def test_rotations_refer_to_the_grid_of_a_projection() -> None:
+    """A level photo flown in a true azimuth: its x axis runs along it, less the meridian convergence."""
+    level = Flight(photos=3, heading_deg=70.0, attitude_sigma_deg=(0.0, 0.0, 0.0), position_sigma=(0.0, 0.0, 0.0))
+    place = (17.9, 70.0)
+    found = recovered(exact(Spec(ground=Ground(center_deg=place), flight=level)))
+    middle = document_of(found.result)["photos"][1]
+    convergence = Proj("EPSG:32633").get_factors(*place).meridian_convergence
+    assert convergence > 2.5
+    azimuth = np.radians(70.0 - convergence)
+    sin, cos = np.sin(azimuth), np.cos(azimuth)
+    np.testing.assert_allclose(middle["rotation"], [sin, -cos, 0, cos, sin, 0, 0, 0, 1], rtol=0, atol=2e-9)
+
+
+@pytest.mark.parametrize("crs", ["geocentric", "local"])
+def test_rotations_refer_to_the_axes_of_a_cartesian_frame(crs: str) -> None:
+    axes = ("x", "y", "z") if crs == "geocentric" else ("east", "north", "up")
+    found = recovered(exact(Spec(ground=Ground(crs=crs, axes=axes))))
+    written = np.array([photo["rotation"] for photo in document_of(found.result)["photos"]]).reshape(-1, 3, 3)
+    np.testing.assert_allclose(written, found.simulation.truth.rotations, rtol=0, atol=2e-9)
+
+
+# ------------------------------------------------------------------------------------------------ with errors
+
+
+def rms(spec: Spec, seeds: int, *choices: str) -> dict[str, Floats]:
+    """Root mean square errors X, Y, Z of points that are not control over seeds 1, 2, ..., in units of sigma."""
+    squares: dict[str, list[Floats]] = {choice: [] for choice in choices}
+    for seed in range(1, seeds + 1):
+        done = simulate(replace(spec, seed=seed))
+        for choice in choices:
+            simple = choice == "similarity"
+            asked = Settings(
+                adjustment="similarity" if simple else "polynomial",
+                polynomial=polynomial.Settings("auto" if simple else choice),
+            )
+            squares[choice].append(Recovery(done, triangulate(inputs_of(done), asked)).along_across_up())
+    return {choice: np.sqrt(np.mean(found, axis=0)) / SIGMA for choice, found in squares.items()}
+
+
+def strip_of(models: int, bands: int) -> Spec:
+    """A film strip 1:10 000 with 5 micrometres, bands of three control points; a dozen points or more in each model."""
+    return Spec(
+        flight=Flight(photos=models + 1, end_lap_percent=64.0),
+        points=Points(reach_percent=75.0, extra_per_model=6),
+        control=Control(bands=bands, sigma=(0.02, 0.02, 0.02)),
+    )
+
+
+def test_image_noise_becomes_errors_of_its_size_no_more_and_no_less() -> None:
+    found = recovered(strip_of(10, 3))
+    strip = found.result.strips[0]
+    error = np.sqrt((found.errors**2).mean(axis=1))
+    assert np.median(error) > 0.3 * SIGMA  # an error of zero would mean that the truth leaked
+    assert np.median(error) < 6.0 * SIGMA
+    assert found.centers > 0.3 * SIGMA
+    assert found.rotations > 1e-6
+    assert float(np.median(strip.orientation.sigma0)) == pytest.approx(0.005, rel=0.15)
+    assert 0.003 < float(np.sqrt((strip.resection.residuals**2).mean())) < 0.008  # mm
+
+
+@pytest.mark.parametrize("sigma_um", [0.05, 0.5, 20.0])
+def test_errors_are_proportional_to_the_noise(sigma_um: float) -> None:
+    spec = strip_of(6, 3)
+    spec = replace(spec, control=replace(spec.control, noise=EXACT_CONTROL, sigma=(1e-4, 1e-4, 1e-4)))
+    asked = Settings(adjustment="similarity", relative=relative.Settings(screening="none"))
+    small, large = (
+        recovered(replace(spec, image=Image(sigma_um=size)), asked).errors for size in (0.1 * sigma_um, sigma_um)
+    )
+    np.testing.assert_allclose(10 * small, large, rtol=0, atol=0.1 * np.abs(large).max())
+
+
+def test_relative_orientation_finds_the_noise() -> None:
+    """Mean over many pairs of the estimated variance, with its own standard error."""
+    spec = replace(strip_of(200, 20), seed=3)
+    strip = recovered(spec, Settings(relative=relative.Settings(screening="none"))).result.strips[0]
+    redundancy = strip.orientation.points_used - 5
+    variance = float((strip.orientation.sigma0**2 @ redundancy) / redundancy.sum()) / 0.005**2
+    assert variance == pytest.approx(1.0, abs=3 * np.sqrt(2 / redundancy.sum()))
+
+
+def test_second_degree_takes_out_what_the_similarity_leaves() -> None:
+    """Limits of ten models and three bands, in units of sigma at photo scale; floors at half of them."""
+    found = rms(strip_of(10, 3), 12, "similarity", "2", "auto")
+    assert (found["2"] < [2.1, 2.3, 4.5]).all()
+    assert (found["2"] > 0.5 * np.array([2.1, 2.3, 4.5])).all()
+    assert (found["similarity"] < 1.15 * np.array([3.4, 3.2, 7.0])).all()
+    assert (found["similarity"] > found["2"]).all()
+    assert np.linalg.norm(found["auto"]) < 1.1 * np.linalg.norm(found["2"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("bands", "degree", "limits"), [(3, "2", (4.8, 4.4, 9.2)), (4, "3", (2.9, 2.9, 5.9))], ids=["3 bands", "4 bands"]
+)
+def test_twenty_models_stay_within_their_limits(bands: int, degree: str, limits: Sequence[float]) -> None:
+    found = rms(strip_of(20, bands), 40, "similarity", degree, "auto")
+    assert (found[degree] < 1.1 * np.array(limits)).all()  # forty strips know their rms to 5 to 8 %
+    assert (found[degree] > 0.5 * np.array(limits)).all()
+    assert (found["similarity"] > 1.5 * found[degree]).all()
+    assert np.linalg.norm(found["auto"]) < 1.1 * np.linalg.norm(found[degree])
+
+
+# ----------------------------------------------------------------------------------- what must not influence
+
+
+def numbers(result: Result) -> dict[str, Floats]:
+    """Every number of a result that is not a difference at a given point."""
+    found = {"points": result.points.cartesian, "ground": result.points.ground, "ties": result.ties.difference}
+    for strip in result.strips:
+        name = strip.strip.id
+        found |= {
+            f"{name} elements": strip.orientation.elements,
+            f"{name} weights": strip.orientation.pairs.weight,
+            f"{name} scale": strip.formed.scale,
+            f"{name} strip": strip.formed.xyz,
+            f"{name} frame": np.vstack([strip.intermediate.origin, strip.intermediate.axes]),
+            f"{name} similarity": np.append(strip.absolute.similarity.shift, strip.absolute.similarity.scale),
+            f"{name} misclosures": strip.absolute.misclosures,
+            f"{name} rejected": np.array([[r.row, r.value, r.limit] for r in strip.rejections]),
+            f"{name} centers": strip.resection.centers,
+            f"{name} rotations": strip.resection.rotations,
+            f"{name} residuals": strip.resection.residuals,
+        }
+        if strip.polynomial is not None:
+            found[f"{name} degree"] = np.array([strip.polynomial.degree])
+            for axis in strip.polynomial.axes:
+                found[f"{name} {len(found)}"] = np.concatenate([axis.coefficients, axis.residuals, axis.leverage])
+            weighed = [[e.degree, e.rms, e.left_out, e.f, e.p] for e in strip.polynomial.evidence]
+            found[f"{name} evidence"] = np.array(weighed)
+    return found
+
+
+def noisy_project(crs: str = "EPSG:32633") -> tuple[Simulation, Inputs]:
+    spec = Spec(
+        ground=Ground(crs=crs),
+        flight=Flight(photos=12, strips=2, side_lap_percent=35.0),
+        control=Control(bands=4, check=12),
+    )
+    done = simulate(spec)
+    return done, inputs_of(done)
+
+
+def moved(control: ControlPoints, shift: Floats) -> ControlPoints:
+    """The same control list with its check points elsewhere."""
+    return replace(control, enu=control.enu + np.where(control.check[:, None], shift, 0.0))
+
+
+@pytest.mark.parametrize("curvature", ["auto", "model"])
+@pytest.mark.parametrize("change", ["wild", "slightly", "removed", "first", "plan only", "sure"])
+def test_a_check_point_never_influences_anything(change: str, curvature: str) -> None:
+    done, inputs = noisy_project("local" if curvature == "model" else "EPSG:32633")
+    asked = replace(Settings(), absolute=replace(Settings().absolute, earth_curvature=curvature))
+    control = done.control
+    assert control.check.sum() == 12
+    others = {
+        "wild": moved(control, np.array([1e5, -3e5, 4e3])),
+        "slightly": moved(control, np.array([0.1, 0.2, -0.3])),
+        "removed": control.take(~control.check),
+        "first": control.take(np.argsort(~control.check, kind="stable")),
+        "plan only": replace(control, use=control.use & ~(control.check[:, None] & np.array([False, False, True]))),
+        "sure": replace(control, sigma=np.where(control.check[:, None], 1e-6, control.sigma)),
+    }
+    before = numbers(triangulate(inputs, asked))
+    result = triangulate(replace(inputs, control=others[change]), asked)
+    after = numbers(result)
+    assert before.keys() == after.keys()
+    for name, values in before.items():
+        np.testing.assert_array_equal(values, after[name], err_msg=name)
+    if change == "wild":  # and it is looked at all the same
+        at_check = result.control_differences[result.inputs.control.check]
+        assert np.abs(np.abs(at_check) - [1e5, 3e5, 4e3]).max() < 10.0
+
+
+def shuffled(inputs: Inputs, seed: int) -> Inputs:
+    """The same tables with rows, points, photos and control in another order."""
+    rng = np.random.default_rng(seed)
+    given_points = inputs.observations
+    rows = rng.permutation(len(given_points))
+    photos, points = (rng.permutation(len(ids)) for ids in (given_points.photo_ids, given_points.point_ids))
+    observations = PhotoPoints(
+        tuple(given_points.photo_ids[n] for n in photos),
+        tuple(given_points.point_ids[n] for n in points),
+        np.argsort(photos)[given_points.photo[rows]],
+        np.argsort(points)[given_points.point[rows]],
+        given_points.xy[rows],
+        given_points.sigma[rows],
+    )
+    return replace(inputs, observations=observations, control=inputs.control.take(rng.permutation(len(inputs.control))))
+
+
+def coordinates(result: Result) -> dict[str, Floats]:
+    """Points and photos of a result by their ids."""
+    ids = result.inputs.observations.point_ids
+    found = {f"point {ids[n]}": xyz for n, xyz in zip(result.points.number, result.points.cartesian, strict=True)}
+    for strip in result.strips:
+        centers = strip.intermediate.cartesian_from_intermediate(strip.resection.centers)
+        rotations = strip.intermediate.cartesian_rotations(strip.resection.rotations)
+        for photo, center, rotation in zip(strip.strip.photos, centers, rotations, strict=True):
+            found[f"photo {photo}"] = np.vstack([center, rotation])
+    return found
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_order_of_rows_and_ids_does_not_matter(seed: int) -> None:
+    _, inputs = noisy_project()
+    straight = coordinates(triangulate(inputs, Settings()))
+    mixed = coordinates(triangulate(shuffled(inputs, seed), Settings()))
+    assert straight.keys() == mixed.keys()
+    for name, values in straight.items():
+        np.testing.assert_allclose(mixed[name], values, rtol=0, atol=MICRON, err_msg=name)
+
+
+def test_names_do_not_matter() -> None:
+    _, inputs = noisy_project()
+    names = {name: f"{n * 7919 % 100_003:05d}" for n, name in enumerate(inputs.observations.point_ids)}
+    renamed = replace(
+        inputs,
+        observations=replace(inputs.observations, point_ids=tuple(names.values())),
+        control=replace(inputs.control, ids=tuple(names[name] for name in inputs.control.ids)),
+    )
+    before, after = (numbers(triangulate(each, Settings())) for each in (inputs, renamed))
+    for name, values in before.items():
+        np.testing.assert_array_equal(values, after[name], err_msg=name)
+
+
+def test_twice_is_the_same() -> None:
+    _, inputs = noisy_project()
+    first, second = (triangulate(inputs, Settings()) for _ in range(2))
+    assert document_of(first) == document_of(second)
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_a_strip_may_be_listed_from_either_end(backwards: bool) -> None:
+    """Another first photo, another chain, other rounding: free of errors, the same result."""
+    done = simulate(exact(Spec(flight=Flight(photos=12))))
+    inputs = inputs_of(done)
+    strip = inputs.strips[0]
+    listed = replace(strip, photos=strip.photos[::-1] if backwards else strip.photos)
+    assert_exact(Recovery(done, triangulate(replace(inputs, strips=(listed,)), Settings())))
