@@ -5,6 +5,7 @@ Everything that is wrong with any of the files is told in one go; see :class:`ph
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -34,7 +35,7 @@ from photostrip.project.tables import Tables, check_tables, read_tables
 from photostrip.project.validation import valid_section, validate
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from photostrip.camera import Camera
     from photostrip.notes import Note
@@ -61,6 +62,10 @@ class Project:
         The project as YAML with all defaults filled in, without absolute paths.
     hints : tuple of Note
         What was passed over or not used, and why.
+    tree : Node
+        The project file with everything merged into it: it knows where each value stands.
+    tables : Tables
+        Its tables as they were read.
     """
 
     inputs: Inputs
@@ -69,11 +74,21 @@ class Project:
     files: tuple[Path, ...]
     resolved: str
     hints: tuple[Note, ...]
+    tree: Node
+    tables: Tables
 
     @property
     def directory(self) -> Path:
         """Folder of the project file."""
         return self.path.parent
+
+    @contextmanager
+    def places(self) -> Iterator[None]:
+        """Give faults that are found in what was read, not while it was read, their place in the project file."""
+        try:
+            yield
+        except InputError as error:
+            raise InputError(fault if fault.file else _placed(self.tree, fault) for fault in error.faults) from None
 
 
 def load_project(path: Path, overrides: Sequence[str] = ()) -> Project:
@@ -112,7 +127,8 @@ def load_project(path: Path, overrides: Sequence[str] = ()) -> Project:
     project = completed(project, root, name)
     inputs, notes = _inputs(project, tables)
     read = tuple(map(Path, files))
-    return Project(inputs, settings(project), path, read, text_of(project), (*findings.notes, *notes))
+    told = (*findings.notes, *notes)
+    return Project(inputs, settings(project), path, read, text_of(project), told, root, tables)
 
 
 def _check_frames(root: Node, directory: Path, findings: Findings) -> None:

@@ -35,7 +35,7 @@ def path_of(node: Node, project: str) -> str:
         The path as the user could type it: relative to where `project` is relative to.
     """
     owner = project if node.place.file == COMMAND_LINE else node.place.file
-    return os.path.normpath(Path(owner).parent / node.text)
+    return str(Path(owner).parent / node.text)  # `..` stays: behind a link it does not cancel the folder before it
 
 
 def read_tree(file: str, findings: Findings, files: list[str]) -> Node | None:

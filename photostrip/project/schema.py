@@ -6,9 +6,11 @@ those of the settings beside the mathematics; none is repeated. Each description
 
 from __future__ import annotations
 
+from copy import deepcopy
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainValidator, WithJsonSchema, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainValidator, model_validator
 from pydantic_core import PydanticCustomError
 
 from photostrip.formats.findings import suggestion
@@ -62,9 +64,19 @@ def _text(value: object) -> Text:
     return Text(word)
 
 
-def _typed(read: Callable[[object], object], schema: dict[str, Any]) -> tuple[PlainValidator, WithJsonSchema]:
+@dataclass(frozen=True, eq=False)
+class _Described:
+    """What editors are told about a type; each key gets a copy of its own, to which its description is added."""
+
+    schema: dict[str, Any]
+
+    def __get_pydantic_json_schema__(self, core: object, handler: object) -> dict[str, Any]:
+        return deepcopy(self.schema)
+
+
+def _typed(read: Callable[[object], object], schema: dict[str, Any]) -> tuple[PlainValidator, _Described]:
     """Type that is read by a function of our own and described to editors by a schema of our own."""
-    return PlainValidator(read), WithJsonSchema(schema)
+    return PlainValidator(read), _Described(schema)
 
 
 def _number(expected: str, least: float = -float("inf"), most: float = float("inf")) -> Callable[[object], float]:
@@ -88,7 +100,7 @@ def _or_auto(read: Callable[[object], float]) -> Callable[[object], float | None
     return lambda value: None if value == "auto" else read(value)
 
 
-def _choice(allowed: tuple[str, ...], *later: str) -> tuple[PlainValidator, WithJsonSchema]:
+def _choice(allowed: tuple[str, ...], *later: str) -> tuple[PlainValidator, _Described]:
     """Type of a word from a list; words of a later version are refused by name."""
     expected = allowed[0] if len(allowed) == 1 else f"one of {', '.join(allowed)}"
 
@@ -458,6 +470,8 @@ def json_schema() -> dict[str, Any]:
     dict
         JSON Schema, draft 2020-12; the same on every call.
     """
+    for section in (Angles, Output, Relative, Polynomial, Interior, Processing, Tolerances):
+        section.model_rebuild()  # early versions of pydantic cannot describe a default of a section not built yet
     schema = _for_editors(ProjectFile.model_json_schema())
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "photostrip project", **schema}
 
@@ -469,6 +483,10 @@ def _for_editors(schema: Any) -> Any:  # noqa: ANN401 (JSON)
     if not isinstance(schema, dict):
         return schema
     result = {name: _for_editors(each) for name, each in schema.items() if name != "title" or isinstance(each, dict)}
+    if "allOf" in result:  # early versions of pydantic wrap a reference that has a description
+        result |= result.pop("allOf")[0]
+    if result.get("type") == "object" and "minLength" in result:
+        result["minProperties"] = result.pop("minLength")
     kinds = [each for each in result.get("anyOf", []) if each != {"type": "null"}]
     if "anyOf" in result:
         del result["anyOf"]

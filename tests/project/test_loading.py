@@ -140,6 +140,16 @@ def test_paths_are_shown_as_the_user_typed_them(tmp_path: Path, monkeypatch: pyt
     assert [str(file) for file in load_project(Path("project.yaml")).files][1] == "observations.csv"
 
 
+def test_paths_behind_a_link_lead_where_the_system_finds_them(tmp_path: Path) -> None:
+    project = sample(tmp_path / "runs" / "july")
+    (tmp_path / "latest").symlink_to(tmp_path / "runs" / "july")
+    (tmp_path / "runs" / "july" / "observations.csv").rename(tmp_path / "runs" / "o.csv")
+    project.change("project.yaml", "observations.csv", "../o.csv")
+    loaded = load_project(tmp_path / "latest" / "project.yaml")
+    assert len(loaded.inputs.observations) == 8
+    assert 'file: "../o.csv"' in loaded.resolved
+
+
 # ------------------------------------------------------------------------------------------- units of photos
 
 

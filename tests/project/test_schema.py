@@ -59,6 +59,7 @@ def test_editors_are_told_what_is_read() -> None:
     assert definitions["Relative"]["properties"]["parallax_limit"]["default"] == "auto"
     assert definitions["Polynomial"]["properties"]["degree"]["enum"] == ["auto", 1, 2, 3]
     assert "number" in definitions["Strip"]["properties"]["photos"]["items"]["type"]
+    assert schema["properties"]["cameras"]["minProperties"] == 1
     text = json.dumps(schema)
     assert '"default": null' not in text
     assert '{"type": "null"}' not in text
