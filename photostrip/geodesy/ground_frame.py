@@ -339,6 +339,21 @@ class GroundFrame:
         axes = self._true_axes(geodetic) if self.kind == "geographic" else self._grid_axes(geodetic)
         return axes if self._shift is None else self._shifted_axes(geodetic, axes)
 
+    def level_axes_at(self, xyz: ArrayLike) -> Array:
+        """Directions of east, north and up at points, in the Cartesian frame.
+
+        Parameters
+        ----------
+        xyz : array_like, shape (n, 3)
+            Points in the Cartesian frame, metres.
+
+        Returns
+        -------
+        ndarray, shape (n, 3, 3)
+            Rows are unit vectors: :meth:`axes_at`, but true east, north and the normal for ``geocentric``.
+        """
+        return self._true_axes(self.geodetic(xyz)) if self.kind == "geocentric" else self.axes_at(xyz)
+
     def convergence(self, xyz: ArrayLike) -> Array:
         """Meridian convergence: the azimuth of grid north.
 

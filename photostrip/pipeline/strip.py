@@ -73,7 +73,7 @@ def adjust_strip(
         problem = polynomial.Problem(
             xyz[rows],
             targets,
-            absolute.weights(here, precision),
+            absolute.weights(targets.turned(xyz[rows]), precision),
             spacing=float(np.linalg.norm(np.diff(centers, axis=0), axis=1).mean()),
             breadth=max(float(np.quantile(np.abs(xyz[:, 1]), 0.95)), 1e-6),
         )
@@ -148,7 +148,9 @@ def _to_ground(
         intermediate = provisional_frame.with_azimuth(strip_azimuth(ends[0], ends[1]))
         precision = _precision(formed, oriented, sigma, provisional.similarity.scale)
         targets = absolute.Targets(control, frames, intermediate)
-        final = absolute.orient(formed.xyz[rows], targets, absolute.weights(control, precision))
+        cartesian = provisional_frame.cartesian_from_intermediate(provisional.similarity(formed.xyz[rows]))
+        turned = targets.turned(intermediate.intermediate_from_cartesian(cartesian))
+        final = absolute.orient(formed.xyz[rows], targets, absolute.weights(turned, precision))
     except GeometryError as error:
         msg = f"strip {strip.id}: {error}"
         raise GeometryError(msg, photos=strip.photos, points=error.points, code=error.code) from error

@@ -57,6 +57,7 @@ def triangulate(inputs: Inputs, settings: Settings, *, directory: Path | None = 
     """
     _require(settings)
     frames, output = _frames(inputs, settings, directory)
+    _require_whole(inputs, frames)
     observations, fiducial = _photo_coordinates(inputs, settings)
     refined = _ideal_coordinates(observations, inputs, settings, frames)
     control = _measured_control(inputs, refined.observations)
@@ -92,6 +93,24 @@ def _require(settings: Settings) -> None:
             expected=" or ".join(ADJUSTMENTS),
         )
         raise InputError(fault)
+
+
+def _require_whole(inputs: Inputs, frames: Sequence[GroundFrame]) -> None:
+    """Refuse geocentric points of which only some coordinates count: X, Y, Z are neither plan nor height."""
+    control = inputs.control
+    geocentric = np.array([frame.kind == "geocentric" for frame in frames])
+    part = control.use.any(axis=1) & ~control.use.all(axis=1)
+    faults = [
+        Fault(
+            f"point {control.ids[row]} is geocentric, and only some of its coordinates count",
+            code="geocentric-use",
+            key=f"control[{control.frame[row]}]",
+            expected="`use: xyz` or `off`: X, Y and Z are neither plan nor height",
+        )
+        for row in np.flatnonzero(part & geocentric[control.frame]).tolist()
+    ]
+    if faults:
+        raise InputError(faults)
 
 
 def _frames(inputs: Inputs, settings: Settings, directory: Path | None) -> tuple[list[GroundFrame], GroundFrame]:

@@ -10,7 +10,7 @@ Source: [001] eq. 142-149; mixed control and its weights are derived.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,7 +20,7 @@ from photostrip.geometry.rotation import from_vector
 from photostrip.geometry.similarity import Similarity, collinearity
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -97,7 +97,7 @@ class Targets:
         return self.intermediate.intermediate_from_cartesian(result)
 
     def axes(self, xyz: Floats) -> Floats:
-        """Directions along which the coordinates of the control points are given.
+        """Directions along which the control points are compared with the strip.
 
         Parameters
         ----------
@@ -107,15 +107,42 @@ class Targets:
         Returns
         -------
         ndarray, shape (n, 3, 3)
-            Rows are the unit vectors of the point's ground axes in the intermediate frame.
+            Rows are unit vectors in the intermediate frame: the point's ground axes; east, north and up
+            for geocentric points, whose coordinates come three together.
         """
         cartesian = self.intermediate.cartesian_from_intermediate(xyz)
+        return self._by_frame(cartesian, lambda frame, points: frame.level_axes_at(points)) @ self.intermediate.axes
+
+    def turned(self, xyz: Floats) -> ControlPoints:
+        """Give the control with its standard deviations along :meth:`axes`.
+
+        Parameters
+        ----------
+        xyz : ndarray, shape (n, 3)
+            Positions in the intermediate frame, metres.
+
+        Returns
+        -------
+        ControlPoints
+            The same points; the standard deviations differ where the coordinates are geocentric.
+        """
+        if not any(frame.kind == "geocentric" for frame in self.frames):
+            return self.control
+        cartesian = self.intermediate.cartesian_from_intermediate(xyz)
+        turn = self.axes(xyz) @ self.intermediate.axes.T  # compared axes in the Cartesian frame
+        given = self._by_frame(cartesian, lambda frame, points: frame.axes_at(points))
+        share = np.einsum("nij,nkj->nik", turn, given) ** 2  # the identity but for geocentric points
+        sigma = np.where(self.control.use, self.control.sigma, 0.0)
+        return replace(self.control, sigma=np.sqrt(np.einsum("nik,nk->ni", share, sigma**2)))
+
+    def _by_frame(self, cartesian: Floats, directions: Callable[[GroundFrame, Floats], Floats]) -> Floats:
+        """Collect directions at points from the ground frame of each."""
         result = np.empty((len(cartesian), 3, 3))
         for number, frame in enumerate(self.frames):
             rows = self.control.frame == number
             if rows.any():
-                result[rows] = frame.axes_at(cartesian[rows])
-        return result @ self.intermediate.axes
+                result[rows] = directions(frame, cartesian[rows])
+        return result
 
     def misclosures(self, xyz: Floats) -> Floats:
         """Present minus given coordinates, along the ground axes.
@@ -143,7 +170,8 @@ class AbsoluteOrientation:
     similarity : Similarity
         Strip to intermediate frame.
     misclosures : ndarray, shape (n, 3)
-        Strip minus control along the ground axes in metres, after the similarity; 0 where a coordinate does not count.
+        Strip minus control along the axes compared (:meth:`Targets.axes`) in metres, after the similarity; 0 where a
+        coordinate does not count.
     sigma0 : float
         Standard deviation of unit weight, without unit (1 when the strip fits within the sigmas of the control and the
         a-priori precision of its points); NaN without redundancy.
@@ -169,14 +197,14 @@ def weights(control: ControlPoints, precision: tuple[float, float]) -> Floats:
     Parameters
     ----------
     control : ControlPoints
-        Control points with the standard deviations of their coordinates.
+        Control points with the standard deviations along the axes compared (:meth:`Targets.turned`).
     precision : tuple of float
         A-priori standard deviation of a strip point in plan and in height, metres.
 
     Returns
     -------
     ndarray, shape (n, 3)
-        1/(sigma_control^2 + sigma_point^2) in metres^-2; 0 where a coordinate does not count.
+        1/(sigma_control^2 + sigma_point^2) in metres^-2 along the axes compared; 0 where a coordinate does not count.
     """
     point = np.array([precision[0], precision[0], precision[1]])
     return np.where(control.use, 1 / (control.sigma**2 + point**2), 0.0)

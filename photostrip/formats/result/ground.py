@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.formats.result.numbers import GEOGRAPHIC, GROUND, Document, Plain, natural_rank, rounded
-from photostrip.geodesy.local_frame import axes_matrix
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -18,8 +17,6 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
-
-EASTWARD = np.pi / 2  # azimuth that makes the axes of an intermediate frame east, north, up
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,8 +154,8 @@ def differences(result: Result) -> Differences:
         if len(rows):
             place = result.points.cartesian[result.control_rows[rows]]
             found = result.control_differences[rows]
-            own = _level_axes(frame, place)
-            parts[rows] = found if frame.kind != "geocentric" else _turned(found, frame, place, own)
+            level = frame.level_axes_at(place)
+            parts[rows] = found if frame.kind != "geocentric" else _turned(found, frame, place, level)
             same = (frame.kind == "geocentric") == (result.output.kind == "geocentric")
             axes[rows] = found if same else _turned(found, frame, place, result.output.axes_at(place))
     sigma, scale, strips = _expected(result)
@@ -166,14 +163,6 @@ def differences(result: Result) -> Differences:
         ratio = np.abs(result.control_differences) / sigma
     normalised = np.where(np.isnan(ratio).all(axis=1), np.nan, np.nan_to_num(ratio).max(axis=1, initial=0.0))
     return Differences(result.output.user_from_internal(axes), parts, sigma, normalised, scale, strips)
-
-
-def _level_axes(frame: GroundFrame, place: Floats) -> Floats:
-    """East, north and up at points; grid axes where the frame has a grid."""
-    if frame.kind != "geocentric":
-        return frame.axes_at(place)
-    lon, lat, _ = frame.geodetic(place).T
-    return np.array([axes_matrix(*place, EASTWARD).T for place in zip(lat, lon, strict=True)])
 
 
 def _turned(found: Floats, frame: GroundFrame, place: Floats, axes: Floats) -> Floats:
@@ -191,6 +180,11 @@ def _expected(result: Result) -> tuple[Floats, Floats, tuple[tuple[str, ...], ..
     count = np.maximum(held.sum(axis=0), 1)
     point = np.array([[s.precision[0], s.precision[0], s.precision[1]] for s in strips])
     variance = (held.T @ point**2) / count[:, None]
+    for index, frame in enumerate(result.frames):
+        rows = np.flatnonzero((control.frame == index) & (result.control_rows >= 0))
+        if frame.kind == "geocentric" and len(rows):
+            level = frame.level_axes_at(result.points.cartesian[result.control_rows[rows]])
+            variance[rows] = np.einsum("nka,nk->na", level**2, variance[rows])
     scale = (held.T @ np.array([s.scale_number for s in strips])) / count
     names = tuple(tuple(s.strip.id for s, yes in zip(strips, column, strict=True) if yes) for column in held.T)
     return np.sqrt(control.sigma**2 + variance), np.where(scale > 0, scale, np.nan), names
@@ -269,7 +263,7 @@ def _level_ties(result: Result) -> Floats:
     if result.output.kind != "geocentric":
         return result.ties.difference
     place = result.points.cartesian[np.searchsorted(result.points.number, result.ties.number)]
-    level: Floats = np.einsum("nij,nj->ni", _level_axes(result.output, place), result.ties.difference)
+    level: Floats = np.einsum("nij,nj->ni", result.output.level_axes_at(place), result.ties.difference)
     return level
 
 
