@@ -1,0 +1,306 @@
+"""How accurately correction directions must be measured for a given image accuracy, and the other way round.
+
+The exact formulas hold for any orientation of the camera. Those of the source, kept for comparison, hold for a level
+camera and inherit a misprint of its eq. 3 in the vertical direction.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.terrestrial.directions import partials
+from photostrip.terrestrial.frame import ARCSECONDS, ground_from_photo
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    Floats = NDArray[np.float64]
+
+LEVEL = 1e-12  # difference of a rotation from that of a level camera
+
+
+@dataclass(frozen=True, eq=False)
+class Required:
+    """Standard errors with which correction directions must be known.
+
+    Parameters
+    ----------
+    angle : ndarray, shape (...)
+        m_lambda', of the angle between a point and the optical axis as the photo gives it, radians.
+    horizontal : ndarray, shape (...)
+        m_lambda, of a horizontal direction: an angle is the difference of two of them, radians.
+    vertical : ndarray, shape (...)
+        m_beta, of a vertical direction, radians.
+    """
+
+    angle: Floats
+    horizontal: Floats
+    vertical: Floats
+
+
+def required(xz: ArrayLike, principal_distance: float, sigma: float, rotation: ArrayLike) -> Required:
+    """Accuracy of directions that corresponds to an accuracy of image coordinates.
+
+    Parameters
+    ----------
+    xz : array_like, shape (..., 2)
+        Image coordinates in mm, reduced to the principal point.
+    principal_distance : float
+        Principal distance in mm.
+    sigma : float
+        Standard error m of x, of z and of the principal distance, mm.
+    rotation : array_like, shape (3, 3)
+        Photo to ground.
+
+    Returns
+    -------
+    Required
+        Standard errors in radians.
+
+    Notes
+    -----
+    Source: [002] eq. 4-6 with all first-order terms and without the misprint of eq. 3. For a level camera
+    m_lambda' = m / sqrt(f^2 + x^2) and m_beta = m / sqrt(f^2 + x^2 + z^2).
+    """
+    by = partials(xz, principal_distance, rotation)
+    errors = sigma * np.sqrt((by.by_xz**2).sum(axis=-1) + by.by_f**2)
+    return Required(errors[..., 0], errors[..., 0] / np.sqrt(2.0), errors[..., 1])
+
+
+@dataclass(frozen=True, eq=False)
+class Printed:
+    """Standard errors by the formulas as they are printed, for a level camera.
+
+    Parameters
+    ----------
+    horizontal : ndarray, shape (...)
+        m_lambda by eq. 5 and 6, which is right, radians.
+    vertical_eq5, vertical_eq6 : ndarray, shape (...)
+        m_beta by eq. 5 and by its shorter form eq. 6, radians.
+    """
+
+    horizontal: Floats
+    vertical_eq5: Floats
+    vertical_eq6: Floats
+
+
+def as_printed(xz: ArrayLike, principal_distance: float, sigma: float) -> Printed:
+    """Accuracy of directions by the formulas of the source.
+
+    Parameters
+    ----------
+    xz : array_like, shape (..., 2)
+        Image coordinates in mm, reduced to the principal point.
+    principal_distance : float
+        Principal distance in mm.
+    sigma : float
+        Standard error m of x, of z and of the principal distance, mm.
+
+    Returns
+    -------
+    Printed
+        Standard errors in radians.
+
+    Notes
+    -----
+    Source: [002] eq. 5 and 6 as printed, see docs/sources.md.
+    """
+    x, z = np.moveaxis(np.asarray(xz, float), -1, 0)
+    f = principal_distance
+    g = np.sqrt(1.0 + (x / f) ** 2)  # sec(lambda'), which should have been its inverse
+    denominator = f**2 + (z * g) ** 2
+    eq5 = sigma * g * np.sqrt(f**2 + z**2) / denominator
+    return Printed(sigma / np.sqrt(2.0 * (f**2 + x**2)), eq5, sigma / np.sqrt(denominator))
+
+
+def supported(
+    xz: ArrayLike, principal_distance: float, horizontal: float, vertical: float, rotation: ArrayLike
+) -> Floats:
+    """Image accuracy that directions of a given accuracy can vouch for.
+
+    Parameters
+    ----------
+    xz : array_like, shape (..., 2)
+        Image coordinates in mm, reduced to the principal point.
+    principal_distance : float
+        Principal distance in mm.
+    horizontal, vertical : float
+        Standard errors of the measured directions, radians.
+    rotation : array_like, shape (3, 3)
+        Photo to ground.
+
+    Returns
+    -------
+    ndarray, shape (..., 2)
+        Smallest standard error of image coordinates, in mm, for which the horizontal and the vertical direction are
+        accurate enough.
+
+    Notes
+    -----
+    Source: derived; :func:`required` solved for m.
+    """
+    unit = required(xz, principal_distance, 1.0, rotation)
+    return np.stack([horizontal / unit.horizontal, vertical / unit.vertical], axis=-1)
+
+
+def of_rounds(sigma: float, rounds: int) -> float:
+    """Give the standard error of the mean of several rounds.
+
+    Parameters
+    ----------
+    sigma : float
+        Standard error of a direction measured in one round, in both faces; any unit.
+    rounds : int
+        Number of rounds.
+
+    Returns
+    -------
+    float
+        In the unit of `sigma`.
+    """
+    return float(sigma / np.sqrt(rounds))
+
+
+def rounds_for(sigma: float, wanted: float) -> int:
+    """Give the number of rounds that a theodolite needs.
+
+    Parameters
+    ----------
+    sigma : float
+        Standard error of a direction measured in one round, in both faces.
+    wanted : float
+        Standard error that the mean must have, in the same unit.
+
+    Returns
+    -------
+    int
+        Number of rounds, at least 1.
+    """
+    return max(1, ceil((sigma / wanted) ** 2 - 1e-9))  # exactly four times is not more than four times
+
+
+def grid(photo_format: tuple[float, float], step: float, *, level: bool = True) -> tuple[Floats, Floats]:
+    """Coordinates over the photo at which accuracy is tabulated.
+
+    Parameters
+    ----------
+    photo_format : tuple of float
+        Width and height of the photo in mm.
+    step : float
+        Distance of the coordinates in mm.
+    level : bool
+        Whether one quarter of the photo stands for the others.
+
+    Returns
+    -------
+    x, z : ndarray
+        Multiples of the step up to the edge, and the edge itself, mm.
+    """
+    axes = []
+    for size in photo_format:
+        half = size / 2
+        inside = step * np.arange(int(np.ceil(half / step - LEVEL)))
+        upper = np.append(inside, half)
+        axes.append(upper if level else np.concatenate([-upper[:0:-1], upper]))
+    return axes[0], axes[1]
+
+
+# ---------------------------------------------------------------------------------- the examples of the source
+
+
+@dataclass(frozen=True, slots=True)
+class Example:
+    """A worked example of the source.
+
+    Parameters
+    ----------
+    camera : str
+        Name of the camera.
+    f, x, z, sigma : float
+        Principal distance, image coordinates and their standard error, mm.
+    horizontal, vertical : float
+        m_lambda and m_beta as printed, arcseconds.
+    factor : float
+        1 + x^2/f^2 as printed.
+    """
+
+    camera: str
+    f: float
+    x: float
+    z: float
+    sigma: float
+    horizontal: float
+    vertical: float
+    factor: float
+
+
+# Source: [002], the two examples at its end.
+EXAMPLES = (
+    Example("Photheo 19/1318", 190.0, 80.0, 60.0, 0.005, 3.5, 5.0, 1.18),
+    Example("UMK 10/1318", 100.0, 80.0, 60.0, 0.005, 6.0, 8.5, 1.18),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class WorkedExample:
+    """An example computed again, step by step; standard errors in arcseconds.
+
+    Parameters
+    ----------
+    example : Example
+        What is printed.
+    horizontal : float
+        m_lambda, exact.
+    printed_factor : float
+        m_beta by eq. 6 with the factor that is printed: what the source computed.
+    eq5, eq6 : float
+        m_beta by eq. 5 and by eq. 6 with the factor of the camera.
+    factor : float
+        The factor 1 + x^2/f^2 of the camera.
+    vertical : float
+        m_beta, exact.
+    returned_z : float
+        What z comes back as, when beta is computed by eq. 3 as printed and put into eq. 2, mm.
+    """
+
+    example: Example
+    horizontal: float
+    printed_factor: float
+    eq5: float
+    eq6: float
+    factor: float
+    vertical: float
+    returned_z: float
+
+
+def worked(example: Example) -> WorkedExample:
+    """Compute an example of the source again.
+
+    Parameters
+    ----------
+    example : Example
+        What is printed.
+
+    Returns
+    -------
+    WorkedExample
+        The same by the printed and by the exact formulas.
+    """
+    f, x, z, m = example.f, example.x, example.z, example.sigma
+    exact = required([x, z], f, m, ground_from_photo(0.0))
+    printed = as_printed([x, z], f, m)
+    factor = 1.0 + (x / f) ** 2
+    return WorkedExample(
+        example,
+        float(exact.horizontal) * ARCSECONDS,
+        float(m * ARCSECONDS / np.sqrt(f**2 + z**2 * example.factor)),
+        float(printed.vertical_eq5) * ARCSECONDS,
+        float(printed.vertical_eq6) * ARCSECONDS,
+        factor,
+        float(exact.vertical) * ARCSECONDS,
+        z * factor,  # tan(beta) = z sec/f, and eq. 2 multiplies by f sec again
+    )

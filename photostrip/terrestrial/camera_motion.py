@@ -1,0 +1,297 @@
+"""Cameras that turned between two epochs: found by points that did not move, and taken into account.
+
+A camera on its station can turn, not walk: the image of a point that stands still moves by an amount that depends on
+the turn alone, not on the distance of the point. For each camera and epoch a small turn against the reference epoch is
+fitted to the stable points and tested against zero. A stable point that does not fit to the others moved itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.geometry.rotation import alpha_omega_kappa
+from photostrip.statistics import chi2_quantile
+from photostrip.terrestrial.frame import rays, small_turn
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
+
+ANGLES = 3  # a turn to the right, up, and about the optical axis
+ITERATIONS = 20
+CONVERGED = 1e-12  # rad
+WEAKEST = 1e-10  # reciprocal of the squared condition number below which a turn is not determined
+REJECTION = 0.01  # probability of rejecting any of the stable points of an epoch by chance
+
+
+@dataclass(frozen=True, eq=False)
+class ImagePair:
+    """The stable points on two photos of one camera.
+
+    Parameters
+    ----------
+    before, after : ndarray, shape (m, 2)
+        x, z in mm, reduced to the principal point, in the reference epoch and now. NaN in `after` where a coordinate
+        was not measured now.
+    variances : ndarray, shape (m, 2)
+        Variances of the differences, mm^2.
+    principal_distance : float
+        f in mm.
+    """
+
+    before: Floats
+    after: Floats
+    variances: Floats
+    principal_distance: float
+
+    @property
+    def measured(self) -> Flags:
+        """Which coordinates can be compared, shape (m, 2)."""
+        return np.asarray(np.isfinite(self.before + self.after), bool)
+
+
+@dataclass(frozen=True, eq=False)
+class Turn:
+    """The fitted turn of one camera in one epoch.
+
+    Parameters
+    ----------
+    values : ndarray, shape (3,)
+        Turn to the right, up, and counter-clockwise about the optical axis, radians.
+    normal : ndarray, shape (3, 3)
+        Inverse of its covariance, rad^-2.
+    design : ndarray, shape (m, 2, 3)
+        Derivatives of the coordinates by the turn, mm/rad; zero where a point was not used.
+    weights : ndarray, shape (m, 2)
+        Weights of the coordinates, mm^-2; zero where a point was not used.
+    residuals : ndarray, shape (m, 2)
+        Measured minus computed coordinates of all points, mm; NaN where they cannot be compared.
+    """
+
+    values: Floats
+    normal: Floats
+    design: Floats
+    weights: Floats
+    residuals: Floats
+
+    @property
+    def covariance(self) -> Floats:
+        """Covariance of the turn, rad^2, shape (3, 3)."""
+        return np.asarray(np.linalg.inv(self.normal), float)
+
+    @property
+    def sigma(self) -> Floats:
+        """Standard deviations of the turn, radians."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def statistic(self) -> float:
+        """Test value of the turn: chi-square with three degrees of freedom when the camera stood still."""
+        return float(self.values @ self.normal @ self.values)
+
+    @property
+    def weighted_sum(self) -> float:
+        """Weighted sum of squared residuals of the points used."""
+        return float(np.nansum(self.weights * self.residuals**2))
+
+    @property
+    def dof(self) -> int:
+        """Degrees of freedom of the weighted sum."""
+        return int((self.weights > 0).sum()) - ANGLES
+
+    def predict(self, number: int) -> tuple[Floats, Floats] | None:
+        """Fit the turn without one point.
+
+        Parameters
+        ----------
+        number : int
+            The point.
+
+        Returns
+        -------
+        tuple of ndarray or None
+            Turn and its normal matrix; None when the other points do not determine it.
+        """
+        own = self.design[number] * self.weights[number][:, None]
+        normal = self.normal - own.T @ self.design[number]
+        if not determined(normal):
+            return None
+        shift = np.linalg.solve(normal, own.T @ np.nan_to_num(self.residuals[number]))
+        return self.values - shift, normal
+
+
+def turned(before: Floats, principal_distance: float, turn: Floats) -> Floats:
+    """Where points stand in the photo after the camera turned.
+
+    Parameters
+    ----------
+    before : ndarray, shape (m, 2)
+        Coordinates before in mm, from the principal point.
+    principal_distance : float
+        f in mm.
+    turn : ndarray, shape (3,)
+        Turn to the right, up, and counter-clockwise, radians.
+
+    Returns
+    -------
+    ndarray, shape (m, 2)
+        Coordinates after it, mm.
+    """
+    ray = rays(before, principal_distance) @ small_turn(turn)
+    after: Floats = -principal_distance * ray[:, :2] / ray[:, 2:]
+    return after
+
+
+def turn_gradient(points: Floats, principal_distance: float) -> Floats:
+    """Give the derivatives of coordinates by a small turn of the camera.
+
+    Parameters
+    ----------
+    points : ndarray, shape (m, 2)
+        Coordinates in mm, from the principal point.
+    principal_distance : float
+        f in mm.
+
+    Returns
+    -------
+    ndarray, shape (m, 2, 3)
+        Rows x, z; columns turn to the right, up, counter-clockwise; mm/rad.
+
+    Notes
+    -----
+    Source: derived; tested against differences.
+    """
+    x, z = points.T
+    f = principal_distance
+    across = x * z / f
+    return np.stack(
+        [np.column_stack([-f - x**2 / f, -across, z]), np.column_stack([-across, -f - z**2 / f, -x])], axis=1
+    )
+
+
+def fit(pair: ImagePair, used: Flags) -> Turn | None:
+    """Fit the turn of a camera.
+
+    Parameters
+    ----------
+    pair : ImagePair
+        The stable points on both photos.
+    used : ndarray of bool, shape (m,)
+        Points to use.
+
+    Returns
+    -------
+    Turn or None
+        None when the points do not determine a turn: two points with x and z are needed, or three with x.
+    """
+    there = pair.measured & used[:, None]
+    weights = np.where(there, 1.0 / pair.variances, 0.0)
+    values = np.zeros(ANGLES)
+    for _ in range(ITERATIONS):
+        predicted = turned(pair.before, pair.principal_distance, values)
+        design = np.where(there[:, :, None], turn_gradient(np.nan_to_num(predicted), pair.principal_distance), 0.0)
+        normal = np.einsum("mij,mi,mik->jk", design, weights, design)
+        if not determined(normal):
+            return None
+        residuals = pair.after - predicted
+        step = np.linalg.solve(normal, np.einsum("mij,mi,mi->j", design, weights, np.nan_to_num(residuals)))
+        values = _composed(values, step)
+        if np.abs(step).max() < CONVERGED:
+            return Turn(values, normal, design, weights, residuals)
+    return None
+
+
+def _composed(turn: Floats, step: Floats) -> Floats:
+    """Turn of a camera that turned first by `turn`, then by `step` in its new axes."""
+    return np.array(alpha_omega_kappa(small_turn(turn) @ small_turn(step)))
+
+
+def determined(normal: Floats) -> bool:
+    """Whether a normal matrix of a turn can be inverted."""
+    length = np.sqrt(np.diag(normal))
+    if not length.all():
+        return False
+    size = np.linalg.eigvalsh(normal / np.outer(length, length))
+    return bool(size[0] > WEAKEST)
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """What the stable points say of both cameras in one epoch.
+
+    Parameters
+    ----------
+    turns : tuple of Turn or None
+        Of the left and the right camera; None where the stable points do not determine it.
+    used : ndarray of bool, shape (m,)
+        Stable points that fit together.
+    rejected : tuple of tuple
+        Number, test value and limit of points that do not fit to the others, in order.
+    """
+
+    turns: tuple[Turn | None, Turn | None]
+    used: Flags
+    rejected: tuple[tuple[int, float, float], ...]
+
+
+def find_motion(left: ImagePair, right: ImagePair) -> Motion:
+    """Fit the turns of both cameras to the points that did not move.
+
+    Parameters
+    ----------
+    left, right : ImagePair
+        The same stable points on the photos of both cameras.
+
+    Returns
+    -------
+    Motion
+        Turns, and the points that moved themselves: at each step the one that fits worst to the others.
+    """
+    pairs = (left, right)
+    used = np.ones(len(left.before), bool)
+    rejected: list[tuple[int, float, float]] = []
+    while True:
+        turns = (fit(left, used), fit(right, used))
+        worst = _worst(pairs, turns, used)
+        if worst is None:
+            return Motion(turns, used, tuple(rejected))
+        rejected.append(worst)
+        used = used.copy()
+        used[worst[0]] = False
+
+
+def _worst(
+    pairs: tuple[ImagePair, ImagePair], turns: tuple[Turn | None, Turn | None], used: Flags
+) -> tuple[int, float, float] | None:
+    """Find the point that fits worst to the turns that the others give, if it fits too badly."""
+    rows = np.flatnonzero(used)
+    worst: tuple[int, float, float] | None = None
+    for row in rows:
+        value, components = 0.0, 0
+        for pair, turn in zip(pairs, turns, strict=True):
+            drop, parts = _misfit(pair, turn, int(row))
+            value, components = value + drop, components + parts
+        if not components:
+            continue
+        limit = chi2_quantile(1 - REJECTION / len(rows), components)
+        if value > limit and (worst is None or value / limit > worst[1] / worst[2]):
+            worst = (int(row), value, limit)
+    return worst
+
+
+def _misfit(pair: ImagePair, turn: Turn | None, row: int) -> tuple[float, int]:
+    """Squared misclosure of a point against the turn fitted without it, and its degrees of freedom."""
+    there = pair.measured[row]
+    without = turn.predict(row) if turn is not None else None
+    if without is None or turn is None or not there.any():
+        return 0.0, 0
+    values, normal = without
+    miss = (pair.after[row] - turned(pair.before[row : row + 1], pair.principal_distance, values)[0])[there]
+    design = turn.design[row][there]
+    covariance = np.diag(pair.variances[row][there]) + design @ np.linalg.inv(normal) @ design.T
+    return float(miss @ np.linalg.solve(covariance, miss)), int(there.sum())

@@ -1,0 +1,136 @@
+"""Photo coordinates of a phototheodolite to horizontal and vertical directions, and back.
+
+Directions are azimuths lambda, clockwise from the ground's Y axis, and elevations beta.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.terrestrial.frame import direction_gradient, directions_of, rays, vectors_of
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    Floats = NDArray[np.float64]
+
+BEHIND = 1e-6  # cosine of the angle to the optical axis below which a direction cannot be on the photo
+
+
+@dataclass(frozen=True, slots=True)
+class Phototheodolite:
+    """What a terrestrial camera is made of.
+
+    Parameters
+    ----------
+    name : str
+        Its name.
+    principal_distance : float
+        Principal distance f in mm.
+    principal_point : tuple of float
+        x0, z0 in mm in the system of the image coordinates.
+    format : tuple of float, optional
+        Width and height in mm of the field in which points are measured.
+    """
+
+    name: str
+    principal_distance: float
+    principal_point: tuple[float, float] = (0.0, 0.0)
+    format: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Partials:
+    """Derivatives of the directions of image points.
+
+    Parameters
+    ----------
+    by_xz : ndarray, shape (..., 2, 2)
+        Rows lambda and beta, columns x and z, rad/mm.
+    by_f : ndarray, shape (..., 2)
+        By the principal distance, rad/mm.
+    """
+
+    by_xz: Floats
+    by_f: Floats
+
+
+def directions_from_photo(xz: ArrayLike, principal_distance: float, rotation: ArrayLike) -> Floats:
+    """Horizontal and vertical directions of image points.
+
+    Parameters
+    ----------
+    xz : array_like, shape (..., 2)
+        Image coordinates in mm, reduced to the principal point.
+    principal_distance : float
+        Principal distance in mm.
+    rotation : array_like, shape (3, 3)
+        Photo to ground.
+
+    Returns
+    -------
+    ndarray, shape (..., 2)
+        Lambda in (-pi, pi] and beta in radians.
+
+    Notes
+    -----
+    Source: [002] eq. 1 turned round; for omega = kappa = 0 eq. 3 with cos(lambda') where sec(lambda') is printed.
+    """
+    return directions_of(rays(xz, principal_distance) @ np.asarray(rotation, float).T)
+
+
+def photo_from_directions(directions: ArrayLike, principal_distance: float, rotation: ArrayLike) -> Floats:
+    """Image coordinates of directions.
+
+    Parameters
+    ----------
+    directions : array_like, shape (..., 2)
+        Lambda and beta in radians.
+    principal_distance : float
+        Principal distance in mm.
+    rotation : array_like, shape (3, 3)
+        Photo to ground.
+
+    Returns
+    -------
+    ndarray, shape (..., 2)
+        Image coordinates in mm from the principal point; NaN where the direction is 90 degrees or more from the
+        optical axis.
+
+    Notes
+    -----
+    Source: [002] eq. 1; eq. 2 for omega = kappa = 0.
+    """
+    ray = vectors_of(directions) @ np.asarray(rotation, float)
+    depth = np.where(-ray[..., 2] > BEHIND, -ray[..., 2], np.nan)
+    xz: Floats = principal_distance * ray[..., :2] / depth[..., None]
+    return xz
+
+
+def partials(xz: ArrayLike, principal_distance: float, rotation: ArrayLike) -> Partials:
+    """Give the derivatives of the directions by what is measured in the photo.
+
+    Parameters
+    ----------
+    xz : array_like, shape (..., 2)
+        Image coordinates in mm, reduced to the principal point.
+    principal_distance : float
+        Principal distance in mm.
+    rotation : array_like, shape (3, 3)
+        Photo to ground.
+
+    Returns
+    -------
+    Partials
+        Derivatives of lambda and beta.
+
+    Notes
+    -----
+    Source: derived; for omega = kappa = 0 they are [002] eq. 4 with the error of eq. 3 removed.
+    """
+    turn = np.asarray(rotation, float)
+    gradient = direction_gradient(rays(xz, principal_distance) @ turn.T) @ turn
+    return Partials(gradient[..., :2], -gradient[..., 2])

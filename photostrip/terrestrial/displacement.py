@@ -1,0 +1,159 @@
+"""Displacements of points between two epochs, from pseudo-parallaxes in the normal case.
+
+A pseudo-parallax is the difference of a coordinate on two photos taken from the same station at different times.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.statistics import chi2_quantile
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    Floats = NDArray[np.float64]
+
+SPACE = 3  # components of a displacement
+SINGULAR = 1e-12  # reciprocal condition of a covariance matrix below which there is no test
+
+
+def displacements(first: Floats, second: Floats, principal_distance: float, base: float) -> Floats:
+    """Displacements in the axes of the normal case.
+
+    Parameters
+    ----------
+    first, second : ndarray, shape (n, 4)
+        x, z of the left and x, z of the right photo in mm in two epochs.
+    principal_distance : float
+        f in mm.
+    base : float
+        B in metres.
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+        dX, dY, dZ in metres, second minus first epoch: exactly the difference of the intersected points, without
+        its loss of digits.
+
+    Notes
+    -----
+    Source: [004c] eq. 2, completed: x' and z' are coordinates of the second epoch, dp is left minus right.
+    """
+    f = principal_distance
+    change = second - first
+    p = first[:, 0] - first[:, 2]
+    dp = change[:, 0] - change[:, 2]
+    depth = base * f / p
+    dy = -depth * dp / (p + dp)
+    dx = (depth * change[:, 0] + dy * second[:, 0]) / f
+    dz = (depth * change[:, 1] + dy * second[:, 1]) / f
+    return np.column_stack([dx, dy, dz])
+
+
+def standard_errors(second: Floats, sigma: float, principal_distance: float, base: float) -> Floats:
+    """Give standard errors for pseudo-parallaxes of equal accuracy, z of the right photo not measured.
+
+    Parameters
+    ----------
+    second : ndarray, shape (n, 4)
+        Coordinates of the second epoch in mm.
+    sigma : float
+        Standard deviation of each pseudo-parallax in mm.
+    principal_distance : float
+        f in mm.
+    base : float
+        B in metres.
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+        m_dX, m_dY, m_dZ in metres.
+
+    Notes
+    -----
+    Source: derived from the completed [004c] eq. 2.
+    """
+    x, z, p = second[:, 0], second[:, 1], second[:, 0] - second[:, 2]
+    depth = base * principal_distance / p
+    across = depth / principal_distance * sigma
+    return np.column_stack(
+        [
+            across * np.hypot(1 - x / p, x / p),
+            depth**2 / (base * principal_distance) * sigma * np.sqrt(2.0),
+            across * np.sqrt(1 + 2 * (z / p) ** 2),
+        ]
+    )
+
+
+def statistic(displacement: ArrayLike, covariance: ArrayLike) -> Floats:
+    """Test value of displacements: chi-square with three degrees of freedom where nothing moved.
+
+    Parameters
+    ----------
+    displacement : array_like, shape (..., 3)
+        Displacements in metres.
+    covariance : array_like, shape (..., 3, 3)
+        Their covariance in m^2.
+
+    Returns
+    -------
+    ndarray, shape (...)
+        d^T C^-1 d; NaN where C is singular or has no value.
+    """
+    d, c = np.asarray(displacement, float), np.asarray(covariance, float)
+    value = np.full(d.shape[:-1], np.nan)
+    known = np.isfinite(d).all(axis=-1) & np.isfinite(c).all(axis=(-2, -1))
+    sound = known.copy()
+    if known.any():
+        size = np.linalg.eigvalsh(c[known])
+        sound[known] = size[..., 0] > SINGULAR * size[..., -1]
+    if sound.any():
+        value[sound] = np.einsum("ni,ni->n", d[sound], np.linalg.solve(c[sound], d[sound][..., None])[..., 0])
+    return value
+
+
+def limit(significance: float, components: int = SPACE) -> float:
+    """Critical value of :func:`statistic`.
+
+    Parameters
+    ----------
+    significance : float
+        Probability of calling a point moved that did not move.
+    components : int
+        Degrees of freedom.
+
+    Returns
+    -------
+    float
+        Quantile of chi-square.
+    """
+    return chi2_quantile(1 - significance, components)
+
+
+def ellipses(covariance: ArrayLike, probability: float) -> tuple[Floats, Floats, Floats]:
+    """Confidence ellipses in plan.
+
+    Parameters
+    ----------
+    covariance : array_like, shape (..., 2, 2)
+        Covariance of the first two components (to the right and ahead, or east and north), m^2.
+    probability : float
+        Probability that the ellipse around the estimate covers the truth.
+
+    Returns
+    -------
+    major, minor : ndarray, shape (...)
+        Semi-axes in metres.
+    azimuth : ndarray, shape (...)
+        Direction of the major axis clockwise from the second axis, in [0, pi), radians.
+    """
+    c = np.asarray(covariance, float)
+    half_sum = (c[..., 0, 0] + c[..., 1, 1]) / 2
+    half_difference = (c[..., 1, 1] - c[..., 0, 0]) / 2
+    radius = np.hypot(half_difference, c[..., 0, 1])
+    factor = chi2_quantile(probability, 2)
+    azimuth = np.mod(np.arctan2(c[..., 0, 1], half_difference) / 2, np.pi)
+    return np.sqrt(factor * (half_sum + radius)), np.sqrt(factor * np.maximum(half_sum - radius, 0)), azimuth

@@ -1,0 +1,176 @@
+"""How a camera on a tripod looks at the ground: its rotation, its rays, their directions.
+
+The ground has X to the right of Y and Z up (east, north, up). The photo has x to the right, z up; the third axis of its
+rays points away from the object, as everywhere in this program: a ray is (x, z, -f). The rotation from the photo to
+the ground is that of an aerial photo, alpha-omega-kappa, with the axes of the ground renamed: what lies ahead of an
+aerial camera, to its left and above it, lies to the right of a terrestrial one, above it and behind it.
+
+- alpha: azimuth of the optical axis, clockwise from the ground's Y axis (north);
+- omega: elevation of the optical axis, positive when the camera looks up;
+- kappa: roll about the optical axis, positive when the photo's x axis turns counter-clockwise for the photographer.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.geometry.rotation import alpha_omega_kappa, from_alpha_omega_kappa
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    Floats = NDArray[np.float64]
+
+ARCSECONDS = 180.0 * 3600.0 / np.pi  # in a radian
+GROUND_FROM_HOUSE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+# what small turns of a camera in its own axes are as a vector: (alpha, omega, kappa) -> (omega, -alpha, kappa)
+TURN_AXES = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+
+
+def ground_from_photo(alpha: ArrayLike, omega: ArrayLike = 0.0, kappa: ArrayLike = 0.0) -> Floats:
+    """Rotation of a terrestrial photo.
+
+    Parameters
+    ----------
+    alpha, omega, kappa : array_like, shape (...)
+        Azimuth, elevation and roll of the camera in radians.
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+        Takes a ray (x, z, -f) to the ground; its columns are the ground components of the photo's x axis, of its z
+        axis and of the optical axis turned round.
+
+    Notes
+    -----
+    Source: [002] eq. 1 and 2 for omega = kappa = 0; the angles of the general form are not defined there, derived.
+    """
+    matrix: Floats = GROUND_FROM_HOUSE @ from_alpha_omega_kappa(alpha, omega, kappa)
+    return matrix
+
+
+def angles_of(rotation: ArrayLike) -> tuple[Floats, Floats, Floats]:
+    """Azimuth, elevation and roll of a camera; the inverse of :func:`ground_from_photo`.
+
+    Parameters
+    ----------
+    rotation : array_like, shape (..., 3, 3)
+        Photo to ground.
+
+    Returns
+    -------
+    alpha, omega, kappa : ndarray, shape (...)
+        Radians.
+
+    Raises
+    ------
+    GeometryError
+        When the camera looks straight up or down.
+    """
+    return alpha_omega_kappa(GROUND_FROM_HOUSE.T @ np.asarray(rotation, float))
+
+
+def small_turn(turn: ArrayLike) -> Floats:
+    """Rotation of a camera that turned a little in its own axes.
+
+    Parameters
+    ----------
+    turn : array_like, shape (..., 3)
+        Turn to the right, up, and counter-clockwise about the optical axis, radians.
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+        Rays after the turn to the camera before it; ``rotation @ small_turn(turn)`` is the rotation after it.
+    """
+    alpha, omega, kappa = np.moveaxis(np.asarray(turn, float), -1, 0)
+    return from_alpha_omega_kappa(alpha, omega, kappa)
+
+
+def rays(xz: ArrayLike, principal_distance: ArrayLike) -> Floats:
+    """Rays of image points.
+
+    Parameters
+    ----------
+    xz : array_like, shape (..., 2)
+        Image coordinates in mm, reduced to the principal point.
+    principal_distance : array_like, shape (...)
+        Principal distance in mm.
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+        Rays (x, z, -f) in the frame of the photo.
+    """
+    points = np.asarray(xz, float)
+    depth = np.broadcast_to(-np.asarray(principal_distance, float), points.shape[:-1])
+    return np.concatenate([points, depth[..., None]], axis=-1)
+
+
+def directions_of(vector: ArrayLike) -> Floats:
+    """Horizontal and vertical direction of a vector.
+
+    Parameters
+    ----------
+    vector : array_like, shape (..., 3)
+        Vectors in the frame of the ground.
+
+    Returns
+    -------
+    ndarray, shape (..., 2)
+        Azimuth clockwise from the Y axis, in (-pi, pi], and elevation, radians.
+    """
+    u = np.asarray(vector, float)
+    level = np.hypot(u[..., 0], u[..., 1])
+    return np.stack([np.arctan2(u[..., 0], u[..., 1]), np.arctan2(u[..., 2], level)], axis=-1)
+
+
+def vectors_of(directions: ArrayLike) -> Floats:
+    """Give unit vectors of directions; the inverse of :func:`directions_of`.
+
+    Parameters
+    ----------
+    directions : array_like, shape (..., 2)
+        Azimuth and elevation in radians.
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+        Unit vectors in the frame of the ground.
+    """
+    horizontal, vertical = np.moveaxis(np.asarray(directions, float), -1, 0)
+    level = np.cos(vertical)
+    return np.stack([level * np.sin(horizontal), level * np.cos(horizontal), np.sin(vertical)], axis=-1)
+
+
+def direction_gradient(vector: ArrayLike) -> Floats:
+    """Give the derivative of the directions of a vector by the vector.
+
+    Parameters
+    ----------
+    vector : array_like, shape (..., 3)
+        Vectors in the frame of the ground, none of them vertical.
+
+    Returns
+    -------
+    ndarray, shape (..., 2, 3)
+        Rows: azimuth, elevation.
+
+    Notes
+    -----
+    Source: derived; tested against differences.
+    """
+    u = np.asarray(vector, float)
+    east, north, up = u[..., 0], u[..., 1], u[..., 2]
+    level2 = east**2 + north**2
+    level = np.sqrt(level2)
+    length2 = level2 + up**2
+    gradient = np.zeros((*u.shape[:-1], 2, 3))
+    gradient[..., 0, 0] = north / level2
+    gradient[..., 0, 1] = -east / level2
+    gradient[..., 1, 0] = -up * east / (level * length2)
+    gradient[..., 1, 1] = -up * north / (level * length2)
+    gradient[..., 1, 2] = level / length2
+    return gradient

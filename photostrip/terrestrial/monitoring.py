@@ -1,0 +1,222 @@
+"""Displacements of all points in all epochs, with covariances, tests, and the turns of the cameras taken out.
+
+The first epoch is the reference. A coordinate measured in epoch e is the sum of the truth, an error that all epochs
+share (of the reference photos, when pseudo-parallaxes were measured against them) and an error of its own.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.terrestrial.displacement import SPACE, limit, statistic
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.notes import Note
+    from photostrip.terrestrial.camera_motion import Motion, Turn
+    from photostrip.terrestrial.normal_case import StereoPair
+
+    Floats = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
+
+MOVED_CAMERA = ("always", "auto", "never")
+MEASURED, ABSENT, NO_REFERENCE, SMALL_PARALLAX, OUTSIDE = range(5)
+REASONS = {
+    ABSENT: "not measured",
+    NO_REFERENCE: "not measured in the reference epoch",
+    SMALL_PARALLAX: "x parallax too small or negative",
+    OUTSIDE: "ray cannot be brought to the normal case",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How displacements are judged.
+
+    Parameters
+    ----------
+    significance : float
+        Probability of calling a point, or a camera, moved that did not move.
+    moved_camera : str
+        ``"always"`` takes out the turn of a camera whenever the stable points determine it: the tests keep their level
+        whether the camera turned or not. ``"auto"`` takes it out when it is significant: a little more precise with few
+        stable points, but a turn just too small to be found makes up to twice as many points seem to move. ``"never"``
+        only reports it.
+    """
+
+    significance: float = 0.05
+    moved_camera: str = "always"
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """Measurements of all epochs.
+
+    Parameters
+    ----------
+    points, epochs : tuple of str
+        Ids; the first epoch is the reference.
+    coordinates : ndarray, shape (e, n, 4)
+        x, z of the left and x, z of the right photo in mm, reduced to the principal points. NaN where a point was not
+        measured; the last alone is NaN where z was not measured on the right photo.
+    own : ndarray, shape (e, n, 4)
+        Variances of the errors that an epoch has for itself, mm^2.
+    shared : ndarray, shape (n, 4)
+        Variances of the errors that all epochs share, mm^2.
+    stable : ndarray of bool, shape (n,)
+        Points that are taken not to move.
+    times : ndarray, shape (e,), optional
+        Times of the epochs in a unit of the user's choice, ascending.
+    """
+
+    points: tuple[str, ...]
+    epochs: tuple[str, ...]
+    coordinates: Floats
+    own: Floats
+    shared: Floats
+    stable: Flags
+    times: Floats | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class CameraState:
+    """What is known of one camera in one epoch.
+
+    Parameters
+    ----------
+    epoch : int
+        Number of the epoch.
+    side : str
+        ``"left"`` or ``"right"``.
+    turn : Turn or None
+        The fitted turn; None where the stable points do not determine it.
+    moved : bool
+        Whether it is significant.
+    removed : bool
+        Whether it was taken out of the displacements.
+    """
+
+    epoch: int
+    side: str
+    turn: Turn | None
+    moved: bool
+    removed: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """Displacements between two epochs, or rates.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n, 3)
+        On the ground: metres, or metres per unit of time; NaN where not determined.
+    covariance : ndarray, shape (n, 3, 3)
+        Its covariance; NaN where not determined.
+    """
+
+    values: Floats
+    covariance: Floats
+
+    @cached_property
+    def statistic(self) -> Floats:
+        """Test value, chi-square with three degrees of freedom where nothing moved, shape (n,)."""
+        return statistic(self.values, self.covariance)
+
+    @property
+    def sigma(self) -> Floats:
+        """Standard deviations, shape (n, 3)."""
+        return np.asarray(np.sqrt(np.einsum("nii->ni", self.covariance)), float)
+
+
+@dataclass(frozen=True, eq=False)
+class Rates:
+    """Uniform motion fitted to the epochs.
+
+    Parameters
+    ----------
+    step : Step
+        Velocities, metres per unit of time.
+    misfit : ndarray, shape (n,)
+        Weighted sum of squares of what the uniform motion leaves; NaN where there are fewer than three epochs.
+    dof : ndarray of int, shape (n,)
+        Its degrees of freedom.
+    """
+
+    step: Step
+    misfit: Floats
+    dof: NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Monitoring:
+    """Displacements of all points in all epochs.
+
+    Parameters
+    ----------
+    series : Series
+        What was measured.
+    pair : StereoPair
+        The stations.
+    settings : Settings
+        How it was judged.
+    positions : tuple of Step
+        Coordinates on the ground in each epoch (``values``), with covariance.
+    since_first, since_previous : tuple of Step
+        Displacements of each epoch after the first, on the ground.
+    rates : Rates or None
+        Uniform motion, when the epochs have times.
+    reason : ndarray of int, shape (e, n)
+        Why a point has no coordinates in an epoch: a key of :data:`REASONS`; 0 where it has.
+    parallax, parallax_sigma : ndarray, shape (e, n)
+        Vertical parallaxes in mm with their standard deviations; NaN where z was not measured on the right photo.
+    parallax_change, parallax_change_sigma : ndarray, shape (e, n)
+        Their changes since the first epoch.
+    cameras : tuple of CameraState
+        Left and right camera of each epoch after the first.
+    motions : tuple of Motion or None
+        What the stable points say in each epoch after the first; None where there are none.
+    notes : tuple of Note
+        What the surveyor should know.
+    """
+
+    series: Series
+    pair: StereoPair
+    settings: Settings
+    positions: tuple[Step, ...]
+    since_first: tuple[Step, ...]
+    since_previous: tuple[Step, ...]
+    rates: Rates | None
+    reason: NDArray[np.intp]
+    parallax: Floats
+    parallax_sigma: Floats
+    parallax_change: Floats
+    parallax_change_sigma: Floats
+    cameras: tuple[CameraState, ...]
+    motions: tuple[Motion | None, ...]
+    notes: tuple[Note, ...] = ()
+
+    @property
+    def limit(self) -> float:
+        """Critical value of the test of a displacement."""
+        return limit(self.settings.significance, SPACE)
+
+    def significant(self, step: Step) -> Flags:
+        """Tell which displacements are larger than chance allows, shape (n,)."""
+        return np.asarray(np.nan_to_num(step.statistic) > self.limit, bool)
+
+    @property
+    def rejected(self) -> list[tuple[int, str]]:
+        """Epoch number and id of points that were given as stable and moved."""
+        names = [name for name, yes in zip(self.series.points, self.series.stable, strict=True) if yes]
+        return [
+            (number, names[point])
+            for number, motion in enumerate(self.motions, 1)
+            if motion is not None
+            for point, _, _ in motion.rejected
+        ]

@@ -1,0 +1,266 @@
+"""Two photos of any orientation brought to the normal case: axes parallel, at right angles to the base.
+
+The normal case has X along the base from the left to the right station, Y at right angles to it in the mean direction
+of the optical axes, Z completing them; both photos have the principal distance of the left camera. A point is a
+quadruple of coordinates: x and z of the left photo, x and z of the right one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import GeometryError
+from photostrip.terrestrial.frame import GROUND_FROM_HOUSE, TURN_AXES, rays
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+LEFT, RIGHT = 0, 1
+SIDES = ("left", "right")
+PARALLAX = 1e-3  # of the principal distance: a smaller x parallax is refused
+ALONG = 0.05  # sine of the angle between the base and the mean optical axis below which there is no normal case
+AHEAD = 1e-3  # cosine of the angle to the normal direction below which a ray cannot be transformed
+CONDITION = np.array([0.0, 1.0, 0.0, -1.0])  # the z coordinates of both photos are equal in the normal case
+
+
+@dataclass(frozen=True, eq=False)
+class StereoPair:
+    """Two stations from which the same object is photographed again and again.
+
+    Parameters
+    ----------
+    principal_distances : tuple of float
+        Of the left and right camera, mm.
+    centers : ndarray, shape (2, 3)
+        Perspective centres of the left and right camera on the ground, metres.
+    rotations : ndarray, shape (2, 3, 3)
+        Photo to ground in the reference epoch.
+    """
+
+    principal_distances: tuple[float, float]
+    centers: Floats
+    rotations: Floats
+
+    @property
+    def base(self) -> float:
+        """Length of the base in metres."""
+        return float(np.linalg.norm(self.centers[RIGHT] - self.centers[LEFT]))
+
+    def ground_from_normal(self) -> Floats:
+        """Rotation from the axes of the normal case to the ground.
+
+        Returns
+        -------
+        ndarray, shape (3, 3)
+            Columns X, Y, Z.
+
+        Raises
+        ------
+        GeometryError
+            When there is no base, or the cameras look along it.
+        """
+        if self.base == 0:
+            msg = "the left and the right station are at the same place: there is no base"
+            raise GeometryError(msg, photos=SIDES, code="no-base")
+        along = (self.centers[RIGHT] - self.centers[LEFT]) / self.base
+        mean = -(self.rotations[LEFT, :, 2] + self.rotations[RIGHT, :, 2])
+        across = mean - (mean @ along) * along
+        if np.linalg.norm(across) < ALONG * max(float(np.linalg.norm(mean)), 1.0):
+            msg = "the cameras look along the base, or away from each other: there is no normal case"
+            raise GeometryError(msg, photos=SIDES, code="along-base")
+        across /= np.linalg.norm(across)
+        return np.column_stack([along, across, np.cross(along, across)])
+
+
+def normal_pair(principal_distance: float, base: float) -> StereoPair:
+    """Give two cameras that stand in the normal case; ground axes: X to the right, Y ahead, Z up.
+
+    Parameters
+    ----------
+    principal_distance : float
+        Of both cameras, mm.
+    base : float
+        Length of the base in metres.
+
+    Returns
+    -------
+    StereoPair
+        The left camera stands at the origin.
+    """
+    centers = np.array([[0.0, 0.0, 0.0], [base, 0.0, 0.0]])
+    return StereoPair((principal_distance,) * 2, centers, np.array([GROUND_FROM_HOUSE] * 2))
+
+
+@dataclass(frozen=True, eq=False)
+class Normal:
+    """Coordinates of points in the normal case, with their derivatives.
+
+    Parameters
+    ----------
+    coordinates : ndarray, shape (n, 4)
+        x, z of the left and x, z of the right photo in mm; both z equal: the rays meet. NaN where a ray is missing or
+        cannot be transformed.
+    by_measured : ndarray, shape (n, 4, 4)
+        Derivatives by the measured coordinates.
+    by_turn : ndarray, shape (n, 4, 6)
+        Derivatives by small turns (alpha, omega, kappa) of the left and of the right camera, mm/rad.
+    parallax : ndarray, shape (n,)
+        Vertical parallax z_left - z_right before the rays were made to meet, mm; NaN where z was not measured on the
+        right photo.
+    parallax_by_measured : ndarray, shape (n, 4)
+        Its derivatives.
+    parallax_by_turn : ndarray, shape (n, 6)
+        Its derivatives by the turns, mm/rad.
+    """
+
+    coordinates: Floats
+    by_measured: Floats
+    by_turn: Floats
+    parallax: Floats
+    parallax_by_measured: Floats
+    parallax_by_turn: Floats
+
+
+def to_normal(measured: Floats, variances: Floats, pair: StereoPair, rotations: Floats) -> Normal:
+    """Bring measured image coordinates to the normal case.
+
+    Parameters
+    ----------
+    measured : ndarray, shape (n, 4)
+        x, z of the left and x, z of the right photo in mm, reduced to the principal points. Where the last is NaN, it
+        is what makes the rays meet.
+    variances : ndarray, shape (n, 4)
+        Variances of the measured coordinates, in any unit: they say which coordinates give way when the rays do not
+        meet.
+    pair : StereoPair
+        The stations.
+    rotations : ndarray, shape (n, 2, 3, 3)
+        Photo to ground, for each point and camera.
+
+    Returns
+    -------
+    Normal
+        Coordinates that fulfil z_left = z_right, and their derivatives.
+
+    Notes
+    -----
+    Source: derived. [004c] takes transformed coordinates as given and does not use z of the right photo.
+    """
+    turn = np.einsum("ki,nskj->nsij", pair.ground_from_normal(), rotations)
+    focal = pair.principal_distances
+    complete = measured.copy()
+    without = np.isnan(measured[:, 3])
+    complete[without, 3] = meeting_z(measured[without], pair, rotations[without])
+    ray = np.stack([rays(complete[:, :2], focal[LEFT]), rays(complete[:, 2:], focal[RIGHT])], axis=1)
+    turned = np.einsum("nsij,nsj->nsi", turn, ray)
+    with np.errstate(invalid="ignore"):
+        bad = (turned[..., 1] < AHEAD * np.linalg.norm(turned, axis=-1)).any(axis=1)
+    turned[bad] = np.nan
+    common = focal[LEFT]
+    scale = common / turned[..., 1]
+    raw = (turned[..., [0, 2]] * scale[..., None]).reshape(-1, 4)
+    # derivative of (x, z) by the turned ray: scale * (unit axis - (x, z)/f * Y axis)
+    by_ray = np.zeros((len(raw), 2, 2, 3))
+    by_ray[:, :, 0, 0] = by_ray[:, :, 1, 2] = scale
+    by_ray[..., 1] = -scale[..., None] * raw.reshape(-1, 2, 2) / common
+    by_photo = np.einsum("nsij,nsjk->nsik", by_ray, turn)
+    by_measured = _blocks(by_photo[..., :2])
+    axes = np.cross(TURN_AXES.T, ray[:, :, None, :])  # what a turn about each axis adds to the ray
+    by_turn = _blocks(np.einsum("nsij,nsaj->nsia", by_photo, axes))
+    parallax = raw @ CONDITION
+    # the rays are made to meet: along the covariance of the coordinates, or by the z that was not measured
+    way = np.einsum("nij,nj,nkj,k->ni", by_measured, variances, by_measured, CONDITION)
+    way[without] = by_measured[without, :, 3]
+    by_measured[without, :, 3] = 0.0
+    onto = np.eye(4) - way[:, :, None] * CONDITION / (way @ CONDITION)[:, None, None]
+    return Normal(
+        np.einsum("nij,nj->ni", onto, raw),
+        onto @ by_measured,
+        onto @ by_turn,
+        np.where(without, np.nan, parallax),
+        CONDITION @ by_measured,
+        CONDITION @ by_turn,
+    )
+
+
+def meeting_z(measured: Floats, pair: StereoPair, rotations: Floats) -> Floats:
+    """Give z of the right photo for which the rays meet.
+
+    Parameters
+    ----------
+    measured : ndarray, shape (n, 4)
+        x, z of the left and x of the right photo in mm; the last column is not used.
+    pair : StereoPair
+        The stations.
+    rotations : ndarray, shape (n, 2, 3, 3)
+        Photo to ground, for each point and camera.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        z of the right photo in mm.
+
+    Notes
+    -----
+    Source: derived; both rays and the base lie in one plane.
+    """
+    focal = pair.principal_distances
+    turn = np.einsum("ki,nskj->nsij", pair.ground_from_normal(), rotations)
+    left = np.einsum("nij,nj->ni", turn[:, LEFT], rays(measured[:, :2], focal[LEFT]))
+    x_part = np.einsum("nij,nj->ni", turn[:, RIGHT], rays(measured[:, [2, 2]] * [1.0, 0.0], focal[RIGHT]))
+    z_part = turn[:, RIGHT, :, 1]
+    # the base is the X axis: coplanar when Y_left Z_right = Z_left Y_right
+    along = left[:, 1] * z_part[:, 2] - left[:, 2] * z_part[:, 1]
+    value: Floats = (left[:, 2] * x_part[:, 1] - left[:, 1] * x_part[:, 2]) / np.where(along == 0, np.nan, along)
+    return value
+
+
+def _blocks(parts: Floats) -> Floats:
+    """Set the derivatives of the two cameras into one matrix."""
+    n, _, rows, columns = parts.shape
+    whole = np.zeros((n, 2 * rows, 2 * columns))
+    whole[:, :rows, :columns] = parts[:, LEFT]
+    whole[:, rows:, columns:] = parts[:, RIGHT]
+    return whole
+
+
+def intersect(coordinates: Floats, principal_distance: float, base: float) -> tuple[Floats, Floats]:
+    """Points of the normal case.
+
+    Parameters
+    ----------
+    coordinates : ndarray, shape (n, 4)
+        x, z of the left and of the right photo in mm.
+    principal_distance : float
+        f in mm.
+    base : float
+        B in metres.
+
+    Returns
+    -------
+    xyz : ndarray, shape (n, 3)
+        Coordinates from the left station, metres; NaN where the parallax is too small.
+    by_coordinates : ndarray, shape (n, 3, 4)
+        Their derivatives, m/mm.
+
+    Notes
+    -----
+    Source: [004c] eq. 1.
+    """
+    x, z, x_right = coordinates[:, 0], coordinates[:, 1], coordinates[:, 2]
+    p = x - x_right
+    with np.errstate(invalid="ignore"):
+        p = np.where(p > PARALLAX * principal_distance, p, np.nan)
+    depth = base * principal_distance / p
+    xyz = depth[:, None] * np.column_stack([x, np.full_like(x, principal_distance), z]) / principal_distance
+    jacobian = np.zeros((len(p), 3, 4))
+    jacobian[:, :, 0] = -xyz / p[:, None]
+    jacobian[:, :, 2] = xyz / p[:, None]
+    jacobian[:, 0, 0] += depth / principal_distance
+    jacobian[:, 2, 1] = depth / principal_distance
+    return xyz, jacobian

@@ -1,0 +1,457 @@
+"""A photo oriented by correction directions: least squares on the directions to distinct points.
+
+Measured are the image coordinates of the points and, with a theodolite at the same station, their directions. Both have
+errors: every point enters with the covariance of its directions plus that of its ray.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import GeometryError
+from photostrip.statistics import chi2_quantile, f_p_value
+from photostrip.terrestrial.frame import (
+    GROUND_FROM_HOUSE,
+    angles_of,
+    direction_gradient,
+    directions_of,
+    ground_from_photo,
+    rays,
+    vectors_of,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
+
+ANGLES = ("alpha", "omega", "kappa")
+FREE = {"principal-distance": ("f",), "principal-point": ("x0", "z0")}  # what may be determined besides
+SCREENINGS = ("deletion", "stated", "none")
+ITERATIONS = 50
+CONVERGED = 1e-11  # of the normalised unknowns: rad, and mm over the principal distance
+WEAKEST = 1e6  # condition number of the scaled equations from which a photo counts as not determined
+MINIMUM_POINTS = 2
+NEGLIGIBLE = 1e-18  # weighted sum of squares of error-free data: rounding, nothing to be screened
+
+
+@dataclass(frozen=True, eq=False)
+class Sightings:
+    """Points of one photo with their measured directions.
+
+    Parameters
+    ----------
+    ids : tuple of str
+        Ids of the points.
+    xz : ndarray, shape (n, 2)
+        Image coordinates in mm in the system of the principal point.
+    directions : ndarray, shape (n, 2)
+        Horizontal and vertical directions in radians; NaN where none was measured.
+    sigma_xz : ndarray, shape (n, 2)
+        Standard deviations of the image coordinates, mm.
+    sigma_directions : ndarray, shape (n, 2)
+        Standard deviations of the directions, radians.
+    """
+
+    ids: tuple[str, ...]
+    xz: Floats
+    directions: Floats
+    sigma_xz: Floats
+    sigma_directions: Floats
+
+    @cached_property
+    def measured(self) -> Flags:
+        """Which directions were measured, shape (n, 2)."""
+        return np.asarray(~np.isnan(self.directions), bool)
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How a photo is oriented.
+
+    Parameters
+    ----------
+    free : tuple of str
+        What is determined besides the angles: ``"principal-distance"``, ``"principal-point"``.
+    screening : str
+        ``"deletion"`` tests each point against the scatter of the others, ``"stated"`` against the stated standard
+        deviations, ``"none"`` tests nothing.
+    significance : float
+        Probability of rejecting any point of a photo without gross errors, and of a false global test.
+    """
+
+    free: tuple[str, ...] = ()
+    screening: str = "deletion"
+    significance: float = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Rejection:
+    """A point that was taken out.
+
+    Parameters
+    ----------
+    point : int
+        Number of the point.
+    test : str
+        ``"deletion"`` or ``"stated"``.
+    value, limit : float
+        Test value and critical value: for ``"deletion"`` the p value and the probability below which it is rejected,
+        for ``"stated"`` chi-square.
+    residual : tuple of float
+        Misclosure of its directions against the orientation without it, radians; NaN where not measured.
+    """
+
+    point: int
+    test: str
+    value: float
+    limit: float
+    residual: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Orientation:
+    """A photo oriented by directions.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Unknowns: alpha, omega, kappa, then what else was determined: f, x0, z0.
+    values : ndarray, shape (u,)
+        Radians and mm.
+    cofactors : ndarray, shape (u, u)
+        Their covariance for the stated standard deviations.
+    principal_distance : float
+        f in mm.
+    principal_point : tuple of float
+        x0, z0 in mm.
+    residuals : ndarray, shape (n, 2)
+        Computed minus measured directions in radians; NaN where not measured. Of rejected points the misclosure.
+    redundancy : ndarray, shape (n, 2)
+        Redundancy numbers of the directions; NaN where they were not used.
+    used : ndarray of bool, shape (n,)
+        Points that were used.
+    weighted_sum : float
+        Weighted sum of squared residuals, chi-square with `dof` degrees of freedom.
+    dof : int
+        Redundancy.
+    condition : float
+        Condition number of the equations, columns scaled to equal length.
+    rejected : tuple of Rejection
+        Points taken out, in order.
+    """
+
+    names: tuple[str, ...]
+    values: Floats
+    cofactors: Floats
+    principal_distance: float
+    principal_point: tuple[float, float]
+    residuals: Floats
+    redundancy: Floats
+    used: Flags
+    weighted_sum: float
+    dof: int
+    condition: float
+    rejected: tuple[Rejection, ...] = ()
+
+    @property
+    def rotation(self) -> Floats:
+        """Photo to ground, shape (3, 3)."""
+        return ground_from_photo(*self.values[:3])
+
+    @property
+    def sigma(self) -> Floats:
+        """Standard deviations of the unknowns, in radians and mm."""
+        return np.sqrt(np.diag(self.cofactors))
+
+    @property
+    def sigma0(self) -> float:
+        """Scatter of the directions over what the stated standard deviations make expect; NaN without redundancy."""
+        return float(np.sqrt(self.weighted_sum / self.dof)) if self.dof else float("nan")
+
+    def sigma0_range(self, significance: float) -> tuple[float, float]:
+        """Give the range in which sigma0 should lie when the stated standard deviations are right.
+
+        Parameters
+        ----------
+        significance : float
+            Probability of lying outside by chance.
+
+        Returns
+        -------
+        tuple of float
+            Lower and upper limit; NaN without redundancy.
+        """
+        if not self.dof:
+            return float("nan"), float("nan")
+        tails = (significance / 2, 1 - significance / 2)
+        lower, upper = (float(np.sqrt(chi2_quantile(tail, self.dof) / self.dof)) for tail in tails)
+        return lower, upper
+
+
+@dataclass(frozen=True, eq=False)
+class _System:
+    """Linearised equations of all points, whitened point by point."""
+
+    design: Floats  # (n, 2, u)
+    misclosure: Floats  # (n, 2), measured minus computed, radians
+    weight: Floats  # (n, 2, 2)
+
+
+def orient(
+    sightings: Sightings,
+    principal_distance: float,
+    principal_point: tuple[float, float] = (0.0, 0.0),
+    settings: Settings | None = None,
+) -> Orientation:
+    """Orient a photo by the directions of its points.
+
+    Parameters
+    ----------
+    sightings : Sightings
+        Image coordinates and directions.
+    principal_distance : float
+        f in mm; the start value when it is free.
+    principal_point : tuple of float
+        x0, z0 in mm; the start values when they are free.
+    settings : Settings, optional
+        What is determined and how it is screened.
+
+    Returns
+    -------
+    Orientation
+        Angles, interior elements if free, precision, residuals and rejected points.
+
+    Raises
+    ------
+    GeometryError
+        When the points do not determine what is asked for, or the solution does not converge.
+
+    Notes
+    -----
+    Source: the condition is [002] eq. 1; its least-squares solution is derived.
+    """
+    chosen = settings or Settings()
+    names = (*ANGLES, *(name for key, keys in FREE.items() if key in chosen.free for name in keys))
+    interior = np.array([principal_distance, *principal_point])
+    used = np.asarray(sightings.measured.any(axis=1), bool)
+    _enough(sightings, used, names)
+    solution = _solve(sightings, used, names, interior)
+    rejected: list[Rejection] = []
+    while chosen.screening != "none":
+        found = _worst(solution, sightings, chosen)
+        if found is None:
+            break
+        used = used.copy()
+        used[found.point] = False
+        solution = _solve(sightings, used, names, interior)
+        miss = tuple(map(float, solution.residuals[found.point]))
+        rejected.append(replace(found, residual=(miss[0], miss[1])))
+    return replace(solution, rejected=tuple(rejected))
+
+
+def _enough(sightings: Sightings, used: Flags, names: Sequence[str]) -> None:
+    """Refuse a photo with too few directions."""
+    number = int(sightings.measured[used].sum())
+    points = int(used.sum())
+    if points < MINIMUM_POINTS or number < len(names):
+        msg = (
+            f"{points} points with {number} directions do not determine {', '.join(names)}: at least "
+            f"{len(names)} directions to at least {MINIMUM_POINTS} points are needed"
+        )
+        raise GeometryError(msg, points=sightings.ids, code="too-few-directions")
+
+
+def _solve(sightings: Sightings, used: Flags, names: tuple[str, ...], interior: Floats) -> Orientation:
+    """Gauss-Newton from a start that needs no approximate values."""
+    values = np.concatenate([_start(sightings, used, interior), interior])
+    active = np.flatnonzero([name in names for name in (*ANGLES, "f", "x0", "z0")])
+    scale = np.where(active < len(ANGLES), 1.0, interior[0])
+    for _ in range(ITERATIONS):
+        system = _linearised(sightings, values, active)
+        normal, right = _normal(system, used)
+        condition = _condition(normal, names, sightings)
+        step = np.linalg.solve(normal, right)
+        values[active] += step
+        if not np.isfinite(values).all() or values[3] <= 0:
+            break
+        if np.abs(step / scale).max() < CONVERGED:
+            return _result(sightings, used, names, values, active, condition)
+    msg = "the orientation of the photo does not converge: are the points the same in the photo and at the theodolite?"
+    raise GeometryError(msg, points=sightings.ids, code="not-converged")
+
+
+def _start(sightings: Sightings, used: Flags, interior: Floats) -> Floats:
+    """Angles from the rotation that brings the rays closest to the directions; level where that is not determined."""
+    ray = rays(sightings.xz - interior[1:], interior[0])
+    both = used & sightings.measured.all(axis=1)
+    if both.sum() >= MINIMUM_POINTS:
+        unit = ray[both] / np.linalg.norm(ray[both], axis=1, keepdims=True)
+        left, size, right = np.linalg.svd(vectors_of(sightings.directions[both]).T @ unit)
+        if size[1] > 1e-9 * size[0]:  # two different directions
+            sign = np.diag([1.0, 1.0, np.linalg.det(left @ right)])
+            return np.array(angles_of(left @ sign @ right))
+    across = directions_of(ray @ GROUND_FROM_HOUSE.T)[:, 0]
+    turned = (sightings.directions[:, 0] - across)[used & sightings.measured[:, 0]]
+    if not len(turned):
+        return np.zeros(3)
+    return np.array([np.arctan2(np.sin(turned).mean(), np.cos(turned).mean()), 0.0, 0.0])
+
+
+def _linearised(sightings: Sightings, values: Floats, active: NDArray[np.intp]) -> _System:
+    """Directions of all points under the present orientation, and their derivatives."""
+    alpha, omega, kappa, f = values[:4]
+    turn = ground_from_photo(alpha, omega, kappa)
+    ray = rays(sightings.xz - values[4:], f)
+    ground = ray @ turn.T
+    gradient = direction_gradient(ground)
+    # the roll turns the ray about the photo's third axis, the elevation about the ground's x axis before the azimuth
+    roll = np.cross([0.0, 0.0, 1.0], ray) @ turn.T
+    tilt = np.cross([1.0, 0.0, 0.0], ray @ ground_from_photo(0.0, omega, kappa).T) @ _about_vertical(alpha).T
+    by_photo = gradient @ turn
+    design = np.empty((len(ray), 2, 6))
+    design[:, :, 0] = [1.0, 0.0]  # alpha is added to every azimuth
+    design[:, :, 1] = np.einsum("nij,nj->ni", gradient, tilt)
+    design[:, :, 2] = np.einsum("nij,nj->ni", gradient, roll)
+    design[:, :, 3] = -by_photo[:, :, 2]
+    design[:, :, 4:] = -by_photo[:, :, :2]
+    miss = sightings.directions - directions_of(ground)
+    miss[:, 0] = (miss[:, 0] + np.pi) % (2 * np.pi) - np.pi
+    return _System(design[:, :, active], miss, _weights(sightings, by_photo[:, :, :2]))
+
+
+def _about_vertical(alpha: float) -> Floats:
+    """Rotation of the ground that adds alpha to every azimuth."""
+    return np.asarray(ground_from_photo(alpha) @ GROUND_FROM_HOUSE.T, float)
+
+
+def _weights(sightings: Sightings, by_xz: Floats) -> Floats:
+    """Inverse covariance of the misclosures of each point; zero where a direction was not measured."""
+    covariance = np.einsum("nij,nj,nkj->nik", by_xz, sightings.sigma_xz**2, by_xz)
+    covariance[:, [0, 1], [0, 1]] += sightings.sigma_directions**2
+    there = sightings.measured
+    missing = ~there
+    covariance[missing[:, 0] | missing[:, 1], 0, 1] = 0.0
+    covariance[missing[:, 0] | missing[:, 1], 1, 0] = 0.0
+    covariance[:, [0, 1], [0, 1]] = np.where(there, covariance[:, [0, 1], [0, 1]], 1.0)
+    return np.asarray(np.linalg.inv(covariance) * (there[:, :, None] & there[:, None, :]), float)
+
+
+def _normal(system: _System, used: Flags) -> tuple[Floats, Floats]:
+    weighted = np.einsum("niu,nij->nuj", system.design[used], system.weight[used])
+    miss = np.nan_to_num(system.misclosure[used])
+    return np.einsum("nuj,njv->uv", weighted, system.design[used]), np.einsum("nuj,nj->u", weighted, miss)
+
+
+def _condition(normal: Floats, names: Sequence[str], sightings: Sightings) -> float:
+    """Condition number of the scaled equations; refuse what is not determined and say which unknowns."""
+    length = np.sqrt(np.diag(normal))
+    if not length.all():
+        lost = [name for name, each in zip(names, length, strict=True) if not each]
+        raise _undetermined(lost, sightings)
+    values, vectors = np.linalg.eigh(normal / np.outer(length, length))
+    condition = float(np.sqrt(values[-1] / max(values[0], np.finfo(float).tiny)))
+    if condition > WEAKEST:
+        share = np.abs(vectors[:, 0])
+        raise _undetermined([n for n, each in zip(names, share, strict=True) if each > 0.3 * share.max()], sightings)
+    return condition
+
+
+def _undetermined(lost: Sequence[str], sightings: Sightings) -> GeometryError:
+    separate = f"separate {', '.join(lost[:-1])} and {lost[-1]}"
+    what = separate if len(lost) > 1 else f"determine {lost[0]}"
+    msg = f"the points cannot {what}: measure points farther apart in the photo, or hold an element fixed"
+    return GeometryError(msg, points=sightings.ids, code="undetermined")
+
+
+def _result(
+    sightings: Sightings,
+    used: Flags,
+    names: tuple[str, ...],
+    values: Floats,
+    active: NDArray[np.intp],
+    condition: float,
+) -> Orientation:
+    system = _linearised(sightings, values, active)
+    normal, _ = _normal(system, used)
+    cofactors = np.asarray(np.linalg.inv(normal), float)
+    miss = np.nan_to_num(system.misclosure)
+    squares = np.einsum("ni,nij,nj->n", miss, system.weight, miss)
+    # redundancy number: diagonal of I - A Q A^T P
+    hat = np.einsum("niu,uv,njv,njk->nik", system.design, cofactors, system.design, system.weight)
+    redundancy = np.where(sightings.measured & used[:, None], 1.0 - hat[:, [0, 1], [0, 1]], np.nan)
+    values = values.copy()
+    values[:3] = np.array(angles_of(ground_from_photo(*values[:3])))
+    return Orientation(
+        names,
+        values[active],
+        cofactors,
+        float(values[3]),
+        (float(values[4]), float(values[5])),
+        -system.misclosure,
+        redundancy,
+        used,
+        float(squares[used].sum()),
+        int(sightings.measured[used].sum()) - len(names),
+        condition,
+    )
+
+
+# ---------------------------------------------------------------------------------------------------- screening
+
+
+def _worst(solution: Orientation, sightings: Sightings, settings: Settings) -> Rejection | None:
+    """Find the point that fits worst, if it should be taken out.
+
+    The drop of the weighted sum of squares when a point is deleted is v^T (C - A Q A^T)^-1 v, exactly the sum of
+    squares of its own predicted residuals.
+    """
+    if solution.dof < 2 or solution.weighted_sum < NEGLIGIBLE:
+        return None
+    rows = np.flatnonzero(solution.used)
+    drop, parts = _drops(solution, sightings, rows)
+    left = solution.dof - parts
+    testable = (left >= 1) & (sightings.measured[rows].sum(axis=1) == parts)
+    if not testable.any():
+        return None
+    level = settings.significance / len(rows)
+    if settings.screening == "stated":
+        limits = np.array([chi2_quantile(1 - level, int(k)) if k else np.inf for k in parts])
+        ratio = np.where(testable, drop / limits, 0.0)
+        worst = int(np.argmax(ratio))
+        if ratio[worst] <= 1:
+            return None
+        return Rejection(int(rows[worst]), "stated", float(drop[worst]), float(limits[worst]), (np.nan, np.nan))
+    p_values = np.ones(len(rows))
+    for number in np.flatnonzero(testable):
+        rest = max((solution.weighted_sum - drop[number]) / left[number], np.finfo(float).tiny)
+        p_values[number] = f_p_value(drop[number] / parts[number] / rest, int(parts[number]), int(left[number]))
+    worst = int(np.lexsort([-drop, p_values])[0])  # of p values that are all zero the largest drop
+    if p_values[worst] >= level:
+        return None
+    return Rejection(int(rows[worst]), "deletion", float(p_values[worst]), level, (np.nan, np.nan))
+
+
+def _drops(solution: Orientation, sightings: Sightings, rows: NDArray[np.intp]) -> tuple[Floats, NDArray[np.intp]]:
+    """By how much the sum of squares falls without each point, and with how many degrees of freedom."""
+    values = np.array([*solution.values[:3], solution.principal_distance, *solution.principal_point])
+    active = np.flatnonzero([name in solution.names for name in (*ANGLES, "f", "x0", "z0")])
+    system = _linearised(sightings, values, active)
+    drop, parts = np.zeros(len(rows)), np.zeros(len(rows), np.intp)
+    for number, row in enumerate(rows):
+        there = sightings.measured[row]
+        weight = system.weight[row][np.ix_(there, there)]
+        design, miss = system.design[row][there], system.misclosure[row][there]
+        covariance = np.linalg.inv(weight) - design @ solution.cofactors @ design.T
+        size, axes = np.linalg.eigh((covariance + covariance.T) / 2)
+        seen = size > 1e-9 * np.abs(np.linalg.inv(weight)).max()  # the rest is not controlled at all
+        drop[number] = float((((axes.T @ miss)[seen]) ** 2 / size[seen]).sum())
+        parts[number] = int(seen.sum())
+    return drop, parts

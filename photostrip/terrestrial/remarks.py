@@ -1,0 +1,151 @@
+"""What a surveyor should know of displacements beside their numbers."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.notes import Note
+from photostrip.statistics import chi2_quantile
+from photostrip.terrestrial.frame import ARCSECONDS
+from photostrip.terrestrial.monitoring import MEASURED, REASONS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from numpy.typing import NDArray
+
+    from photostrip.terrestrial.monitoring import CameraState, Monitoring
+
+    Floats = NDArray[np.float64]
+
+SURE = 0.99  # probability below which a misfit may be chance
+NAMED = 8  # ids named in one message
+MICROMETRES = 1000.0  # in a millimetre
+
+
+def remarks(result: Monitoring) -> Iterator[Note]:
+    """Give warnings and remarks on displacements.
+
+    Parameters
+    ----------
+    result : Monitoring
+        Displacements.
+
+    Yields
+    ------
+    Note
+        What is missing, what moved that should not, what does not fit.
+    """
+    yield from _cameras(result)
+    yield from _stable_points(result)
+    yield from _parallaxes(result)
+    yield from _missing(result)
+
+
+def _cameras(result: Monitoring) -> Iterator[Note]:
+    """Tell which cameras turned, and which nobody can know of."""
+    if not result.series.stable.any():
+        message = "no stable points are given: a camera that turned between the epochs shows as displacements"
+        yield Note("no-stable-points", message)
+        return
+    for state in result.cameras:
+        where = f"epoch {result.series.epochs[state.epoch]}: the {state.side} camera"
+        if state.turn is None:
+            message = f"{where} has too few stable points to see whether it turned: two with x and z are needed"
+            yield Note("turn-not-determined", message, photos=(state.side,))
+        elif state.moved:
+            done = "its turn is taken out" if state.removed else "its turn is left in the displacements"
+            severity = "note" if state.removed else "warning"
+            yield Note("camera-turned", f"{where} turned by {_turn(state)}; {done}", severity, photos=(state.side,))
+
+
+def _turn(state: CameraState) -> str:
+    assert state.turn is not None  # noqa: S101
+    values = state.turn.values * ARCSECONDS
+    words = ("to the right", "up", "counter-clockwise")
+    return ", ".join(f"{value:+.0f}″ {word}" for value, word in zip(values, words, strict=True))
+
+
+def _stable_points(result: Monitoring) -> Iterator[Note]:
+    """Tell which stable points moved, and where they do not fit together."""
+    for number, name in result.rejected:
+        epoch = result.series.epochs[number]
+        message = (
+            f"epoch {epoch}: point {name} is given as stable and does not fit to the others; it was not used as such"
+        )
+        yield Note("not-stable", message, points=(name,))
+    for state in result.cameras:
+        turn = state.turn
+        if turn is None or turn.dof <= 0 or turn.weighted_sum <= chi2_quantile(SURE, turn.dof):
+            continue
+        ratio = float(np.sqrt(turn.weighted_sum / turn.dof))
+        message = (
+            f"epoch {result.series.epochs[state.epoch]}: the stable points of the {state.side} camera scatter"
+            f" {ratio:.1f} times as much as the stated standard deviations say, after a turn of the camera is allowed"
+            " for: the camera may have been moved from its place, or the standard deviations are too small"
+        )
+        yield Note("stable-scatter", message, photos=(state.side,))
+
+
+def _parallaxes(result: Monitoring) -> Iterator[Note]:
+    """Tell where rays of a point do not meet as they should."""
+    yield from _misorientation(result)
+    for number in range(1, len(result.series.epochs)):
+        ratio = np.abs(result.parallax_change[number] / result.parallax_change_sigma[number])
+        known = np.isfinite(ratio)
+        if not known.any():
+            continue
+        limit = float(np.sqrt(chi2_quantile(1 - (1 - SURE) / known.sum(), 1)))
+        for row in np.flatnonzero(known & (np.nan_to_num(ratio) > limit)):
+            name = result.series.points[row]
+            change = result.parallax_change[number, row] * MICROMETRES
+            message = (
+                f"epoch {result.series.epochs[number]}: the vertical parallax of point {name} changed by"
+                f" {change:+.1f} µm, {ratio[row]:.1f} standard deviations (limit {limit:.1f}): measured wrongly, or"
+                " another point"
+            )
+            yield Note("parallax-change", message, points=(name,))
+
+
+def _misorientation(result: Monitoring) -> Iterator[Note]:
+    """Compare the vertical parallaxes of the first epoch with what the measurements explain."""
+    ratio = result.parallax[0] / result.parallax_sigma[0]
+    ratio = ratio[np.isfinite(ratio)]
+    if len(ratio) and (ratio**2).sum() > chi2_quantile(SURE, len(ratio)):
+        rms = float(np.sqrt(np.nanmean(result.parallax[0] ** 2))) * MICROMETRES
+        message = (
+            f"the vertical parallaxes of the first epoch have an rms of {rms:.1f} µm,"
+            f" {np.sqrt((ratio**2).mean()):.1f} times what the stated standard deviations say: the orientation of the"
+            " cameras is not exact; what it adds to both epochs alike cancels in the displacements"
+        )
+        yield Note("orientation", message)
+
+
+def _missing(result: Monitoring) -> Iterator[Note]:
+    """Name points without displacements, by epoch and reason."""
+    for number, epoch in enumerate(result.series.epochs):
+        for code in np.unique(result.reason[number]):
+            if code == MEASURED:
+                continue
+            names = [result.series.points[row] for row in np.flatnonzero(result.reason[number] == code)]
+            verb = "has" if len(names) == 1 else "have"
+            what = "displacement" if number else "coordinates"
+            message = f"epoch {epoch}: {_listed(names)} {verb} no {what}: {REASONS[int(code)]}"
+            yield Note("not-determined", message, "note", points=tuple(names))
+    untested = [
+        result.series.points[row]
+        for row in np.flatnonzero(result.series.stable)
+        if any(np.isfinite(step.values[row, 0]) and not np.isfinite(step.statistic[row]) for step in result.since_first)
+    ]
+    if untested:
+        message = f"not tested, because the turn of a camera depends on them: {_listed(untested)}"
+        yield Note("not-tested", message, "note", points=tuple(untested))
+
+
+def _listed(names: Iterable[str]) -> str:
+    given = list(names)
+    head = ", ".join(given[:NAMED])
+    word = "point" if len(given) == 1 else "points"
+    return f"{word} {head}" if len(given) <= NAMED else f"{word} {head} and {len(given) - NAMED} more"
