@@ -232,7 +232,7 @@ def counts_section(document: Document) -> Section:
         ("image points", f"{counts['image_points']} measured, {counts['image_points_used']} used"),
         (
             "rejected",
-            "{rejected_in_pairs} in pairs, {rejected_in_scale_transfer} in scale transfer".format(**counts),
+            _rejections(counts),
         ),
         ("without coordinates", counted(counts["not_determined"], "point")),
     ]
@@ -240,6 +240,12 @@ def counts_section(document: Document) -> Section:
         rows.append(("photo scale", _scale(strips[0])))
         return Section("Counts", (Facts(tuple(rows)),))
     return Section("Counts", (Facts(tuple(rows)), _strips(strips)))
+
+
+def _rejections(counts: Document) -> str:
+    text = "{rejected_in_pairs} in pairs, {rejected_in_scale_transfer} in scale transfers".format(**counts)
+    points = counts["rejected_for_rays"]
+    return f"{text}, {counted(points, 'point')} with rays that contradict each other" if points else text
 
 
 def _scale(strip: Document) -> str:

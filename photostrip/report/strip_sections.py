@@ -18,6 +18,7 @@ STRIPS_SHOWN = 3  # strips up to which every polynomial is shown with its eviden
 WORST_SHOWN = 12  # rows shown of a longer one
 ELEMENTS = (("alpha1", "α1"), ("kappa1", "κ1"), ("alpha2", "α2"), ("omega2", "ω2"), ("kappa2", "κ2"))
 DIRECTIONS = ("along", "across", "up")
+GROUND_AXES = ("east", "north", "up")
 
 
 def worst_first(
@@ -171,7 +172,6 @@ def _drift(strip: Document) -> str:
 
 def absolute_section(document: Document) -> Section:
     """Absolute orientation: the fit of each strip to its control before any polynomial."""
-    axes = document["frame"]["axes"]
     columns = (
         Column("strip", left=True),
         Column("plan", "points"),
@@ -179,7 +179,7 @@ def absolute_section(document: Document) -> Section:
         Column("σ0"),
         Column("redund."),
         Column("condition", rank=1),
-        *(Column(name, "m") for name in axes),
+        *(Column(name, "m") for name in GROUND_AXES),
         Column("base of scale", "m", rank=3),
         *(Column(name, "deg", rank=2) for name in ("α", "ω", "κ")),
     )
@@ -191,14 +191,14 @@ def absolute_section(document: Document) -> Section:
             ratio(a["sigma0"]),
             str(a["redundancy"]),
             short(a["condition"], 3),
-            *(metres(a["misclosure_rms"][axis]) for axis in ("x", "y", "z")),
+            *(metres(a["misclosure_rms"][axis]) for axis in GROUND_AXES),
             metres(a["scale"]),
             *(fixed(a["angles_deg"][key] if a["angles_deg"] else None, 4) for key in ("alpha", "omega", "kappa")),
         )
         for a in document["absolute"]
     )
     note = (
-        f"{', '.join(axes)}: rms misclosures of the similarity; σ0: their ratio to what the control and one model let "
+        "east, north, up: rms misclosures of the similarity; σ0: their ratio to what the control and one model let "
         "expect"
     )
     weights = tuple((_labelled(document, s["id"], "weights"), _weights(s["precision"])) for s in document["strips"])

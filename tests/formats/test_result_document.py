@@ -20,7 +20,7 @@ from photostrip.formats.simulation import inputs_of
 from photostrip.notes import Note
 from photostrip.pipeline import Settings
 from photostrip.simulate.simulation import simulate
-from photostrip.simulate.spec import GrossError
+from photostrip.simulate.spec import Flight, GrossError
 from tests.results import FRAMES, NORTH_FIRST, Case, case, solved, spec, written_to
 
 if TYPE_CHECKING:
@@ -490,7 +490,7 @@ def test_the_polynomial_moves_the_control_by_the_stated_misclosures() -> None:
     points = {row["id"]: np.array(xyz(row)) for row in document["points"]}
     left = {row["id"]: np.array([row["dx"], row["dy"], row["dz"]]) for row in document["control"]}
     for row in document["misclosures"]:
-        before = np.array([row["dx"], row["dy"], row["dz"]])
+        before = np.array([row["east"], row["north"], row["up"]])
         place = axes.T @ (points[row["id"]] - (left[row["id"]] - before) - origin)
         correction = [polynomial(block, axis, place[0], place[1]) for axis in "xyz"]
         assert axes @ correction == pytest.approx(left[row["id"]] - before, abs=5 * GROUND_STEP)
@@ -588,7 +588,7 @@ def test_points_without_coordinates_are_named_with_the_reason() -> None:
 def test_notes_of_the_reading_come_first() -> None:
     note = Note("hint", "something about a file", severity="note", points=("A",))
     document = document_of(case("local").result, [note])
-    assert document["notes"][0] == {
+    expected = {
         "code": "hint",
         "severity": "note",
         "message": "something about a file",
@@ -596,6 +596,7 @@ def test_notes_of_the_reading_come_first() -> None:
         "photos": [],
         "points": ["A"],
     }
+    assert {key: document["notes"][0][key] for key in expected} == expected
     assert document["notes"][1:] == case("local").document["notes"]
 
 
@@ -718,3 +719,43 @@ def test_rounding() -> None:
     assert rounded(math.nan, 2) is None
     assert rounded([[500100.123456]], 4) == [[500100.1235]]
     assert significant([0.000123456, 0.0, math.nan, 98765.4]) == [0.0001235, 0.0, None, 98770.0]
+
+
+# ----------------------------------------------------------------------------------------- errors along the base
+
+
+def with_a_wrong_ray(rays: int) -> tuple[Document, str, str]:
+    """Shift one of the rays of a point along the base, where no y parallax shows it: result, photo, point."""
+    inputs = inputs_of(simulate(replace(spec("local"), flight=Flight(photos=7, end_lap_percent=80.0))))
+    o = inputs.observations
+    given = set(inputs.control.ids)
+    count = np.bincount(o.point, minlength=len(o.point_ids))
+    (point, *_) = (n for n in range(len(count)) if count[n] == rays and o.point_ids[n] not in given)
+    row = np.flatnonzero(o.point == point)[1]
+    xy = o.xy.copy()
+    xy[row, 0] += 0.3  # mm
+    document = solved(replace(inputs, observations=replace(o, xy=xy))).document
+    return document, o.photo_ids[o.photo[row]], o.point_ids[point]
+
+
+def test_a_wrong_ray_among_many_is_named() -> None:
+    document, photo, point = with_a_wrong_ray(5)
+    (found,) = (row for row in document["rejected"] if row["stage"] == "rays")
+    assert (found["photo"], found["point"]) == (photo, point)
+    assert found["value"] > found["limit"]
+    assert "meet without it" in found["reason"]
+    group = next(group for group in document["residuals"] if group["photo"] == photo)
+    place = group["points"].index(point)
+    assert group["used"][place] is False
+    assert group["vx_um"][place] == pytest.approx(300, rel=0.1)
+    assert document["counts"]["rejected_for_rays"] == 1
+
+
+def test_a_wrong_ray_among_three_takes_the_point_out() -> None:
+    document, photo, point = with_a_wrong_ray(3)
+    found = [row for row in document["rejected"] if row["stage"] == "rays"]
+    assert photo in {row["photo"] for row in found}
+    assert {row["point"] for row in found} == {point}
+    assert len(found) == 3
+    assert "cannot be told" in found[0]["reason"]
+    assert point in {row["id"] for row in document["not_determined"]}

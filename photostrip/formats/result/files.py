@@ -124,8 +124,10 @@ def _table(header: str, rows: Iterable[str]) -> str:
     return f"{header}\n{''.join(rows)}"
 
 
-def _cell(text: str) -> str:
+def _cell(text: str | None) -> str:
     """Quote an id where CSV needs it."""
+    if text is None:
+        return ""
     return '"' + text.replace('"', '""') + '"' if NEEDS_QUOTES.search(text) or not text else text
 
 
@@ -206,7 +208,7 @@ def rejected_csv(document: Document) -> str:
     return _table(
         "strip,photo,other_photo,point,stage,test,value,limit,unit,reason",
         (
-            f"{_cell(row['strip'])},{_cell(row['photo'])},{_cell(row['other_photo']) if row['other_photo'] else ''},"
+            f"{_cell(row['strip'])},{_cell(row['photo'])},{_cell(row['other_photo'])},"
             f"{_cell(row['point'])},{row['stage']},{row['test']},{number(row['value'])},{number(row['limit'])},"
             f"{row['unit']},{_cell(row['reason'])}\n"
             for row in document["rejected"]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.formats.result.numbers import GEOGRAPHIC, GROUND, Document, Plain, natural_rank, rounded
+from photostrip.geodesy.frame_spec import GROUND_AXES
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -277,12 +278,8 @@ def misclosures_of(result: Result) -> list[Document]:
     """Give the list ``misclosures``: strip minus control after the similarity, before any polynomial."""
     rows = []
     for strip in result.strips:
-        counted = np.where(strip.control.use, strip.absolute.misclosures, np.nan)
-        for number, frame in enumerate(result.frames):
-            own = strip.control.frame == number
-            counted[own] = frame.user_from_internal(counted[own])
-        values = rounded(counted, GROUND)
+        values = rounded(np.where(strip.control.use, strip.absolute.misclosures, np.nan), GROUND)
         for row in np.argsort(natural_rank(strip.control.ids)):
-            dx, dy, dz = values[row]
-            rows.append({"strip": strip.strip.id, "id": strip.control.ids[row], "dx": dx, "dy": dy, "dz": dz})
+            parts = dict(zip(GROUND_AXES, values[row], strict=True))
+            rows.append({"strip": strip.strip.id, "id": strip.control.ids[row], **parts})
     return rows

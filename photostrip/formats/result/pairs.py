@@ -13,6 +13,7 @@ from photostrip.formats.result.numbers import (
     GROUND,
     Document,
     micrometres,
+    natural_rank,
     rounded,
     significant,
 )
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.pipeline import Result, StripResult
+    from photostrip.points import PhotoPoints
     from photostrip.triangulation.screening import Rejection
 
     Floats = NDArray[np.float64]
@@ -31,6 +33,8 @@ if TYPE_CHECKING:
 
 PPM = 1e6
 RATIO_DECIMALS = 1  # of parts per million
+MEET = "the other rays of the point meet without it"
+CONTRADICT = "the rays of the point contradict each other, and which is wrong cannot be told: none is used"
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,8 +158,9 @@ def _junctions(strip: StripResult, ids: Sequence[str]) -> list[Document]:
     joints = len(joined.factor)
     count = np.bincount(joined.joint, joined.used, joints).astype(np.intp)
     gap = discrepancies(strip)
-    squares = np.column_stack([np.bincount(joined.joint, joined.used * gap[:, axis] ** 2, joints) for axis in range(3)])
-    size = np.sqrt(squares / np.maximum(count, 1)[:, None])
+    known = joined.used & ~np.isnan(gap[:, 0])  # points left out later, for their rays, have no place in the models
+    squares = np.column_stack([np.bincount(joined.joint[known], gap[known, axis] ** 2, joints) for axis in range(3)])
+    size = np.sqrt(squares / np.maximum(np.bincount(joined.joint[known], minlength=joints), 1)[:, None])
     metres, in_photo = rounded(size, GROUND), rounded(size / strip.scale_number * PPM, 1)
     left_out: dict[int, list[str]] = {}
     for row in np.flatnonzero(~joined.used).tolist():
@@ -195,7 +200,8 @@ def discrepancies(strip: StripResult) -> Floats:
     Returns
     -------
     ndarray, shape (t, 3)
-        Metres along the strip, to its left and up, of every pass point of every joint.
+        Metres along the strip, to its left and up, of every pass point of every joint; NaN where its rays were
+        left out.
     """
     joined, similarity = strip.formed.junctions, strip.absolute.similarity
     gap = strip.formed.model_xyz[joined.after] - strip.formed.model_xyz[joined.before]
@@ -215,6 +221,7 @@ def rejected_of(result: Result) -> list[Document]:
         gone.sort(key=lambda rejection: int(oriented.pairs.pair[rejection.row]))
         found += [_from_pair(strip, rejection, ids) for rejection in gone]
         found += [_from_joint(strip, int(row), ids) for row in np.flatnonzero(~strip.formed.junctions.used)]
+        found += _from_rays(strip, result.refined.observations)
     return found
 
 
@@ -256,9 +263,38 @@ def _from_joint(strip: StripResult, row: int, ids: Sequence[str]) -> Document:
         "stage": "scale_transfer",
         "test": "ratio",
         "value": rounded(value, RATIO_DECIMALS),
-        "limit": rounded(joined.limit[joint] * PPM, RATIO_DECIMALS),
+        "limit": rounded(joined.limit[row] * PPM, RATIO_DECIMALS),
         "unit": "ppm",
         "parallax_um": None,
         "zone": None,
         "reason": f"scale ratio {value:.0f} ppm from that of the other pass points",
     }
+
+
+def _from_rays(strip: StripResult, observations: PhotoPoints) -> list[Document]:
+    """Rays that contradict the others of their point, in natural order of the points, then of the observations."""
+    found, oriented = strip.contradictions, strip.orientation
+    names = [observations.point_ids[number] for number in found.point]
+    rows = []
+    for number in np.argsort(natural_rank(names)).tolist():
+        told = bool(found.ray[number] >= 0)
+        of_point = oriented.used & (oriented.point == found.point[number])
+        rays = [found.ray[number]] if told else np.unique(oriented.rows[of_point]).tolist()
+        rows += [
+            {
+                "strip": strip.strip.id,
+                "photo": observations.photo_ids[observations.photo[ray]],
+                "other_photo": None,
+                "point": names[number],
+                "stage": "rays",
+                "test": "ratio",
+                "value": rounded(found.value[number], 2),
+                "limit": rounded(found.limit[number], 2),
+                "unit": "",
+                "parallax_um": None,
+                "zone": None,
+                "reason": MEET if told else CONTRADICT,
+            }
+            for ray in rays
+        ]
+    return rows

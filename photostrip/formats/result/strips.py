@@ -20,6 +20,7 @@ from photostrip.formats.result.numbers import (
     significant,
 )
 from photostrip.formats.result.pairs import PPM, Parallaxes, discrepancies, sigma0
+from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.geometry.rotation import alpha_omega_kappa
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ def strips_of(result: Result) -> list[Document]:
 def _strip(result: Result, strip: StripResult) -> Document:
     sums, formed, resection = Parallaxes.of(strip), strip.formed, strip.resection
     used = strip.orientation.used
-    gap = discrepancies(strip)[formed.junctions.used]
+    gap = discrepancies(strip)[formed.junctions.used]  # rms() passes over points left out for their rays
     gap_rms = [rms(column) for column in gap.T]
     sigma = result.refined.observations.sigma[strip.rows]
     return {
@@ -93,15 +94,12 @@ def _scale_change(correction: Polynomial, x: float) -> float:
 
 def absolute_of(result: Result) -> list[Document]:
     """Give the list ``absolute``: the similarity of every strip to its control."""
-    return [_absolute(result, strip) for strip in result.strips]
+    return [_absolute(strip) for strip in result.strips]
 
 
-def _absolute(result: Result, strip: StripResult) -> Document:
+def _absolute(strip: StripResult) -> Document:
     found, use = strip.absolute, strip.control.use
-    misclosures = np.where(use, found.misclosures, np.nan)
-    for number, frame in enumerate(result.frames):
-        own = strip.control.frame == number
-        misclosures[own] = frame.user_from_internal(misclosures[own])
+    misclosures = rounded([rms(column) for column in np.where(use, found.misclosures, np.nan).T], GROUND)
     return {
         "strip": strip.strip.id,
         "control": {"points": len(strip.control), "plan": int(use[:, 0].sum()), "height": int(use[:, 2].sum())},
@@ -115,7 +113,7 @@ def _absolute(result: Result, strip: StripResult) -> Document:
         "redundancy": found.redundancy,
         "condition": significant(found.condition),
         "iterations": found.iterations,
-        "misclosure_rms": _by_axis(rounded([rms(column) for column in misclosures.T], GROUND)),
+        "misclosure_rms": dict(zip(GROUND_AXES, misclosures, strict=True)),
     }
 
 

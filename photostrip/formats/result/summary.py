@@ -62,6 +62,7 @@ def counts_of(result: Result, measurements: int) -> Document:
         "pass_point_transfers": sum(int(s.formed.junctions.used.sum()) for s in strips),
         "rejected_in_pairs": sum(not rejection.readmitted for s in strips for rejection in s.rejections),
         "rejected_in_scale_transfer": sum(int((~s.formed.junctions.used).sum()) for s in strips),
+        "rejected_for_rays": sum(len(s.contradictions.point) for s in strips),
         "not_determined": len(result.not_determined),
         "ties": len(result.ties.number),
     }
