@@ -20,6 +20,7 @@ if TYPE_CHECKING:
         formation,
         interior,
         polynomial,
+        rays,
         refinement,
         relative,
         screening,
@@ -71,6 +72,8 @@ class StripResult:
         What this strip's numbers say beside themselves.
     screened : screening.Screened
         The search for gross errors: log, zones, detectable errors; it holds ``orientation`` and ``rejections`` too.
+    contradictions : rays.Contradictions
+        Points whose rays contradict each other from model to model.
     """
 
     strip: Strip
@@ -90,6 +93,7 @@ class StripResult:
     depth: float
     notes: tuple[Note, ...]
     screened: screening.Screened
+    contradictions: rays.Contradictions
 
     @property
     def scale_number(self) -> float:

@@ -10,7 +10,7 @@ from photostrip.errors import GeometryError
 from photostrip.geodesy.local_frame import IntermediateFrame, mean_position, strip_azimuth
 from photostrip.notes import Note
 from photostrip.pipeline.results import StripResult
-from photostrip.triangulation import absolute, exterior, formation, polynomial, relative, screening
+from photostrip.triangulation import absolute, exterior, formation, polynomial, rays, relative, screening
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -61,7 +61,7 @@ def adjust_strip(
     screened = screening.examine(first, settings.relative, sigma, converged)
     oriented, rejections = screened.orientation, screened.rejections
     relative.require(oriented, screened.converged, strip.photos)
-    formed = formation.form(oriented, settings.formation, strip.photos)
+    oriented, formed, contradictions = _form(strip, observations, screened, settings)
 
     here, rows = _control_of(formed, control, observations)
     intermediate, orientation, precision = _to_ground(strip, formed, here, rows, frames, oriented, sigma)
@@ -101,7 +101,26 @@ def adjust_strip(
             *_notes(strip, oriented, formed, orientation, correction, adjusted, resection),
         ),
         screened,
+        contradictions,
     )
+
+
+def _form(
+    strip: Strip, observations: PhotoPoints, screened: screening.Screened, settings: Settings
+) -> tuple[relative.Orientation, formation.FormedStrip, rays.Contradictions]:
+    """Form the strip, find the points whose rays contradict each other, and form it again without them."""
+    oriented, scatter = screened.orientation, screened.scatter.by_pair
+    formed = formation.form(oriented, settings.formation, strip.photos, scatter)
+    if settings.relative.screening == "none":
+        return oriented, formed, rays.Contradictions.none(oriented)
+    sigma = float(np.median(scatter)) / np.sqrt(2.0)
+    found = rays.examine(oriented, formed, observations, strip.photos, sigma)
+    unfit = screening.spared(oriented, found.unfit)
+    if unfit.any():
+        weight = np.where(unfit, 0.0, oriented.pairs.weight)
+        oriented = relative.refine(oriented, weight, np.unique(oriented.pairs.pair[unfit]))
+        formed = formation.form(oriented, settings.formation, strip.photos, scatter)
+    return oriented, formation.without(formed, oriented, found.left_out), found
 
 
 def _sigma(strip: Strip, observations: PhotoPoints) -> float:

@@ -10,14 +10,14 @@ Source: [001] eq. 125-141.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_alpha_omega_kappa
-from photostrip.triangulation import relative
+from photostrip.triangulation import relative, scale_screening
 from photostrip.triangulation.intersection import intersect
 
 if TYPE_CHECKING:
@@ -32,8 +32,6 @@ if TYPE_CHECKING:
     Flags = NDArray[np.bool_]
 
 SCALE_TRANSFERS = ("least_squares", "distances")
-REJECTION_FACTOR = 3.0  # standard deviations of a single scale ratio
-REJECTION_FLOOR = 1 / 500  # relative; smaller deviations are never rejected
 STEEPEST_BASE = 1e-6  # cosine of the base inclination
 
 
@@ -67,8 +65,8 @@ class Junctions:
         Distance from the common centre in the model before, divided by that in the model after.
     used : ndarray of bool, shape (t,)
         Whether the point took part in the scale transfer.
-    limit : ndarray, shape (j,)
-        Largest relative deviation of a ratio that was not rejected.
+    limit : ndarray, shape (t,)
+        Largest relative deviation of each ratio from its joint's factor that is not rejected.
     factor : ndarray, shape (j,)
         Ratio of the scales of the models, after over before.
     spread : ndarray, shape (j,)
@@ -191,7 +189,12 @@ def _junction_rows(orientation: Orientation, sound: Flags) -> tuple[Numbers, Num
 
 
 def transfer_scale(
-    orientation: Orientation, vectors: Floats, sound: Flags, settings: Settings, photos: Sequence[str]
+    orientation: Orientation,
+    vectors: Floats,
+    sound: Flags,
+    settings: Settings,
+    photos: Sequence[str],
+    sigma: Floats | None = None,
 ) -> Junctions:
     """Scale of every model from the one before it, through the pass points at their common photo.
 
@@ -207,6 +210,8 @@ def transfer_scale(
         Form of the transfer.
     photos : sequence of str
         Photos of the strip, to name a broken joint.
+    sigma : ndarray, shape (p,), optional
+        Standard deviation of a y parallax of weight one in each pair, mm; by default from the pairs' own residuals.
 
     Returns
     -------
@@ -230,7 +235,8 @@ def transfer_scale(
     distance_after = np.linalg.norm(vectors[after], axis=1)
     ratio = distance_before / distance_after
     weight = _weights(orientation, vectors, before, after, joint, settings)
-    used, limit = _reject_ratios(ratio, weight, joint, joints)
+    spreads = scale_screening.spreads(orientation, vectors, (joint, before, after), sigma)
+    used, limit = scale_screening.screen(ratio, weight, spreads, joint, joints)
     factor, spread = _factors(ratio, weight * used, joint, joints, settings)
     return Junctions(joint, before, after, orientation.point[before], ratio, used, limit, factor, spread)
 
@@ -274,26 +280,9 @@ def _factors(ratio: Floats, weight: Floats, joint: Numbers, joints: int, setting
     return factor, np.where(count > 1, spread, np.nan)
 
 
-def _reject_ratios(ratio: Floats, weight: Floats, joint: Numbers, joints: int) -> tuple[Flags, Floats]:
-    """Take out ratios that do not belong, the worst of each joint first, until none is left."""
-    used = np.ones(len(ratio), bool)
-    while True:
-        factor, spread = _factors(ratio, weight * used, joint, joints, Settings())
-        count = np.bincount(joint, used, joints)
-        limit = np.maximum(REJECTION_FACTOR * np.nan_to_num(spread), REJECTION_FLOOR)
-        # With few points one bad ratio raises the spread itself; it is compared with what the others say.
-        deviation = np.where(used, np.abs(ratio / factor[joint] - 1), 0.0)
-        peak = np.zeros(joints)
-        np.maximum.at(peak, joint, deviation)
-        bad = (deviation == peak[joint]) & (deviation > limit[joint]) & (count[joint] > 3)
-        if not bad.any():
-            return used, limit
-        rows = np.flatnonzero(bad)
-        _, first = np.unique(joint[rows], return_index=True)
-        used[rows[first]] = False
-
-
-def form(orientation: Orientation, settings: Settings, photos: Sequence[str]) -> FormedStrip:
+def form(
+    orientation: Orientation, settings: Settings, photos: Sequence[str], sigma: Floats | None = None
+) -> FormedStrip:
     """Form the strip from its oriented pairs.
 
     Parameters
@@ -304,6 +293,8 @@ def form(orientation: Orientation, settings: Settings, photos: Sequence[str]) ->
         Form of the scale transfer.
     photos : sequence of str
         Photos of the strip in flight order.
+    sigma : ndarray, shape (p,), optional
+        Standard deviation of a y parallax of weight one in each pair, mm; by default from the pairs' own residuals.
 
     Returns
     -------
@@ -317,7 +308,7 @@ def form(orientation: Orientation, settings: Settings, photos: Sequence[str]) ->
     """
     vectors, gap, sound = model_points(orientation)
     base, rotation = orientation.relative
-    junctions = transfer_scale(orientation, vectors, sound, settings, photos)
+    junctions = transfer_scale(orientation, vectors, sound, settings, photos, sigma)
     rotations = hand_on(rotation)
     scale = np.concatenate([[1.0], np.cumprod(junctions.factor)])
     bases = scale[:, None] * np.einsum("pij,pj->pi", rotations[:-1], base)
@@ -339,6 +330,29 @@ def form(orientation: Orientation, settings: Settings, photos: Sequence[str]) ->
         models,
         junctions,
     )
+
+
+def without(formed: FormedStrip, orientation: Orientation, left_out: Flags) -> FormedStrip:
+    """Give a formed strip whose points are the means over fewer models.
+
+    Parameters
+    ----------
+    formed : FormedStrip
+        The strip.
+    orientation : Orientation
+        Oriented pairs.
+    left_out : ndarray of bool, shape (m,)
+        Rows of the pairs' table that no longer count.
+
+    Returns
+    -------
+    FormedStrip
+        The same models; points without a row are gone, and rows left out have no model coordinates.
+    """
+    model_xyz = np.where(left_out[:, None], np.nan, formed.model_xyz)
+    use = orientation.used & np.isfinite(model_xyz).all(axis=1)
+    point, mean, models = mean_points(orientation.point, model_xyz, use)
+    return replace(formed, model_xyz=model_xyz, point=point, xyz=mean, models=models)
 
 
 def _refuse_vertical_base(directions: Floats, photos: Sequence[str]) -> None:

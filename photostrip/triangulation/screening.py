@@ -35,6 +35,7 @@ GRUBBS_MINIMUM = 7  # below it the test is meaningless: G cannot exceed (n-1)/sq
 NEGLIGIBLE = 1e-9  # mm; residuals of error-free data are rounding, not measurements
 LIMIT_FACTOR = 4.0  # a-priori standard deviations of a y parallax
 TAU_REDUNDANCY = 0.01  # a residual with less redundancy says nothing about its point
+MOST_IN_FRONT = 0.5  # share of the points above which a pair stands as it should
 DETECTABLE = 4.13  # shift of a normal variable found in 80 % of cases by a two-sided test at 0.1 %
 
 
@@ -220,6 +221,32 @@ def _sequential(orientation: Orientation, settings: Settings, sigma: float) -> t
     return result, log
 
 
+def spared(orientation: Orientation, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Choose the rows that can all go without leaving a pair or a zone without support.
+
+    Parameters
+    ----------
+    orientation : Orientation
+        Oriented pairs.
+    rows : ndarray of bool, shape (m,)
+        Rows that should go.
+
+    Returns
+    -------
+    ndarray of bool, shape (m,)
+        Those that may, one after the other in the order of the table.
+    """
+    result = np.zeros(len(rows), bool)
+    support = Support.of(orientation)
+    counts = support.counts.copy()
+    for row in np.flatnonzero(rows & orientation.used).tolist():
+        pair = orientation.pairs.pair[[row]]
+        if Support(support.zone[[row]], counts).spare(pair)[0]:
+            counts[pair[0], support.zone[row] - 1] -= 1
+            result[row] = True
+    return result
+
+
 def _completed(log: list[Rejection], result: Orientation, zone: NDArray[np.intp]) -> tuple[Rejection, ...]:
     """Add to each rejection what only the final orientation can say."""
     used = result.used
@@ -230,8 +257,11 @@ def _completed(log: list[Rejection], result: Orientation, zone: NDArray[np.intp]
 
 def _drop_behind(orientation: Orientation) -> tuple[Orientation, list[Rejection]]:
     """Take out the points that come out behind a camera; no measurement of theirs can be right."""
-    front = relative.in_front(orientation.elements, orientation.pairs)
-    rows = np.flatnonzero(~front & orientation.used)
+    pairs, used = orientation.pairs, orientation.used
+    front = relative.in_front(orientation.elements, pairs)
+    # with most of its points behind, the pair itself is wrong, and relative.require says so
+    most = pairs.sums((front & used).astype(float)) > MOST_IN_FRONT * orientation.points_used
+    rows = np.flatnonzero(~front & used & most[pairs.pair])
     if not len(rows):
         return orientation, []
     log = [Rejection(int(row), "in front", np.nan, np.nan, float(orientation.parallax[row])) for row in rows]
