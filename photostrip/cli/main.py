@@ -34,6 +34,11 @@ class Entry(NamedTuple):
 
 
 COMMANDS = {
+    "check": Entry(
+        "photostrip.cli.check",
+        "Check projects without adjusting them, and name all faults.",
+        "photostrip check project.yaml",
+    ),
     "run": Entry(
         "photostrip.cli.run",
         "Adjust the strips of a project and report the accuracy.",
@@ -92,7 +97,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code. Every failure becomes one; none is raised.
     """
     rest = list(sys.argv[1:] if arguments is None else arguments)
-    debug = _take_flag(rest, "--debug")
+    debug = _take_flag(rest, "--debug") or os.environ.get("PHOTOSTRIP_DEBUG", "") not in {"", "0"}
     for stream in (sys.stdout, sys.stderr):
         _never_fail_on_characters(stream)
     try:

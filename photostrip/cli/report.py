@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from photostrip.cli.options import Quiet, Verbose, Width
 from photostrip.cli.showing import Format, show
 
 
@@ -15,12 +16,12 @@ def report(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="FILE", help="File to write; its ending gives the format.")
     ] = None,
-    form: Annotated[Format | None, typer.Option("--format", help="How the report is printed.")] = None,
-    width: Annotated[
-        int | None, typer.Option(metavar="N", help="Width of the text, 60 to 200; default: that of the terminal.")
+    form: Annotated[
+        Format | None, typer.Option("--format", envvar="PHOTOSTRIP_FORMAT", help="How the report is printed.")
     ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print the verdict only.")] = False,
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Print long tables whole.")] = False,
+    width: Width = None,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Print the accuracy report of a saved result again.
 

@@ -18,6 +18,7 @@ class Format(StrEnum):
     TEXT = "text"
     JSON = "json"
     MD = "md"
+    GITHUB = "github"
 
 
 ENDINGS = {".txt": Format.TEXT, ".json": Format.JSON, ".md": Format.MD}
@@ -31,7 +32,7 @@ def show(document: dict[str, Any], form: Format, width: int | None, *, quiet: bo
     document : dict
         The document of the result.
     form : Format
-        How; JSON is the content of result.json.
+        How; JSON is the content of result.json, GITHUB the notes as annotations.
     width : int, optional
         Width of the text in characters; default: that of the terminal.
     quiet : bool
@@ -81,6 +82,10 @@ def rendered(
         from photostrip.formats.result.files import to_json
 
         return to_json(document, ascii_only=ascii_only)
+    if form is Format.GITHUB:
+        from photostrip.report.messages import annotated, result_findings
+
+        return annotated(result_findings(document))
     title, sections = "" if quiet else title_of(document), chosen_sections(document, quiet=quiet, everything=verbose)
     if form is Format.MD:
         page = text.to_markdown(title, sections)

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import gc
+import json
 import sys
 import time
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
+
+import typer
+
+from photostrip.cli.showing import Format
+from photostrip.errors import GeometryError, InputError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -40,6 +46,37 @@ class Talk:
         if self.verbose:
             self.say(f"{text} ({now - self._begin:.2f} s)")
         self._begin = now
+
+
+@contextmanager
+def failures_as(form: Format) -> Iterator[None]:
+    """Tell failures in the form that was asked for: as JSON or annotations on stdout, else as lines on stderr.
+
+    Parameters
+    ----------
+    form : Format
+        What the user asked for. The exit code is the same whatever it is.
+
+    Raises
+    ------
+    typer.Exit
+        With the exit code, after the failure was told.
+    """
+    try:
+        yield
+    except (InputError, GeometryError) as error:
+        if form not in {Format.JSON, Format.GITHUB}:
+            raise
+        from photostrip.report import console, messages
+
+        findings = messages.findings_of(error)
+        if form is Format.GITHUB:
+            sys.stdout.write(messages.annotated(findings))
+        else:
+            document = messages.as_document(findings, error.exit_code)
+            text = json.dumps(document, ensure_ascii=not console.speaks_unicode(sys.stdout), indent=1)
+            sys.stdout.write(f"{text}\n")
+        raise typer.Exit(error.exit_code) from error
 
 
 @contextmanager

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 MEGABYTE = 1_000_000
 BOM = b"\xef\xbb\xbf"
+BYTE_ORDER_MARK = "begins with a byte order mark; it was skipped"
 GZIP = b"\x1f\x8b"
 ZIP = b"PK\x03\x04"
 UTF16 = (b"\xff\xfe", b"\xfe\xff")

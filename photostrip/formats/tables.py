@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import Fault, InputError
+from photostrip.formats.files import BYTE_ORDER_MARK
 from photostrip.formats.findings import Findings, counted, listed, suggestion
 from photostrip.formats.numbers import NotANumber, number, shown
 from photostrip.formats.table_text import TableText, content
@@ -149,7 +150,7 @@ def read_table(file: str, layout: Sequence[Column], findings: Findings) -> Table
         findings.extend(error)
         return None
     if marked:
-        findings.notes.append(Note("byte-order-mark", f"{file} begins with a byte order mark; it was skipped", "note"))
+        findings.notes.append(Note("byte-order-mark", BYTE_ORDER_MARK, "note", file=file, line=1))
     return _Reader(TableText(file, data), layout, findings).read()
 
 
@@ -287,8 +288,8 @@ class _Reader:
                 others.append(shown(name) or "(no name)")
         if others:
             used = ", ".join(column.name for column in self.columns)
-            message = f"{self.source.file}: {counted(len(others), 'column')} not used: {listed(others)}; used: {used}"
-            self.findings.notes.append(Note("unused-column", message, "note"))
+            message = f"{counted(len(others), 'column')} not used: {listed(others)}; used: {used}"
+            self.findings.notes.append(Note("unused-column", message, "note", file=self.source.file, line=line))
 
     # ------------------------------------------------------------------------------------------ the rows
 
@@ -422,10 +423,11 @@ class _Reader:
     def _note_blanks(self, column: Column, written: list[str], codes: Numbers, lines: Numbers) -> None:
         padded = np.array([name != name.strip() for name in written])
         rows = np.flatnonzero(padded[codes])
-        file, first = self.source.file, int(lines[rows[0]])
         example = shown(written[codes[rows[0]]])
-        message = f"{file}: blanks around the id of a {column.name} taken off in {counted(len(rows), 'row')}"
-        self.findings.notes.append(Note("stray-blanks", f"{message} (first `{example}`, line {first})", "note"))
+        message = f"blanks around the id of a {column.name} taken off in {counted(len(rows), 'row')}, here `{example}`"
+        name = self.source.header.get(column.name, column.name)
+        note = Note("stray-blanks", message, "note", file=self.source.file, line=int(lines[rows[0]]), key=name)
+        self.findings.notes.append(note)
 
 
 def _fast_floats(cells: Cells) -> Floats | None:

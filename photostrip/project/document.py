@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from photostrip.errors import Fault, InputError
-from photostrip.formats.files import MEGABYTE, decode, read_bytes
+from photostrip.formats.files import BYTE_ORDER_MARK, MEGABYTE, decode, read_bytes
 from photostrip.formats.numbers import shown
 from photostrip.notes import Note
 
@@ -174,7 +174,7 @@ def read_document(file: str, findings: Findings) -> Node | None:
         findings.extend(error)
         return None
     if marked:
-        findings.notes.append(Note("byte-order-mark", f"{file} begins with a byte order mark; it was skipped", "note"))
+        findings.notes.append(Note("byte-order-mark", BYTE_ORDER_MARK, "note", file=file, line=1))
     root = parse(text, file, findings)
     if root is None:
         return None
@@ -291,8 +291,9 @@ class _Builder:
         text: str = event.value
         stripped = text.strip()
         if stripped != text and event.style in {"'", '"'}:
-            message = f"{place.file}:{place.line}: blanks around `{shown(text)}` taken off"
-            self.findings.notes.append(Note("stray-blanks", message, "note"))
+            message = f"blanks around `{shown(text)}` taken off"
+            note = Note("stray-blanks", message, "note", file=place.file, line=place.line, column=place.column)
+            self.findings.notes.append(note)
         return stripped
 
     def _open(self, node: Node) -> None:

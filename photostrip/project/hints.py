@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from photostrip.formats.findings import counted, listed
 from photostrip.notes import Note
+from photostrip.project.document import key_path
 from photostrip.project.tables import alike, rays
 
 if TYPE_CHECKING:
@@ -14,6 +17,7 @@ if TYPE_CHECKING:
     from photostrip.formats.control import ControlTable
     from photostrip.formats.observations import Measurements
     from photostrip.project import schema
+    from photostrip.project.document import Node
 
 NEAR_NAMED = 3
 
@@ -23,6 +27,7 @@ def hints(
     observations: Measurements,
     fiducials: Measurements | None,
     control: Sequence[ControlTable],
+    root: Node,
 ) -> Iterator[Note]:
     """Explain every row and every definition that is not used.
 
@@ -34,6 +39,8 @@ def hints(
         Measured points and marks.
     control : sequence of ControlTable
         Control lists.
+    root : Node
+        The project file, which knows where its values stand.
 
     Yields
     ------
@@ -41,7 +48,7 @@ def hints(
         One for each kind of thing in each file.
     """
     photos = {str(photo) for strip in project.strips for photo in strip.photos}
-    yield from _unused_cameras(project)
+    yield from _unused_cameras(project, root)
     for measured in (observations, fiducials):
         if measured is not None:
             yield from _photos_in_no_strip(measured, photos)
@@ -53,13 +60,15 @@ def hints(
         yield from _never_measured(read, count, given)
 
 
-def _unused_cameras(project: schema.ProjectFile) -> Iterator[Note]:
+def _unused_cameras(project: schema.ProjectFile, root: Node) -> Iterator[Note]:
     used = {strip.camera for strip in project.strips}
     unused = [name for name in project.cameras if name not in used]
     if unused:
         verb = "belongs" if len(unused) == 1 else "belong"
         number = counted(len(unused), "camera")
-        yield Note("unused-camera", f"{number} {verb} to no strip: {listed(unused)}", "note")
+        place, key = root.entries["cameras"].keys[unused[0]], key_path(("cameras", unused[0]))
+        message = f"{number} {verb} to no strip: {listed(unused)}"
+        yield Note("unused-camera", message, "note", file=place.file, line=place.line, column=place.column, key=key)
 
 
 def _photos_in_no_strip(read: Measurements, photos: set[str]) -> Iterator[Note]:
@@ -68,13 +77,14 @@ def _photos_in_no_strip(read: Measurements, photos: set[str]) -> Iterator[Note]:
     if not others:
         return
     number = {name: code for code, name in enumerate(read.photo_ids)}
-    rows = sum(int((read.photo == number[name]).sum()) for name in others)
+    rows = np.flatnonzero(np.isin(read.photo, [number[name] for name in others]))
     near = alike(others, photos)
     message = (
-        f"{read.table.file}: {counted(rows, 'row')} of {counted(len(others), 'photo')} in no strip not used:"
+        f"{counted(len(rows), 'row')} of {counted(len(others), 'photo')} in no strip not used:"
         f" {listed(others)}{_twins(near)}"
     )
-    yield Note("photo-in-no-strip", message, photos=tuple(others))
+    file, line = read.table.file, int(read.table.lines[rows[0]])
+    yield Note("photo-in-no-strip", message, photos=tuple(others), file=file, line=line, key="photo")
 
 
 def _measured_once(read: Measurements, count: dict[str, int], given: set[str]) -> Iterator[Note]:
@@ -86,23 +96,29 @@ def _measured_once(read: Measurements, count: dict[str, int], given: set[str]) -
         what = (
             f"{counted(len(control), 'control or check point is', 'control or check points are')} measured on one photo"
         )
-        message = f"{read.table.file}: {what} only and cannot be used: {listed(control)}"
-        yield Note("control-measured-once", message, points=tuple(control))
+        message = f"{what} only and cannot be used: {listed(control)}"
+        file, line = read.table.file, _first_line(read, control)
+        yield Note("control-measured-once", message, points=tuple(control), file=file, line=line, key="point")
     if new:
         near = alike(new, given - set(once))
         what = f"{counted(len(new), 'point is', 'points are')} measured on one photo only and cannot be determined"
-        note = Note(
-            "measured-once", f"{read.table.file}: {what}: {listed(new)}{_twins(near)}", "note", points=tuple(new)
-        )
-        yield note
+        message, file, line = f"{what}: {listed(new)}{_twins(near)}", read.table.file, _first_line(read, new)
+        yield Note("measured-once", message, "note", points=tuple(new), file=file, line=line, key="point")
+
+
+def _first_line(read: Measurements, points: Sequence[str]) -> int:
+    """Line of the first row of any of some points."""
+    number = {name: code for code, name in enumerate(read.target_ids)}
+    return int(read.table.lines[np.flatnonzero(np.isin(read.target, [number[name] for name in points]))[0]])
 
 
 def _switched_off(read: ControlTable) -> Iterator[Note]:
     off = [name for name, used in zip(read.ids, read.used, strict=True) if not used]
     if off:
         number = counted(len(off), "point is", "points are")
-        message = f"{read.table.file}: {number} switched off (use: off): {listed(off)}"
-        yield Note("control-off", message, "note", points=tuple(off))
+        message = f"{number} switched off (use: off): {listed(off)}"
+        line = int(read.table.lines[np.flatnonzero(~read.used)[0]])
+        yield Note("control-off", message, "note", points=tuple(off), file=read.table.file, line=line, key="use")
 
 
 def _never_measured(read: ControlTable, count: dict[str, int], given: set[str]) -> Iterator[Note]:
@@ -113,8 +129,13 @@ def _never_measured(read: ControlTable, count: dict[str, int], given: set[str]) 
     near = alike(missing, [name for name in count if name not in given])
     verb = "is" if len(missing) == 1 else "are"
     number = counted(len(missing), "control or check point")
-    message = f"{read.table.file}: {number} {verb} not measured on any photo: {listed(missing)}{_twins(near)}"
-    yield Note("control-not-measured", message, "warning" if near else "note", points=tuple(missing))
+    message = f"{number} {verb} not measured on any photo: {listed(missing)}{_twins(near)}"
+    file, line, level = (
+        read.table.file,
+        int(read.table.lines[read.ids.index(missing[0])]),
+        "warning" if near else "note",
+    )
+    yield Note("control-not-measured", message, level, points=tuple(missing), file=file, line=line, key="point")
 
 
 def _twins(near: dict[str, str]) -> str:

@@ -5,8 +5,9 @@ Everything that is wrong with any of the files is told in one go; see :class:`ph
 
 from __future__ import annotations
 
+import os
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,7 +26,7 @@ from photostrip.project.conversion import (
     settings,
     strips,
 )
-from photostrip.project.document import Node, fault_at
+from photostrip.project.document import COMMAND_LINE, Node, fault_at
 from photostrip.project.hints import hints
 from photostrip.project.merging import override, read_tree, steps
 from photostrip.project.references import check_references
@@ -82,6 +83,11 @@ class Project:
         """Folder of the project file."""
         return self.path.parent
 
+    @property
+    def remarks(self) -> tuple[Note, ...]:
+        """The hints with files as seen from the project's folder: the same wherever the project is run from."""
+        return tuple(replace(note, file=_seen_from(note.file, self.directory)) for note in self.hints)
+
     @contextmanager
     def places(self) -> Iterator[None]:
         """Give faults that are found in what was read, not while it was read, their place in the project file."""
@@ -125,10 +131,20 @@ def load_project(path: Path, overrides: Sequence[str] = ()) -> Project:
     if project is None:  # cannot be: validate() had a reason, and stop() told it
         raise InputError(f"{name} is not a valid project")
     project = completed(project, root, name)
-    inputs, notes = _inputs(project, tables)
+    inputs, notes = _inputs(project, tables, root)
     read = tuple(map(Path, files))
     told = (*findings.notes, *notes)
     return Project(inputs, settings(project), path, read, text_of(project), told, root, tables)
+
+
+def _seen_from(file: str, folder: Path) -> str:
+    """Path of a file relative to a folder, with slashes on every system; as it is where there is no way."""
+    if not file or file == COMMAND_LINE:
+        return file
+    try:
+        return os.path.relpath(file, folder).replace(os.sep, "/")
+    except ValueError:  # another drive
+        return file
 
 
 def _check_frames(root: Node, directory: Path, findings: Findings) -> None:
@@ -150,7 +166,7 @@ def _placed(root: Node, fault: Fault) -> Fault:
     return fault_at(root, steps(fault.key), fault.message, fault.code, expected=fault.expected, fix=fault.fix)
 
 
-def _inputs(project: schema.ProjectFile, tables: Tables) -> tuple[Inputs, list[Note]]:
+def _inputs(project: schema.ProjectFile, tables: Tables, root: Node) -> tuple[Inputs, list[Note]]:
     """Turn a project without faults into what the pipeline takes."""
     known = cameras(project)
     photos = {str(photo): known[strip.camera] for strip in project.strips for photo in strip.photos}
@@ -170,7 +186,7 @@ def _inputs(project: schema.ProjectFile, tables: Tables) -> tuple[Inputs, list[N
         output=None if output == frames[0] else output,
         fiducials=_fiducials(project, tables, photos),
     )
-    return inputs, list(hints(project, tables.observations, tables.fiducials, control))
+    return inputs, list(hints(project, tables.observations, tables.fiducials, control, root))
 
 
 def _fiducials(project: schema.ProjectFile, tables: Tables, photos: dict[str, Camera]) -> PhotoPoints | None:

@@ -6,6 +6,7 @@ from itertools import groupby
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
+from photostrip.notes import before
 from photostrip.report.figures import counted, listed, metres, micrometres, ratio, signed, unit
 from photostrip.report.parts import Column, Facts, Part, Section, Table, Words
 from photostrip.report.strip_sections import WORST_SHOWN, worst_first
@@ -226,9 +227,14 @@ def notes_section(document: Document, *, everything: bool) -> Section:
     notes = document["notes"]
     limit = len(notes) if everything else 2 * WORST_SHOWN
     parts: list[Part] = [
-        Words(f"{note['severity']}: {note['message']}", "look" if note["severity"] == "warning" else "", "-")
+        Words(f"{note['severity']}: {_told(note)}", "look" if note["severity"] == "warning" else "", "-")
         for note in notes[:limit]
     ]
     if len(notes) > limit:
         parts.append(Words(f"{len(notes) - limit} more in `notes` of result.json"))
     return Section("Notes", tuple(parts) or (Words("None."),))
+
+
+def _told(note: Document) -> str:
+    """Give a note with its place; results of older versions have none."""
+    return before(note.get("file", ""), note.get("line", 0), note.get("column", 0)) + str(note["message"])

@@ -409,7 +409,11 @@ def test_unused_cameras_and_columns(tmp_path: Path) -> None:
     project.write("control.csv", "point,x,y,z,remark\nG1,500100,4649871,212,post\n")
     found = notes(project.load())
     assert found["unused-camera"].message == "1 camera belongs to no strip: old"
-    assert found["unused-column"].message.endswith("control.csv: 1 column not used: remark; used: point, x, y, z")
+    assert found["unused-column"].message == "1 column not used: remark; used: point, x, y, z"
+    assert [(note.file, note.line, note.key) for note in map(found.__getitem__, ("unused-camera", "unused-column"))] == [
+        (f"{tmp_path}/project.yaml", 9, "cameras.old"),
+        (f"{tmp_path}/control.csv", 1, ""),
+    ]
 
 
 def test_blanks_around_ids_and_a_byte_order_mark(tmp_path: Path) -> None:
@@ -420,12 +424,12 @@ def test_blanks_around_ids_and_a_byte_order_mark(tmp_path: Path) -> None:
     loaded = project.load()
     assert image_points(loaded)["1001", "P1"] == (10.5, -20.25)
     assert loaded.inputs.strips[1].photos == ("2001", "2002")
-    told = [note.message.replace(f"{tmp_path}/", "") for note in loaded.hints]
+    told = [str(note).replace(f"{tmp_path}/", "") for note in loaded.hints]
     assert told == [
-        "project.yaml begins with a byte order mark; it was skipped",
-        "project.yaml:15: blanks around `2001 ` taken off",
-        "observations.csv begins with a byte order mark; it was skipped",
-        "observations.csv: blanks around the id of a point taken off in 1 row (first `P1 `, line 2)",
+        "project.yaml:1: begins with a byte order mark; it was skipped",
+        "project.yaml:15:14: blanks around `2001 ` taken off",
+        "observations.csv:1: begins with a byte order mark; it was skipped",
+        "observations.csv:2: blanks around the id of a point taken off in 1 row, here `P1 `",
     ]
 
 

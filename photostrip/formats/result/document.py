@@ -84,4 +84,8 @@ def _note(note: Note) -> Document:
         "strip": note.strip,
         "photos": list(note.photos),
         "points": list(note.points),
+        "file": note.file,
+        "line": note.line,
+        "column": note.column,
+        "key": note.key,
     }

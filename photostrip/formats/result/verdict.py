@@ -9,6 +9,7 @@ from itertools import groupby
 from operator import itemgetter
 from typing import TYPE_CHECKING
 
+from photostrip.notes import before
 from photostrip.statistics import chi2_quantile
 
 if TYPE_CHECKING:
@@ -177,5 +178,5 @@ def _notes(document: Document) -> Iterator[str]:
     warnings = sorted((n for n in document["notes"] if n["severity"] == "warning"), key=itemgetter("code"))
     for _, group in groupby(warnings, key=itemgetter("code")):
         kind = list(group)
-        yield from (note["message"] for note in kind[:NAMED])
+        yield from (before(n["file"], n["line"], n["column"]) + n["message"] for n in kind[:NAMED])
         yield from _more(len(kind), "notes")

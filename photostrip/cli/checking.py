@@ -1,0 +1,88 @@
+"""How ``photostrip check`` prints what it found."""
+
+from __future__ import annotations
+
+import json
+import sys
+from typing import TYPE_CHECKING, Any
+
+from photostrip import __version__
+from photostrip.cli.showing import Format
+from photostrip.report import console, messages
+from photostrip.report.check_sections import check_sections, verdict
+from photostrip.report.text import to_markdown
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from photostrip.project.checking import Checked
+
+SCHEMA = 1
+
+
+def print_checked(found: Sequence[Checked], form: Format, width: int | None, *, quiet: bool, verbose: bool) -> None:
+    """Print what was found in some projects on stdout.
+
+    Parameters
+    ----------
+    found : sequence of Checked
+        Projects in the order in which the user named them.
+    form : Format
+        How.
+    width : int, optional
+        Width of the text in characters.
+    quiet : bool
+        Whether verdicts and findings are enough.
+    verbose : bool
+        Whether long tables are printed whole.
+    """
+    if form is Format.JSON:
+        text = json.dumps(document_of(found), ensure_ascii=not console.speaks_unicode(sys.stdout), indent=1)
+        sys.stdout.write(f"{text}\n")
+    elif form is Format.GITHUB:
+        sys.stdout.write(messages.annotated(finding for each in found for finding in findings_of(each)))
+    else:
+        for number, each in enumerate(found):
+            if number and not quiet:
+                sys.stdout.write("\n")
+            _print_one(each, form, width, quiet=quiet, verbose=verbose)
+        if len(found) > 1:
+            faulty = sum(bool(each.faults) for each in found)
+            sys.stdout.write(f"\n{len(found)} projects: {len(found) - faulty} OK, {faulty} faulty\n")
+
+
+def findings_of(checked: Checked) -> list[dict[str, Any]]:
+    """Give faults, then notes, as plain values."""
+    return [messages.finding_of(told) for told in checked.told]
+
+
+def document_of(found: Sequence[Checked]) -> dict[str, Any]:
+    """Give all that was found as plain values: the content of ``--format json``."""
+    projects = [
+        {
+            "project": each.path,
+            "status": "faulty" if each.faults else "ok",
+            "findings": findings_of(each),
+            **each.document,
+        }
+        for each in found
+    ]
+    return {"photostrip_check": SCHEMA, "version": __version__, "projects": projects}
+
+
+def _print_one(checked: Checked, form: Format, width: int | None, *, quiet: bool, verbose: bool) -> None:
+    """Print the verdict of one project, its findings line by line, and what was decoded."""
+    findings = findings_of(checked)
+    head = verdict(checked.path, len(checked.faults), len(checked.notes))
+    lines = [messages.line_of(each) for each in findings]
+    sections = () if quiet or not checked.document else check_sections(checked.document, everything=verbose)
+    if form is Format.MD:
+        marked = "".join(f"- {line}\n" for line in lines)
+        page = to_markdown("", sections) if sections else ""
+        sys.stdout.write(f"# {head}\n\n{marked}\n{page}")
+        return
+    # not wrapped: an editor or grep finds `file:line:column:` at the beginning of a line
+    sys.stdout.write("".join(f"{line}\n" for line in (head, *lines)))
+    if sections:
+        sys.stdout.write("\n")
+        console.print_report("", sections, sys.stdout, width)

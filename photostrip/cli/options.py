@@ -1,0 +1,29 @@
+"""Options that several commands share: one name, one help text, one environment variable each."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from photostrip.cli.showing import Format
+
+Assignments = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the project file; may be repeated."),
+]
+Shape = Annotated[Format, typer.Option("--format", envvar="PHOTOSTRIP_FORMAT", help="How the answer is printed.")]
+Width = Annotated[
+    int | None,
+    typer.Option(
+        "--width",
+        metavar="N",
+        envvar="PHOTOSTRIP_WIDTH",
+        help="Width of the text, 60 to 200; default: that of the terminal.",
+    ),
+]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", envvar="PHOTOSTRIP_QUIET", help="Print the verdict only.")]
+Verbose = Annotated[
+    bool,
+    typer.Option("--verbose", "-v", envvar="PHOTOSTRIP_VERBOSE", help="Print long tables whole, and what is done."),
+]

@@ -1,0 +1,149 @@
+"""What became of every row of every table, with the reason for those that are not used."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from photostrip.project.tables import rays
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from photostrip.formats.control import ControlTable
+    from photostrip.formats.observations import Measurements
+    from photostrip.pipeline import Inputs
+    from photostrip.project.loading import Project
+
+    Numbers = NDArray[np.intp]
+    Document = dict[str, Any]
+
+IN_NO_STRIP = "its photo belongs to no strip"
+ONCE = "the point is measured on one photo only"
+NO_NEIGHBOUR = "the point is on no two neighbouring photos of one strip"
+OFF = "switched off (use: off)"
+NOT_MEASURED = "not measured on any photo of the strips"
+
+
+def observations_used(inputs: Inputs) -> Numbers:
+    """Find the strip in which each image point takes part.
+
+    Parameters
+    ----------
+    inputs : Inputs
+        What is given.
+
+    Returns
+    -------
+    ndarray of int, shape (n,)
+        Number of the strip; -1 for points that no neighbouring photo of the strip shows: they are in no pair.
+    """
+    observations = inputs.observations
+    places = {photo: (i, j) for i, strip in enumerate(inputs.strips) for j, photo in enumerate(strip.photos)}
+    strip, place = np.array([places[name] for name in observations.photo_ids], np.intp).reshape(-1, 2).T
+    strip, place = strip[observations.photo], place[observations.photo]
+    # a photo's number in one long row of all strips, with a gap between strips: neighbours differ by one
+    starts = np.cumsum([0, *(len(each.photos) + 1 for each in inputs.strips)])
+    position = starts[strip] + place
+    key = observations.point * (int(starts[-1]) + 1) + position
+    present = np.sort(key)
+
+    def shown(wanted: Numbers) -> NDArray[np.bool_]:
+        at = np.searchsorted(present, wanted)
+        return np.asarray(present[np.minimum(at, len(present) - 1)] == wanted)
+
+    if not len(key):
+        return np.zeros(0, np.intp)
+    return np.where(shown(key - 1) | shown(key + 1), strip, -1)
+
+
+def gaps_of(inputs: Inputs) -> list[str]:
+    """Name the points measured on two photos or more, of which no two are neighbours in a strip."""
+    observations = inputs.observations
+    paired = np.zeros(len(observations.point_ids), bool)
+    paired[observations.point[observations_used(inputs) >= 0]] = True
+    count = np.bincount(observations.point, minlength=len(observations.point_ids))
+    return [observations.point_ids[code] for code in np.flatnonzero(~paired & (count > 1))]
+
+
+def table_rows(project: Project) -> list[Document]:
+    """Count what became of the rows of each table.
+
+    Parameters
+    ----------
+    project : Project
+        The project.
+
+    Returns
+    -------
+    list of dict
+        ``file``, ``rows``, ``used`` and ``unused``: reason, number of rows, ids, first line. Used and unused rows add
+        up to all rows.
+    """
+    tables, inputs = project.tables, project.inputs
+    photos = {photo for strip in inputs.strips for photo in strip.photos}
+    found = []
+    if tables.observations is not None:
+        found.append(_measured(tables.observations, photos, set(gaps_of(inputs))))
+    if tables.fiducials is not None:
+        found.append(_marks(tables.fiducials, photos))
+    count = {} if tables.observations is None else rays(tables.observations, photos)
+    apart = set(gaps_of(inputs))
+    found += [_given(read, count, apart) for read in tables.control if read is not None]
+    return found
+
+
+def _measured(read: Measurements, photos: set[str], gaps: set[str]) -> Document:
+    """Sort the rows of measured points by what becomes of them."""
+    stranger = np.array([name not in photos for name in read.photo_ids], bool)[read.photo]
+    count = rays(read, photos)
+    once = np.array([count.get(name) == 1 for name in read.target_ids], bool)[read.target]
+    apart = np.array([name in gaps for name in read.target_ids], bool)[read.target]
+    names = np.array(read.target_ids, object)[read.target]
+    owners = np.array(read.photo_ids, object)[read.photo]
+    reasons = [
+        (IN_NO_STRIP, stranger, owners),
+        (ONCE, ~stranger & once, names),
+        (NO_NEIGHBOUR, ~stranger & ~once & apart, names),
+    ]
+    return _block(read.table.file, read.table.lines, reasons)
+
+
+def _marks(read: Measurements, photos: set[str]) -> Document:
+    stranger = np.array([name not in photos for name in read.photo_ids], bool)[read.photo]
+    owners = np.array(read.photo_ids, object)[read.photo]
+    return _block(read.table.file, read.table.lines, [(IN_NO_STRIP, stranger, owners)])
+
+
+def _given(read: ControlTable, count: dict[str, int], gaps: set[str]) -> Document:
+    number = np.array([count.get(name, 0) for name in read.ids], np.intp)
+    apart = np.array([name in gaps for name in read.ids], bool)
+    names = np.array(read.ids, object)
+    reasons = [
+        (OFF, ~read.used, names),
+        (NOT_MEASURED, read.used & (number == 0), names),
+        (ONCE, read.used & (number == 1), names),
+        (NO_NEIGHBOUR, read.used & (number > 1) & apart, names),
+    ]
+    return _block(read.table.file, read.table.lines, reasons)
+
+
+def _block(file: str, lines: Numbers, reasons: list[tuple[str, NDArray[np.bool_], NDArray[np.object_]]]) -> Document:
+    unused = list(_unused(lines, reasons))
+    return {
+        "file": file,
+        "rows": len(lines),
+        "used": len(lines) - sum(each["rows"] for each in unused),
+        "unused": unused,
+    }
+
+
+def _unused(lines: Numbers, reasons: list[tuple[str, NDArray[np.bool_], NDArray[np.object_]]]) -> Iterator[Document]:
+    for why, which, names in reasons:
+        rows = np.flatnonzero(which)
+        if len(rows):
+            ids = list(dict.fromkeys(names[rows].tolist()))
+            yield {"why": why, "rows": len(rows), "ids": ids, "first_line": int(lines[rows[0]])}
