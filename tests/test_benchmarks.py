@@ -1,0 +1,41 @@
+"""The benchmark programs run and print their tables; what the numbers are is another matter."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+
+import pytest
+
+from tests.source_tree import ROOT
+
+
+def printed(program: str, *options: str) -> str:
+    """Run a benchmark program from elsewhere and give what it prints."""
+    command = [sys.executable, str(ROOT / "benchmarks" / program), *options]
+    return subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT.parent).stdout
+
+
+@pytest.mark.slow
+def test_accuracy_prints_limits_and_what_was_measured() -> None:
+    out = printed("accuracy.py", "--seeds", "2", "--cases", "b", "long", "--workers", "1")
+    rows = re.findall(r"^5 rows +10\.0 +degree 3 +0\.112/0\.230 +(\d\.\d{3})/(\d\.\d{3})", out, re.MULTILINE)
+    assert len(rows) == 1
+    assert all(0.05 < float(value) < 0.6 for value in rows[0])
+    assert "auto against the best fixed choice" in out
+    assert re.search(r"^100 photos +\d", out, re.MULTILINE)
+
+
+@pytest.mark.slow
+def test_strip_prints_seconds_memory_parts_and_growth() -> None:
+    out = printed("strip.py", "--photos", "30", "--sizes", "10", "20", "--repeat", "1")
+    assert re.search(
+        r"^30 photos x \d\d points: photostrip run PROJECT -o DIR +\d+\.\d{3} s +target 1\.5 s", out, re.MULTILINE
+    )
+    assert re.search(r"peak memory +\d+ MB +target 250 MB, ratio 0\.\d\d", out)
+    assert re.search(r"30 pairs of 24 points in one batch +\d+ us", out)
+    assert re.search(r"^exponent of triangulate from 10 to 20 photos +-?\d", out, re.MULTILINE)
+    shares = [float(value) for value in re.findall(r"^\w[\w ]+ +\d\.\d{4} +(\d+\.\d)%", out, re.MULTILINE)]
+    assert shares[-1] == 100.0
+    assert sum(shares[:-1]) == pytest.approx(100.0, abs=0.5)
