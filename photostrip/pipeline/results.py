@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from photostrip.points import ControlPoints
     from photostrip.triangulation import (
         absolute,
+        control_screening,
         exterior,
         formation,
         interior,
@@ -74,6 +75,8 @@ class StripResult:
         The search for gross errors: log, zones, detectable errors; it holds ``orientation`` and ``rejections`` too.
     contradictions : rays.Contradictions
         Points whose rays contradict each other from model to model.
+    wrong_control : tuple of control_screening.ControlRejection
+        Control coordinates that were not used; ``control`` says so in its ``use``.
     """
 
     strip: Strip
@@ -94,6 +97,7 @@ class StripResult:
     notes: tuple[Note, ...]
     screened: screening.Screened
     contradictions: rays.Contradictions
+    wrong_control: tuple[control_screening.ControlRejection, ...]
 
     @property
     def scale_number(self) -> float:

@@ -10,7 +10,16 @@ from photostrip.errors import GeometryError
 from photostrip.geodesy.local_frame import IntermediateFrame, mean_position, strip_azimuth
 from photostrip.notes import Note
 from photostrip.pipeline.results import StripResult
-from photostrip.triangulation import absolute, exterior, formation, polynomial, rays, relative, screening
+from photostrip.triangulation import (
+    absolute,
+    control_screening,
+    exterior,
+    formation,
+    polynomial,
+    rays,
+    relative,
+    screening,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -65,8 +74,15 @@ def adjust_strip(
 
     here, rows = _control_of(formed, control, observations)
     intermediate, orientation, precision = _to_ground(strip, formed, here, rows, frames, oriented, sigma)
+    spacing, breadth = _extent(formed, orientation)
+    wrong: tuple[control_screening.ControlRejection, ...] = ()
+    if settings.relative.screening != "none":
+        place = control_screening.Setting(formed.xyz[rows], frames, intermediate, precision, spacing, breadth)
+        here, wrong = control_screening.screen(here, place)
+    if wrong:
+        intermediate, orientation, precision = _to_ground(strip, formed, here, rows, frames, oriented, sigma)
+        spacing, breadth = _extent(formed, orientation)
     xyz = orientation.similarity(formed.xyz)
-    centers = orientation.similarity(formed.centers)
     correction = None
     if settings.adjustment == "polynomial":
         targets = absolute.Targets(here, frames, intermediate)
@@ -74,8 +90,8 @@ def adjust_strip(
             xyz[rows],
             targets,
             absolute.weights(targets.turned(xyz[rows]), precision),
-            spacing=float(np.linalg.norm(np.diff(centers, axis=0), axis=1).mean()),
-            breadth=max(float(np.quantile(np.abs(xyz[:, 1]), 0.95)), 1e-6),
+            spacing=spacing,
+            breadth=breadth,
         )
         correction = polynomial.fit(problem, settings.polynomial)
     adjusted = xyz if correction is None else correction(xyz)
@@ -98,11 +114,20 @@ def adjust_strip(
         _depth(strip, observations, image_rows, formed, adjusted, resection),
         (
             *_screening_notes(strip, screened, sigma),
+            *_wrong_control_notes(strip, wrong),
             *_notes(strip, oriented, formed, orientation, correction, adjusted, resection),
         ),
         screened,
         contradictions,
+        wrong,
     )
+
+
+def _extent(formed: formation.FormedStrip, orientation: absolute.AbsoluteOrientation) -> tuple[float, float]:
+    """Mean base and half width of the strip, metres."""
+    centers, xyz = orientation.similarity(formed.centers), orientation.similarity(formed.xyz)
+    spacing = float(np.linalg.norm(np.diff(centers, axis=0), axis=1).mean())
+    return spacing, max(float(np.quantile(np.abs(xyz[:, 1]), 0.95)), 1e-6)
 
 
 def _form(
@@ -161,7 +186,10 @@ def _to_ground(
     try:
         provisional_frame = _intermediate(control, frames)
         provisional = absolute.orient(
-            formed.xyz[rows], absolute.Targets(control, frames, provisional_frame), control.use.astype(float)
+            formed.xyz[rows],
+            absolute.Targets(control, frames, provisional_frame),
+            control.use.astype(float),
+            formed.xyz,
         )
         ends = provisional.similarity(formed.centers[[0, -1]])
         intermediate = provisional_frame.with_azimuth(strip_azimuth(ends[0], ends[1]))
@@ -169,7 +197,7 @@ def _to_ground(
         targets = absolute.Targets(control, frames, intermediate)
         cartesian = provisional_frame.cartesian_from_intermediate(provisional.similarity(formed.xyz[rows]))
         turned = targets.turned(intermediate.intermediate_from_cartesian(cartesian))
-        final = absolute.orient(formed.xyz[rows], targets, absolute.weights(turned, precision))
+        final = absolute.orient(formed.xyz[rows], targets, absolute.weights(turned, precision), formed.xyz)
     except GeometryError as error:
         msg = f"strip {strip.id}: {error}"
         raise GeometryError(msg, photos=strip.photos, points=error.points, code=error.code) from error
@@ -312,6 +340,22 @@ def _screening_notes(strip: Strip, screened: screening.Screened, sigma: float) -
             "standard deviation allows, and no further point can be rejected; measure the pair again or add points"
         )
         notes.append(Note("masked-errors", text, strip=strip.id, photos=names))
+    return notes
+
+
+def _wrong_control_notes(strip: Strip, wrong: Sequence[control_screening.ControlRejection]) -> list[Note]:
+    """Name control that was not used, and what seems to be wrong with it."""
+    notes = []
+    for each in wrong:
+        sizes = dict(zip(control_screening.AXES, each.size, strict=True))
+        parts = ", ".join(f"{axis} by about {sizes[axis]:+.2f} m" for axis in each.axes)
+        text = (
+            f"control point {each.id} contradicts the strip and the other control: {parts} (test value "
+            f"{each.value:.1f}, limit {each.limit:.1f}); not used"
+        )
+        if each.exchanged_with:
+            text += f"; it fits when exchanged with {each.exchanged_with}"
+        notes.append(Note("control-rejected", text, strip=strip.id, points=(each.id,)))
     return notes
 
 

@@ -56,6 +56,7 @@ def triangulate(inputs: Inputs, settings: Settings, *, directory: Path | None = 
         When a pair, a joint or the absolute orientation cannot be determined.
     """
     _require(settings)
+    _require_strips(inputs)
     frames, output = _frames(inputs, settings, directory)
     _require_whole(inputs, frames)
     observations, fiducial = _photo_coordinates(inputs, settings)
@@ -64,7 +65,7 @@ def triangulate(inputs: Inputs, settings: Settings, *, directory: Path | None = 
     strips = tuple(adjust_strip(strip, refined.observations, control, frames, settings) for strip in inputs.strips)
     points, ties = _join(strips, refined.observations, output)
     rows, differences = _at_given_points(inputs, frames, points, refined.observations)
-    missing = _not_determined(refined.observations, points, inputs)
+    missing = _not_determined(refined.observations, points, inputs, strips)
     notes = _notes(inputs, settings, strips, fiducial)
     return Result(
         inputs,
@@ -93,6 +94,15 @@ def _require(settings: Settings) -> None:
             expected=" or ".join(ADJUSTMENTS),
         )
         raise InputError(fault)
+
+
+def _require_strips(inputs: Inputs) -> None:
+    """Refuse measurements on photos without a strip: nobody knows their camera."""
+    cameras = _cameras(inputs)
+    stray = [photo for photo in inputs.observations.photo_ids if photo not in cameras]
+    if stray:
+        message = f"photo {stray[0]} is measured but belongs to no strip ({len(stray)} such photos)"
+        raise InputError(Fault(message, code="photo-without-strip", key="strips"))
 
 
 def _require_whole(inputs: Inputs, frames: Sequence[GroundFrame]) -> None:
@@ -218,8 +228,11 @@ def _at_given_points(
     return rows, np.where(control.use, differences, np.nan)
 
 
-def _not_determined(observations: PhotoPoints, points: Adjusted, inputs: Inputs) -> dict[str, str]:
+def _not_determined(
+    observations: PhotoPoints, points: Adjusted, inputs: Inputs, strips: Sequence[StripResult]
+) -> dict[str, str]:
     """Points that were measured and have no coordinates, with the reason."""
+    contradicted = {int(number) for strip in strips for number in strip.contradictions.point}
     placed = {photo: (n, k) for n, strip in enumerate(inputs.strips) for k, photo in enumerate(strip.photos)}
     done = np.zeros(len(observations.point_ids), bool)
     done[points.number] = True
@@ -228,12 +241,17 @@ def _not_determined(observations: PhotoPoints, points: Adjusted, inputs: Inputs)
         photo = observations.photo_ids[observations.photo[row]]
         if photo in placed:
             seen.setdefault(int(observations.point[row]), []).append(placed[photo])
-    return {observations.point_ids[point]: _reason(places) for point, places in sorted(seen.items())}
+    return {
+        observations.point_ids[point]: _reason(places, contradicted=point in contradicted)
+        for point, places in sorted(seen.items())
+    }
 
 
-def _reason(places: list[tuple[int, int]]) -> str:
+def _reason(places: list[tuple[int, int]], *, contradicted: bool) -> str:
     if len(places) == 1:
         return "measured on one photo"
+    if contradicted:
+        return "its rays contradict each other"
     neighbours = any((n, k + 1) in places for n, k in places)
     return "rejected in every pair" if neighbours else "on no two neighbouring photos of one strip"
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.geometry.rotation import from_vector
+from photostrip.geometry.rotation import cross_matrix, from_vector
 from photostrip.geometry.similarity import Similarity, collinearity
 
 if TYPE_CHECKING:
@@ -32,9 +32,10 @@ if TYPE_CHECKING:
 
 ITERATIONS = 50
 CONVERGED = 1e-12  # of the strip's half length
-RANK_LIMIT = 1e-3  # smallest over largest singular value: control on a line to a thousandth of its length
+RANK_LIMIT = 1e-3  # smallest over largest singular value: a motion of the strip of which the control sees a thousandth
 WEAK_LIMIT = 1e-2
 PARAMETERS = 7
+NAMED = 6  # ids in a message
 PLAN, HEIGHT = slice(0, 2), 2
 
 
@@ -178,7 +179,7 @@ class AbsoluteOrientation:
     redundancy : int
         Control coordinates minus seven.
     condition : float
-        Largest over smallest singular value of the column-scaled design.
+        Largest over smallest singular value of the design for motions of the strip of the same size.
     iterations : int
         Steps of the least-squares iteration.
     """
@@ -210,7 +211,7 @@ def weights(control: ControlPoints, precision: tuple[float, float]) -> Floats:
     return np.where(control.use, 1 / (control.sigma**2 + point**2), 0.0)
 
 
-def orient(strip: Floats, targets: Targets, weight: Floats) -> AbsoluteOrientation:
+def orient(strip: Floats, targets: Targets, weight: Floats, reach: Floats | None = None) -> AbsoluteOrientation:
     """Similarity of the strip on its control.
 
     Parameters
@@ -221,6 +222,9 @@ def orient(strip: Floats, targets: Targets, weight: Floats) -> AbsoluteOrientati
         The control points.
     weight : ndarray, shape (n, 3)
         Weights of their coordinates, metres^-2.
+    reach : ndarray, shape (q, 3), optional
+        All points of the strip, strip coordinates. What the control must determine is their position: control far along
+        a narrow strip is enough when it spans the strip's width. Without them a square of the control's length counts.
 
     Returns
     -------
@@ -244,7 +248,8 @@ def orient(strip: Floats, targets: Targets, weight: Floats) -> AbsoluteOrientati
     for iteration in range(1, ITERATIONS + 1):  # noqa: B007
         xyz = similarity(strip)
         design, free = _design(xyz, targets, weight, half)
-        _refuse_deficient(design, xyz, targets, half)
+        root = _motion(None if reach is None else similarity(reach), xyz.mean(axis=0), half)
+        _refuse_deficient(design, root, xyz, targets, half)
         step = np.asarray(np.linalg.lstsq(design, free, rcond=None)[0], float)
         similarity = _corrected(similarity, step, xyz.mean(axis=0), half)
         if np.abs(step).max() < CONVERGED * half:
@@ -259,7 +264,7 @@ def orient(strip: Floats, targets: Targets, weight: Floats) -> AbsoluteOrientati
             )
         )
     misclosures = targets.misclosures(similarity(strip))
-    values = np.linalg.svd(design, compute_uv=False)
+    values = np.linalg.svd(_seen(design, root), compute_uv=False)
     redundancy = int(targets.control.use.sum()) - PARAMETERS
     squares = float((weight * misclosures**2).sum())
     sigma0 = float(np.sqrt(squares / redundancy)) if redundancy > 0 else float("nan")
@@ -341,13 +346,32 @@ def _orthonormal(matrix: Floats) -> Floats:
     return result
 
 
-def _refuse_deficient(design: Floats, xyz: Floats, targets: Targets, half: float) -> None:
+def _motion(reach: Floats | None, center: Floats, half: float) -> Floats:
+    """Triangular root of the matrix that gives the mean square motion of the strip's points from seven parameters."""
+    if reach is None:
+        return np.eye(PARAMETERS)
+    arm = (reach - center) / half
+    columns = np.zeros((len(arm), 3, PARAMETERS))
+    columns[:, :, :3] = np.eye(3)
+    columns[:, :, 3:6] = -cross_matrix(arm)  # theta x arm
+    columns[:, :, 6] = arm
+    flat = columns.reshape(-1, PARAMETERS)
+    return np.asarray(np.linalg.cholesky(flat.T @ flat / len(arm) + 1e-15 * np.eye(PARAMETERS)), float)
+
+
+def _seen(design: Floats, root: Floats) -> Floats:
+    """Design for motions of unit size, so that its singular values say how much of each the control sees."""
+    return np.asarray(np.linalg.solve(root, design.T).T, float)
+
+
+def _refuse_deficient(design: Floats, root: Floats, xyz: Floats, targets: Targets, half: float) -> None:
     """Raise when the control leaves a motion free, and name that motion."""
-    _, values, vt = np.linalg.svd(design / np.linalg.norm(design), full_matrices=True)
+    _, values, vt = np.linalg.svd(_seen(design, root), full_matrices=True)
     if len(values) == PARAMETERS and values[-1] > RANK_LIMIT * values[0]:
         return
     points = targets.control.ids
-    msg = f"absolute orientation: the control does not determine {free_motion(vt[-1], xyz, targets.control, half)}"
+    free = free_motion(np.linalg.solve(root.T, vt[-1]), xyz, targets.control, half)
+    msg = f"absolute orientation: the control does not determine {free}"
     raise GeometryError(msg, points=points, code="control-deficient")
 
 
@@ -381,7 +405,8 @@ def free_motion(direction: Floats, xyz: Floats, control: ControlPoints, half: fl
     offset = np.linalg.norm(np.cross((xyz - xyz.mean(axis=0)) / half - foot, axis), axis=1)
     near = [name for name, distance in zip(control.ids, offset, strict=True) if distance < 0.02]  # noqa: PLR2004
     if len(near) >= 2:
-        return f"the rotation about the line of control points {', '.join(near)}"
+        named = ", ".join(near) if len(near) <= NAMED else f"{', '.join(near[:NAMED])} and {len(near) - NAMED} more"
+        return f"the rotation about the line of control points {named}"
     if abs(axis[2]) > 0.7:  # noqa: PLR2004
         return "the azimuth (rotation about the vertical)"
     return "the rotation about the flight line" if abs(axis[0]) > abs(axis[1]) else "the tilt along the flight line"

@@ -207,7 +207,7 @@ class Problem:
     targets : Targets
         What they should be.
     weight : ndarray, shape (n, 3)
-        Weights along the points' ground axes, metres^-2; 0 where a coordinate does not count.
+        Weights along the points' axes (east, north, up), metres^-2; 0 where a coordinate does not count.
     spacing : float
         Distance along the strip that makes two stations different, metres (one base).
     breadth : float
@@ -408,23 +408,27 @@ def fit(problem: Problem, settings: Settings) -> Polynomial:
     )
 
 
-def _candidates(problem: Problem, axis: int, asked: str) -> list[tuple[str, ...]]:
-    """Terms for the similarity alone and for every degree that adds something, as far as the control carries them."""
+def _candidates(problem: Problem, axis: int, asked: str) -> list[list[tuple[str, ...]]]:
+    """Terms of all axes for the similarity alone and for every degree that adds something to one axis.
+
+    The other axes get the terms of the same degree as far as their own control carries them.
+    """
     forced = asked != "auto"
-    points = problem.xyz[problem.by_axis[:, axis] > 0]
-    found: list[tuple[str, ...]] = [()]
+    points = [problem.xyz[_counted(problem, k)] for k in range(3)]
+    found: list[list[tuple[str, ...]]] = [[(), (), ()]]
     for degree in range(1, (int(asked) if forced else 3) + 1):
-        terms = choose_terms(points, degree, problem, forced=forced)
-        if terms != found[-1]:
+        terms = [choose_terms(xyz, degree, problem, forced=forced) for xyz in points]
+        if terms[axis] != found[-1][axis]:
             found.append(terms)
     return found
 
 
 def _decide(problem: Problem, group: str, axes: tuple[int, ...], asked: str) -> tuple[tuple[str, ...], list[Evidence]]:
     """Go up the degrees of one group: each step must be asked for by its F test and not spoil left-out points."""
-    candidates = _candidates(problem, axes[0], asked)
+    every = _candidates(problem, axes[0], asked)
     forced = asked != "auto"
-    fits = [_fit(problem, [terms] * 3) for terms in candidates]
+    fits = [_fit(problem, terms) for terms in every]
+    candidates = [terms[axes[0]] for terms in every]
     left_out, by = _left_out_errors(problem, candidates, fits, axes)
     expected = _expected(problem)
     chosen, evidence = 0, []
