@@ -34,6 +34,11 @@ class Entry(NamedTuple):
 
 
 COMMANDS = {
+    "init": Entry(
+        "photostrip.cli.init",
+        "Write a commented project file and the headers of its tables.",
+        "photostrip init strip-a",
+    ),
     "check": Entry(
         "photostrip.cli.check",
         "Check projects without adjusting them, and name all faults.",
@@ -53,6 +58,21 @@ COMMANDS = {
         "photostrip.cli.simulate",
         "Write a synthetic project with known truth, ready to run.",
         "photostrip simulate strip.yaml -o simulated",
+    ),
+    "terrestrial": Entry(
+        "photostrip.cli.terrestrial",
+        "Directions of a phototheodolite, displacements between epochs.",
+        "photostrip terrestrial displacement survey.yaml -o result",
+    ),
+    "schema": Entry(
+        "photostrip.cli.schema",
+        "Print the JSON Schema of the project file, for editors.",
+        "photostrip schema -o photostrip.schema.json",
+    ),
+    "info": Entry(
+        "photostrip.cli.info",
+        "Print versions, formats and extras, and how to get what is missing.",
+        "photostrip info",
     ),
 }
 
@@ -74,6 +94,10 @@ Options:
   --version   Print the version and exit.
   --debug     Print the traceback of an error.
   -h, --help  Print this text and exit; after a command, the help of the command.
+
+Environment: PHOTOSTRIP_FORMAT, PHOTOSTRIP_WIDTH, PHOTOSTRIP_QUIET,
+PHOTOSTRIP_VERBOSE and PHOTOSTRIP_DEBUG stand in for the options of these names;
+NO_COLOR forbids colours.
 
 Example:
   {COMMANDS["run"].example}

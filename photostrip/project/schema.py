@@ -6,6 +6,7 @@ those of the settings beside the mathematics; none is repeated. Each description
 
 from __future__ import annotations
 
+import warnings
 from copy import deepcopy
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
@@ -472,8 +473,29 @@ def json_schema() -> dict[str, Any]:
     """
     for section in (Angles, Output, Relative, Polynomial, Interior, Processing, Tolerances):
         section.model_rebuild()  # early versions of pydantic cannot describe a default of a section not built yet
-    schema = _for_editors(ProjectFile.model_json_schema())
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "photostrip project", **schema}
+    return described(ProjectFile, "photostrip project")
+
+
+def described(kind: type[Section], title: str) -> dict[str, Any]:
+    """JSON Schema of a kind of file.
+
+    Parameters
+    ----------
+    kind : type
+        The file as a section.
+    title : str
+        What it is.
+
+    Returns
+    -------
+    dict
+        JSON Schema, draft 2020-12.
+    """
+    with warnings.catch_warnings():
+        # defaults of nested sections are encoded twice, and the second time a tuple of words is a list
+        warnings.filterwarnings("ignore", message="Pydantic serializer warnings", category=UserWarning)
+        schema = _for_editors(kind.model_json_schema())
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title, **schema}
 
 
 def _for_editors(schema: Any) -> Any:  # noqa: ANN401 (JSON)

@@ -32,6 +32,7 @@ from photostrip.project.schema import (
     Unit,
     Words,
     YAxis,
+    described,
     key,
     wrong,
 )
@@ -305,6 +306,20 @@ def load_specification(path: Path, overrides: Sequence[str] = ()) -> Specificati
     if given is None:  # cannot be: checked() had a reason, and stop() told it
         raise InputError(f"{path} is not a valid specification")
     return Specification(_spec(given), tuple(files), root)
+
+
+def simulation_schema() -> dict[str, Any]:
+    """JSON Schema of the specification, with every key, default and unit.
+
+    Returns
+    -------
+    dict
+        JSON Schema, draft 2020-12.
+    """
+    for field in SimulationFile.model_fields.values():
+        if isinstance(field.annotation, type) and issubclass(field.annotation, Section):
+            field.annotation.model_rebuild()  # as for the project file
+    return described(SimulationFile, "photostrip simulation")
 
 
 def _spec(given: SimulationFile) -> simulate.Spec:

@@ -1,0 +1,29 @@
+"""``photostrip info``: what is installed, what it can read and write, and what is missing."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from photostrip.cli.showing import Format
+
+
+def info(
+    form: Annotated[
+        Format, typer.Option("--format", envvar="PHOTOSTRIP_FORMAT", help="How the answer is printed: text or json.")
+    ] = Format.TEXT,
+) -> None:
+    """Print versions, threads, formats and extras, and how to get what is missing.
+
+    Put it into every report of a problem.
+    """
+    from photostrip.cli.installation import as_text, installation
+
+    found = installation()
+    if form is Format.JSON:
+        import json
+
+        typer.echo(json.dumps(found, indent=1))
+        return
+    typer.echo(as_text(found), nl=False)

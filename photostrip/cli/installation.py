@@ -1,0 +1,100 @@
+"""What is installed: versions, threads, formats, extras."""
+
+from __future__ import annotations
+
+import os
+import platform
+import re
+import sys
+from importlib import metadata
+from typing import Any
+
+from photostrip import __version__
+from photostrip.threads import THREAD_VARIABLES
+
+# What can be read and written, by the command that does it.
+FORMATS = {
+    "read": [
+        "project file (YAML): photostrip check, run",
+        "image coordinates, fiducial marks, control (.csv, .csv.gz): photostrip check, run",
+        "simulation (YAML): photostrip simulate",
+        "result.json: photostrip report",
+    ],
+    "written": [
+        "result.json, points.csv, photos.csv, residuals.csv, parallaxes.csv, rejected.csv: photostrip run -o",
+        "accuracy report (text, Markdown, JSON, annotations): photostrip run, report",
+        "project with tables and truth.json: photostrip simulate -o",
+        "JSON Schema: photostrip schema",
+    ],
+}
+OWN = ("test", "dev")  # extras for those who work on photostrip itself
+
+
+def installation() -> dict[str, Any]:
+    """Give what is installed.
+
+    Returns
+    -------
+    dict
+        ``photostrip``, ``python``, ``system``, ``libraries`` (name to version), ``threads`` (variable to value),
+        ``formats``, ``extras`` (name to ``missing`` libraries and the command that gets them).
+    """
+    required, extras = _requirements()
+    return {
+        "photostrip": __version__,
+        "python": platform.python_version(),
+        "system": f"{platform.system()} {platform.machine()}",
+        "libraries": {name: _version(name) for name in required},
+        "threads": {name: os.environ.get(name, "") for name in THREAD_VARIABLES},
+        "formats": FORMATS,
+        "extras": {name: _extra(name, libraries) for name, libraries in extras.items() if name not in OWN},
+    }
+
+
+def _requirements() -> tuple[list[str], dict[str, list[str]]]:
+    """Give the libraries that are needed, and those of each extra, from the installed package itself."""
+    try:
+        lines = metadata.requires("photostrip") or []
+    except metadata.PackageNotFoundError:  # run from a folder, not installed
+        lines = ["numpy", "pydantic", "pyproj", "pyyaml", "rich", "scipy", "typer"]
+    required: list[str] = []
+    extras: dict[str, list[str]] = {}
+    for line in lines:
+        found = re.match(r"[A-Za-z0-9._-]+", line)
+        name = found[0].lower() if found else line
+        extra = re.search(r"extra == ['\"]([^'\"]+)['\"]", line)
+        extras.setdefault(extra[1], []).append(name) if extra else required.append(name)
+    return sorted(set(required)), {name: sorted(set(each)) for name, each in sorted(extras.items())}
+
+
+def _version(name: str) -> str:
+    """Give the version of a library; empty when it is not installed."""
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return ""
+
+
+def _extra(name: str, libraries: list[str]) -> dict[str, Any]:
+    missing = [each for each in libraries if not _version(each)]
+    command = f"{sys.executable} -m pip install 'photostrip[{name}]'" if missing else ""
+    return {"libraries": libraries, "missing": missing, "command": command}
+
+
+def as_text(found: dict[str, Any]) -> str:
+    """Give what is installed as text, one fact a line."""
+    lines = [
+        f"photostrip  {found['photostrip']}",
+        f"python      {found['python']}",
+        f"system      {found['system']}",
+        "libraries   " + ", ".join(f"{name} {version or 'MISSING'}" for name, version in found["libraries"].items()),
+        "threads     " + ", ".join(f"{name}={value or 'not set'}" for name, value in found["threads"].items()),
+        *(f"reads       {each}" for each in found["formats"]["read"]),
+        *(f"writes      {each}" for each in found["formats"]["written"]),
+    ]
+    for name, extra in found["extras"].items():
+        state = f"missing: {', '.join(extra['missing'])}; {extra['command']}" if extra["missing"] else "there"
+        lines.append(f"extra       {name}: {state}")
+    if not found["extras"]:
+        lines.append("extras      none are defined in this version")
+    return "".join(f"{line}\n" for line in lines)

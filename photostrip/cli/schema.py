@@ -1,0 +1,34 @@
+"""``photostrip schema``: what may stand in the files that users write, for editors and other programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def schema(
+    simulation: Annotated[
+        bool, typer.Option("--simulation", help="The specification of `photostrip simulate` instead.")
+    ] = False,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FILE", help="File to write; default: stdout.")
+    ] = None,
+) -> None:
+    """Print the JSON Schema of the project file: every key, its unit, its default.
+
+    An editor that knows JSON Schema completes keys and explains them: write the schema to a file and begin the
+    project file with `# yaml-language-server: $schema=photostrip.schema.json`.
+    """
+    import json
+
+    from photostrip.formats.writing import write_text
+    from photostrip.project.schema import json_schema
+    from photostrip.project.simulation_spec import simulation_schema
+
+    text = json.dumps(simulation_schema() if simulation else json_schema(), indent=2, ensure_ascii=True) + "\n"
+    if output is None:
+        typer.echo(text, nl=False)
+    else:
+        write_text(output, text)

@@ -1,0 +1,314 @@
+"""``photostrip check`` as a user calls it, and what run and check tell in every format."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pyproj
+import pytest
+
+from photostrip.cli.main import main
+from photostrip.project.checking import check_project
+from tests.project.samples import MARKED_FILES, OBSERVATIONS, Sample, sample
+from tests.results import spec, write_project
+from tests.source_tree import ROOT
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+MILLIMETRE = 1e-3
+SAMPLES = sorted((ROOT / "sample_data").glob("*/project.yaml"))
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_project(tmp_path_factory.mktemp("project"), spec("north first", 2))
+
+
+def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
+    code = main([str(argument) for argument in arguments])
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+def small(folder: Path) -> Sample:
+    """Write a project that reads well and cannot be adjusted: two points, no neighbours to speak of."""
+    return sample(folder)
+
+
+# ------------------------------------------------------------------------------------------------ what is told
+
+
+def test_a_good_project_is_decoded_and_nothing_is_written(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = {path: path.read_bytes() for path in project.parent.iterdir()}
+    code, out, err = call(capsys, "check", project)
+    assert (code, err) == (0, "")
+    assert out.splitlines()[0].startswith(f"{project}: OK, ready to run")
+    for title in ("Contents", "Ground frames", "Standard deviations of the control", "Rows of the tables"):
+        assert f"── {title}" in out
+    assert {path: path.read_bytes() for path in project.parent.iterdir()} == before
+
+
+@pytest.mark.parametrize("path", SAMPLES, ids=lambda path: path.parent.name)
+def test_the_sample_projects_are_ready(path: Path) -> None:
+    assert check_project(path).faults == ()
+
+
+def test_every_project_is_checked_and_every_fault_told(
+    project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    wrong = small(tmp_path)
+    wrong.change("project.yaml", "unit: mm", "unit: cm")
+    wrong.change("control.csv", "xyz", "xyy")
+    code, out, err = call(capsys, "check", wrong.folder / "project.yaml", tmp_path / "no.yaml", project)
+    assert (code, err) == (2, "")
+    lines = out.splitlines()
+    assert lines[0] == f"{tmp_path}/project.yaml: FAULTY, 2 faults"
+    assert lines[1].startswith(f"error: {tmp_path}/project.yaml:18:9: observations.unit: `cm` is not known")
+    assert lines[2].startswith(f"error: {tmp_path}/control.csv:2:32: use: `xyy` is not known")
+    assert f"error: {tmp_path}/no.yaml: does not exist" in out
+    assert lines[-1] == "3 projects: 1 OK, 2 faulty"
+
+
+def test_quiet_leaves_verdicts_and_findings(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = call(capsys, "check", project, "--quiet")
+    assert all(re.match(rf"{project}: OK|(warning|note): ", line) for line in out.splitlines())
+
+
+@pytest.mark.parametrize("width", [60, 100, 200])
+def test_no_line_of_the_tables_is_wider_than_the_page(
+    project: Path, width: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, out, _ = call(capsys, "check", project, "--width", width)
+    tables = out[out.index("──") :].splitlines()
+    assert max(map(len, tables)) <= width
+
+
+def test_markdown(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    _, out, _ = call(capsys, "check", project, "--format", "md")
+    assert out.startswith(f"# {project}: OK")
+    assert "## Contents" in out
+
+
+# -------------------------------------------------------------------------------- weak geometry, before it is met
+
+
+def test_pairs_joints_and_control_are_counted(tmp_path: Path) -> None:
+    faults = check_project(small(tmp_path).folder / "project.yaml").faults
+    told = {(fault.code, fault.line): str(fault) for fault in faults}
+    assert set(told) == {
+        ("too-few-common-points", 12),
+        ("too-few-common-points", 15),
+        ("too-little-control", 10),
+        ("too-little-control", 13),
+    }
+    assert "photos 1001 and 1002 have 2 points in common; expected at least 5" in told["too-few-common-points", 12]
+    assert "strip B has 1 control points in plan and 1 in height" in told["too-little-control", 13]
+
+
+def test_three_photos_without_a_common_point(project: Path, tmp_path: Path) -> None:
+    import shutil
+
+    shutil.copytree(project.parent, tmp_path / "p")
+    path = tmp_path / "p" / "observations.csv"
+    head, *rows = path.read_text(encoding="utf-8").splitlines()
+    third = {row.split(",")[1] for row in rows if row.startswith(rows[0].split(",")[0] + ",")}
+    photos = list(dict.fromkeys(row.split(",")[0] for row in rows))
+    kept = [row for row in rows if not (row.split(",")[0] == photos[2] and row.split(",")[1] in third)]
+    path.write_text("\n".join([head, *kept]) + "\n", encoding="utf-8")
+    faults = check_project(tmp_path / "p" / "project.yaml").faults
+    assert [fault.code for fault in faults] == ["broken-joint"]
+    assert f"no point is common to photos {photos[0]}, {photos[1]} and {photos[2]}" in faults[0].message
+
+
+def test_what_check_refuses_run_refuses_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = small(tmp_path).folder / "project.yaml"
+    code, _, err = call(capsys, "run", path)
+    assert code == 3
+    assert "common points" in err
+
+
+# --------------------------------------------------------------------------------------------- decoded frames
+
+
+def test_the_decoded_point_is_that_of_proj(project: Path) -> None:
+    found = check_project(project).document["frames"][0]
+    north, east, height = found["given"]
+    crs = re.search(r"EPSG:\d+", found["frame"])
+    assert crs
+    transformer = pyproj.Transformer.from_crs(crs[0], "EPSG:4326", always_xy=True)
+    longitude, latitude = transformer.transform(east, north)
+    assert np.abs(np.array(found["geodetic"]) - (longitude, latitude, height)).max() < 1e-8
+    assert found["back_mm"] < MILLIMETRE
+    factors = pyproj.Proj(crs[0]).get_factors(longitude, latitude)
+    low, high = found["convergence_deg"]
+    assert low - 1e-6 <= factors.meridian_convergence <= high + 1e-6
+    assert high - low < 0.2
+
+
+def test_axes_in_the_wrong_order_do_not_pass_unseen(project: Path) -> None:
+    found = check_project(project, ["control[0].axes=[east, north, up]"])
+    swapped = found.document["frames"][0]
+    right = check_project(project).document["frames"][0]
+    assert swapped["geodetic"][1] != pytest.approx(right["geodetic"][1], abs=1)
+
+
+def test_a_point_outside_the_projection_is_a_fault(tmp_path: Path) -> None:
+    made = small(tmp_path)
+    made.change("control.csv", "500100.12,4649871.40", "9e99,9e99")
+    faults = check_project(tmp_path / "project.yaml").faults
+    assert ("ground-domain", 23) in {(fault.code, fault.line) for fault in faults}
+
+
+# -------------------------------------------------------------------------------------- where sigma comes from
+
+
+def test_every_control_coordinate_says_its_sigma_and_where_it_stands(tmp_path: Path) -> None:
+    made = small(tmp_path)
+    table = "point,x,y,z,use,sx,sy,sz\nG1,500100,4649871,212,xyz,0.01,,\nP2,500200,4649971,,xy,,,0.7\n"
+    made.write("control.csv", table)
+    first, second = check_project(tmp_path / "project.yaml").document["control"]
+    assert first["sigma"] == [0.01, 0.06, 0.08]
+    assert [each["source"] for each in first["sigma_from"]] == ["row", "default", "default"]
+    assert [(each["file"].rpartition("/")[2], each["line"]) for each in first["sigma_from"]] == [
+        ("control.csv", 2),
+        ("project.yaml", 26),
+        ("project.yaml", 26),
+    ]
+    assert second["sigma"] == [0.05, 0.06, None]
+    assert second["sigma_from"][2] is None
+
+
+def test_a_sigma_from_the_command_line_says_so(tmp_path: Path) -> None:
+    small(tmp_path)
+    found = check_project(tmp_path / "project.yaml", ["control[0].sigma=[1, 2, 3]"]).document["control"][0]
+    assert found["sigma"] == [1, 2, 3]
+    assert found["sigma_from"][0] == {"source": "default", "file": "--set", "line": 0, "key": "control[0].sigma"}
+
+
+# -------------------------------------------------------------------------------------------- rows of the tables
+
+
+def test_every_row_is_accounted_for(tmp_path: Path) -> None:
+    made = sample(tmp_path, MARKED_FILES)
+    made.write("observations.csv", OBSERVATIONS + "9999,P1,1,2\n1001,lonely,3,4\n1001,apart,5,6\n2001,apart,7,8\n")
+    made.write("fiducials.csv", MARKED_FILES["fiducials.csv"] + "9999,F1,1,2\n")
+    made.change("control.csv", "P2,", "N1,1,2,3,off,control\nN2,1,2,3,,check\nP2,")
+    rows = {each["file"].rpartition("/")[2]: each for each in check_project(tmp_path / "project.yaml").document["rows"]}
+    for table in rows.values():
+        assert table["used"] + sum(each["rows"] for each in table["unused"]) == table["rows"]
+    told = {name: [(each["why"], each["ids"], each["first_line"]) for each in rows[name]["unused"]] for name in rows}
+    assert told["observations.csv"] == [
+        ("its photo belongs to no strip", ["9999"], 10),
+        ("the point is measured on one photo only", ["lonely"], 11),
+        ("the point is on no two neighbouring photos of one strip", ["apart"], 12),
+    ]
+    assert told["fiducials.csv"] == [("its photo belongs to no strip", ["9999"], 10)]
+    assert told["control.csv"] == [
+        ("switched off (use: off)", ["N1"], 3),
+        ("not measured on any photo of the strips", ["N2"], 4),
+    ]
+
+
+def test_a_near_miss_of_a_name_is_suggested(tmp_path: Path) -> None:
+    made = small(tmp_path)
+    made.change("control.csv", "G1,", "G-1 ,")
+    notes = {note.code: note for note in check_project(tmp_path / "project.yaml").notes}
+    assert "`G-1`, did you mean `G1`?" in notes["control-not-measured"].message
+    assert (notes["control-not-measured"].line, notes["stray-blanks"].line) == (2, 2)
+
+
+# ------------------------------------------------------------------------------------- the same in every format
+
+
+FINDING = {
+    "severity", "code", "file", "line", "column", "key", "message", "expected", "fix", "photos", "points",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("command", ["run", "check"])
+def test_findings_as_json(tmp_path: Path, command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    made = small(tmp_path)
+    made.change("project.yaml", "y_axis: up", "y_axes: up")
+    made.change("observations.csv", "-20.25", "-20,25")
+    code, out, err = call(capsys, command, made.folder / "project.yaml", "--format", "json")
+    document = json.loads(out)
+    assert (code, err) == (2, "")
+    findings = document["findings"] if command == "run" else document["projects"][0]["findings"]
+    assert all(each.keys() == FINDING for each in findings)
+    assert [(each["file"], each["line"], each["column"], each["key"], each["code"]) for each in findings] == [
+        (f"{tmp_path}/project.yaml", 19, 3, "observations.y_axes", "unknown-key"),
+        (f"{tmp_path}/observations.csv", 2, 0, "", "row-length"),
+    ]
+
+
+@pytest.mark.parametrize("command", ["run", "check"])
+def test_findings_as_annotations(tmp_path: Path, command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    made = small(tmp_path)
+    made.change("project.yaml", "unit: mm", "unit: 100%,cm")
+    code, out, _ = call(capsys, command, made.folder / "project.yaml", "--format", "github")
+    assert code == 2
+    assert out == (
+        f"::error file={tmp_path}/project.yaml,line=18,col=9,title=photostrip word"
+        "::observations.unit: `100%25,cm` is not known; expected one of mm, um, px\n"
+    )
+
+
+def test_weak_geometry_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = call(capsys, "run", small(tmp_path).folder / "project.yaml", "--format", "json")
+    document = json.loads(out)
+    assert (code, err, document["exit_code"]) == (3, "", 3)
+    assert document["findings"][0]["code"] == "too-few-common-points"
+    assert document["findings"][0]["photos"] == ["1001", "1002"]
+
+
+def test_notes_of_a_run_know_their_place(tmp_path: Path, project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    import shutil
+
+    shutil.copytree(project.parent, tmp_path / "p")
+    table = tmp_path / "p" / "observations.csv"
+    text = table.read_text(encoding="utf-8").replace("\n", "\nIMG_1,P1,1,2\n", 1)
+    table.write_text(text, encoding="utf-8")
+    _, out, _ = call(capsys, "run", tmp_path / "p" / "project.yaml", "--format", "json")
+    note = json.loads(out)["notes"][0]
+    assert (note["code"], note["file"], note["line"]) == ("photo-in-no-strip", "observations.csv", 2)
+    assert str(tmp_path) not in out
+    _, out, _ = call(capsys, "run", tmp_path / "p" / "project.yaml", "--format", "github")
+    assert out.startswith("::warning file=observations.csv,line=2,title=photostrip photo-in-no-strip::")
+    _, out, _ = call(capsys, "run", tmp_path / "p" / "project.yaml")
+    assert "- warning: observations.csv:2: 1 row of 1 photo in no strip not used: IMG_1" in out
+
+
+# ----------------------------------------------------------------------------------------- the environment
+
+
+def test_variables_stand_in_for_options(
+    project: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("PHOTOSTRIP_FORMAT", "json")
+    assert json.loads(call(capsys, "check", project)[1])["photostrip_check"] == 1
+    monkeypatch.setenv("PHOTOSTRIP_FORMAT", "text")
+    monkeypatch.setenv("PHOTOSTRIP_WIDTH", "60")
+    assert max(map(len, call(capsys, "run", project)[1].splitlines())) <= 60
+    assert call(capsys, "run", project, "--width", "70")[1].splitlines()[2] == "── Verdict ".ljust(70, "─")
+    monkeypatch.setenv("PHOTOSTRIP_QUIET", "1")
+    assert len(call(capsys, "run", project)[1].splitlines()) < 6
+
+
+def test_a_wrong_variable_is_refused_by_name(
+    project: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("PHOTOSTRIP_FORMAT", "xml")
+    code, _, err = call(capsys, "check", project)
+    assert code == 2
+    assert "PHOTOSTRIP_FORMAT" in err
+
+
+def test_debug_by_variable(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setenv("PHOTOSTRIP_DEBUG", "1")
+    assert "Traceback" in call(capsys, "run", tmp_path / "no.yaml")[2]
+    monkeypatch.setenv("PHOTOSTRIP_DEBUG", "0")
+    assert "Traceback" not in call(capsys, "run", tmp_path / "no.yaml")[2]
