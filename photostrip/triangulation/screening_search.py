@@ -218,6 +218,7 @@ def robust_start(orientation: Orientation, todo: Numbers, sigma: Floats) -> tupl
         other, spread = robust.solve(present, rest, sigma[todo[again]])
         better = (spread < scale[again]) & (_share(other, rest, spread) > HALF)
         elements[again[better]], scale[again[better]] = other[better], spread[better]
+    elements = robust.consensus(elements, part, sigma[todo])
     return elements, scale
 
 

@@ -1,0 +1,207 @@
+"""Whole strips with gross errors: what is found, what is lost, and what the new points are worth afterwards.
+
+Run it as ``python benchmarks/gross_errors.py [strips]``. Every simulated strip of 20 photos is adjusted three times: as
+it is, with gross errors in 1 to 5 % of its image points, and with those errors and the search switched off. Errors are
+from 5 standard deviations to 50 mm (all sizes on a logarithmic scale equally often), along x or y; in a third of the
+strips one control coordinate is wrong too.
+
+An error along the base moves a point that stands on two photos along its other ray, and nothing contradicts it; points
+with a wrong measurement of their own are therefore counted apart.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from anywhere, installed or not
+
+from photostrip.errors import PhotostripError
+from photostrip.formats.simulation import inputs_of, settings_of
+from photostrip.pipeline import triangulate
+from photostrip.simulate.simulation import simulate
+from photostrip.simulate.spec import Control, Flight, GrossError, Points, Spec
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.pipeline import Settings
+    from photostrip.simulate.simulation import Simulation
+
+    Floats = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
+
+SMALLEST, LARGEST = 5.0, 50_000.0  # standard deviations of an image coordinate; micrometres
+WRONG_SHARE = (0.01, 0.05)
+CONTROL_ERRORS = (0.5, 50.0)  # m
+KINDS = ("without errors", "errors, auto", "errors, none")
+CONSPICUOUS = 2.0  # ratio of rms that is printed for a single strip
+STRIP = Spec(
+    flight=Flight(photos=20, end_lap_percent=62.0),
+    points=Points(rows=3, extra_per_model=8),
+    control=Control(layout="bands", bands=5, per_band=3),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One strip, adjusted.
+
+    Parameters
+    ----------
+    errors : ndarray, shape (n, 3)
+        Errors of the new points in the intermediate frame, metres.
+    own : ndarray of bool, shape (n,)
+        Points with a wrong measurement of their own.
+    good, lost, other_lost, wrong, found : int
+        Good image points, those of them that took no part in anything, those of them whose point has no wrong ray,
+        wrong image points, those of them that took no part.
+    control_found : bool or None
+        Whether the wrong control coordinate was named; None without one.
+    """
+
+    errors: Floats
+    own: Flags
+    good: int
+    lost: int
+    other_lost: int
+    wrong: int
+    found: int
+    control_found: bool | None
+
+
+def gross_errors(rng: np.random.Generator, image_points: int, sigma_um: float, *, control: bool) -> list[GrossError]:
+    """Draw gross errors for one strip."""
+    number = round(rng.uniform(*WRONG_SHARE) * image_points)
+    sizes = np.exp(rng.uniform(np.log(SMALLEST * sigma_um), np.log(LARGEST), number))
+    errors = [GrossError("image", size_um=float(size)) for size in sizes]
+    if control:
+        errors.append(GrossError("control", size_m=float(np.exp(rng.uniform(*np.log(CONTROL_ERRORS))))))
+    return errors
+
+
+def adjusted(simulation: Simulation, settings: Settings, spoiled: set[str]) -> Run:
+    """Adjust one strip and compare it with its truth."""
+    result = triangulate(inputs_of(simulation), settings)
+    observations = simulation.observations
+    given = {name for name, check in zip(simulation.control.ids, simulation.control.check, strict=True) if not check}
+    truth = {name: row for row, name in enumerate(simulation.truth.points.ids)}
+    names = [observations.point_ids[number] for number in result.points.number]
+    errors = result.points.cartesian - simulation.truth.points.xyz[[truth[name] for name in names]]
+    new = np.array([name not in given for name in names])
+    injected = {(error.photo, error.point) for error in simulation.truth.errors if error.kind == "image"}
+    photo = [observations.photo_ids[number] for number in observations.photo]
+    point = [observations.point_ids[number] for number in observations.point]
+    bad = np.array([key in injected for key in zip(photo, point, strict=True)])
+    used = np.zeros(len(bad), bool)
+    for strip in result.strips:
+        used[strip.rows] = True
+    own = np.array([name in spoiled for name in names])[new]
+    wrong_control = [error.point for error in simulation.truth.errors if error.kind == "control"]
+    named = None
+    if wrong_control:
+        named = any(wrong_control[0] in note.points for note in result.notes if note.code.startswith("control-"))
+    local = (errors @ result.strips[0].intermediate.axes)[new]
+    lost = ~bad & ~used
+    other = lost & ~np.isin(point, list(spoiled))
+    good, gone, spared, wrong, found = (int(each.sum()) for each in (~bad, lost, other, bad, bad & ~used))
+    return Run(local, own, good, gone, spared, wrong, found, named)
+
+
+def spoiled_points(simulation: Simulation) -> set[str]:
+    """Give the points with a wrong measurement."""
+    return {error.point for error in simulation.truth.errors if error.kind == "image"}
+
+
+@dataclass(eq=False)
+class Table:
+    """Sums over all strips."""
+
+    squares: dict[str, Floats]
+    points: dict[str, int]
+    failed: dict[str, int]
+    counts: dict[str, int]
+    ratios: list[float]
+
+    @classmethod
+    def empty(cls) -> Table:
+        """Begin with nothing."""
+        names = ("good", "lost", "other lost", "wrong", "found", "clean good", "clean lost", "control", "control found")
+        return cls(
+            {kind: np.zeros(3) for kind in KINDS},
+            dict.fromkeys(KINDS, 0),
+            dict.fromkeys(KINDS, 0),
+            dict.fromkeys(names, 0),
+            [],
+        )
+
+    def add(self, kind: str, run: Run) -> float:
+        """Add one strip; give its rms at sound points."""
+        sound = run.errors[~run.own]
+        self.squares[kind] += (sound**2).sum(axis=0)
+        self.points[kind] += len(sound)
+        if kind == KINDS[1]:
+            for name in ("good", "lost", "other_lost", "wrong", "found"):
+                self.counts[name.replace("_", " ")] += getattr(run, name)
+            self.counts["control"] += run.control_found is not None
+            self.counts["control found"] += bool(run.control_found)
+        elif kind == KINDS[0]:
+            self.counts["clean good"] += run.good
+            self.counts["clean lost"] += run.lost
+        return float(np.sqrt((sound**2).sum(axis=1).mean()))
+
+    def show(self, strips: int) -> None:
+        """Print everything."""
+        print(f"\n{strips} strips of 20 photos, {STRIP.image.sigma_um:g} um, 1:{STRIP.scale:.0f}")
+        print("                  rms along  across      up   plan ratio  height ratio   strips failed")
+        base = np.sqrt(self.squares[KINDS[0]] / self.points[KINDS[0]])
+        for kind in KINDS:
+            value = np.sqrt(self.squares[kind] / max(self.points[kind], 1))
+            plan, height = np.hypot(*value[:2]) / np.hypot(*base[:2]), value[2] / base[2]
+            row = f"{kind:16s}{value[0]:11.3f}{value[1]:8.3f}{value[2]:8.3f}{plan:13.3f}{height:14.3f}"
+            print(f"{row}{self.failed[kind]:16d}")
+        middle, most = np.quantile(self.ratios, (0.5, 0.95))
+        c = self.counts
+        print(f"\nratio of a strip's rms: median {middle:.3f}, 95 % below {most:.3f}, largest {max(self.ratios):.3f}")
+        print(f"wrong image points out of everything: {c['found']} of {c['wrong']}")
+        print(
+            f"good image points lost: {100 * c['lost'] / c['good']:.2f} %, of points without a wrong ray: "
+            f"{100 * c['other lost'] / c['good']:.2f} %"
+        )
+        print(f"the same in strips without errors: {c['clean lost']} of {c['clean good']}")
+        print(f"wrong control coordinates named: {c['control found']} of {c['control']}")
+
+
+def main(strips: int) -> None:
+    """Adjust all strips and print the table."""
+    table = Table.empty()
+    for seed in range(1, strips + 1):
+        rng = np.random.default_rng(seed)
+        clean = replace(STRIP, seed=seed)
+        plain = simulate(clean)
+        errors = gross_errors(rng, len(plain.observations), clean.image.sigma_um, control=seed % 3 == 0)
+        spoiled = simulate(replace(clean, gross_errors=tuple(errors)))
+        rms: dict[str, float] = {}
+        for kind, simulation in zip(KINDS, (plain, spoiled, spoiled), strict=True):
+            settings = settings_of(simulation)
+            if kind == KINDS[2]:
+                settings = replace(settings, relative=replace(settings.relative, screening="none"))
+            try:
+                rms[kind] = table.add(kind, adjusted(simulation, settings, spoiled_points(spoiled)))
+            except PhotostripError as error:
+                table.failed[kind] += 1
+                if kind != KINDS[2]:
+                    print(f"strip {seed}, {kind}: {error}")
+        if len(rms) > 1 and KINDS[1] in rms:
+            table.ratios.append(rms[KINDS[1]] / rms[KINDS[0]])
+            if table.ratios[-1] > CONSPICUOUS:
+                print(f"strip {seed}: rms {rms[KINDS[1]]:.3f} m, without errors {rms[KINDS[0]]:.3f} m")
+    table.show(strips)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 300)

@@ -1,0 +1,322 @@
+"""Wrong control: coordinates that the strip and all other control contradict.
+
+A wrong coordinate pulls the similarity, and a polynomial bends towards it. It is therefore judged by what the others
+predict: its residual against a polynomial of the highest degree that the control carries, divided by the share of it
+that the fit leaves (its redundancy number), in units of the scatter of the others. Very large errors go first, by a
+similarity that minimises absolute residuals. Two large ones that fit exchanged are named as an exchange.
+
+Source: data snooping after a robust start; derived, see docs/sources.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import PhotostripError
+from photostrip.statistics import t_quantile
+from photostrip.triangulation import absolute, polynomial
+from photostrip.triangulation.absolute import Targets
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.geodesy.crs import GroundFrame
+    from photostrip.geodesy.local_frame import IntermediateFrame
+    from photostrip.points import ControlPoints
+
+    Floats = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
+
+ALPHA = 0.01  # of rejecting anything in a strip without wrong control
+LEAST_REDUNDANCY = 3  # of plan and of height, for a test
+SEEN = 0.05  # redundancy number below which a coordinate cannot be judged
+LARGEST_SHARE = 0.34  # of the control coordinates of plan or height that may be rejected
+CONSPICUOUS = 6.0  # largest over median misclosure that asks for a robust start
+GROSS = 12.0  # standard deviations from the median, in the robust start
+ROBUST_STEPS = 20
+NORMAL = 1.4826
+EXCHANGED = 0.2  # misclosures left by an exchange, over those before
+AXES = ("east", "north", "up")
+PLAN = slice(0, 2)
+
+
+@dataclass(frozen=True, slots=True)
+class ControlRejection:
+    """Wrong coordinates of one control point. With one plan coordinate the other one is not used either.
+
+    Parameters
+    ----------
+    id : str
+        The point.
+    axes : tuple of str
+        Which coordinates look wrong: ``"east"``, ``"north"``, ``"up"`` (of the point's ground frame).
+    value, limit : float
+        Largest test value and its critical value.
+    size : tuple of float
+        Estimated errors of the coordinates east, north, up, metres: given minus what the others predict.
+    redundancy : float
+        Smallest redundancy number of the coordinates rejected.
+    exchanged_with : str
+        The point with which it seems to have been exchanged; empty when there is none.
+    """
+
+    id: str
+    axes: tuple[str, ...]
+    value: float
+    limit: float
+    size: tuple[float, float, float]
+    redundancy: float
+    exchanged_with: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """Where a strip stands when its control is examined.
+
+    Parameters
+    ----------
+    strip : ndarray, shape (n, 3)
+        Strip coordinates of the control points.
+    frames : sequence of GroundFrame
+        Ground frames of the control.
+    intermediate : IntermediateFrame
+        Frame of the adjustment.
+    precision : tuple of float
+        A-priori standard deviation of a strip point in plan and height, metres.
+    spacing, breadth : float
+        As in :class:`polynomial.Problem`.
+    """
+
+    strip: Floats
+    frames: Sequence[GroundFrame]
+    intermediate: IntermediateFrame
+    precision: tuple[float, float]
+    spacing: float
+    breadth: float
+
+    def problem(self, control: ControlPoints) -> polynomial.Problem:
+        """Fit the similarity, and give what is left to a polynomial."""
+        targets = Targets(control, self.frames, self.intermediate)
+        first = absolute.orient(self.strip, targets, control.use.astype(float))
+        weight = absolute.weights(targets.turned(first.similarity(self.strip)), self.precision)
+        orientation = absolute.orient(self.strip, targets, weight)
+        return polynomial.Problem(orientation.similarity(self.strip), targets, weight, self.spacing, self.breadth)
+
+
+def screen(control: ControlPoints, setting: Setting) -> tuple[ControlPoints, tuple[ControlRejection, ...]]:
+    """Take wrong coordinates out of the control.
+
+    Parameters
+    ----------
+    control : ControlPoints
+        Control of a strip, no check points.
+    setting : Setting
+        The strip.
+
+    Returns
+    -------
+    ControlPoints
+        The same points with ``use`` false where a coordinate was rejected.
+    tuple of ControlRejection
+        What was rejected, in order of the control.
+    """
+    try:
+        start = _without(control, _gross(control, setting))
+        kept = _snoop(start, setting)
+        kept = _taken_back(control, kept, setting)
+        return kept, _log(control, kept, setting)
+    except PhotostripError:
+        # without the suspected coordinates the strip hangs free: nothing can be said against them
+        return control, ()
+
+
+def _without(control: ControlPoints, out: Flags) -> ControlPoints:
+    return replace(control, use=control.use & ~out)
+
+
+def _gross(control: ControlPoints, setting: Setting) -> Flags:
+    """Find coordinates far from a similarity of least absolute misclosures."""
+    nothing = np.zeros(control.use.shape, bool)
+    targets = Targets(control, setting.frames, setting.intermediate)
+    weight = control.use.astype(float)
+    result = absolute.orient(setting.strip, targets, weight)
+    size = np.abs(result.misclosures)
+    if size[control.use].max() < CONSPICUOUS * np.median(size[control.use]):
+        return nothing
+    for _ in range(ROBUST_STEPS):
+        floor = max(float(np.median(size[control.use])), 1e-6)
+        result = absolute.orient(setting.strip, targets, weight / np.maximum(size / floor, 1.0) * control.use)
+        size = np.abs(result.misclosures)
+    scatter = NORMAL * np.array([np.median(size[:, axes][control.use[:, axes]]) for axes in ([0, 1], [0, 1], [2])])
+    far = np.array(control.use & (size > GROSS * scatter), bool)
+    far[:, PLAN] = far[:, PLAN].any(axis=1, keepdims=True) & control.use[:, PLAN]
+    return far if _enough(control, far) else nothing
+
+
+def _together(axis: int) -> list[int]:
+    """Coordinates that go with a wrong one: a point with half of its plan position left would bend the fit."""
+    return [0, 1] if axis < 2 else [axis]
+
+
+def _enough(control: ControlPoints, out: Flags) -> bool:
+    """Whether few enough coordinates of plan and of height are suspected."""
+    given, suspected = control.use, control.use & out
+    return all(suspected[:, axes].sum() <= LARGEST_SHARE * given[:, axes].sum() for axes in (PLAN, slice(2, 3)))
+
+
+def _richest(problem: polynomial.Problem) -> polynomial.Polynomial | None:
+    """Polynomial of the highest degree that leaves redundancy in every axis; None when there is none."""
+    for degree in ("3", "2", "1"):
+        fit = polynomial.fit(problem, polynomial.Settings(degree))
+        if all(axis.terms and axis.redundancy >= LEAST_REDUNDANCY for axis in fit.axes):
+            return fit
+    return None
+
+
+def judged(problem: polynomial.Problem, fit: polynomial.Polynomial) -> tuple[Floats, Floats, Floats, Floats]:
+    """Judge every control coordinate by what the others predict.
+
+    Parameters
+    ----------
+    problem : polynomial.Problem
+        Control after the similarity.
+    fit : polynomial.Polynomial
+        Polynomial of the control.
+
+    Returns
+    -------
+    value, limit : ndarray, shape (n, 3)
+        Test values and critical values along east, north, up; value 0 where nothing can be said.
+    size : ndarray, shape (n, 3)
+        Given minus predicted, metres.
+    redundancy : ndarray, shape (n, 3)
+        Redundancy numbers of the coordinates, 0 to 1.
+    """
+    use = problem.targets.control.use
+    rest = np.column_stack([1 - axis.leverage for axis in fit.axes])
+    residual = np.column_stack([axis.residuals for axis in fit.axes])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        predicted = np.where(rest > SEEN, residual / rest, 0.0)
+    expected = 1 / np.sqrt(np.where(problem.by_axis > 0, problem.by_axis, np.inf))
+    groups = ((0, 1), (0, 1), (2,))
+    spread, freedom = np.empty_like(residual), np.empty(3)
+    for axis, group in enumerate(groups):
+        counted = problem.by_axis[:, group] > 0
+        total = sum(fit.axes[k].redundancy for k in group)
+        squares = (residual[:, group] ** 2).sum()
+        own = (residual[:, group] ** 2 / np.maximum(rest[:, group], SEEN) * counted).sum(axis=1)
+        freedom[axis] = max(total - len(group), 1)
+        spread[:, axis] = np.sqrt(np.maximum(squares - own, 0.0) / freedom[axis])
+    deviation = np.maximum(spread, expected) / np.sqrt(np.maximum(rest, SEEN))
+    axes = problem.targets.axes(problem.xyz)
+    size = -np.einsum("nij,nj->ni", axes, predicted)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        value = np.abs(size) / np.sqrt(np.einsum("nij,nj->ni", axes**2, deviation**2))
+    redundancy = np.einsum("nij,nj->ni", axes**2, np.clip(rest, 0.0, 1.0))
+    tail = ALPHA / (2 * int(use.sum()))
+    limit = np.array([t_quantile(1 - tail, dof) for dof in freedom])
+    seen = use & (redundancy > SEEN) & np.isfinite(value)
+    return np.where(seen, value, 0.0), np.broadcast_to(limit, value.shape), size, redundancy
+
+
+def _snoop(control: ControlPoints, setting: Setting) -> ControlPoints:
+    """Take out the worst coordinate, fit again, until none is beyond its limit."""
+    kept = control
+    while True:
+        problem = setting.problem(kept)
+        fit = _richest(problem)
+        if fit is None:
+            return kept
+        value, limit, _, _ = judged(problem, fit)
+        ratio = value / limit
+        row = int(ratio.max(axis=1).argmax())
+        out = np.zeros(kept.use.shape, bool)
+        out[row, _together(int(ratio[row].argmax()))] = True
+        if ratio.max() <= 1 or not _enough(control, ~kept.use | out):
+            return kept
+        kept = _without(kept, out)
+
+
+def _predicted(control: ControlPoints, kept: ControlPoints, setting: Setting) -> tuple[Floats, Floats, Floats, Floats]:
+    """Judge all given coordinates, the rejected ones too, by a fit of those that are kept."""
+    problem = setting.problem(kept)
+    fit = _richest(problem)
+    if fit is None:
+        nothing = np.zeros(control.use.shape)
+        return nothing, nothing + 1, nothing, nothing
+    value, limit, size, redundancy = judged(problem, fit)
+    given = Targets(control, setting.frames, setting.intermediate)
+    corrected = fit(problem.xyz)
+    out = control.use & ~kept.use
+    gap = -np.einsum("nij,nj->ni", given.axes(corrected), corrected - given.of(corrected))
+    expected = 1 / np.sqrt(problem.weight.max(axis=0))
+    sigma0 = np.array([max(fit.axes[k].sigma0, float(expected[k])) for k in range(3)])
+    columns = [_leverages(problem, axis.terms, problem.by_axis[:, k]) for k, axis in enumerate(fit.axes)]
+    spread = sigma0 * np.sqrt(1 + np.column_stack(columns))
+    turned = np.sqrt(np.einsum("nij,nj->ni", given.axes(corrected) ** 2, spread**2))
+    value = np.where(out, np.abs(gap) / turned, value)
+    return value, limit, np.where(out, gap, size), np.where(out, 1.0, redundancy)
+
+
+def _leverages(problem: polynomial.Problem, terms: Sequence[str], weight: Floats) -> Floats:
+    """Variance of the fit at every point in units of that of a coordinate of mean weight, shape (n,)."""
+    x, y = problem.xyz[:, 0] / problem.reach, problem.xyz[:, 1] / problem.breadth
+    columns = np.column_stack([x**i * y**j for i, j in (polynomial.POWERS[term] for term in terms)])
+    used = weight > 0
+    design = columns[used] * np.sqrt(weight[used] / weight[used].mean())[:, None]
+    cofactors = np.linalg.pinv(design.T @ design, hermitian=True)
+    return np.asarray(np.einsum("ni,ij,nj->n", columns, cofactors, columns), float)
+
+
+def _taken_back(control: ControlPoints, kept: ControlPoints, setting: Setting) -> ControlPoints:
+    """Take back coordinates that the final fit predicts after all."""
+    value, limit, _, _ = _predicted(control, kept, setting)
+    good = np.array(value <= limit, bool)
+    good[:, PLAN] = (good | ~control.use)[:, PLAN].all(axis=1, keepdims=True)
+    return replace(kept, use=kept.use | (control.use & good))
+
+
+def _log(control: ControlPoints, kept: ControlPoints, setting: Setting) -> tuple[ControlRejection, ...]:
+    out = control.use & ~kept.use
+    if not out.any():
+        return ()
+    value, limit, size, redundancy = _predicted(control, kept, setting)
+    partner = _exchanges(control, out, size)
+    rows = np.flatnonzero(out.any(axis=1)).tolist()
+    found = []
+    for row in rows:
+        axes = np.flatnonzero(out[row] & (value[row] > limit[row]))
+        worst = axes[(value[row] / limit[row])[axes].argmax()]
+        found.append(
+            ControlRejection(
+                control.ids[row],
+                tuple(AXES[k] for k in axes),
+                float(value[row, worst]),
+                float(limit[row, worst]),
+                (float(size[row, 0]), float(size[row, 1]), float(size[row, 2])),
+                float(redundancy[row, axes].min()),
+                partner.get(row, ""),
+            )
+        )
+    return tuple(found)
+
+
+def _exchanges(control: ControlPoints, out: Flags, size: Floats) -> dict[int, str]:
+    """Find pairs of rejected points whose errors vanish when their coordinates are exchanged."""
+    rows = np.flatnonzero(out[:, :2].any(axis=1)).tolist()
+    found: dict[int, str] = {}
+    for one in rows:
+        for other in rows:
+            if other <= one or control.frame[one] != control.frame[other]:
+                continue
+            step = (control.enu[other] - control.enu[one])[:2]
+            gaps = np.array([size[one, :2] + step, size[other, :2] - step])
+            before = np.array([size[one, :2], size[other, :2]])
+            if np.linalg.norm(gaps) < EXCHANGED * np.linalg.norm(before):
+                found[one], found[other] = control.ids[other], control.ids[one]
+    return found
