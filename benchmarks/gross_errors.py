@@ -43,7 +43,7 @@ CONSPICUOUS = 2.0  # ratio of rms that is printed for a single strip
 STRIP = Spec(
     flight=Flight(photos=20, end_lap_percent=62.0),
     points=Points(rows=3, extra_per_model=8),
-    control=Control(layout="bands", bands=5, per_band=3),
+    control=Control(layout="bands", bands=7, per_band=3),
 )
 
 

@@ -28,7 +28,7 @@ AGREE = 4.0  # standard deviations
 FEW = 3  # points that may disagree before other elements are looked for
 MINIMAL = 5  # points of a set
 SETS = 300  # with a third of the points wrong, 13 % of the sets are right
-SURE_OF_SET = 2.0  # a set of five determines the elements worse than all points do
+MOST = 0.65  # share of the points that a set must suit
 DEGENERATE = 1e-7  # determinant of a set, columns of unit length over the pair
 SETTLED = 1e-6  # rad; what follows is least squares
 
@@ -77,7 +77,7 @@ def start_values(pairs: Pairs) -> Floats:
     return start
 
 
-def solve(start: Floats, pairs: Pairs, sigma: Floats) -> tuple[Floats, Floats]:
+def solve(start: Floats, pairs: Pairs, sigma: Floats, *, near: bool = False) -> tuple[Floats, Floats]:
     """Orient pairs with weights that fall with the residual.
 
     Parameters
@@ -88,6 +88,8 @@ def solve(start: Floats, pairs: Pairs, sigma: Floats) -> tuple[Floats, Floats]:
         Measurements; weight 0 leaves a point out.
     sigma : ndarray, shape (p,)
         A-priori standard deviation of a y parallax of weight one, mm.
+    near : bool
+        Whether the start agrees with most points already: absolute residuals are not minimised first.
 
     Returns
     -------
@@ -99,7 +101,7 @@ def solve(start: Floats, pairs: Pairs, sigma: Floats) -> tuple[Floats, Floats]:
     elements = start.copy()
     scale = sigma
     given = pairs.weight
-    absolute = True
+    absolute = not near
     for step in range(ABSOLUTE_STEPS + WELSCH_STEPS):
         with np.errstate(all="ignore"):
             q, jacobian = relative.linearised(elements, pairs)
@@ -140,42 +142,50 @@ def consensus(elements: Floats, pairs: Pairs, sigma: Floats) -> Floats:
     ndarray, shape (p, 5)
         Elements in radians; those of pairs in which nothing better was found are unchanged.
     """
-    result = elements.copy()
+    before = _agreeing(elements, pairs, sigma)
+    todo = np.flatnonzero(pairs.sums((pairs.weight > 0).astype(float)) - before > FEW)
+    if not len(todo):
+        return elements
+    part, _ = pairs.take(todo)
+    start = elements[todo].copy()
     with np.errstate(all="ignore"):
-        q, jacobian = relative.linearised(elements, pairs)
-    root = np.sqrt(pairs.weight) / sigma[pairs.pair]
-    disagree = ~(np.abs(q) * root <= AGREE) & (pairs.weight > 0)
-    for number in np.flatnonzero(pairs.sums(disagree.astype(float)) > FEW):
-        rows = np.flatnonzero((pairs.pair == number) & (pairs.weight > 0) & np.isfinite(q))
+        q, jacobian = relative.linearised(start, part)
+    root = np.sqrt(part.weight) / sigma[todo][part.pair]
+    for number in range(len(todo)):
+        rows = np.flatnonzero((part.pair == number) & (part.weight > 0) & np.isfinite(q))
         # an order of the points that does not depend on that of the table
-        rows = rows[np.lexsort((pairs.left[rows, 1], pairs.left[rows, 0]))]
-        step = _largest_agreement(jacobian[:, rows].T * root[rows, None], q[rows] * root[rows])
-        result[number] += step
+        rows = rows[np.lexsort((part.left[rows, 1], part.left[rows, 0]))]
+        start[number] += _best_set(jacobian[:, rows].T * root[rows, None], q[rows] * root[rows])
+    other, _ = solve(start, part, sigma[todo], near=True)
+    better = _agreeing(other, part, sigma[todo]) > before[todo]
+    result = elements.copy()
+    result[todo[better]] = other[better]
     return result
 
 
-def _largest_agreement(design: Floats, residual: Floats) -> Floats:
-    """Change of the elements with which most points agree; zero when none is better than no change."""
+def _agreeing(elements: Floats, pairs: Pairs, sigma: Floats) -> Floats:
+    """Count the points of each pair that agree with its elements."""
+    with np.errstate(all="ignore"):
+        size = np.abs(relative.parallaxes(elements, pairs)) * np.sqrt(pairs.weight) / sigma[pairs.pair]
+        good = (size <= AGREE) & (pairs.weight > 0) & relative.in_front(elements, pairs)
+    return pairs.sums(good.astype(float))
+
+
+def _best_set(design: Floats, residual: Floats) -> Floats:
+    """Change of the elements by which most residuals become small; zero when there is none."""
     n = len(residual)
-    best, best_count = np.zeros(5), int((np.abs(residual) <= AGREE).sum())
     if n <= MINIMAL:
-        return best
+        return np.zeros(5)
     draws = np.argsort(np.random.default_rng(n).random((SETS, n)), axis=1)[:, :MINIMAL]
     matrix = design[draws]
-    scale = np.linalg.norm(design, axis=0)
-    regular = np.abs(np.linalg.det(matrix / scale)) > DEGENERATE
+    regular = np.abs(np.linalg.det(matrix / np.linalg.norm(design, axis=0))) > DEGENERATE
     steps = -np.linalg.solve(matrix[regular], residual[draws[regular]][:, :, None])[:, :, 0]
-    steps = steps[np.abs(steps).max(axis=1) < LONGEST]
+    steps = steps[np.abs(steps).max(axis=1, initial=0.0) < LONGEST]
     if not len(steps):
-        return best
-    left = np.abs(residual + steps @ design.T)
-    order = (left <= SURE_OF_SET * AGREE).sum(axis=1)
-    step = steps[order.argmax()]
-    for _ in range(3):
-        agree = np.abs(residual + design @ step) <= SURE_OF_SET * AGREE
-        step = -np.linalg.lstsq(design[agree], residual[agree], rcond=None)[0]
-    count = int((np.abs(residual + design @ step) <= AGREE).sum())
-    return np.asarray(step, float) if count > best_count else best
+        return np.zeros(5)
+    left = np.sort(np.abs(residual + steps @ design.T), axis=1)
+    best: Floats = steps[left[:, int(MOST * (n - 1))].argmin()]
+    return best
 
 
 def _step(q: Floats, jacobian: Floats, pairs: Pairs) -> Floats:
