@@ -72,7 +72,7 @@ COMMANDS = {
     "info": Entry(
         "photostrip.cli.info",
         "Print versions, formats and extras, and how to get what is missing.",
-        "photostrip info",
+        "photostrip info --format json",
     ),
 }
 
