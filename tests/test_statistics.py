@@ -11,7 +11,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from photostrip.statistics import chi2_quantile, f_p_value, grubbs_limit, t_p_value, t_quantile, tau_limit
+from photostrip.statistics import (
+    chi2_quantile,
+    f_p_value,
+    grubbs_limit,
+    normal_quantile,
+    t_p_value,
+    t_quantile,
+    tau_limit,
+)
 from tests.vectors import cases, section, vector
 
 if TYPE_CHECKING:
@@ -27,6 +35,14 @@ ALPHAS = st.floats(1e-4, 0.2)
 
 
 # -------------------------------------------------------------------------------------- Student, F, chi2
+
+
+@pytest.mark.parametrize(
+    ("probability", "printed"), [(0.5, 0.0), (0.90, 1.2816), (0.975, 1.9600), (0.995, 2.5758), (0.9995, 3.2905)]
+)
+def test_printed_quantiles_of_the_normal_distribution(probability: float, printed: float) -> None:
+    assert normal_quantile(probability) == pytest.approx(printed, abs=0.0000501)
+    assert normal_quantile(1 - probability) == pytest.approx(-printed, abs=0.0000501)
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from hypothesis import given
+from hypothesis import settings as examples
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -208,6 +209,7 @@ def test_orientations_are_handed_on() -> None:
 
 
 @TRANSFERS
+@examples(max_examples=30)
 @given(size=st.floats(0.01, 100.0))
 def test_the_size_of_the_photos_does_not_matter(transfer: str, size: float) -> None:
     flown = fly(4, 5, sigma=5 * MICROMETRE, extra=10)
@@ -270,25 +272,22 @@ def test_the_spread_of_the_ratios_is_that_of_the_parallaxes() -> None:
 
 
 @TRANSFERS
-def test_a_wrong_pass_point_is_rejected_and_does_no_harm(transfer: str) -> None:
-    flown = fly(8, 5, sigma=2 * MICROMETRE, extra=150, tilt_deg=0.2)
+@pytest.mark.parametrize("extra", [10, 40, 150], ids=["4 points a joint", "7 points", "18 points"])
+def test_a_wrong_pass_point_is_rejected_and_does_little_harm(transfer: str, extra: int) -> None:
+    flown = fly(8, 5, sigma=2 * MICROMETRE, extra=extra, tilt_deg=0.2)
     strip = formed(flown, transfer)
     xy = flown.observations.xy.copy()
     wrong = np.flatnonzero(seen(flown, 3, "p2_1"))  # the third photo of the joint at photo 2
     xy[wrong, 0] += 1.0  # along the base: no y parallax tells
-    spoiled = replace(flown, observations=replace(flown.observations, xy=xy))
-    found = formed(spoiled, transfer)
-    out = [(int(j), int(p)) for j, p in zip(found.junctions.joint, found.junctions.point, strict=True)]
-    rejected = [out[row] for row in np.flatnonzero(~found.junctions.used)]
+    found = formed(replace(flown, observations=replace(flown.observations, xy=xy)), transfer).junctions
+    rejected = {(int(found.joint[row]), int(found.point[row])) for row in np.flatnonzero(~found.used)}
     number = flown.at["p2_1"]
-    assert set(rejected) <= {(1, number), (2, number)}
     assert (1, number) in rejected
-    kept = np.flatnonzero(strip.junctions.used)
-    assert len(kept) == len(strip.junctions.used)
-    assert np.allclose(found.junctions.factor, strip.junctions.factor, rtol=3e-4, atol=0)
-    assert np.all(
-        np.abs(found.junctions.ratio / found.junctions.factor[found.junctions.joint] - 1)[found.junctions.used] < 0.01
-    )
+    assert rejected <= {(1, number), (2, number)}
+    assert strip.junctions.used.all()
+    harm = np.abs(found.factor / strip.junctions.factor - 1)
+    share = 0.011 / np.bincount(found.joint, minlength=3)[1]  # of the scale, had it been left in the mean
+    assert harm.max() < 0.25 * share
 
 
 def test_small_deviations_are_never_rejected() -> None:

@@ -13,10 +13,24 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from photostrip.errors import EXIT_GEOMETRY, GeometryError
+from photostrip.pipeline import Settings, triangulate
 from photostrip.points import PhotoPoints
 from photostrip.triangulation import relative
 from photostrip.triangulation.intersection import intersect
-from tests.strips import MICROMETRE, attitude, batch, fly, gruber, measured, photograph, relative_geometry, true_pairs
+from tests.strips import (
+    MICROMETRE,
+    Flown,
+    attitude,
+    batch,
+    control_points,
+    fly,
+    gruber,
+    measured,
+    photograph,
+    project,
+    relative_geometry,
+    true_pairs,
+)
 from tests.vectors import cases, section, vector
 
 if TYPE_CHECKING:
@@ -426,6 +440,37 @@ def test_a_critical_cylinder_is_refused() -> None:
     error = refusal(of_arrays(photograph(ground, np.zeros(3), level, 100.0), photograph(ground, right, level, 100.0)))
     assert error.code == "degenerate-pair"
     assert "critical surface" in str(error)
+
+
+def notes_of_a_pair(plan: list[list[float]]) -> dict[str, str]:
+    """Notes of a run over two photos 700 m apart, 1000 m above points of which four are control."""
+    rng = np.random.default_rng(1)
+    xyz = np.column_stack([np.array(plan), rng.uniform(-60, 60, len(plan))])
+    centers, rotations = np.array([[0.0, 0, 1000], [700, 0, 1000]]), attitude(rng.normal(0, 1, (2, 3)))
+    images = [
+        {f"p{n}": xy for n, xy in enumerate(photograph(xyz, center, rotation, 100.0))}
+        for center, rotation in zip(centers, rotations, strict=True)
+    ]
+    observations = measured(dict(zip(BOTH, images, strict=True)))
+    at = {name: n for n, name in enumerate(observations.point_ids)}
+    flown = Flown(observations, xyz, centers, rotations, 100.0, 700.0, 1000.0, at)
+    control = control_points({f"p{n}": xyz[n] for n in range(4)})
+    return {note.code: note.message for note in triangulate(project(flown, control), Settings("similarity")).notes}
+
+
+STANDARD = [[0.0, 0.0], [700.0, 0.0], [0.0, 650.0], [700.0, 650.0], [0.0, -650.0], [700.0, -650.0]]
+
+
+def test_a_pair_on_five_points_is_warned_of() -> None:
+    said = notes_of_a_pair(STANDARD[:5])
+    assert "photos 1 and 2 are oriented on 5 points: no check" in said["no-check"]
+    assert "no-check" not in notes_of_a_pair(STANDARD)
+
+
+def test_a_pair_on_a_narrow_band_is_warned_of() -> None:
+    said = notes_of_a_pair([[x, y / 8] for x, y in STANDARD])
+    assert "photos 1 and 2: weak relative orientation (condition number" in said["weak-pair"]
+    assert "weak-pair" not in notes_of_a_pair(STANDARD)
 
 
 # ---------------------------------------------------------------------------------------------- refused
