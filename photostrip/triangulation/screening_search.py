@@ -34,7 +34,8 @@ MEDIAN_SCATTER = 1.17  # sd of a standard deviation from the median of n residua
 PROOF = 3.0  # of those, by which a scatter must exceed the one in force
 CONTRADICTION = 1.25  # ratio of the scatter found to the one stated that is worth a change
 UNCHANGED = 1.05  # ratio of scatters that makes no difference
-FEW = 0.25  # share of a pair's points that may go before what is left says nothing about the scatter
+FEW = 0.35  # share of a pair's points that may go before what is left says nothing about the scatter
+ENOUGH = 5.0  # redundancy below which one error cannot be told from a larger scatter
 SMALLEST_SIGMA = 1e-9  # mm
 GROSS = 4.0  # standard deviations; residuals from the robust start beyond it are wrong points
 PAIRS_AT_ONCE = 64
@@ -307,10 +308,10 @@ def _revised(scatter: Scatter, given: Orientation, found: Deleted, cleaned: Orie
     trusted = (few & ~failing(found.orientation, scatter.by_pair))[pairs.pair]
     sizes = np.where(trusted, _normalised(found.orientation), _normalised(cleaned))
     tested = np.isfinite(sizes)
-    if not tested.any():
-        return scatter
     redundancy = np.where(trusted, found.orientation.redundancy, cleaned.redundancy)
     freedom = pairs.sums(np.where(tested, redundancy, 0.0))
+    if freedom.sum() < ENOUGH:
+        return scatter
     pooled = robust.NORMAL * float(np.median(sizes[tested]))
     proof = 1 + PROOF * MEDIAN_SCATTER / np.sqrt(max(float(freedom.sum()), 1.0))
     first = np.isnan(scatter.found)
@@ -318,7 +319,7 @@ def _revised(scatter: Scatter, given: Orientation, found: Deleted, cleaned: Orie
     found_now = pooled if pooled > factor * level else scatter.found
     level = max(level, np.nan_to_num(found_now))
     own = robust.NORMAL * np.nan_to_num(robust.median_by_pair(sizes, pairs, tested))
-    proven = own / (1 + PROOF * MEDIAN_SCATTER / np.sqrt(np.maximum(freedom, 1.0)))
+    proven = np.where(freedom < ENOUGH, 0.0, own / (1 + PROOF * MEDIAN_SCATTER / np.sqrt(np.maximum(freedom, 1.0))))
     return Scatter(scatter.stated, found_now, np.maximum(level, np.maximum(proven, scatter.by_pair)))
 
 
