@@ -19,7 +19,7 @@ import numpy as np
 
 from photostrip.errors import InputError
 from photostrip.statistics import grubbs_limit, tau_limit
-from photostrip.triangulation import relative, screening_search
+from photostrip.triangulation import global_test, readmission, relative, screening_search
 from photostrip.triangulation.zones import Support, zones
 
 if TYPE_CHECKING:
@@ -182,12 +182,12 @@ def examine(
     if settings.screening in SEARCHES:
         result, log = _readmitted(orientation, scatter, found)
         # a pair that was lost at first and now fits its points has converged after all; any other is refused as it was
-        sound = sound | (doubtful & ~screening_search.failing(result, scatter.by_pair))
+        sound = sound | (doubtful & ~global_test.failing(result, scatter.by_pair))
         result = relative.restored(result, orientation, np.flatnonzero(doubtful & relative.doubtful(result, sound)))
     else:
         result, log = _sequential(orientation, settings, sigma)
     zone = zones(result.elements, result.pairs)
-    masked = screening_search.failing(result, scatter.by_pair)
+    masked = global_test.failing(result, scatter.by_pair)
     return Screened(result, _completed(log, result, zone), zone, scatter, masked, sound)
 
 
@@ -196,7 +196,7 @@ def _readmitted(
 ) -> tuple[Orientation, list[Rejection]]:
     """Take back what the final elements predict well, take out what lies behind a camera, write the log."""
     weight = orientation.pairs.weight
-    result, _ = screening_search.readmit(found.orientation, found.rows, weight, scatter.by_pair)
+    result, _ = readmission.readmit(found.orientation, found.rows, weight, scatter.by_pair)
     before = np.nan_to_num(orientation.parallax)
     log = [
         Rejection(int(row), test, float(value), float(limit), float(before[row]))

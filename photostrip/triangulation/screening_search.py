@@ -1,4 +1,4 @@
-"""Gross errors of pairs by global test: robust start, minimum-deletion search, re-admission.
+"""Gross errors of pairs by global test: robust start, then the smallest set of points that explains the misfit.
 
 A pair is looked at only when its sum of squared parallaxes, or a single one of them, does not belong to the scatter
 that the measurements should have. What that scatter is, is decided first: the stated one, unless the residuals of the
@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.statistics import chi2_quantile, normal_quantile
 from photostrip.triangulation import deletion, relative, robust
+from photostrip.triangulation.global_test import failing, global_limits, largest_limits, standardised
 from photostrip.triangulation.zones import EMPTY_ZONES, MINIMUM_LEFT, ZONES, Support
 
 if TYPE_CHECKING:
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     Numbers = NDArray[np.intp]
     Flags = NDArray[np.bool_]
 
-CONFIDENCE = 0.999  # of the global test, and of the test of the largest residual of a pair
-READMIT = 3.0  # standard deviations of the predicted residual
 SMALLEST_REDUNDANCY = 0.05  # a residual with less says little about the scatter
 MEDIAN_SCATTER = 1.17  # sd of a standard deviation from the median of n residuals, times sqrt(n)
 PROOF = 3.0  # of those, by which a scatter must exceed the one in force
@@ -40,7 +38,6 @@ SMALLEST_SIGMA = 1e-9  # mm
 GROSS = 4.0  # standard deviations; residuals from the robust start beyond it are wrong points
 PAIRS_AT_ONCE = 64
 HALF = 0.5
-NO_REDUNDANCY = 1e-6  # residuals with less are rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,106 +80,6 @@ class Deleted:
     tests: tuple[str, ...]
     values: Floats
     limits: Floats
-
-
-def squares(orientation: Orientation, sigma: Floats) -> Floats:
-    """Sum of squared parallaxes of each pair in units of their variance.
-
-    Parameters
-    ----------
-    orientation : Orientation
-        Oriented pairs.
-    sigma : ndarray, shape (p,)
-        Standard deviation of a y parallax of weight one, mm.
-
-    Returns
-    -------
-    ndarray, shape (p,)
-        Values of the global test.
-    """
-    total: Floats = orientation.pairs.sums(orientation.pairs.weight * orientation.parallax**2) / sigma**2
-    return total
-
-
-def global_limits(count: Numbers) -> Floats:
-    """Critical values of the global test.
-
-    Parameters
-    ----------
-    count : ndarray of int
-        Points of each pair.
-
-    Returns
-    -------
-    ndarray
-        Chi-square with count - 5 degrees of freedom; infinite without redundancy.
-    """
-    freedom = count - relative.MINIMUM_POINTS
-    table = {int(n): chi2_quantile(CONFIDENCE, int(n)) if n > 0 else np.inf for n in np.unique(freedom)}
-    return np.array([table[int(n)] for n in freedom.ravel()]).reshape(freedom.shape)
-
-
-def standardised(orientation: Orientation, sigma: Floats) -> Floats:
-    """Give parallaxes in units of their standard deviation: residuals of points used, predictions of the others.
-
-    Parameters
-    ----------
-    orientation : Orientation
-        Oriented pairs.
-    sigma : ndarray, shape (p,)
-        Standard deviation of a y parallax of weight one, mm.
-
-    Returns
-    -------
-    ndarray, shape (m,)
-        Values without unit; 0 where a residual has no redundancy.
-    """
-    pairs, used = orientation.pairs, orientation.used
-    size = np.abs(orientation.parallax) / sigma[pairs.pair] * np.sqrt(np.where(used, pairs.weight, 1.0))
-    share = np.where(used, orientation.redundancy, 1.0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        value = size / np.sqrt(share)
-    return np.where(np.isfinite(value) & (share > NO_REDUNDANCY), value, 0.0)
-
-
-def failing(orientation: Orientation, sigma: Floats) -> Flags:
-    """Pairs whose residuals do not belong to the scatter.
-
-    Parameters
-    ----------
-    orientation : Orientation
-        Oriented pairs.
-    sigma : ndarray, shape (p,)
-        Standard deviation of a y parallax of weight one, mm.
-
-    Returns
-    -------
-    ndarray of bool, shape (p,)
-        True where the sum of squares or the largest residual exceeds its limit.
-    """
-    count = orientation.points_used
-    largest = np.maximum.reduceat(
-        np.where(orientation.used, standardised(orientation, sigma), 0.0), orientation.pairs.starts
-    )
-    bad: Flags = ~(squares(orientation, sigma) <= global_limits(count)) | (largest > largest_limits(count))
-    return bad & (count > relative.MINIMUM_POINTS)
-
-
-def largest_limits(count: Numbers) -> Floats:
-    """Critical values of the largest standardised residual (Bonferroni).
-
-    Parameters
-    ----------
-    count : ndarray of int
-        Points of each pair.
-
-    Returns
-    -------
-    ndarray
-        Quantiles of the normal distribution.
-    """
-    table = {int(n): normal_quantile(1 - (1 - CONFIDENCE) / (2 * max(int(n), 1))) for n in np.unique(count)}
-    return np.array([table[int(n)] for n in count])
 
 
 # ---------------------------------------------------------------------------------------------- robust start
@@ -489,64 +386,3 @@ def _delete_beyond(orientation: Orientation, sigma: Floats, todo: Numbers, log: 
         weight[row] = 0.0
         log.add(row, "robust", float(size[row] / sigma[pair]), float(limit[pair] / sigma[pair]))
     return relative.refine(orientation, weight, todo)
-
-
-# ------------------------------------------------------------------------------------------------ re-admission
-
-
-def readmit(orientation: Orientation, rows: Numbers, given: Floats, sigma: Floats) -> tuple[Orientation, Numbers]:
-    """Take points back that the final elements predict well, the best of each pair first.
-
-    Parameters
-    ----------
-    orientation : Orientation
-        Pairs oriented without the points.
-    rows : ndarray of int
-        Points taken out.
-    given : ndarray, shape (m,)
-        Weights of all points before any was taken out.
-    sigma : ndarray, shape (p,)
-        Standard deviation of a y parallax of weight one, mm.
-
-    Returns
-    -------
-    Orientation
-        Pairs oriented with the points taken back.
-    ndarray of int
-        Rows taken back.
-    """
-    result, back = orientation, []
-    waiting = np.unique(rows)
-    pairs = orientation.pairs
-    while len(waiting):
-        number = pairs.pair[waiting]
-        value, growth = _predicted(result, waiting, given, sigma)
-        total = squares(result, sigma)[number] + growth
-        allowed = (value <= READMIT) & (total <= global_limits(result.points_used + 1)[number])
-        allowed &= relative.in_front(result.elements, pairs)[waiting]
-        if not allowed.any():
-            break
-        order = np.lexsort((np.where(allowed, value, np.inf), number))
-        _, first = np.unique(number[order], return_index=True)
-        best = order[first]
-        best = best[allowed[best]]
-        weight = result.pairs.weight.copy()
-        weight[waiting[best]] = given[waiting[best]]
-        back += waiting[best].tolist()
-        result = relative.refine(result, weight, np.unique(number[best]))
-        waiting = np.delete(waiting, best)
-    return result, np.array(back, np.intp)
-
-
-def _predicted(orientation: Orientation, rows: Numbers, given: Floats, sigma: Floats) -> tuple[Floats, Floats]:
-    """Predicted residuals in units of their standard deviation, and what they would add to the sum of squares."""
-    pairs = orientation.pairs
-    with np.errstate(all="ignore"):
-        _, jacobian = relative.linearised(orientation.elements, pairs)
-    normal = relative.normal_matrices(jacobian, pairs)
-    cofactors = np.linalg.pinv(np.nan_to_num(normal), hermitian=True)[pairs.pair[rows]]
-    part = jacobian[:, rows]
-    spread = 1 / given[rows] + np.einsum("im,mij,jm->m", part, cofactors, part)
-    value = np.abs(orientation.parallax[rows]) / (sigma[pairs.pair[rows]] * np.sqrt(spread))
-    value = np.where(np.isfinite(value), value, np.inf)
-    return value, value**2

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from photostrip.triangulation import deletion, relative, robust, screening, screening_search
+from photostrip.triangulation import deletion, readmission, relative, robust, screening
 from photostrip.triangulation.relative import Pairs, Settings
 from tests.strips import MICROMETRE, TruePairs, true_pairs
 from tests.vectors import Vector, cases
@@ -170,7 +170,7 @@ def test_a_good_point_that_a_wrong_one_made_look_bad_is_taken_back() -> None:
     weight[[0, 7]] = 0.0
     less = relative.refine(oriented, weight, np.array([0]))
     sigma = np.array([np.sqrt(2) * SIGMA])
-    result, back = screening_search.readmit(less, np.array([0, 7]), flown.pairs.weight, sigma)
+    result, back = readmission.readmit(less, np.array([0, 7]), flown.pairs.weight, sigma)
     assert sorted(back.tolist()) == [0, 7]
     assert result.elements == pytest.approx(oriented.elements, abs=1e-9)
 
