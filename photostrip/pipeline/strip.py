@@ -9,6 +9,7 @@ import numpy as np
 from photostrip.errors import GeometryError
 from photostrip.geodesy.local_frame import IntermediateFrame, mean_position, strip_azimuth
 from photostrip.notes import Note
+from photostrip.pipeline import overruling
 from photostrip.pipeline.results import StripResult
 from photostrip.triangulation import (
     absolute,
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
+    Flags = NDArray[np.bool_]
 
 LONG_STRIP = 25  # models; beyond it polynomials fall far behind a rigorous adjustment
 
@@ -66,11 +68,15 @@ def adjust_strip(
     """
     sigma = _sigma(strip, observations)
     pairs, point, pair_rows = relative.collect_pairs(observations, strip.photos, strip.camera.principal_distance)
+    dropped = overruling.touched(settings.relative.drop, observations, pair_rows)
+    pairs, point, pair_rows = overruling.without(pairs, point, pair_rows, dropped)
     first, converged = relative.attempt(pairs, point, pair_rows)
     screened = screening.examine(first, settings.relative, sigma, converged)
+    kept = overruling.touched(settings.relative.keep, observations, pair_rows)
+    screened = overruling.restored(screened, pairs.weight, kept)
     oriented, rejections = screened.orientation, screened.rejections
     relative.require(oriented, screened.converged, strip.photos)
-    oriented, formed, contradictions = _form(strip, observations, screened, settings)
+    oriented, formed, contradictions = _form(strip, observations, screened, settings, kept)
 
     here, rows = _control_of(formed, control, observations)
     intermediate, orientation, precision = _to_ground(strip, formed, here, rows, frames, oriented, sigma)
@@ -113,6 +119,7 @@ def adjust_strip(
         image_rows,
         _depth(strip, observations, image_rows, formed, adjusted, resection),
         (
+            *overruling.notes(settings.relative, strip.id, strip.photos),
             *_screening_notes(strip, screened, sigma),
             *_wrong_control_notes(strip, wrong),
             *_notes(strip, oriented, formed, orientation, correction, adjusted, resection),
@@ -131,7 +138,7 @@ def _extent(formed: formation.FormedStrip, orientation: absolute.AbsoluteOrienta
 
 
 def _form(
-    strip: Strip, observations: PhotoPoints, screened: screening.Screened, settings: Settings
+    strip: Strip, observations: PhotoPoints, screened: screening.Screened, settings: Settings, kept: Flags
 ) -> tuple[relative.Orientation, formation.FormedStrip, rays.Contradictions]:
     """Form the strip, find the points whose rays contradict each other, and form it again without them."""
     oriented, scatter = screened.orientation, screened.scatter.by_pair
@@ -139,7 +146,7 @@ def _form(
     if settings.relative.screening == "none":
         return oriented, formed, rays.Contradictions.none(oriented)
     sigma = float(np.median(scatter)) / np.sqrt(2.0)
-    found = rays.examine(oriented, formed, observations, strip.photos, sigma)
+    found = rays.examine(oriented, formed, observations, strip.photos, sigma, kept)
     unfit = screening.spared(oriented, found.unfit)
     if unfit.any():
         weight = np.where(unfit, 0.0, oriented.pairs.weight)

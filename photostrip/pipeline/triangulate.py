@@ -10,6 +10,7 @@ import numpy as np
 from photostrip.errors import Fault, InputError
 from photostrip.geodesy.crs import tie_frames
 from photostrip.notes import Note
+from photostrip.pipeline import overruling
 from photostrip.pipeline.inputs import ADJUSTMENTS
 from photostrip.pipeline.results import Adjusted, Result, Ties
 from photostrip.pipeline.strip import adjust_strip
@@ -60,6 +61,7 @@ def triangulate(inputs: Inputs, settings: Settings, *, directory: Path | None = 
     frames, output = _frames(inputs, settings, directory)
     _require_whole(inputs, frames)
     observations, fiducial = _photo_coordinates(inputs, settings)
+    overruling.require(settings.relative, observations)
     refined = _ideal_coordinates(observations, inputs, settings, frames)
     control = _measured_control(inputs, refined.observations)
     strips = tuple(adjust_strip(strip, refined.observations, control, frames, settings) for strip in inputs.strips)

@@ -69,7 +69,12 @@ class Contradictions:
 
 
 def examine(
-    orientation: Orientation, formed: FormedStrip, observations: PhotoPoints, photos: Sequence[str], sigma: float
+    orientation: Orientation,
+    formed: FormedStrip,
+    observations: PhotoPoints,
+    photos: Sequence[str],
+    sigma: float,
+    kept: Flags | None = None,
 ) -> Contradictions:
     """Find the wrong ray of every point whose scale ratio was rejected.
 
@@ -85,6 +90,8 @@ def examine(
         Photos of the strip in flight order.
     sigma : float
         Standard deviation of an image coordinate, mm.
+    kept : ndarray of bool, shape (m,), optional
+        Rows of the pairs' table whose points are not examined.
 
     Returns
     -------
@@ -97,6 +104,8 @@ def examine(
     by_ratio = np.unique(junctions.point[~junctions.used])
     halves = _half_rejected(orientation)
     suspects = np.union1d(by_ratio, halves).astype(np.intp)
+    if kept is not None:
+        suspects = np.setdiff1d(suspects, orientation.point[kept])
     place = {photo: number for number, photo in enumerate(photos)}
     position = np.array([place.get(photo, -1) for photo in observations.photo_ids], np.intp)
     left_out, unfit = np.zeros(len(orientation.point), bool), np.zeros(len(orientation.point), bool)

@@ -46,16 +46,21 @@ class Settings:
     Parameters
     ----------
     screening : str
-        ``"auto"`` (= ``"parallax+grubbs"``), ``"parallax+grubbs"``, ``"tau"`` or ``"none"``.
+        ``"auto"`` (robust start where needed, then deletion search), ``"parallax+grubbs"``, ``"tau"``,
+        ``"deletion"``, ``"robust"`` or ``"none"``.
     grubbs_alpha : float
         Probability of rejecting a point of a pair without gross errors.
     parallax_limit : float, optional
         Largest y parallax in mm that needs no rejection; None: four times its a-priori standard deviation.
+    keep, drop : sequence of str
+        Measurements, ``photo/point``, that are used or left out whatever the tests say.
     """
 
     screening: str = "auto"
     grubbs_alpha: float = 0.05
     parallax_limit: float | None = None
+    keep: Sequence[str] = ()
+    drop: Sequence[str] = ()
 
 
 @dataclass(frozen=True, eq=False)

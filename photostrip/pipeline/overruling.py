@@ -1,0 +1,175 @@
+"""What the user knows better: measurements that are kept or dropped whatever the tests say."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import Fault, InputError
+from photostrip.notes import Note
+from photostrip.triangulation import relative
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.points import PhotoPoints
+    from photostrip.triangulation.relative import Pairs
+    from photostrip.triangulation.screening import Screened
+
+    Numbers = NDArray[np.intp]
+    Flags = NDArray[np.bool_]
+
+
+def require(settings: relative.Settings, observations: PhotoPoints) -> None:
+    """Refuse entries that name no measurement, and those that are to be kept and dropped.
+
+    Parameters
+    ----------
+    settings : relative.Settings
+        The lists.
+    observations : PhotoPoints
+        Image points.
+
+    Raises
+    ------
+    InputError
+        With a fault for each such entry.
+    """
+    faults = []
+    for key in ("keep", "drop"):
+        found = _rows(getattr(settings, key), observations)
+        faults += [
+            Fault(
+                f"`{entry}` names no measurement",
+                code="no-such-measurement",
+                key=f"processing.relative.{key}",
+                expected="photo/point, as in the table of observations",
+            )
+            for entry, row in found.items()
+            if row < 0
+        ]
+    faults += [
+        Fault(f"`{entry}` is to be kept and dropped", code="kept-and-dropped", key="processing.relative.drop")
+        for entry in settings.drop
+        if entry in settings.keep
+    ]
+    if faults:
+        raise InputError(faults)
+
+
+def _rows(entries: Sequence[str], observations: PhotoPoints) -> dict[str, int]:
+    """Row of each measurement named photo/point; -1 for none."""
+    if not entries:
+        return {}
+    wanted = dict.fromkeys(entries, -1)
+    photos, points = observations.photo_ids, observations.point_ids
+    for row, (photo, point) in enumerate(zip(observations.photo, observations.point, strict=True)):
+        name = f"{photos[photo]}/{points[point]}"
+        if name in wanted:
+            wanted[name] = row
+    return wanted
+
+
+def touched(entries: Sequence[str], observations: PhotoPoints, rows: Numbers) -> Flags:
+    """Find the rows of a pairs' table that use a measurement of a list.
+
+    Parameters
+    ----------
+    entries : sequence of str
+        Measurements, photo/point.
+    observations : PhotoPoints
+        Image points.
+    rows : ndarray of int, shape (m, 2)
+        Rows of the two measurements in the observations.
+
+    Returns
+    -------
+    ndarray of bool, shape (m,)
+        True for those.
+    """
+    hits = np.isin(rows, list(_rows(entries, observations).values()))
+    found: Flags = hits[:, 0] | hits[:, 1]
+    return found
+
+
+def without(pairs: Pairs, point: Numbers, rows: Numbers, gone: Flags) -> tuple[Pairs, Numbers, Numbers]:
+    """Give pairs without some rows.
+
+    Parameters
+    ----------
+    pairs, point, rows
+        As :func:`relative.collect_pairs` gives them.
+    gone : ndarray of bool, shape (m,)
+        Rows to leave out; each pair must keep one.
+
+    Returns
+    -------
+    pairs, point, rows
+        What is left.
+    """
+    if not gone.any():
+        return pairs, point, rows
+    kept = ~gone
+    number = pairs.pair[kept]
+    starts = np.searchsorted(number, np.arange(pairs.size))
+    left = replace(
+        pairs, starts=starts, pair=number, left=pairs.left[kept], right=pairs.right[kept], weight=pairs.weight[kept]
+    )
+    return left, point[kept], rows[kept]
+
+
+def restored(screened: Screened, weight: NDArray[np.float64], kept: Flags) -> Screened:
+    """Take rejected measurements back that the user keeps.
+
+    Parameters
+    ----------
+    screened : Screened
+        The search.
+    weight : ndarray, shape (m,)
+        Weights before the search.
+    kept : ndarray of bool, shape (m,)
+        Rows that are kept.
+
+    Returns
+    -------
+    Screened
+        The search with those rows in use; their rejections are marked as re-admitted.
+    """
+    oriented = screened.orientation
+    back = kept & ~oriented.used
+    if not back.any():
+        return screened
+    restored_weight = np.where(back, weight, oriented.pairs.weight)
+    oriented = relative.refine(oriented, restored_weight, np.unique(oriented.pairs.pair[back]))
+    log = tuple(replace(each, readmitted=each.readmitted or bool(back[each.row])) for each in screened.rejections)
+    return replace(screened, orientation=oriented, rejections=log)
+
+
+def notes(settings: relative.Settings, strip: str, photos: Sequence[str]) -> list[Note]:
+    """Say what the user has decided.
+
+    Parameters
+    ----------
+    settings : relative.Settings
+        The lists.
+    strip : str
+        The strip.
+    photos : sequence of str
+        Its photos.
+
+    Returns
+    -------
+    list of Note
+        One for each list that touches the strip.
+    """
+    found = []
+    for key, text in (("keep", "kept whatever the tests say"), ("drop", "left out")):
+        here = [entry for entry in getattr(settings, key) if any(entry.startswith(f"{photo}/") for photo in photos)]
+        if here:
+            message = f"strip {strip}: {text} at the user's wish: {', '.join(here)}"
+            found.append(Note(f"user-{key}", message, severity="note", strip=strip))
+    return found
