@@ -22,12 +22,9 @@ LEFT_OUT = ("version", "residuals", "parallaxes")  # a number of ours, and what 
 
 
 def kept(name: str) -> dict[str, object]:
-    """Run a sample project and give what is kept of its result.
-
-    The path is relative, as a user types it, because messages name files as they were given.
-    """
+    """Run a sample project and give what is kept of its result."""
     project = load_project(Path("sample_data") / name / "project.yaml")
-    document = document_of(triangulate(project.inputs, project.settings), project.hints)
+    document = document_of(triangulate(project.inputs, project.settings), project.remarks)
     return {key: value for key, value in document.items() if key not in LEFT_OUT}
 
 

@@ -71,7 +71,7 @@ COMMANDS = {
     ),
     "info": Entry(
         "photostrip.cli.info",
-        "Print versions, formats and extras, and how to get what is missing.",
+        "Print versions and formats, and how to get what is missing.",
         "photostrip info --format json",
     ),
 }
@@ -93,7 +93,7 @@ Commands:
 Options:
   --version   Print the version and exit.
   --debug     Print the traceback of an error.
-  -h, --help  Print this text and exit; after a command, the help of the command.
+  -h, --help  Print this text and exit; after a command, its help.
 
 Environment: PHOTOSTRIP_FORMAT, PHOTOSTRIP_WIDTH, PHOTOSTRIP_QUIET,
 PHOTOSTRIP_VERBOSE and PHOTOSTRIP_DEBUG stand in for the options of these names;
@@ -102,8 +102,9 @@ NO_COLOR forbids colours.
 Example:
   {COMMANDS["run"].example}
 
-Exit codes: 0 done; 1 done, but a tolerance or a comparison failed; 2 wrong usage,
-project file or data; 3 the geometry is too weak; 70 an internal error (a bug).
+Exit codes: 0 done; 1 done, but a tolerance or a comparison failed; 2 wrong
+usage, project file or data; 3 the geometry is too weak; 70 an internal error
+(a bug).
 """
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import math
 import re
 import unicodedata
 
+LARGEST = 1e15  # no coordinate in any unit is larger, and its square is still a number
+SMALLEST = 1e-12  # no length, and no standard deviation in any unit, is smaller
 NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _DECIMAL_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+")
 _GROUPED = re.compile(r"[+-]?[0-9]{1,3}(?:[ '’_\u00a0\u202f][0-9]{3})+(?:\.[0-9]*)?")
@@ -42,7 +43,7 @@ def number(text: str) -> float:
     Returns
     -------
     float
-        A finite number.
+        A number of at most 15 digits before the decimal point.
 
     Raises
     ------
@@ -52,7 +53,7 @@ def number(text: str) -> float:
     word = text.strip()
     if NUMBER.fullmatch(word):
         value = float(word)
-        if math.isfinite(value):
+        if abs(value) <= LARGEST:
             return value
         raise NotANumber(f"`{shown(word)}` is too large")
     raise _reason(word)

@@ -18,7 +18,7 @@ import numpy as np
 from photostrip.errors import Fault, InputError
 from photostrip.formats.files import BYTE_ORDER_MARK
 from photostrip.formats.findings import Findings, counted, listed, suggestion
-from photostrip.formats.numbers import NotANumber, number, shown
+from photostrip.formats.numbers import LARGEST, SMALLEST, NotANumber, number, shown
 from photostrip.formats.table_text import TableText, content
 from photostrip.notes import Note
 
@@ -384,7 +384,7 @@ class _Reader:
 
     def _positive(self, column: Column, lines: list[int]) -> None:
         values = self.numbers[column.name][-1]
-        for row in np.flatnonzero(values <= 0):
+        for row in np.flatnonzero(values < SMALLEST):
             message = f"{values[row]:g} cannot be a standard deviation"
             self._add(lines[row], column.name, message, "range", expected="a number larger than 0")
 
@@ -439,4 +439,4 @@ def _fast_floats(cells: Cells) -> Floats | None:
         values = np.fromiter(map(float, cells), float, len(cells))
     except ValueError:
         return None
-    return values if np.isfinite(values).all() else None
+    return values if (np.abs(values) <= LARGEST).all() else None

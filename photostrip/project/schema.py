@@ -15,7 +15,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainValidat
 from pydantic_core import PydanticCustomError
 
 from photostrip.formats.findings import suggestion
-from photostrip.formats.numbers import NotANumber, shown
+from photostrip.formats.numbers import SMALLEST, NotANumber, shown
 from photostrip.formats.numbers import number as read_number
 from photostrip.formats.tables import CONTROL_CHARACTER
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
@@ -149,7 +149,7 @@ def _if_empty(value: object) -> object:
 
 
 _read_number = _number("a number")
-_read_positive = _number("a number larger than 0", least=0.0)
+_read_positive = _number("a number larger than 0", least=SMALLEST)
 _read_fraction = _number("a number between 0 and 1", least=0.0, most=1.0)
 _ANY = {"type": ["string", "number", "boolean", "null"]}  # whatever an id looks like, it is read as text
 _NUMBER = {"type": "number"}
@@ -360,7 +360,7 @@ class Output(Section):
 class Relative(Section):
     """Relative orientation and its search for gross errors."""
 
-    screening: Annotated[str, *_choice(METHODS, "deletion", "robust")] = key(
+    screening: Annotated[str, *_choice(METHODS)] = key(
         f"How gross errors are searched for: {_or(METHODS)}", DEFAULTS.relative.screening
     )
     grubbs_alpha: Fraction = key(
@@ -371,6 +371,8 @@ class Relative(Section):
         DEFAULTS.relative.parallax_limit,
         unit="mm",
     )
+    keep: list[Id] = key("Measurements, `photo/point`, that are used whatever the tests say", [])
+    drop: list[Id] = key("Measurements, `photo/point`, that are left out", [])
 
 
 class Polynomial(Section):

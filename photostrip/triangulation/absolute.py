@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
+LARGEST_STEP = 5.0  # of the logarithm of the scale, in one iteration
 ITERATIONS = 50
 CONVERGED = 1e-12  # of the strip's half length
 RANK_LIMIT = 1e-3  # smallest over largest singular value: a motion of the strip of which the control sees a thousandth
@@ -334,7 +335,8 @@ def _design(xyz: Floats, targets: Targets, weight: Floats, half: float) -> tuple
 def _corrected(similarity: Similarity, step: Floats, center: Floats, half: float) -> Similarity:
     """Compose the similarity with a small one about a centre."""
     turn = from_vector(step[3:6] / half)
-    growth = float(np.exp(step[6] / half))
+    # control that is wrong beyond measure asks for steps that no number holds
+    growth = float(np.exp(np.clip(step[6] / half, -LARGEST_STEP, LARGEST_STEP)))
     shift = center + step[:3] + growth * turn @ (similarity.shift - center)
     return Similarity(similarity.scale * growth, _orthonormal(turn @ similarity.rotation), shift)
 

@@ -8,12 +8,13 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from photostrip.formats.numbers import NotANumber, number, shown
+from photostrip.formats.numbers import LARGEST, NotANumber, number, shown
 from photostrip.formats.tables import _fast_floats
 
 
-@given(st.floats(allow_nan=False, allow_infinity=False))
+@given(st.floats(-LARGEST, LARGEST))
 @example(-0.0)
+@example(LARGEST)
 @example(5e-324)
 def test_every_number_python_writes_is_read_back(value: float) -> None:
     assert number(repr(value)) == value
@@ -36,6 +37,7 @@ def test_forms_of_numbers(text: str, value: float) -> None:
         ("nan", "not a measured value", ""),
         ("-Infinity", "not a measured value", ""),
         ("1e400", "too large", ""),
+        ("-1.1e15", "too large", ""),
         ("1,5", "decimal comma", "1.5"),
         (",5", "decimal comma", ".5"),
         ("1_000", "digits in groups", "without separators"),
@@ -91,7 +93,7 @@ def test_a_column_is_converted_at_once_only_if_every_cell_is_a_number(column: li
     assert fast.tolist() == [number(cell) for cell in column]
 
 
-@given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=1))
+@given(st.lists(st.floats(-LARGEST, LARGEST), min_size=1))
 def test_a_column_of_numbers_is_converted_at_once(values: list[float]) -> None:
     fast = _fast_floats(tuple(map(repr, values)))
     assert fast is not None

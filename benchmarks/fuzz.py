@@ -1,0 +1,62 @@
+"""Damaged projects and tables: how they end, how long they take, and whether anything comes out that must not.
+
+Run it as ``python benchmarks/fuzz.py [cases] [seed]``; 10 000 cases are usual. Every case is a right project to which
+one to four things were done: characters and bytes put in, values, lines and columns exchanged, files cut off or saved
+as other programs do. Half of them are checked, half are run with a result. The exit code is 1 when a case ends with a
+traceback, another exit code than 0, 1, 2 and 3, a changed input, half a result, or takes longer than 10 s.
+"""
+
+from __future__ import annotations
+
+import resource
+import sys
+import tempfile
+import time
+import warnings
+from collections import Counter
+from pathlib import Path
+from random import Random
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from anywhere, installed or not
+
+from tests.fuzzing import damaged, emptied, projects, tried
+
+CASES, SEED = 10_000, 1
+MEMORY_MB = 600  # of the process, with all cases one after the other
+SHOWN = 10
+
+
+def main(arguments: list[str]) -> int:
+    """Try the cases and print the table."""
+    number, seed = (int(each) for each in (*arguments, *(str(each) for each in (CASES, SEED)[len(arguments) :])))
+    codes: Counter[tuple[str, int]] = Counter()
+    seconds: list[float] = []
+    wrong: list[str] = []
+    begin = time.perf_counter()
+    with tempfile.TemporaryDirectory() as place:
+        right = projects(Path(place) / "right")
+        for each in range(number):
+            random = Random(f"{seed} {each}")  # noqa: S311 (no secret: the same cases every time)
+            case, command = damaged(right, random), random.choice(["run", "check"])
+            outcome = tried(case, emptied(Path(place) / "case"), command)
+            codes[command, outcome.code] += 1
+            seconds.append(outcome.seconds)
+            wrong += [f"case {each} ({', '.join(case.done)}; {command}): {fault}" for fault in outcome.faults]
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    if peak > MEMORY_MB:
+        wrong.append(f"{peak:.0f} MB of memory")
+    print(f"{number} cases, seed {seed}, {time.perf_counter() - begin:.0f} s, peak {peak:.0f} MB")
+    print("exit code        0      1      2      3  other")
+    for command in ("run", "check"):
+        row = [codes[command, code] for code in range(4)]
+        other = sum(count for (name, _), count in codes.items() if name == command) - sum(row)
+        print(f"{command:<10}" + "".join(f"{count:7d}" for count in (*row, other)))
+    seconds.sort()
+    print(f"seconds: median {seconds[len(seconds) // 2]:.3f}, largest {seconds[-1]:.3f}")
+    print(f"wrong: {len(wrong)}", *wrong[:SHOWN], sep="\n  ")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    warnings.simplefilter("error")  # a warning on the user's terminal would be one more surprise
+    sys.exit(main(sys.argv[1:]))

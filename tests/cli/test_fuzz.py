@@ -1,0 +1,61 @@
+"""Whatever is done to a project: an exit code of the contract, no traceback, inputs untouched, a whole result or none.
+
+``python benchmarks/fuzz.py`` does the same ten thousand times.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from random import Random
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from tests.fuzzing import HARMS, Case, damaged, projects, tried
+
+
+@pytest.fixture(scope="module")
+def right(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, bytes]]:
+    return projects(tmp_path_factory.mktemp("right"))
+
+
+@settings(max_examples=300, suppress_health_check=[HealthCheck.too_slow])
+@given(seed=st.integers(0, 2**32), command=st.sampled_from(["check", "run"]))
+def test_a_damaged_project_ends_well(right: list[dict[str, bytes]], seed: int, command: str) -> None:
+    case = damaged(right, Random(seed))
+    with tempfile.TemporaryDirectory() as folder:
+        assert tried(case, Path(folder), command).faults == (), case.done
+
+
+@pytest.mark.parametrize("command", ["check", "run"])
+def test_right_projects_are_right(right: list[dict[str, bytes]], tmp_path: Path, command: str) -> None:
+    outcome = tried(Case(right[-1]), tmp_path, command)
+    assert (outcome.code, outcome.faults) == (0, ())
+
+
+@pytest.mark.parametrize("harm", HARMS, ids=lambda harm: harm.__name__)
+def test_every_harm_does_some(right: list[dict[str, bytes]], harm: object) -> None:
+    assert callable(harm)
+    data = right[-1]["observations.csv"]
+    assert any(harm(data, Random(seed)) != data for seed in range(20))
+    assert isinstance(harm(b"", Random(1)), bytes)
+
+
+# ------------------------------------------------------------------------------------------ the judge can condemn
+
+
+def test_a_changed_input_is_found(
+    right: list[dict[str, bytes]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def careless(arguments: list[str]) -> int:
+        Path(arguments[1]).write_text("mine now", encoding="utf-8")
+        (Path(arguments[1]).parent / ".result.json.1.tmp").write_text("", encoding="utf-8")
+        return 70
+
+    monkeypatch.setattr("tests.fuzzing.main", careless)
+    found = " ".join(tried(Case(right[0]), tmp_path, "run").faults)
+    assert "exit code 70" in found
+    assert "project.yaml was changed" in found
+    assert ".result.json.1.tmp was left behind" in found

@@ -1,0 +1,122 @@
+"""Ids survive the whole way: from the tables through a run into every file of the result, and through the report."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import pytest
+import yaml
+
+from photostrip.cli.main import main
+from photostrip.simulate.spec import Points
+from tests.project.test_ids import ODD
+from tests.results import spec, write_project
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+PHOTOS = ["0123", "NO", "1:20", "1e3", "~"]
+NAMES = ["Камера", "+7", "-1"]  # camera, strip, project
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(path.read_text(encoding="utf-8"), newline="")))
+
+
+def renamed(folder: Path, target: Path) -> tuple[dict[str, str], dict[str, str]]:
+    """Write the project anew with other ids, by programs that are not ours; give the new ids of photos and points."""
+    project = yaml.load((folder / "project.yaml").read_text(encoding="utf-8"), yaml.BaseLoader)  # noqa: S506 (texts only)
+    tables = {name: rows(folder / name) for name in ("observations.csv", "control.csv")}
+    photos = dict(zip(project["strips"][0]["photos"], PHOTOS, strict=True))
+    names = dict.fromkeys(row["point"] for row in (*tables["observations.csv"], *tables["control.csv"]))
+    odd = [*ODD, *(f"Точка {n}" for n in range(len(names)))]
+    points = dict(zip(names, odd[: len(names)], strict=True))
+    camera = next(iter(project["cameras"]))
+    project["name"] = NAMES[2]
+    project["cameras"] = {NAMES[0]: project["cameras"][camera]}
+    project["strips"][0] |= {"id": NAMES[1], "camera": NAMES[0], "photos": PHOTOS}
+    target.mkdir()
+    (target / "project.yaml").write_text(yaml.safe_dump(project, allow_unicode=True), encoding="utf-8")
+    for name, table in tables.items():
+        stream = io.StringIO()
+        writer = csv.DictWriter(stream, list(table[0]))
+        writer.writeheader()
+        for row in table:
+            changed = {"point": points[row["point"]]} | ({"photo": photos[row["photo"]]} if "photo" in row else {})
+            writer.writerow(row | changed)
+        (target / name).write_text(stream.getvalue(), encoding="utf-8", newline="")
+    return photos, points
+
+
+@pytest.fixture(scope="module")
+def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, dict[str, str], dict[str, str]]:
+    """Run the project with plain and with odd ids."""
+    base = tmp_path_factory.mktemp("ids")
+    path = write_project(base / "plain", replace(spec(), points=Points(extra_per_model=12)))
+    photos, points = renamed(path.parent, base / "odd")
+    for name in ("plain", "odd"):
+        assert main(["run", str(base / name / "project.yaml"), "-o", str(base / f"{name}-result"), "--quiet"]) == 0
+    return base / "plain-result", base / "odd-result", photos, points
+
+
+def test_all_kinds_of_ids_are_there(both: tuple[Path, Path, dict[str, str], dict[str, str]]) -> None:
+    assert set(ODD) <= set(both[3].values())
+    for kind in ("0123", "NO", "1:20", "1e3", "~", "Точка-7", "🛩️", "x" * 200, "-1", "+7", "-", "--"):
+        assert kind in both[3].values()
+
+
+def test_the_result_has_the_same_numbers_under_the_new_ids(
+    both: tuple[Path, Path, dict[str, str], dict[str, str]],
+) -> None:
+    plain, odd, photos, points = both
+    one, two = (json.loads((each / "result.json").read_text(encoding="utf-8")) for each in (plain, odd))
+    assert [two["name"], two["strips"][0]["id"], two["cameras"][0]["id"]] == [NAMES[2], NAMES[1], NAMES[0]]
+    assert [row["id"] for row in two["photos"]] == PHOTOS
+    there = {row["id"]: row for row in two["points"]}
+    assert set(there) == {points[row["id"]] for row in one["points"]}
+    for row in one["points"]:
+        for key in ("x", "y", "z"):
+            assert there[points[row["id"]]][key] == pytest.approx(row[key], abs=1e-3)
+    assert {row["id"] for row in two["control"]} == {points[row["id"]] for row in one["control"]}
+    assert len(photos) == len(PHOTOS)
+
+
+@pytest.mark.parametrize(
+    ("table", "column"), [("points", "point"), ("photos", "photo"), ("residuals", "point"), ("residuals", "photo")]
+)
+def test_the_tables_of_the_result(
+    both: tuple[Path, Path, dict[str, str], dict[str, str]], table: str, column: str
+) -> None:
+    plain, odd, photos, points = both
+    new = photos if column == "photo" else points
+    before, after = (rows(each / f"{table}.csv") for each in (plain, odd))
+    assert sorted(new[row[column]] for row in before) == sorted(row[column] for row in after)
+
+
+def test_the_resolved_project_runs_and_gives_the_same(
+    both: tuple[Path, Path, dict[str, str], dict[str, str]],
+    tmp_path: Path,
+) -> None:
+    odd = both[1]
+    folder = odd.parent / "odd"
+    resolved = folder / "resolved.yaml"
+    resolved.write_text((odd / "project.resolved.yaml").read_text(encoding="utf-8"), encoding="utf-8")
+    assert main(["run", str(resolved), "-o", str(tmp_path / "again"), "--quiet"]) == 0
+    resolved.unlink()
+    for name in ("result.json", "points.csv", "photos.csv", "residuals.csv"):
+        assert (tmp_path / "again" / name).read_bytes() == (odd / name).read_bytes()
+
+
+def test_the_report_shows_them(
+    both: tuple[Path, Path, dict[str, str], dict[str, str]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["report", str(both[1]), "--verbose", "--width", "200"]) == 0
+    out = capsys.readouterr().out
+    document = json.loads((both[1] / "result.json").read_text(encoding="utf-8"))
+    short = [row["id"] for row in document["control"] if len(row["id"]) < 12]
+    assert short
+    assert all(name in out for name in short)

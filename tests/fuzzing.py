@@ -1,0 +1,351 @@
+"""Slips, accidents and malice done to the files of a project, and what must hold whatever they are."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import re
+import shutil
+import time
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from photostrip.cli.main import main
+from tests.project.samples import FILES, MARKED_FILES
+from tests.results import spec, write_project
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+    from random import Random
+
+LONGEST = 10.0  # seconds that one case may take on a machine that does other things as well
+CODES = {0, 1, 2, 3}
+RESULT = 8  # at most so many files in a result
+TEXTS = [
+    "",
+    " ",
+    "\n",
+    "\r\n",
+    "\t",
+    ",",
+    ";",
+    ":",
+    ": ",
+    "- ",
+    "#",
+    "'",
+    '"',
+    "[",
+    "]",
+    "{",
+    "}",
+    "*a",
+    "&a ",
+    "!a ",
+    "<<: ",
+    "---\n",
+    "nan",
+    "inf",
+    "1e999",
+    "-1e308",
+    "1e-320",
+    "-",
+    "0",
+    "-0",
+    "~",
+    "null",
+    "NO",
+    "é",
+    "🛩️",
+    "\u200b",
+    "\x00",
+    "\x85",
+    "\ufeff",
+    "\\",
+    "|",
+    ">",
+    "%",
+    "@",
+    "?",
+    "px",
+    "um",
+    "up",
+    "down",
+    "local",
+    "geocentric",
+    "EPSG:4326",
+    "EPSG:99999",
+    "off",
+    "xy",
+    "z",
+    "check",
+    "../",
+    "/dev/null",
+    "/dev/zero",
+    ".",
+    "0.0",
+    "１",
+    "1_0",
+    "A" * 300,
+    "[[[[",
+    "=1+1",
+    "0123",
+    "1:20",
+    "1e3",
+    "９９",
+    "180",
+    "90",
+    "1e9",
+    "auto",
+    "model",
+    "2",
+    "orthometric",
+    "[north, east, up]",
+    "similarity",
+    "tau",
+    "none",
+    "true",
+]
+OVERRIDES = [
+    "observations.unit=px",
+    "observations.sigma=1e-9",
+    "observations.sigma=1e9",
+    "control[0].sigma=[1e-9, 1, 1e9]",
+    "control[0].axes=[up, north, east]",
+    "control[0].crs=EPSG:4326",
+    "control[0].crs=geocentric",
+    "output.crs=EPSG:3857",
+    "processing.adjustment=similarity",
+    "processing.polynomial.degree=3",
+    "processing.earth_curvature=model",
+    "processing.refraction=true",
+    "processing.relative.screening=tau",
+    "processing.relative.grubbs_alpha=0.999999",
+    "processing.scale_transfer=distances",
+    "tolerances.check_rms_xy=1e-9",
+    "strips=[]",
+    "cameras={}",
+    "=",
+    "a.b.c=1",
+    "processing.interior.transform=projective",
+    "output.angles.unit=rad",
+    "extends=project.yaml",
+    "[0]=1",
+]
+
+
+@dataclass
+class Case:
+    """What is run: files of a project, options, and what was done to the files."""
+
+    files: dict[str, bytes]
+    options: list[str] = field(default_factory=list)
+    done: list[str] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a case ended."""
+
+    code: int
+    seconds: float
+    faults: tuple[str, ...]  # what must not be
+
+
+def projects(folder: Path) -> list[dict[str, bytes]]:
+    """Give the files of right projects: two that are read, one of them with marks, and two that run."""
+    found = [{name: text.encode() for name, text in each.items()} for each in (FILES, MARKED_FILES)]
+    for frame in ("north first", "local"):
+        path = write_project(folder / frame, spec(frame))
+        files = {each.name: each.read_bytes() for each in path.parent.iterdir() if each.name != "truth.json"}
+        found += [files, files]
+    return found
+
+
+def damaged(projects: list[dict[str, bytes]], random: Random) -> Case:
+    """Choose a project and do one to four things to its files."""
+    case = Case(dict(random.choice(projects)))
+    for _ in range(random.choice([1, 1, 2, 4])):
+        name = random.choice(sorted(case.files))
+        harm = random.choice(HARMS)
+        case.files[name] = harm(case.files[name], random)
+        case.done.append(f"{harm.__name__} {name}")
+    if random.random() < 0.2:
+        case.options += ["--set", random.choice(OVERRIDES)]
+    return case
+
+
+# -------------------------------------------------------------------------------------------------- what is done
+
+
+def text_put_in(data: bytes, random: Random) -> bytes:
+    """Replace some characters by a text that means something to someone."""
+    place = random.randrange(len(data) + 1)
+    return data[:place] + random.choice(TEXTS).encode(errors="replace") + data[place + random.choice([0, 0, 1, 5]) :]
+
+
+def value_replaced(data: bytes, random: Random) -> bytes:
+    """Replace what stands between two separators."""
+    found = list(re.finditer(rb"[^\s,\[\]{}:]+", data))
+    if not found:
+        return data
+    match = random.choice(found)
+    return data[: match.start()] + random.choice(TEXTS).encode(errors="replace") + data[match.end() :]
+
+
+def bytes_put_in(data: bytes, random: Random) -> bytes:
+    """Put bytes of any kind somewhere."""
+    place = random.randrange(len(data) + 1)
+    return data[:place] + random.randbytes(random.choice([1, 3, 50])) + data[place:]
+
+
+def cut_off(data: bytes, random: Random) -> bytes:
+    """End the file too early."""
+    return data[: random.randrange(len(data) + 1)]
+
+
+def line_removed(data: bytes, random: Random) -> bytes:
+    """Take out a line."""
+    lines = data.splitlines(keepends=True)
+    if lines:
+        del lines[random.randrange(len(lines))]
+    return b"".join(lines)
+
+
+def line_repeated(data: bytes, random: Random) -> bytes:
+    """Repeat a line, once or very often."""
+    lines = data.splitlines(keepends=True)
+    if lines:
+        place = random.randrange(len(lines))
+        lines[place:place] = [lines[place]] * random.choice([1, 2, 1000])
+    return b"".join(lines)
+
+
+def lines_exchanged(data: bytes, random: Random) -> bytes:
+    """Exchange two lines."""
+    lines = data.splitlines(keepends=True)
+    if len(lines) > 1:
+        one, two = random.randrange(len(lines)), random.randrange(len(lines))
+        lines[one], lines[two] = lines[two], lines[one]
+    return b"".join(lines)
+
+
+def fields_exchanged(data: bytes, random: Random) -> bytes:
+    """Exchange two columns of a table, its header or not."""
+    lines = [line.split(b",") for line in data.splitlines()]
+    width = min(map(len, lines), default=0)
+    if width < 2:
+        return data
+    one, two = random.randrange(width), random.randrange(width)
+    for line in lines[random.choice([0, 1]) :]:
+        line[one], line[two] = line[two], line[one]
+    return b"\n".join(b",".join(line) for line in lines) + b"\n"
+
+
+def written_otherwise(data: bytes, random: Random) -> bytes:
+    """Save the file as another program does."""
+    ways: list[Callable[[bytes], bytes]] = [
+        lambda each: b"\xef\xbb\xbf" + each,
+        lambda each: each.replace(b"\n", b"\r\n"),
+        lambda each: each.replace(b"\n", b"\r"),
+        lambda each: each.replace(b",", b";").replace(b".", b","),
+        lambda each: each.replace(b",", b"\t"),
+        lambda each: each.decode(errors="replace").encode("utf-16"),
+        lambda each: re.sub(rb"([^,\n]+)", rb'"\1"', each),
+        lambda each: each.replace(b",", b" , "),
+        lambda each: each + b"\n\n,,,\n",
+    ]
+    return random.choice(ways)(data)
+
+
+def number_moved(data: bytes, random: Random) -> bytes:
+    """Change a number as a slip does: a sign, a decimal point, two digits."""
+    found = list(re.finditer(rb"-?\d+\.\d+", data))
+    if not found:
+        return data
+    match = random.choice(found)
+    word = match[0]
+    ways = [b"-" + word.lstrip(b"-"), word.lstrip(b"-"), word.replace(b".", b""), word[::-1], word + b"e5", b"0"]
+    return data[: match.start()] + random.choice(ways) + data[match.end() :]
+
+
+HARMS = [
+    text_put_in, text_put_in, value_replaced, value_replaced, bytes_put_in, cut_off, line_removed, line_repeated,
+    lines_exchanged, fields_exchanged, written_otherwise, number_moved, number_moved,
+]  # fmt: skip
+
+
+# ---------------------------------------------------------------------------------------------- what must hold
+
+
+def tried(case: Case, folder: Path, command: str) -> Outcome:
+    """Run a command on a case in a folder of its own and find what must not be.
+
+    Parameters
+    ----------
+    case : Case
+        Files and options.
+    folder : Path
+        An empty folder.
+    command : str
+        ``run`` or ``check``.
+
+    Returns
+    -------
+    Outcome
+        Its faults are empty when all is well: an exit code of the contract, no traceback, inputs as they were, all
+        files of a result or none.
+    """
+    for name, data in case.files.items():
+        (folder / name).write_bytes(data)
+    result = folder / "result"
+    arguments = [command, str(folder / "project.yaml"), *case.options]
+    arguments += ["-o", str(result), "--quiet"] if command == "run" else ["--format", "json"]
+    out, err = io.StringIO(), io.StringIO()
+    begin = time.perf_counter()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        code = main(arguments)
+    seconds = time.perf_counter() - begin
+    wrong = [*_words(command, code, out.getvalue(), err.getvalue()), *_files(case, folder, result, code)]
+    if seconds > LONGEST:
+        wrong.append(f"took {seconds:.1f} s")
+    return Outcome(code, seconds, tuple(wrong))
+
+
+def _words(command: str, code: int, out: str, err: str) -> list[str]:
+    """Find what is wrong with the exit code and with what was said."""
+    found = [] if code in CODES else [f"exit code {code}: {err[-300:]}"]
+    if "Traceback" in out + err or "internal error" in err:
+        found.append("a traceback")
+    if command == "check" and code in CODES:
+        faults = [each for each in json.loads(out)["projects"][0]["findings"] if each["severity"] == "error"]
+        if bool(faults) != (code == 2):
+            found.append(f"{len(faults)} faults and exit code {code}")
+        found += [f"a fault without words: {each}" for each in faults if not (each["message"] and each["code"])]
+    elif code in {2, 3} and not err.startswith("error: "):
+        found.append("a failure without words")
+    return found
+
+
+def _files(case: Case, folder: Path, result: Path, code: int) -> list[str]:
+    """Find inputs that were changed and results that are half written."""
+    found = [f"{name} was changed" for name, data in case.files.items() if (folder / name).read_bytes() != data]
+    strangers = {path.name for path in folder.iterdir()} - set(case.files) - {"result"}
+    found += [f"{name} was left behind" for name in sorted(strangers)]
+    written = sorted(path.name for path in result.iterdir()) if result.exists() else []
+    if any(name.endswith(".tmp") for name in written) or (written and code not in {0, 1}):
+        found.append(f"exit code {code} and half a result: {written}")
+    if written and (len(written) > RESULT or "result.json" not in written):
+        found.append(f"not the files of a result: {written}")
+    if written:
+        json.loads((result / "result.json").read_text(encoding="utf-8"))
+    return found
+
+
+def emptied(folder: Path) -> Path:
+    """Give the folder without anything in it."""
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    return folder
