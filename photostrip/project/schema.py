@@ -515,6 +515,8 @@ def _for_editors(schema: Any) -> Any:  # noqa: ANN401 (JSON)
     if "anyOf" in result:
         del result["anyOf"]
         result |= kinds[0] if len(kinds) == 1 else {"anyOf": kinds}
+    if isinstance(result.get("default"), dict):
+        result["default"] = {}  # the keys of the section carry their own
     if "default" in result and result["default"] is None:
         del result["default"]
         if _AUTO in kinds:
