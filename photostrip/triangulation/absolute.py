@@ -250,7 +250,8 @@ def orient(strip: Floats, targets: Targets, weight: Floats, reach: Floats | None
         xyz = similarity(strip)
         design, free = _design(xyz, targets, weight, half)
         root = _motion(None if reach is None else similarity(reach), xyz.mean(axis=0), half)
-        _refuse_deficient(design, root, xyz, targets, half)
+        plain, _ = _design(xyz, targets, targets.control.use.astype(float), half)  # weights do not decide what is free
+        _refuse_deficient(plain, root, xyz, targets, half)
         step = np.asarray(np.linalg.lstsq(design, free, rcond=None)[0], float)
         similarity = _corrected(similarity, step, xyz.mean(axis=0), half)
         if np.abs(step).max() < CONVERGED * half:
@@ -265,7 +266,7 @@ def orient(strip: Floats, targets: Targets, weight: Floats, reach: Floats | None
             )
         )
     misclosures = targets.misclosures(similarity(strip))
-    values = np.linalg.svd(_seen(design, root), compute_uv=False)
+    values = np.linalg.svd(_seen(plain, root), compute_uv=False)
     redundancy = int(targets.control.use.sum()) - PARAMETERS
     squares = float((weight * misclosures**2).sum())
     sigma0 = float(np.sqrt(squares / redundancy)) if redundancy > 0 else float("nan")
@@ -280,8 +281,9 @@ def _refuse_too_few(control: ControlPoints) -> None:
         "absolute orientation needs at least 2 control points in plan and 3 in height on the strip, not on one line; "
         f"there are {plan} in plan and {height} in height"
     )
-    if plan == height == 2:
-        msg += f": the rotation about the line of control points {control.ids[0]} and {control.ids[1]} stays free"
+    heights = [name for name, used in zip(control.ids, control.use[:, HEIGHT], strict=True) if used]
+    if plan >= 2 and height == 2:
+        msg += f": the rotation about the line of control points {heights[0]} and {heights[1]} stays free"
     raise GeometryError(msg, points=control.ids, code="too-little-control")
 
 
@@ -301,6 +303,10 @@ def _start_apart(strip: Floats, targets: Targets) -> Similarity:
     z = strip[plan, 0] + 1j * strip[plan, 1]
     t = target[:, 0] + 1j * target[:, 1]
     dz = z - z.mean()
+    if np.abs(dz).max() <= 1e-6 * np.ptp(strip, axis=0).max():
+        names = ", ".join(name for name, used in zip(targets.control.ids, plan, strict=True) if used)
+        msg = f"absolute orientation: control points {names} lie at one place in plan: scale and azimuth stay free"
+        raise GeometryError(msg, points=targets.control.ids, code="control-deficient")
     turn = (dz.conj() @ (t - t.mean())) / (dz.conj() @ dz).real
     scale, angle = abs(turn), np.angle(turn)
     shift = t.mean() - turn * z.mean()

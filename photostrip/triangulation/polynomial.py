@@ -491,6 +491,11 @@ def _redundancy(fits: Sequence[AxisFit], similarity: int) -> int:
     return total if any(axis.terms for axis in fits) else total - similarity
 
 
+def _of_all_axes(fits: Sequence[AxisFit]) -> int:
+    """Redundancy over all axes; a group without terms rests on its share of the similarity."""
+    return sum(_redundancy([fits[axis] for axis in axes], SIMILARITY_PARAMETERS[group]) for group, axes in GROUPS)
+
+
 def _f_test(simple: Sequence[AxisFit], rich: Sequence[AxisFit], expected: Floats) -> tuple[float, float]:
     """F ratio of the richer fit against the simpler over all axes, each in units of its own richer variance.
 
@@ -498,9 +503,8 @@ def _f_test(simple: Sequence[AxisFit], rich: Sequence[AxisFit], expected: Floats
     own left-out points say. The variance is never taken below what the control's own standard deviations say: with
     few points a fit can look better than the control is.
     """
-    similarity = sum(SIMILARITY_PARAMETERS.values())
-    gained = _redundancy(simple, similarity) - _redundancy(rich, similarity)
-    left = _redundancy(rich, similarity)
+    left = _of_all_axes(rich)
+    gained = _of_all_axes(simple) - left
     if gained < 1 or left < 1 or any(axis.redundancy < 1 for axis in rich):
         return float("nan"), float("nan")
     explained = 0.0

@@ -9,7 +9,7 @@ Source: [001] for the elements; condition, derivatives, start values and retries
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -36,6 +36,8 @@ CONDITION_WARNING = 100.0  # of the column-normalised Jacobian: a band much narr
 CONDITION_LIMIT = 1e6
 RIDGE = 1e-13  # relative; keeps a singular pair from stopping the batch, changes no digit of a regular one
 RETRIES = np.radians([15, -15, 30, -30, 60, -60, 90, -90, 180])
+RETRY_RMS = 1e-3  # of the principal distance: a larger rms y parallax is a false minimum or a gross error
+SMALLEST_PARALLAX = 1e-3  # of the principal distance, mean over a pair: below it there is no base to speak of
 UPPER = np.triu_indices(5)
 
 
@@ -52,15 +54,15 @@ class Settings:
         Probability of rejecting a point of a pair without gross errors.
     parallax_limit : float, optional
         Largest y parallax in mm that needs no rejection; None: four times its a-priori standard deviation.
-    keep, drop : sequence of str
+    keep, drop : list of str
         Measurements, ``photo/point``, that are used or left out whatever the tests say.
     """
 
     screening: str = "auto"
     grubbs_alpha: float = 0.05
     parallax_limit: float | None = None
-    keep: Sequence[str] = ()
-    drop: Sequence[str] = ()
+    keep: list[str] = field(default_factory=list)
+    drop: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True, eq=False)
@@ -333,9 +335,10 @@ def in_front(elements: Floats, pairs: Pairs) -> NDArray[np.bool_]:
 def solve(pairs: Pairs) -> tuple[Floats, NDArray[np.bool_], Numbers]:
     """Elements of all pairs from nothing: start values, iteration, retries from other azimuths.
 
-    A pair is tried again with its start azimuth turned by 15 to 180 degrees when it does not converge or a
-    point comes out behind a camera; of the solutions found, the one with most points in front and then the
-    smallest sum of squares is taken.
+    A pair is tried again with its start azimuth turned by 15 to 180 degrees when it does not converge, a point comes
+    out behind a camera, or the y parallaxes stay large: with tilts beyond 10 degrees there are false minima with all
+    points in front. Of the solutions found, the one with most points in front and then the smallest sum of squares is
+    taken.
 
     Parameters
     ----------
@@ -349,15 +352,18 @@ def solve(pairs: Pairs) -> tuple[Floats, NDArray[np.bool_], Numbers]:
     """
     start = start_values(pairs)
     best, converged, steps = iterate(start, pairs)
+    best = _facing(best, pairs)
     score = _score(best, converged, pairs)
+    tolerable = (RETRY_RMS * pairs.focal) ** 2 * pairs.sums(pairs.weight)
     for turn in RETRIES:
-        todo = np.flatnonzero(score[0] < 1)
+        todo = np.flatnonzero((score[0] < 1) | (score[1] > tolerable))
         if not len(todo):
             break
         part, _ = pairs.take(todo)
         attempt = start[todo]
         attempt[:, [1, 4]] += turn
         elements, success, count = iterate(attempt, part)
+        elements = _facing(elements, part)
         tried = _score(elements, success, part)
         share, squares = score[0][todo], score[1][todo]
         better = (tried[0] > share + 1e-9) | ((tried[0] > share - 1e-9) & (tried[1] < squares))
@@ -365,6 +371,20 @@ def solve(pairs: Pairs) -> tuple[Floats, NDArray[np.bool_], Numbers]:
         best[chosen], converged[chosen], steps[chosen] = elements[better], success[better], count[better]
         score[0][chosen], score[1][chosen] = tried[0][better], tried[1][better]
     return best, converged, steps
+
+
+def _facing(elements: Floats, pairs: Pairs) -> Floats:
+    """Turn the base of pairs round whose points lie behind both cameras: the same planes, the other side."""
+    (lx, _, lz), (rx, _, rz) = rays(elements, pairs)
+    determinant = lx * rz - rx * lz
+    with np.errstate(all="ignore"):
+        behind = (rz / determinant < 0) & (lz / determinant < 0) & (pairs.weight > 0)
+    away = 2 * pairs.sums(behind.astype(float)) > pairs.sums((pairs.weight > 0).astype(float))
+    result = elements.copy()
+    result[away] *= [-1.0, 1.0, -1.0, -1.0, 1.0]
+    result[away, 1] += np.pi
+    result[away, 4] += np.pi
+    return (result + np.pi) % (2 * np.pi) - np.pi
 
 
 def _score(elements: Floats, converged: NDArray[np.bool_], pairs: Pairs) -> tuple[Floats, Floats]:
@@ -604,7 +624,27 @@ def doubtful(result: Orientation, converged: NDArray[np.bool_]) -> NDArray[np.bo
         front = in_front(result.elements, pairs) & result.used
     share = pairs.sums(front.astype(float)) / np.maximum(result.points_used, 1)
     bad: NDArray[np.bool_] = ~converged | ~(result.condition <= CONDITION_LIMIT) | (share <= 0.5)  # noqa: PLR2004  half of the points
-    return bad
+    return bad | (mean_parallax(result) < SMALLEST_PARALLAX * pairs.focal)
+
+
+def mean_parallax(result: Orientation) -> Floats:
+    """Mean x parallax of the points of each pair, turned into the base frame, mm.
+
+    Parameters
+    ----------
+    result : Orientation
+        The pairs.
+
+    Returns
+    -------
+    ndarray, shape (p,)
+        Near zero when both photos were taken from the same place.
+    """
+    (lx, _, lz), (rx, _, rz) = rays(result.elements, result.pairs)
+    with np.errstate(all="ignore"):
+        size = np.where(result.used, np.abs(lx / lz - rx / rz), 0.0) * result.pairs.focal
+    mean: Floats = np.nan_to_num(result.pairs.sums(size)) / np.maximum(result.points_used, 1)
+    return mean
 
 
 def require(result: Orientation, converged: NDArray[np.bool_], photos: Sequence[str]) -> None:
@@ -744,8 +784,8 @@ def _reason(result: Orientation, number: int, of_pair: NDArray[np.bool_], *, con
             "all common points lie on one line of the photo; points in at least the corners of the overlap are needed",
             "points-on-a-line",
         )
-    parallax = np.linalg.norm((result.pairs.left - result.pairs.right)[of_pair].mean(axis=0))
-    if parallax < 1e-3 * result.pairs.focal:
+    parallax = float(mean_parallax(result)[number])
+    if parallax < SMALLEST_PARALLAX * result.pairs.focal:
         return (
             f"the x parallax is only {parallax:.3f} mm: the photos have no base; the same photo twice?",
             "no-base",

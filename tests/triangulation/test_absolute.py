@@ -446,3 +446,27 @@ def test_check_points_have_no_say() -> None:
     assert np.array_equal(without.points.cartesian, with_checks.points.cartesian)
     rows = with_checks.inputs.control.check
     assert np.allclose(with_checks.control_differences[rows], -1e3, rtol=0, atol=2)
+
+
+@pytest.mark.parametrize(
+    "sigma",
+    [np.array([[0.001] * 3] + [[5.0] * 3] * 7), np.tile([0.02, 0.02, 100.0], (8, 1))],
+    ids=["one point far better than the others", "heights from an old map"],
+)
+def test_weights_do_not_decide_what_is_determined(sigma: Floats) -> None:
+    one = case(FULL, sigma=sigma)
+    found = one.orient(weights(one.control, (0.001, 0.001)))
+    assert np.abs(one.errors(found)).max() < 1e-6
+    assert found.condition < 20  # a matter of geometry
+
+
+def test_two_plan_points_at_one_place_leave_scale_and_azimuth() -> None:
+    same = {**GROUND, "L": GROUND["A"]}
+    error = refusal({"A": "xy", "L": "xy", "B": "z", "C": "z", "H": "z"}, same)
+    assert error.code == "control-deficient"
+
+
+def test_two_heights_leave_the_rotation_about_their_own_line() -> None:
+    error = refusal({"A": "xy", "H": "xy", "B": "z", "C": "z"})
+    assert "2 in plan and 2 in height" in str(error)
+    assert "the line of control points A and H" not in str(error)  # those are the plan points: the free axis is B-C

@@ -546,3 +546,19 @@ def test_long_strips_are_warned_of(photos: int, said: bool) -> None:
     last = photos - 1
     result = strip_result(flown, 90.0, "auto", (0, last // 3, 2 * last // 3, last))
     assert ("long-strip" in codes(result)) == said
+
+
+@pytest.mark.parametrize("degree", ["auto", "1", "2", "3"])
+@pytest.mark.parametrize(("few", "many"), [("xyz", "z"), ("xyz", "xy")], ids=["few plan points", "few heights"])
+def test_control_of_one_kind_leaves_the_other_axes_to_themselves(degree: str, few: str, many: str) -> None:
+    xyz = layout(SEVEN)
+    use = [few if n in {0, 2, 18} else many for n in range(21)]  # three full points at two stations
+    found = fit(problem(xyz, xyz + bent(xyz, 3.0, 2), use), Settings(degree))
+    axes = (2,) if many == "z" else (0, 1)
+    for number, axis in enumerate(found.axes):
+        assert len(axis.terms) <= (6 if number in axes else 3)
+        assert axis.redundancy >= 0
+    if degree in {"2", "auto"}:
+        anywhere = np.random.default_rng(1).uniform([-9000, -1400, 0], [9000, 1400, 200], (20, 3))
+        error = found(anywhere) - anywhere - bent(anywhere, 3.0, 2)
+        assert np.abs(error[:, axes]).max() < 1e-6

@@ -554,3 +554,24 @@ def test_what_an_example_says_of_its_rank() -> None:
 def test_standard_points_lie_where_they_should() -> None:
     exact = gruber(np.random.default_rng(0), 1, a=65, b=70, counts=(1,) * 6, scatter=0.0)[0]
     assert exact.tolist() == [[0, 0], [70, 0], [0, 65], [70, 65], [0, -65], [70, -65]]
+
+
+@pytest.mark.parametrize(("tilt", "share"), [(15.0, 1.0), (20.0, 0.995)])
+def test_large_tilts_come_back_too(tilt: float, share: float) -> None:
+    for seed in range(3):
+        truth = true_pairs(np.random.default_rng(seed), 1000, tilt_deg=tilt)
+        elements, converged, _ = relative.solve(truth.pairs)
+        right = truth.errors(elements) < 1e-9
+        assert right.mean() >= share
+        assert (
+            not (converged & ~right).any() or (converged & ~right).mean() < 0.002
+        )  # hardly one is wrong and looks right
+
+
+def test_the_same_photo_measured_twice() -> None:
+    """Noise makes a pair of it that converges; it has no base all the same."""
+    rng = np.random.default_rng(1)
+    left = true_pairs(rng).pairs.left
+    error = refusal(of_arrays(left, left + rng.normal(0, 5 * MICROMETRE, left.shape)), 153.0)
+    assert error.code == "no-base"
+    assert "the same photo twice" in str(error)
