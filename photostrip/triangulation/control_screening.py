@@ -5,6 +5,9 @@ predict: its residual against a polynomial of the highest degree that the contro
 that the fit leaves (its redundancy number), in units of the scatter of the others. Very large errors go first, by a
 similarity that minimises absolute residuals. Two large ones that fit exchanged are named as an exchange.
 
+A strip bends as a whole: control of one band that agrees in itself and contradicts the other bands shows the bend, not
+an error. A coordinate is therefore rejected only against a witness, another point of its own band that stays.
+
 Source: data snooping after a robust start; derived, see docs/sources.md.
 """
 
@@ -155,7 +158,16 @@ def _gross(control: ControlPoints, setting: Setting) -> Flags:
     scatter = NORMAL * np.array([np.median(size[:, axes][control.use[:, axes]]) for axes in ([0, 1], [0, 1], [2])])
     far = np.array(control.use & (size > GROSS * scatter), bool)
     far[:, PLAN] = far[:, PLAN].any(axis=1, keepdims=True) & control.use[:, PLAN]
+    far &= _witnessed(result.similarity(setting.strip)[:, 0], setting.spacing, control.use & ~far)
     return far if _enough(control, far) else nothing
+
+
+def _witnessed(x: Floats, spacing: float, kept: Flags) -> Flags:
+    """Whether another point of the same band gives the same coordinate and is kept."""
+    group = polynomial.bands(x, spacing)
+    total = np.zeros((int(group.max()) + 1, 3), np.intp)
+    np.add.at(total, group, kept)
+    return np.array(total[group] - kept > 0, bool)
 
 
 def _together(axis: int) -> list[int]:
@@ -233,7 +245,7 @@ def _snoop(control: ControlPoints, setting: Setting) -> ControlPoints:
         if fit is None:
             return kept
         value, limit, _, _ = judged(problem, fit)
-        ratio = value / limit
+        ratio = np.where(_witnessed(problem.xyz[:, 0], setting.spacing, kept.use), value / limit, 0.0)
         row = int(ratio.max(axis=1).argmax())
         out = np.zeros(kept.use.shape, bool)
         out[row, _together(int(ratio[row].argmax()))] = True
