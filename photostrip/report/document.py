@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from photostrip.errors import Fault, InputError
-from photostrip.report import ground_sections, strip_sections
+from photostrip.report import decision_sections, ground_sections, strip_sections
 from photostrip.report.figures import counted, fixed, metres, micrometres, short, unit
 from photostrip.report.parts import Column, Facts, Part, Section, Table, Words
 
@@ -44,11 +44,13 @@ def sections_of(document: Document, *, everything: bool = False) -> tuple[Sectio
     found = [
         verdict_section(document, everything=everything),
         project_section(document),
+        decision_sections.decisions_section(document),
         counts_section(document),
         strip_sections.relative_section(document, everything=everything),
         strip_sections.junction_section(document, everything=everything),
         strip_sections.absolute_section(document),
         *([strip_sections.polynomial_section(document, everything=everything)] if document.get("polynomials") else []),
+        decision_sections.weights_section(document, everything=everything),
         ground_sections.control_section(document, everything=everything),
         ground_sections.check_section(document, everything=everything),
         *([ground_sections.ties_section(document, everything=everything)] if several else []),
