@@ -23,7 +23,7 @@ def photos_of(done: Simulation) -> list[set[int]]:
 @hypothesis_settings(max_examples=60)
 @given(
     seed=st.integers(0, 10_000),
-    lap=st.floats(57.0, 85.0),
+    lap=st.floats(62.0, 85.0),
     heading=st.floats(0.0, 360.0),
     rotation=st.floats(-180.0, 180.0),
     relief=st.floats(0.0, 150.0),
