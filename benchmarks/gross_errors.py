@@ -29,7 +29,7 @@ from photostrip.simulate.spec import Control, Flight, GrossError, Points, Spec
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.pipeline import Settings
+    from photostrip.pipeline import Result, Settings
     from photostrip.simulate.simulation import Simulation
 
     Floats = NDArray[np.float64]
@@ -39,6 +39,7 @@ SMALLEST, LARGEST = 5.0, 50_000.0  # standard deviations of an image coordinate;
 WRONG_SHARE = (0.01, 0.05)
 CONTROL_ERRORS = (0.5, 50.0)  # m
 KINDS = ("without errors", "errors, auto", "errors, none")
+PASS_POINTS = 2  # good ones at a joint, so that a wrong one can be told from them
 CONSPICUOUS = 2.0  # ratio of rms that is printed for a single strip
 STRIP = Spec(
     flight=Flight(photos=20, end_lap_percent=62.0),
@@ -62,6 +63,8 @@ class Run:
         wrong image points, those of them that took no part.
     control_found : bool or None
         Whether the wrong control coordinate was named; None without one.
+    supported : bool
+        Whether every standard zone of every pair that has points has a good one, and every joint two.
     """
 
     errors: Floats
@@ -72,6 +75,7 @@ class Run:
     wrong: int
     found: int
     control_found: bool | None
+    supported: bool
 
 
 def gross_errors(rng: np.random.Generator, image_points: int, sigma_um: float, *, control: bool) -> list[GrossError]:
@@ -84,7 +88,7 @@ def gross_errors(rng: np.random.Generator, image_points: int, sigma_um: float, *
     return errors
 
 
-def adjusted(simulation: Simulation, settings: Settings, spoiled: set[str]) -> Run:
+def adjusted(simulation: Simulation, settings: Settings, wrong_rows: set[tuple[str, str]]) -> Run:
     """Adjust one strip and compare it with its truth."""
     result = triangulate(inputs_of(simulation), settings)
     observations = simulation.observations
@@ -93,7 +97,8 @@ def adjusted(simulation: Simulation, settings: Settings, spoiled: set[str]) -> R
     names = [observations.point_ids[number] for number in result.points.number]
     errors = result.points.cartesian - simulation.truth.points.xyz[[truth[name] for name in names]]
     new = np.array([name not in given for name in names])
-    injected = {(error.photo, error.point) for error in simulation.truth.errors if error.kind == "image"}
+    injected = wrong_measurements(simulation)
+    spoiled = {name for _, name in wrong_rows}
     photo = [observations.photo_ids[number] for number in observations.photo]
     point = [observations.point_ids[number] for number in observations.point]
     bad = np.array([key in injected for key in zip(photo, point, strict=True)])
@@ -109,12 +114,32 @@ def adjusted(simulation: Simulation, settings: Settings, spoiled: set[str]) -> R
     lost = ~bad & ~used
     other = lost & ~np.isin(point, list(spoiled))
     good, gone, spared, wrong, found = (int(each.sum()) for each in (~bad, lost, other, bad, bad & ~used))
-    return Run(local, own, good, gone, spared, wrong, found, named)
+    return Run(local, own, good, gone, spared, wrong, found, named, supported(result, wrong_rows))
 
 
-def spoiled_points(simulation: Simulation) -> set[str]:
-    """Give the points with a wrong measurement."""
-    return {error.point for error in simulation.truth.errors if error.kind == "image"}
+def wrong_measurements(simulation: Simulation) -> set[tuple[str, str]]:
+    """Give photo and point of the wrong measurements."""
+    return {(error.photo, error.point) for error in simulation.truth.errors if error.kind == "image"}
+
+
+def supported(result: Result, wrong_rows: set[tuple[str, str]]) -> bool:
+    """Whether the strip has enough good points: in each zone of each pair that has any, and two at each joint."""
+    observations = result.refined.observations
+    for strip in result.strips:
+        pairs, rows, photos = strip.orientation.pairs, strip.orientation.rows, strip.strip.photos
+        place = 6 * pairs.pair + strip.screened.zone - 1
+        names = [observations.point_ids[number] for number in observations.point[rows[:, 0]]]
+        good = [
+            (photos[pair], name) not in wrong_rows and (photos[pair + 1], name) not in wrong_rows
+            for pair, name in zip(pairs.pair, names, strict=True)
+        ]
+        if not set(place.tolist()) <= set(place[np.array(good)].tolist()):
+            return False
+        joined = strip.formed.junctions
+        right = np.array(good)[joined.before] & np.array(good)[joined.after]
+        if (np.bincount(joined.joint[right], minlength=len(joined.factor)) < PASS_POINTS).any():
+            return False
+    return True
 
 
 @dataclass(eq=False)
@@ -176,31 +201,48 @@ class Table:
         print(f"wrong control coordinates named: {c['control found']} of {c['control']}")
 
 
+def three_runs(seed: int) -> tuple[dict[str, Run], list[str]]:
+    """Adjust one strip without errors, with errors, and with errors and no search; give what failed, too."""
+    rng = np.random.default_rng(seed)
+    clean = replace(STRIP, seed=seed)
+    plain = simulate(clean)
+    errors = gross_errors(rng, len(plain.observations), clean.image.sigma_um, control=seed % 3 == 0)
+    spoiled = simulate(replace(clean, gross_errors=tuple(errors)))
+    runs, failed = {}, []
+    for kind, simulation in zip(KINDS, (plain, spoiled, spoiled), strict=True):
+        settings = settings_of(simulation)
+        if kind == KINDS[2]:
+            settings = replace(settings, relative=replace(settings.relative, screening="none"))
+        try:
+            runs[kind] = adjusted(simulation, settings, wrong_measurements(spoiled))
+        except PhotostripError as error:
+            failed.append(kind)
+            if kind != KINDS[2]:
+                print(f"strip {seed}, {kind}: {error}")
+    return runs, failed
+
+
 def main(strips: int) -> None:
-    """Adjust all strips and print the table."""
-    table = Table.empty()
+    """Adjust all strips and print the tables: of all, and of those with enough good points."""
+    tables = Table.empty(), Table.empty()
+    number = [strips, 0]
     for seed in range(1, strips + 1):
-        rng = np.random.default_rng(seed)
-        clean = replace(STRIP, seed=seed)
-        plain = simulate(clean)
-        errors = gross_errors(rng, len(plain.observations), clean.image.sigma_um, control=seed % 3 == 0)
-        spoiled = simulate(replace(clean, gross_errors=tuple(errors)))
-        rms: dict[str, float] = {}
-        for kind, simulation in zip(KINDS, (plain, spoiled, spoiled), strict=True):
-            settings = settings_of(simulation)
-            if kind == KINDS[2]:
-                settings = replace(settings, relative=replace(settings.relative, screening="none"))
-            try:
-                rms[kind] = table.add(kind, adjusted(simulation, settings, spoiled_points(spoiled)))
-            except PhotostripError as error:
+        runs, failed = three_runs(seed)
+        enough = KINDS[0] in runs and runs[KINDS[0]].supported
+        number[1] += enough
+        for table in tables if enough else tables[:1]:
+            rms = {kind: table.add(kind, run) for kind, run in runs.items()}
+            for kind in failed:
                 table.failed[kind] += 1
-                if kind != KINDS[2]:
-                    print(f"strip {seed}, {kind}: {error}")
-        if len(rms) > 1 and KINDS[1] in rms:
-            table.ratios.append(rms[KINDS[1]] / rms[KINDS[0]])
-            if table.ratios[-1] > CONSPICUOUS:
-                print(f"strip {seed}: rms {rms[KINDS[1]]:.3f} m, without errors {rms[KINDS[0]]:.3f} m")
-    table.show(strips)
+            if KINDS[1] in rms:
+                table.ratios.append(rms[KINDS[1]] / rms[KINDS[0]])
+        if KINDS[1] in rms and table.ratios[-1] > CONSPICUOUS:
+            print(f"strip {seed}: {table.ratios[-1]:.2f} times the rms without errors; enough good points: {enough}")
+    for title, table, count in zip(
+        ("All strips", "Strips with a good point in every zone and two at every joint"), tables, number, strict=True
+    ):
+        print(f"\n{title}")
+        table.show(count)
 
 
 if __name__ == "__main__":

@@ -27,7 +27,9 @@ def spoiled() -> Flown:
 def adjusted(keep: tuple[str, ...] = (), drop: tuple[str, ...] = ()) -> Result:
     strip = spoiled()
     given = {name: strip.xyz[strip.at[name]] for name in strip.bands(0, 3, 6)}
-    return triangulate(project(strip, control_points(given)), Settings(relative=Relative(keep=keep, drop=drop)))
+    return triangulate(
+        project(strip, control_points(given)), Settings(relative=Relative(keep=list(keep), drop=list(drop)))
+    )
 
 
 def in_use(result: Result, photo: str, point: str) -> bool:

@@ -369,7 +369,19 @@ def _wrong_control_notes(strip: Strip, wrong: Sequence[control_screening.Control
 def _joint_notes(strip: Strip, formed: formation.FormedStrip) -> list[Note]:
     junctions = formed.junctions
     count = np.bincount(junctions.joint, junctions.used, len(junctions.factor))
-    return [
+    beyond = np.abs(np.log(junctions.ratio / junctions.factor[junctions.joint])) > junctions.limit
+    doubtful = np.unique(junctions.joint[junctions.used & beyond])
+    notes = [
+        Note(
+            "contradicting-joint",
+            f"photo {strip.photos[number + 1]}: its pass points contradict each other in the scale of the models, and "
+            "which is wrong cannot be told; measure a third pass point",
+            strip=strip.id,
+            photos=(strip.photos[number + 1],),
+        )
+        for number in doubtful.tolist()
+    ]
+    return notes + [
         Note(
             "weak-joint",
             f"photo {strip.photos[number + 1]}: the models on either side are joined by a single pass point: its error "

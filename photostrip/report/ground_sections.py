@@ -183,7 +183,7 @@ def image_section(document: Document) -> Section:
 
 def rejected_section(document: Document, *, everything: bool) -> Section:
     """Measurements that were taken out."""
-    rejected = document["rejected"]
+    rejected = [row for row in document["rejected"] if not row.get("readmitted", False)]
     if not rejected:
         return Section("Rejected", (Words("Nothing was rejected."),))
     shown, note = worst_first(rejected, lambda r: abs(r["parallax_um"] or 0.0), "in `rejected`", everything=everything)
@@ -199,7 +199,7 @@ def rejected_section(document: Document, *, everything: bool) -> Section:
     rows = tuple(
         (
             r["point"],
-            r["photo"] if r["other_photo"] is None else f"{r['photo']} – {r['other_photo']}",
+            " – ".join(photo for photo in (r["photo"], r["other_photo"]) if photo is not None),
             r["test"],
             micrometres(r["value"]) if r["unit"] else ratio(r["value"]),
             micrometres(r["limit"]) if r["unit"] else ratio(r["limit"]),

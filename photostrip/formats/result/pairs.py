@@ -17,6 +17,7 @@ from photostrip.formats.result.numbers import (
     rounded,
     significant,
 )
+from photostrip.triangulation.control_screening import AXES
 from photostrip.triangulation.relative import ELEMENTS, MINIMUM_POINTS
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
     from photostrip.pipeline import Result, StripResult
     from photostrip.points import PhotoPoints
+    from photostrip.triangulation.control_screening import ControlRejection
     from photostrip.triangulation.screening import Rejection
 
     Floats = NDArray[np.float64]
@@ -101,6 +103,9 @@ def _models(strip: StripResult, ids: Sequence[str]) -> list[Document]:
         "points_used": used.tolist(),
         "points_rejected": (total - used).tolist(),
         "redundancy": sums.redundancy.tolist(),
+        "zones": strip.screened.counts.tolist(),
+        "detectable_um": micrometres(_detectable(strip)),
+        "masked_errors_suspected": strip.screened.masked.tolist(),
         "condition": significant(oriented.condition),
         "iterations": oriented.iterations.tolist(),
         "base": rounded(base, GROUND),
@@ -121,6 +126,13 @@ def _models(strip: StripResult, ids: Sequence[str]) -> list[Document]:
         }
         for number, row in enumerate(zip(*columns.values(), strict=True))
     ]
+
+
+def _detectable(strip: StripResult) -> Floats:
+    """Largest of the smallest errors that can be found at the points of each pair, mm; NaN where one is never seen."""
+    size = np.where(strip.orientation.used, strip.screened.detectable, 0.0)
+    worst = np.maximum.reduceat(np.nan_to_num(size, nan=0.0, posinf=np.inf), strip.orientation.pairs.starts)
+    return np.where(np.isfinite(worst), worst, np.nan)
 
 
 def parallaxes_of(result: Result, rank: Numbers) -> list[Document]:
@@ -212,16 +224,19 @@ def discrepancies(strip: StripResult) -> Floats:
 
 
 def rejected_of(result: Result) -> list[Document]:
-    """Give the list ``rejected``: measurements taken out of pairs and of scale transfers, in flight order."""
+    """Give the list ``rejected``: what was taken out of pairs, scale transfers, points and control, in flight order.
+
+    A measurement that was taken back in the end is in it, marked.
+    """
     ids = result.refined.observations.point_ids
     found = []
     for strip in result.strips:
         oriented = strip.orientation
-        gone = [rejection for rejection in strip.rejections if not rejection.readmitted]
-        gone.sort(key=lambda rejection: int(oriented.pairs.pair[rejection.row]))
+        gone = sorted(strip.rejections, key=lambda rejection: int(oriented.pairs.pair[rejection.row]))
         found += [_from_pair(strip, rejection, ids) for rejection in gone]
         found += [_from_joint(strip, int(row), ids) for row in np.flatnonzero(~strip.formed.junctions.used)]
         found += _from_rays(strip, result.refined.observations)
+        found += [_from_control(strip, wrong) for wrong in strip.wrong_control]
     return found
 
 
@@ -235,6 +250,8 @@ def _from_pair(strip: StripResult, rejection: Rejection, ids: Sequence[str]) -> 
         reason = "the rays do not meet in front of the cameras"
     elif rejection.test == "parallax":
         unit, value, limit = "um", value * 1000, limit * 1000
+    if rejection.readmitted:
+        reason = "taken back: the pair oriented on the other points predicts it, or the user keeps it"
     return {
         "strip": strip.strip.id,
         "photo": left,
@@ -247,6 +264,9 @@ def _from_pair(strip: StripResult, rejection: Rejection, ids: Sequence[str]) -> 
         "unit": unit,
         "parallax_um": rounded(size, 2),
         "zone": rejection.zone or None,
+        "size": rounded(size, 2),
+        "size_unit": "um",
+        "readmitted": rejection.readmitted,
         "reason": reason,
     }
 
@@ -267,6 +287,9 @@ def _from_joint(strip: StripResult, row: int, ids: Sequence[str]) -> Document:
         "unit": "ppm",
         "parallax_um": None,
         "zone": None,
+        "size": rounded((joined.ratio[row] / joined.factor[joint] - 1) * PPM, RATIO_DECIMALS),
+        "size_unit": "ppm",
+        "readmitted": False,
         "reason": f"scale ratio {value:.0f} ppm from that of the other pass points",
     }
 
@@ -293,8 +316,35 @@ def _from_rays(strip: StripResult, observations: PhotoPoints) -> list[Document]:
                 "unit": "",
                 "parallax_um": None,
                 "zone": None,
+                "size": None,
+                "size_unit": "",
+                "readmitted": False,
                 "reason": MEET if told else CONTRADICT,
             }
             for ray in rays
         ]
     return rows
+
+
+def _from_control(strip: StripResult, wrong: ControlRejection) -> Document:
+    sizes = dict(zip(AXES, wrong.size, strict=True))
+    reason = "; ".join(f"{axis} by about {sizes[axis]:+.2f} m" for axis in wrong.axes)
+    if wrong.exchanged_with:
+        reason += f"; fits when exchanged with {wrong.exchanged_with}"
+    return {
+        "strip": strip.strip.id,
+        "photo": None,
+        "other_photo": None,
+        "point": wrong.id,
+        "stage": "control",
+        "test": "left out",
+        "value": rounded(wrong.value, 2),
+        "limit": rounded(wrong.limit, 2),
+        "unit": "",
+        "parallax_um": None,
+        "zone": None,
+        "size": rounded(max((sizes[axis] for axis in wrong.axes), key=abs, default=0.0), GROUND),
+        "size_unit": "m",
+        "readmitted": False,
+        "reason": f"given coordinates contradict the strip and the other control: {reason}",
+    }
