@@ -402,7 +402,10 @@ def _control_notes(strip: Strip, orientation: absolute.AbsoluteOrientation) -> l
         )
         notes.append(Note("little-control", text, strip=strip.id))
     if orientation.condition > 1 / absolute.WEAK_LIMIT:
-        text = f"strip {strip.id}: the control is nearly on one line (condition number {orientation.condition:.0f})"
+        text = (
+            f"strip {strip.id}: the control is nearly on one line: errors of some motion of the strip are "
+            f"{orientation.condition:.0f} times those of the others"
+        )
         notes.append(Note("weak-control", text, strip=strip.id))
     return notes
 
