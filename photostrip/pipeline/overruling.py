@@ -166,10 +166,15 @@ def notes(settings: relative.Settings, strip: str, photos: Sequence[str]) -> lis
     list of Note
         One for each list that touches the strip.
     """
+    kept, dropped = (
+        ", ".join(entry for entry in entries if any(entry.startswith(f"{photo}/") for photo in photos))
+        for entries in (settings.keep, settings.drop)
+    )
     found = []
-    for key, text in (("keep", "kept whatever the tests say"), ("drop", "left out")):
-        here = [entry for entry in getattr(settings, key) if any(entry.startswith(f"{photo}/") for photo in photos)]
-        if here:
-            message = f"strip {strip}: {text} at the user's wish: {', '.join(here)}"
-            found.append(Note(f"user-{key}", message, severity="note", strip=strip))
+    if kept:
+        text = f"strip {strip}: kept at the user's wish, whatever the tests say: {kept}"
+        found.append(Note("user-keep", text, severity="note", strip=strip))
+    if dropped:
+        text = f"strip {strip}: left out at the user's wish: {dropped}"
+        found.append(Note("user-drop", text, severity="note", strip=strip))
     return found
