@@ -23,9 +23,10 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 SCHEMA = 1
-ANGLE, ARCSEC, MILLIMETRE, MICROMETRE, RATIO = 7, 3, 6, 3, 3  # decimals: 0.4 milliarcseconds, a nanometre
+ANGLE, ARCSEC, MILLIMETRE, MICROMETRE, RATIO = 8, 5, 6, 4, 3  # decimals: finer than any report prints
 PER_RADIAN = {"deg": 180 / np.pi, "gon": 200 / np.pi}
 FULL_CIRCLE = 2 * np.pi
+ROUNDING = 1e-12  # rad
 UM = 1000.0  # in a millimetre
 
 
@@ -53,7 +54,7 @@ def orientation_block(angles: Sequence[float], unit: str) -> Document:
 def positive(angle: float) -> float:
     """Bring an azimuth between 0 and a full circle; what rounds to the full circle is 0."""
     turned = float(np.mod(angle, FULL_CIRCLE))
-    return 0.0 if FULL_CIRCLE - turned < 1e-12 else turned
+    return 0.0 if FULL_CIRCLE - turned < ROUNDING else turned
 
 
 # ---------------------------------------------------------------------------------------------------- conversion
@@ -99,9 +100,7 @@ def conversion(
     document["orientation"] = orientation_block(angles, unit)
     document["units"] = {"x": "mm", "z": "mm", "lambda": unit, "beta": unit, "_arcsec": "seconds of arc"}
     turned = np.array([[positive(each[0]), each[1]] for each in directions]).reshape(-1, 2)
-    rows = zip(
-        ids, rounded(xz + centre, MILLIMETRE), rounded(turned * PER_RADIAN[unit], ANGLE), strict=True
-    )
+    rows = zip(ids, rounded(xz + centre, MILLIMETRE), rounded(turned * PER_RADIAN[unit], ANGLE), strict=True)
     document["points"] = [
         {"id": name, "x": x, "z": z, "lambda": horizontal, "beta": vertical}
         for name, (x, z), (horizontal, vertical) in rows
@@ -206,7 +205,8 @@ def theodolite_accuracy(
     xz = np.column_stack([x, z])
     horizontal, vertical, rounds = theodolite
     means = [accuracy.of_rounds(each, rounds) for each in (horizontal, vertical)]
-    image = accuracy.supported(xz, camera.principal_distance, *(each / ARCSECONDS for each in means), angles[1]) * UM
+    by = (means[0] / ARCSECONDS, means[1] / ARCSECONDS)
+    image = accuracy.supported(xz, camera.principal_distance, *by, angles[1]) * UM
     document = head("theodolite-accuracy", camera)
     document["orientation"] = orientation_block(angles[0], angles[2])
     document["theodolite"] = {
@@ -362,3 +362,26 @@ def _sighted(sightings: Sightings, found: Orientation) -> list[Document]:
         }
         for name, used, v, r in zip(sightings.ids, found.used, residuals, shares, strict=True)
     ]
+
+
+def camera_list(cameras: dict[str, Phototheodolite]) -> Document:
+    """Give the cameras that can be named.
+
+    Parameters
+    ----------
+    cameras : dict of str to Phototheodolite
+        By name.
+
+    Returns
+    -------
+    dict
+        The document.
+    """
+    document = head("cameras")
+    document["cameras"] = []
+    for name, each in cameras.items():
+        size = each.format or (np.nan, np.nan)
+        keys = ("principal_distance_mm", "x0_mm", "z0_mm", "width_mm", "height_mm")
+        values = rounded([each.principal_distance, *each.principal_point, *size], MILLIMETRE)
+        document["cameras"].append({"id": name, **dict(zip(keys, values, strict=True))})
+    return document

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.formats.result.numbers import natural_rank, rounded, significant
-from photostrip.formats.terrestrial_directions import ARCSEC, MICROMETRE, MILLIMETRE, RATIO, UM, head
+from photostrip.formats.terrestrial_directions import ARCSEC, MICROMETRE, RATIO, UM, head
 from photostrip.statistics import chi2_quantile
 from photostrip.terrestrial.displacement import ellipses
 from photostrip.terrestrial.frame import ARCSECONDS
@@ -273,16 +273,18 @@ def points_csv(document: Document) -> str:
     Parameters
     ----------
     document : dict
-        A document with points that are all alike, or the worked examples.
+        A document with points, worked examples or cameras that are all alike.
 
     Returns
     -------
     str
         A row for each.
     """
-    rows = document["examples"] if "examples" in document else document["points"]
+    rows = next(document[key] for key in ("examples", "cameras", "points") if key in document)
     names = list(rows[0]) if rows else ["id"]
-    return to_csv(["point" if name == "id" else name for name in names], ([row[name] for name in names] for row in rows))
+    return to_csv(
+        ["point" if name == "id" else name for name in names], ([row[name] for name in names] for row in rows)
+    )
 
 
 def to_csv(names: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
@@ -303,8 +305,12 @@ def to_csv(names: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     stream = StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(names)
-    writer.writerows([int(cell) if isinstance(cell, bool) else cell for cell in row] for row in rows)
+    writer.writerows([_cell(cell) for cell in row] for row in rows)
     return stream.getvalue()
 
 
-__all__ = ["MILLIMETRE", "cameras_csv", "displacement_document", "displacements_csv", "points_csv", "to_csv"]
+def _cell(value: object) -> object:
+    """Give a number without an exponent, a truth value as 1 or 0."""
+    if isinstance(value, bool):
+        return int(value)
+    return np.format_float_positional(value, trim="0") if isinstance(value, float) else value

@@ -121,8 +121,9 @@ def _epochs(read: EpochTable, kind: str, wanted: Wanted, findings: Findings) -> 
         if times > 1:
             findings.add(Fault(f"epoch {name} is named {times} times", "duplicate", key="epochs", fix="remove one"))
     if len(epochs) < FEWEST_EPOCHS:
-        message = f"there is only one epoch, {epochs[0]}" if epochs else "there is no epoch"
+        message = f"has only one epoch, {epochs[0]}" if epochs else "has no epoch"
         file, key = ("", "epochs") if wanted.epochs else (read.table.file, "epoch")
+        message = f"the list {message}" if wanted.epochs else message
         findings.add(Fault(message, "one-epoch", file, key=key, expected="two or more"))
     missing = [(number, name) for number, name in enumerate(epochs) if name not in known]
     for number, name in missing:
@@ -135,7 +136,7 @@ def _epochs(read: EpochTable, kind: str, wanted: Wanted, findings: Findings) -> 
         message = f"epoch {epochs[0]} is the reference, against which pseudo-parallaxes are measured"
         fix = "name the reference epoch first in `epochs`, and only later epochs in the table"
         findings.add(read.table.fault(row, "epoch", message, "reference-epoch", fix=fix))
-    others = [name for name in known if name not in epochs]
+    others = [name for name in read.epochs if name not in epochs]
     if others and not missing:
         rows = int(np.isin(read.epoch, [read.epochs.index(name) for name in others]).sum())
         message = (
@@ -193,7 +194,7 @@ def _from_pseudo_parallaxes(
     x, z, p, q = reference.T
     first = np.column_stack([x, z, x - p, z - q]) * scale - centre.ravel()
     place = {name: number for number, name in enumerate(epochs)}
-    names = read.epochs or epochs[1:2]
+    names = read.epochs or epochs[1:2] or (SECOND,)
     number = np.array([place.get(name, -1) for name in names], np.intp)[read.epoch]
     rows = np.flatnonzero(number >= 0)
     shape = (len(epochs), len(read.points), 4)

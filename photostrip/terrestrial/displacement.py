@@ -88,30 +88,27 @@ def standard_errors(second: Floats, sigma: float, principal_distance: float, bas
     )
 
 
-def statistic(displacement: ArrayLike, covariance: ArrayLike) -> Floats:
+def statistic(displacement: Floats, covariance: Floats) -> Floats:
     """Test value of displacements: chi-square with three degrees of freedom where nothing moved.
 
     Parameters
     ----------
-    displacement : array_like, shape (..., 3)
+    displacement : ndarray, shape (n, 3)
         Displacements in metres.
-    covariance : array_like, shape (..., 3, 3)
+    covariance : ndarray, shape (n, 3, 3)
         Their covariance in m^2.
 
     Returns
     -------
-    ndarray, shape (...)
+    ndarray, shape (n,)
         d^T C^-1 d; NaN where C is singular or has no value.
     """
-    d, c = np.asarray(displacement, float), np.asarray(covariance, float)
-    value = np.full(d.shape[:-1], np.nan)
-    known = np.isfinite(d).all(axis=-1) & np.isfinite(c).all(axis=(-2, -1))
-    sound = known.copy()
-    if known.any():
-        size = np.linalg.eigvalsh(c[known])
-        sound[known] = size[..., 0] > SINGULAR * size[..., -1]
-    if sound.any():
-        value[sound] = np.einsum("ni,ni->n", d[sound], np.linalg.solve(c[sound], d[sound][..., None])[..., 0])
+    value = np.full(len(displacement), np.nan)
+    sound = np.flatnonzero(np.isfinite(displacement).all(axis=1) & np.isfinite(covariance).all(axis=(1, 2)))
+    size = np.linalg.eigvalsh(covariance[sound])
+    sound = sound[size[:, 0] > SINGULAR * size[:, -1]]
+    d = displacement[sound]
+    value[sound] = np.einsum("ni,ni->n", d, np.linalg.solve(covariance[sound], d[:, :, None])[:, :, 0])
     return value
 
 

@@ -1,0 +1,167 @@
+"""Simulated terrestrial surveys: two convergent cameras, points that move, cameras that turn, noise of known size."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.simulate.draws import Draws, Purpose
+from photostrip.terrestrial.epochs import monitor
+from photostrip.terrestrial.monitoring import Series, Settings
+from photostrip.terrestrial.normal_case import StereoPair
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.terrestrial.monitoring import Monitoring
+
+    Floats = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
+
+ARCSECOND = np.pi / 180 / 3600
+FOCAL = (190.0, 100.0)
+CENTERS = np.array([[1000.0, 2000.0, 150.0], [1040.0, 2005.0, 152.0]])
+SIGMA = 0.005  # mm
+
+
+def about(axis: int, angle: float) -> Floats:
+    """Give the matrix of a rotation about one axis, right-hand rule: written apart from the program."""
+    c, s = np.cos(angle), np.sin(angle)
+    first, second = [(1, 2), (2, 0), (0, 1)][axis]
+    matrix = np.eye(3)
+    matrix[first, first] = matrix[second, second] = c
+    matrix[second, first], matrix[first, second] = s, -s
+    return matrix
+
+
+def attitude(alpha: float, omega: float, kappa: float) -> Floats:
+    """Columns x, optical axis, z of a camera: first it rolls, then it looks up, then it turns to its azimuth.
+
+    The roll is counter-clockwise for the photographer, that is left-handed about the viewing direction; the azimuth is
+    clockwise, that is left-handed about the vertical.
+    """
+    return about(2, -alpha) @ about(0, omega) @ about(1, -kappa)
+
+
+def photo(points: Floats, center: Floats, columns: Floats, focal: float) -> Floats:
+    """Image coordinates by the collinearity equations of a terrestrial photo."""
+    x, depth, z = (
+        (points - center) @ columns[:, 0],
+        (points - center) @ columns[:, 1],
+        (points - center) @ columns[:, 2],
+    )
+    return focal * np.column_stack([x / depth, z / depth])
+
+
+@dataclass(frozen=True, eq=False)
+class World:
+    """What is photographed. Points in rows; `stable` points are given as such, whether they move or not.
+
+    `turns` are those of the left and right camera in each epoch, in seconds of arc: right, up, counter-clockwise.
+    """
+
+    points: Floats
+    velocity: Floats
+    stable: int
+    epochs: int = 2
+    turns: dict[tuple[int, int], tuple[float, float, float]] = field(default_factory=dict)
+    shared: float = 0.0  # mm, errors that all epochs share: pseudo-parallaxes are measured
+    right_z: bool = True
+    shifts: dict[tuple[int, int], Floats] = field(default_factory=dict)  # of the cameras, metres
+    attitudes: tuple[tuple[float, float, float], ...] = ((0.15, 0.05, -0.02), (-0.25, 0.03, 0.04))
+
+    @property
+    def pair(self) -> StereoPair:
+        columns = [attitude(*each) for each in self.attitudes]
+        rotations = np.array([np.column_stack([c[:, 0], c[:, 2], -c[:, 1]]) for c in columns])
+        return StereoPair(FOCAL, CENTERS, rotations)
+
+    def exact(self, epoch: int) -> Floats:
+        """Coordinates without errors, x and z left, x and z right, shape (n, 4)."""
+        there = self.points + self.velocity * epoch
+        parts = []
+        for side in range(2):
+            right, up, roll = (angle * ARCSECOND for angle in self.turns.get((epoch, side), (0.0, 0.0, 0.0)))
+            columns = attitude(*self.attitudes[side]) @ attitude(right, up, roll)
+            center = CENTERS[side] + self.shifts.get((epoch, side), np.zeros(3))
+            parts.append(photo(there, center, columns, FOCAL[side]))
+        return np.hstack(parts)
+
+    def measure(self, seed: int, sigma: float = SIGMA) -> Series:
+        """Measure all epochs with errors of their own and, for pseudo-parallaxes, errors of the first photos."""
+        n = len(self.points)
+        noise = Draws(seed, Purpose.IMAGE).normal(self.epochs + 1, n, 4)
+        shared = self.shared * noise[0]
+        exact = np.array([self.exact(epoch) for epoch in range(self.epochs)])
+        own = np.full((self.epochs, n, 4), sigma**2)
+        errors = sigma * noise[1:]
+        if self.shared:
+            own[0], errors[0] = 0.0, 0.0
+        coordinates = exact + errors + shared
+        if not self.right_z:
+            coordinates[:, :, 3] = np.nan
+        stable = np.arange(n) < self.stable
+        epochs = tuple(f"epoch {number}" for number in range(self.epochs))
+        names = tuple(f"P{number}" for number in range(n))
+        variance = np.full((n, 4), self.shared**2)
+        return Series(names, epochs, coordinates, own, variance, stable, np.arange(float(self.epochs)))
+
+
+def world(number: int = 30, moving: int = 15, stable: int = 6, seed: int = 1, size: float = 0.02) -> World:
+    """Give a rock face 90 to 150 m away; the last points move."""
+    draws = Draws(seed, Purpose.POINTS)
+    spread = draws.uniform(number, 3)
+    points = CENTERS[0] + np.array([-5.0, 90.0, -15.0]) + spread * [50.0, 60.0, 40.0]
+    velocity = size * draws.normal(number, 3)
+    velocity[: number - moving] = 0.0
+    return World(points, velocity, stable)
+
+
+@dataclass
+class Count:
+    """What many simulated surveys say of the last displacements of the points that are not stable."""
+
+    runs: int = 0
+    errors: list[Floats] = field(default_factory=list)  # in standard deviations
+    plan: list[Floats] = field(default_factory=list)  # squared, weighted by the inverse covariance
+    space: list[Floats] = field(default_factory=list)
+    false: list[Flags] = field(default_factory=list)  # points that stand still and are called moved
+    stable_false: list[Flags] = field(default_factory=list)
+    cameras: list[bool] = field(default_factory=list)  # whether the first turned camera was called turned
+    sigma: list[Floats] = field(default_factory=list)
+
+    def add(self, truth: World, result: Monitoring) -> None:
+        step = result.since_first[-1]
+        ordinary = ~result.series.stable
+        error = step.values - truth.velocity * (truth.epochs - 1)
+        self.errors.append((error / step.sigma)[ordinary])
+        self.plan.append(weighted(error[:, :2], step.covariance[:, :2, :2])[ordinary])
+        self.space.append(weighted(error, step.covariance)[ordinary])
+        still = ordinary & ~truth.velocity.any(axis=1)
+        moved = result.significant(step)
+        self.false.append(moved[still])
+        self.stable_false.append(moved[result.series.stable & ~truth.velocity.any(axis=1)])
+        self.cameras.append(result.cameras[-2].moved)
+        self.sigma.append(step.sigma[ordinary])
+        self.runs += 1
+
+
+def weighted(error: Floats, covariance: Floats) -> Floats:
+    """Squared length of errors in the metric of their covariance, by the inverse itself."""
+    return np.asarray(np.einsum("ni,nij,nj->n", error, np.linalg.inv(covariance), error), float)
+
+
+def repeated(truth: World, runs: int, settings: Settings | None = None, first: int = 1) -> Count:
+    """Measure and compute a survey many times."""
+    count = Count()
+    for seed in range(first, first + runs):
+        count.add(truth, monitor(truth.measure(seed), truth.pair, settings or Settings()))
+    return count
+
+
+def turned(truth: World, *arcseconds: float) -> World:
+    """Turn the left camera in the last epoch."""
+    right, up, roll = arcseconds
+    return replace(truth, turns={(truth.epochs - 1, 0): (right, up, roll)})

@@ -1,0 +1,150 @@
+"""Turned cameras: what a turn does to a photo, its fit, its precision, and points that moved themselves."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from photostrip.simulate.draws import Draws, Purpose
+from photostrip.terrestrial.camera_motion import ImagePair, find_motion, fit, turn_gradient, turned
+from tests.terrestrial.simulated import ARCSECOND, attitude
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+F, SIGMA = 100.0, 0.005
+PLACES = np.array([(-70, 45), (65, 50), (-60, -50), (72, -44), (5, 0), (-20, 30), (30, -25)], float)
+
+
+def pair(turn: tuple[float, float, float], seed: int | None = None, places: Floats = PLACES) -> ImagePair:
+    """Photograph points before and after a turn, by a rotation written apart from the program."""
+    columns = attitude(*turn)
+    ray = np.column_stack([places[:, 0], np.full(len(places), F), places[:, 1]]) @ columns
+    after = F * ray[:, [0, 2]] / ray[:, 1:2]
+    noise = np.zeros((2, *places.shape)) if seed is None else Draws(seed, Purpose.IMAGE).normal(2, *places.shape)
+    variances = np.full(places.shape, 2 * SIGMA**2)
+    return ImagePair(places + SIGMA * noise[0], after + SIGMA * noise[1], variances, F)
+
+
+def without(given_: ImagePair, column: int) -> ImagePair:
+    after = given_.after.copy()
+    after[:, column] = np.nan
+    return ImagePair(given_.before, after, given_.variances, F)
+
+
+ALL = np.ones(len(PLACES), bool)
+angle = st.floats(-0.05, 0.05)
+
+
+@given(angle, angle, angle)
+def test_points_go_where_a_turned_camera_sees_them(right: float, up: float, roll: float) -> None:
+    given_ = pair((right, up, roll))
+    np.testing.assert_allclose(turned(given_.before, F, np.array([right, up, roll])), given_.after, atol=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("turn", "change"), [((1e-4, 0, 0), (-0.01, 0)), ((0, 1e-4, 0), (0, -0.01)), ((0, 0, 1e-4), (0, 0))]
+)
+def test_what_turns_right_sees_the_object_go_left(
+    turn: tuple[float, float, float], change: tuple[float, float]
+) -> None:
+    np.testing.assert_allclose(turned(np.zeros((1, 2)), F, np.array(turn))[0], change, atol=1e-9)
+
+
+def test_the_gradient_is_that_of_differences() -> None:
+    gradient = turn_gradient(PLACES, F)
+    for column in range(3):
+        step = 1e-6 * np.eye(3)[column]
+        change = (turned(PLACES, F, step) - turned(PLACES, F, -step)) / 2e-6
+        np.testing.assert_allclose(change, gradient[:, :, column], atol=1e-6)
+
+
+@given(angle, angle, angle, st.sampled_from([None, 0, 1]))
+def test_a_turn_comes_back(right: float, up: float, roll: float, missing: int | None) -> None:
+    given_ = pair((right, up, roll))
+    found = fit(given_ if missing is None else without(given_, missing), ALL)
+    assert found is not None
+    np.testing.assert_allclose(found.values, [right, up, roll], atol=1e-12)
+    assert found.dof == (14 if missing is None else 7) - 3
+
+
+@pytest.mark.parametrize(
+    ("points", "column", "determined"), [(2, None, True), (1, None, False), (3, 1, True), (2, 1, False)]
+)
+def test_how_many_points_a_turn_needs(points: int, column: int | None, determined: bool) -> None:
+    given_ = pair((1e-3, 1e-3, 1e-3), places=PLACES[:points])
+    found = fit(given_ if column is None else without(given_, column), np.ones(points, bool))
+    assert (found is not None) == determined
+
+
+def test_two_points_in_one_place_do_not_determine_a_turn() -> None:
+    assert fit(pair((0, 0, 0), places=PLACES[[0, 0]]), np.ones(2, bool)) is None
+
+
+def test_precision_and_test_value_are_those_of_repeated_measurements() -> None:
+    turn, runs = (40 * ARCSECOND, -25 * ARCSECOND, 60 * ARCSECOND), 600
+    found = [fit(pair(turn, seed), ALL) for seed in range(runs)]
+    errors = np.array([(each.values - turn) / each.sigma for each in found if each is not None])
+    assert len(errors) == runs
+    assert np.abs(errors.mean(axis=0)).max() < 4 / np.sqrt(runs)
+    np.testing.assert_allclose(errors.std(axis=0), 1.0, atol=0.1)
+    still = [fit(pair((0, 0, 0), seed), ALL) for seed in range(runs)]
+    assert np.mean([each.statistic for each in still if each is not None]) == pytest.approx(3.0, abs=0.4)
+    assert np.mean([each.weighted_sum for each in still if each is not None]) == pytest.approx(11.0, abs=0.6)
+
+
+@pytest.mark.parametrize("point", range(len(PLACES)))
+def test_the_fit_without_a_point_is_the_fit_to_the_others(point: int) -> None:
+    given_ = pair((40 * ARCSECOND, 0, 0), 3)
+    whole, others = fit(given_, ALL), fit(given_, np.arange(len(PLACES)) != point)
+    assert whole is not None
+    assert others is not None
+    predicted = whole.predict(point)
+    assert predicted is not None
+    np.testing.assert_allclose(predicted[0], others.values, atol=1e-3 * others.sigma.min())
+    np.testing.assert_allclose(predicted[1], others.normal, rtol=1e-3)
+
+
+def test_a_point_that_the_turn_rests_on_has_no_prediction() -> None:
+    given_ = pair((0, 0, 0), 3, PLACES[:2])
+    found = fit(given_, np.ones(2, bool))
+    assert found is not None
+    assert found.predict(0) is None
+
+
+# ------------------------------------------------------------------------------------------------- moved points
+
+
+def moved(given_: ImagePair, point: int, change: tuple[float, float]) -> ImagePair:
+    after = given_.after.copy()
+    after[point] += change
+    return ImagePair(given_.before, after, given_.variances, F)
+
+
+@pytest.mark.parametrize("point", range(len(PLACES)))
+@pytest.mark.parametrize("turn", [(0.0, 0.0, 0.0), (100 * ARCSECOND, -80 * ARCSECOND, 200 * ARCSECOND)])
+def test_a_stable_point_that_moved_is_found(point: int, turn: tuple[float, float, float]) -> None:
+    left, right = moved(pair(turn, 1), point, (0.05, -0.02)), moved(pair((0, 0, 0), 2), point, (0.04, -0.02))
+    motion = find_motion(left, right)
+    assert [each[0] for each in motion.rejected] == [point]
+    assert not motion.used[point]
+    assert motion.turns[0] is not None
+    assert np.abs((motion.turns[0].values - turn) / motion.turns[0].sigma).max() < 4
+
+
+def test_clean_stable_points_are_kept() -> None:
+    lost = [bool(find_motion(pair((0, 0, 0), seed), pair((0, 0, 0), 1000 + seed)).rejected) for seed in range(300)]
+    assert 0 < sum(lost) < 10  # 1 % of 300 is 3
+
+
+def test_one_camera_may_have_no_turn() -> None:
+    other = ImagePair(PLACES, np.full_like(PLACES, np.nan), np.ones_like(PLACES), F)
+    motion = find_motion(pair((1e-3, 0, 0), 1), other)
+    assert motion.turns[0] is not None
+    assert motion.turns[1] is None

@@ -1,0 +1,558 @@
+"""``photostrip terrestrial`` as a user calls it: answers in every form, files, pictures, and what is refused."""
+
+# ruff: noqa: E501 (a message stands on one line, as the user reads it)
+from __future__ import annotations
+
+import csv
+import gzip
+import io
+import json
+import os
+import re
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from photostrip.cli.main import main
+from photostrip.terrestrial.epochs import monitor
+from tests.source_tree import ROOT
+from tests.terrestrial.files import TRUTH, coordinates, project, pseudo_parallaxes, write
+from tests.terrestrial.test_orientation import CENTRE, PLACES, directions
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+PHOTHEO = ("--camera", "Photheo 19/1318")
+UMK = ("--camera", "UMK 10/1318")
+
+
+def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
+    code = main(["terrestrial", *(str(argument) for argument in arguments)])
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+def answer(capsys: pytest.CaptureFixture[str], *arguments: object) -> Any:  # noqa: ANN401 (JSON)
+    """Give the JSON answer of a command that must succeed."""
+    code, out, err = call(capsys, *arguments, "--format", "json")
+    assert (code, err) == (0, "")
+    return json.loads(out)
+
+
+def rows(text: str) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def words(text: str) -> str:
+    """Give a text on one line, without the breaks of the page."""
+    return " ".join(text.split())
+
+
+# ------------------------------------------------------------------------------------------------------ directions
+
+
+def test_from_photo_and_to_photo_are_inverse(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table = tmp_path / "points.csv"
+    table.write_text("point,x,z\nA,80,60\nB,-70.5,12.25\nC,0,0\n", encoding="utf-8")
+    held = ("--alpha", 350, "--omega", 12, "--kappa", -3, "--principal-point", "0.1,-0.2", "--angles", "gon")
+    code, out, err = call(capsys, "directions", "from-photo", table, *PHOTHEO, *held, "--format", "csv")
+    assert (code, err) == (0, "")
+    there = tmp_path / "directions.csv"
+    there.write_text(out, encoding="utf-8")
+    assert all(0 <= float(row["lambda"]) < 400 for row in rows(out))
+    code, out, err = call(capsys, "directions", "to-photo", there, *PHOTHEO, *held, "--format", "csv", "--quiet")
+    assert (code, err) == (0, "")
+    assert [row["point"] for row in rows(out)] == ["A", "B", "C"]
+    back = [[float(row["x"]), float(row["z"])] for row in rows(out)]
+    np.testing.assert_allclose(back, [[80, 60], [-70.5, 12.25], [0, 0]], atol=1e-5)
+
+
+def test_from_photo_gives_the_numbers_of_the_source(capsys: pytest.CaptureFixture[str]) -> None:
+    found = answer(capsys, "directions", "from-photo", *PHOTHEO, "--at", "80,60", "--sigma-um", 5)
+    (point,) = found["points"]
+    assert point["lambda"] == pytest.approx(22.83365417791754, abs=1e-8)
+    assert point["beta"] == pytest.approx(16.227254023233513, abs=1e-8)
+    assert point["sigma_lambda_arcsec"] == pytest.approx(5.002661 * 206264.806 / 206265, abs=1e-5)
+    assert point["sigma_beta_arcsec"] == pytest.approx(4.803359 * 206264.806 / 206265, abs=1e-5)
+    assert found["orientation"] == {"unit": "deg", "alpha": 0.0, "omega": 0.0, "kappa": 0.0}
+    micrometres = answer(
+        capsys, "directions", "from-photo", *PHOTHEO, "--at", "80000,60000", "--unit", "um", "--sigma-um", 5
+    )
+    assert micrometres == found
+
+
+def test_azimuths_are_never_negative_nor_a_full_circle(capsys: pytest.CaptureFixture[str]) -> None:
+    found = answer(capsys, "directions", "from-photo", *PHOTHEO, "--at", "-80,0", "--at", "0,0", "--alpha", "360")
+    assert [point["lambda"] for point in found["points"]] == [pytest.approx(360 - 22.83365417791754), 0.0]
+
+
+def test_accuracy_over_the_photo_in_every_form(capsys: pytest.CaptureFixture[str]) -> None:
+    command = ("directions", "accuracy", *UMK, "--step", "40")
+    found = answer(capsys, *command)
+    assert [(row["x"], row["z"]) for row in found["points"]] == [(x, z) for z in (0, 40, 60) for x in (0, 40, 80)]
+    corner = found["points"][-1]
+    assert corner["horizontal_arcsec"] == pytest.approx(5.6945, abs=1e-4)
+    assert corner["vertical_arcsec"] == pytest.approx(7.2926, abs=1e-4)
+    code, out, _ = call(capsys, *command, "--format", "csv")
+    assert code == 0
+    assert {key: float(value) for key, value in rows(out)[-1].items()} == corner
+    code, text, _ = call(capsys, *command)
+    assert code == 0
+    assert "needed everywhere  horizontal 5.69″, vertical 7.29″" in text
+    assert re.search(r"^ +60 +8\.84 +8\.37 +7\.29$", text, re.MULTILINE)
+    code, page, _ = call(capsys, *command, "--format", "md")
+    assert code == 0
+    assert "| 60 | 8.84 | 8.37 | 7.29 |" in page
+
+
+def test_accuracy_as_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    found = answer(capsys, "directions", "accuracy", *UMK, "--step", "40", "--as-printed")
+    corner = found["points"][-1]
+    assert found["formulas"] == "as printed"
+    assert corner["vertical_arcsec"] == pytest.approx(8.1779, abs=1e-4)
+    assert corner["vertical_eq5_arcsec"] == pytest.approx(9.6846, abs=1e-4)
+    assert corner["vertical_exact_arcsec"] == pytest.approx(7.2926, abs=1e-4)
+    code, text, _ = call(capsys, "directions", "accuracy", *UMK, "--as-printed")
+    assert code == 0
+    assert "inherit sec(lambda') from eq. 3, where cos(lambda') is right" in words(text)
+
+
+def test_a_tilted_camera_has_a_table_of_the_whole_photo(capsys: pytest.CaptureFixture[str]) -> None:
+    found = answer(capsys, "directions", "accuracy", *UMK, "--step", "60", "--omega", "15")
+    assert sorted({row["x"] for row in found["points"]}) == [-80, -60, 0, 60, 80]
+    value = {(row["x"], row["z"]): row for row in found["points"]}
+    assert value[0, 60]["horizontal_arcsec"] > value[0, -60]["horizontal_arcsec"]
+    assert value[0, 60]["vertical_arcsec"] == value[0, -60]["vertical_arcsec"]
+
+
+def test_theodolite_of_two_seconds_in_four_rounds(capsys: pytest.CaptureFixture[str]) -> None:
+    command = ("directions", "theodolite", *UMK, "--sigma-arcsec", 2, "--rounds", 4)
+    found = answer(capsys, *command, "--sigma-um", 0.5)
+    assert found["theodolite"]["mean_horizontal_arcsec"] == 1.0
+    assert found["supported_um"]["by_horizontal"] == pytest.approx(0.878, abs=1e-3)
+    assert found["supported_um"]["by_vertical"] == pytest.approx(0.6856, abs=1e-3)
+    assert found["wanted"]["rounds_horizontal"] == 13  # (2 / 0.569)^2 = 12.3
+    assert found["wanted"]["rounds_vertical"] == 8  # (2 / 0.729)^2 = 7.5
+    code, text, _ = call(capsys, *command, "--vertical-arcsec", 6)
+    assert code == 0
+    assert "supports in the photo  2.06 µm everywhere (horizontal 0.88, vertical 2.06)" in text
+
+
+def test_the_examples_are_explained(capsys: pytest.CaptureFixture[str]) -> None:
+    first, second = answer(capsys, "directions", "examples")["examples"]
+    assert (first["horizontal_printed_arcsec"], second["horizontal_printed_arcsec"]) == (3.5, 6.0)
+    assert (first["vertical_printed_arcsec"], second["vertical_printed_arcsec"]) == (5.0, 8.5)
+    assert (round(first["vertical_exact_arcsec"], 2), round(second["vertical_exact_arcsec"], 2)) == (4.80, 7.29)
+    assert (round(first["vertical_eq6_arcsec"], 2), round(second["vertical_eq6_arcsec"], 2)) == (5.13, 8.18)
+    code, text, _ = call(capsys, "directions", "examples")
+    assert code == 0
+    for sentence in (
+        "returns z = 70.6 mm for z = 60 mm with f = 190 mm",
+        "7 % and 16 % smaller in the two examples",
+        "1.18 for f = 190 mm only. The second example uses the same 1.18, but for f = 100 mm it is 1.64.",
+        "printed as 6.0″ where its own formula gives 5.69″",
+    ):
+        assert sentence in words(text)
+    assert re.search(r"^UMK 10/1318 +100 +6\.0 +5\.69 +8\.5 +8\.64 +8\.18 +9\.68 +7\.29$", text, re.MULTILINE)
+
+
+def test_cameras_are_listed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    mine = tmp_path / "mine.yaml"
+    mine.write_text("photostrip_cameras: 1\ncameras: {P32: {principal_distance: 64.12}}\n", encoding="utf-8")
+    code, out, _ = call(capsys, "directions", "cameras", "--presets", mine)
+    assert code == 0
+    assert re.search(r"^P32 +64\.12 +0 +0 +–$", out, re.MULTILINE)
+    found = answer(capsys, "directions", "accuracy", "--camera", "P32", "--presets", mine, "--photo-format", "80,60")
+    assert found["camera"]["principal_distance_mm"] == 64.12
+
+
+# ---------------------------------------------------------------------------------------------------------- orient
+
+
+def sightings_csv(unit: float = 1.0, per_radian: float = 180 / np.pi) -> str:
+    """Points of a photo with alpha 35, omega 4, kappa -1 degrees, free of errors but for rounding."""
+    given = directions(PLACES, (np.radians(35), np.radians(4), np.radians(-1)))
+    lines = ["point,x,z,lambda,beta"]
+    lines += [
+        f"P{number},{x * unit:.6f},{z * unit:.6f},{lam * per_radian:.8f},{beta * per_radian:.8f}"
+        for number, ((x, z), (lam, beta)) in enumerate(zip(PLACES, given, strict=True))
+    ]
+    return "\n".join(lines) + "\n"
+
+
+ORIENT = ("directions", "orient")
+INTERIOR = ("--principal-distance", 100, "--free", "principal-distance,principal-point")
+
+
+@pytest.mark.parametrize("unit", ["deg", "gon"])
+def test_orient_gives_back_the_photo(unit: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table = tmp_path / "s.csv"
+    full = 180 if unit == "deg" else 200
+    table.write_text(sightings_csv(per_radian=full / np.pi), encoding="utf-8")
+    found = answer(capsys, *ORIENT, table, *INTERIOR, "--angles", unit)
+    value = {row["name"]: row["value"] for row in found["elements"]}
+    turned = [35 * full / 180, 4 * full / 180, -1 * full / 180]
+    assert [value[name] for name in ("alpha", "omega", "kappa")] == pytest.approx(turned, abs=1e-6)
+    assert [value[name] for name in ("f", "x0", "z0")] == pytest.approx([100.25, *CENTRE], abs=2e-5)
+    assert found["summary"]["redundancy"] == 2 * len(PLACES) - 6
+    assert found["rejected"] == []
+    assert np.array(found["correlations"]).shape == (6, 6)
+
+
+def test_orient_reports_a_gross_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table = tmp_path / "s.csv"
+    lines = sightings_csv(1000).splitlines()
+    fields = lines[5].split(",")
+    fields[1] = f"{float(fields[1]) + 150:.3f}"  # micrometres
+    lines[5] = ",".join(fields)
+    table.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    held = ("--principal-distance", 100.25, "--principal-point", "0.12,-0.21", "--unit", "um", "--rounds", 4)
+    for method in ("deletion", "stated"):
+        code, text, err = call(capsys, *ORIENT, table, *held, "--screening", method)
+        assert (code, err) == (0, "")
+        assert re.search(r"^P4 .* rejected$", text, re.MULTILINE)
+        assert re.search(
+            r"^- P4: lambda -?\d+\.\d″, beta -?\d+\.\d″ off the orientation without it", text, re.MULTILINE
+        )
+    code, text, _ = call(capsys, *ORIENT, table, *held, "--screening", "none")
+    assert code == 0
+    assert "The scatter of the directions does not agree with the stated standard deviations." in text
+    _, out, _ = call(capsys, *ORIENT, table, *held, "--format", "csv")
+    assert [row["point"] for row in rows(out) if row["used"] == "0"] == ["P4"]
+
+
+def test_standard_deviations_of_the_rows_count(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    plain, own = tmp_path / "plain.csv", tmp_path / "own.csv"
+    lines = sightings_csv().splitlines()
+    plain.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    own.write_text(
+        "\n".join([lines[0] + ",sx,sz,s_lambda,s_beta", *(line + ",0.01,0.01,4,4" for line in lines[1:])]) + "\n",
+        encoding="utf-8",
+    )
+    first = answer(capsys, *ORIENT, plain, *INTERIOR)
+    second = answer(capsys, *ORIENT, own, *INTERIOR)
+    for one, two in zip(first["elements"], second["elements"], strict=True):
+        assert two["sigma"] == pytest.approx(2 * one["sigma"], rel=1e-3)
+
+
+# ---------------------------------------------------------------------------------------------------- displacement
+
+
+def test_displacement_in_every_form(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    survey = write(tmp_path)
+    document = answer(capsys, "displacement", survey)
+    result = monitor(TRUTH.measure(1), TRUTH.pair)
+    assert document["frame"] == {"axes": ["east", "north", "up"]}
+    for row, point in enumerate(document["points"]):
+        step = point["epochs"][2]["since_first"]
+        assert point["id"] == f"P{row}"
+        found = [step[name] for name in ("dx", "dy", "dz")]
+        assert found == pytest.approx(result.since_first[1].values[row], abs=2e-3)  # coordinates have four decimals
+        assert [step[f"sigma_{axis}"] for axis in "xyz"] == pytest.approx(result.since_first[1].sigma[row], rel=1e-2)
+    turned = [(row["epoch"], row["side"]) for row in document["cameras"] if row["turned"]]
+    assert turned == [("epoch 2", "left")]
+    code, out, err = call(capsys, "displacement", survey, "--format", "csv")
+    assert code == 0
+    assert "note: epoch epoch 2: the left camera turned by" in err
+    table = rows(out)
+    assert [(row["point"], row["epoch"]) for row in table[:2]] == [("P0", "epoch 1"), ("P0", "epoch 2")]
+    assert float(table[1]["dx"]) == document["points"][0]["epochs"][2]["since_first"]["dx"]
+    code, text, err = call(capsys, "displacement", survey)
+    assert (code, err) == (0, "")
+    for title in ("Cameras", "epoch 0 to epoch 1", "epoch 1 to epoch 2", "Rates", "Notes"):
+        assert f"── {title}" in text
+    assert re.search(r"^P11 .* moved$", text, re.MULTILINE)
+    code, page, err = call(capsys, "displacement", survey, "--format", "md")
+    assert (code, err) == (0, "")
+    assert page.startswith("# Displacements: quarry\n")
+
+
+def test_results_stand_in_the_order_of_the_axes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "north").mkdir()
+    text = project().replace("[east, north, up]", "[north, east, up]")
+    text = text.replace("[1000.0, 2000.0, 150.0]", "[2000.0, 1000.0, 150.0]")
+    text = text.replace("[1040.0, 2005.0, 152.0]", "[2005.0, 1040.0, 152.0]")
+    east = answer(capsys, "displacement", write(tmp_path))
+    north = answer(capsys, "displacement", write(tmp_path / "north", text))
+    assert north["frame"]["axes"] == ["north", "east", "up"]
+    for one, two in zip(east["points"], north["points"], strict=True):
+        a, b = one["epochs"][1], two["epochs"][1]
+        assert (a["x"], a["y"], a["z"]) == (b["y"], b["x"], b["z"])
+        c, d = a["since_first"], b["since_first"]
+        assert (c["dx"], c["sigma_y"], c["statistic"], c["ellipse"]) == (
+            d["dy"],
+            d["sigma_x"],
+            d["statistic"],
+            d["ellipse"],
+        )
+        xx, xy, xz, yy, yz, zz = c["covariance"]
+        assert d["covariance"] == [yy, xy, yz, xx, xz, zz]
+
+
+def test_files_are_written_and_the_same_every_time(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    survey = write(tmp_path)
+    seen = []
+    for name in ("one", "two"):
+        out = tmp_path / name
+        options = ("-o", out, "--plot", out / "plot.svg", "--depfile", tmp_path / "deps")
+        code, text, err = call(capsys, "displacement", survey, *options)
+        assert (code, err) == (0, "")
+        seen.append((text, {path.name: path.read_bytes() for path in sorted(out.iterdir())}))
+        assert (tmp_path / "deps").read_text().startswith(f"{out}/displacements.json: {survey} ")
+    assert seen[0] == seen[1]
+    files = seen[0][1]
+    assert list(files) == ["cameras.csv", "displacements.csv", "displacements.json", "plot.svg"]
+    assert not [name for name, content in files.items() if str(tmp_path).encode() in content]
+    assert json.loads(files["displacements.json"])["photostrip_terrestrial_result"] == 1
+    assert len(rows(files["cameras.csv"].decode())) == 4
+    assert not re.search(rb"\de[+-]?\d", files["displacements.csv"])  # no exponents
+
+
+def test_output_does_not_depend_on_the_process(tmp_path: Path) -> None:
+    survey = write(tmp_path)
+    seen = set()
+    for seed in ("0", "1"):
+        command = [sys.executable, "-m", "photostrip", "terrestrial", "displacement", str(survey), "--plot", "p.svg"]
+        environment = os.environ | {"PYTHONHASHSEED": seed, "PYTHONPATH": str(ROOT)}
+        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, check=True)
+        seen.add((done.stdout, (tmp_path / "p.svg").read_bytes()))
+    assert len(seen) == 1
+
+
+def test_a_table_alone_is_enough_for_the_normal_case(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table = tmp_path / "pseudo.csv"
+    table.write_text("point,x,z,p,dx,dz,dx_right\n1,30,-12,80,0.35,-0.2,0.1\n", encoding="utf-8")
+    options = ("--base", 50, "--principal-distance", 1000, "--sigma", 0.005)
+    document = answer(capsys, "displacement", table, *options)
+    (point,) = document["points"]
+    step = point["epochs"][1]["since_first"]
+    assert [step["dx"], step["dy"], step["dz"]] == [0.159657, -1.94704, -0.101246]
+    assert [step["sigma_x"], step["sigma_y"], step["sigma_z"]] == pytest.approx(
+        [0.002267, 0.054899, 0.003186], rel=2e-3
+    )
+    assert document["frame"]["axes"] == ["right", "ahead", "up"]
+    packed = tmp_path / "pseudo.csv.gz"
+    packed.write_bytes(gzip.compress(table.read_bytes()))
+    assert answer(capsys, "displacement", packed, *options) == document
+
+
+def test_a_table_of_coordinates_and_stable_points(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table = tmp_path / "c.csv"
+    lines = ["epoch,photo,point,x,z"]
+    for number, (x, z) in enumerate([(-60, 30), (50, 40), (-40, -50), (60, -30), (0, 0)]):
+        for epoch in ("a", "b"):
+            moved = 0.4 if (epoch, number) == ("b", 4) else 0.0
+            lines += [f"{epoch},left,{number},{x + moved},{z}", f"{epoch},right,{number},{x - 40 + moved},{z}"]
+    table.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    options = ("--kind", "coordinates", "--stable", "0,1,2,3", "--base", 20, *UMK, "--sigma", 0.005)
+    document = answer(capsys, "displacement", table, *options)
+    assert document["summary"]["significant"] == 1
+    (moved,) = [point for point in document["points"] if point["id"] == "4"]
+    assert moved["epochs"][1]["since_first"]["dx"] == pytest.approx(20 * 0.4 / 40, abs=1e-6)
+
+
+def test_pseudo_parallaxes_of_a_project(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = project().replace("coordinates: coordinates.csv", "pseudo_parallaxes: pseudo.csv")
+    survey = write(tmp_path, text, pseudo_parallaxes(), "pseudo.csv")
+    document = answer(capsys, "displacement", survey, "--set", "measurements.sigma_d=0.00707")
+    assert document["summary"]["turned_cameras"] == 1
+
+
+def test_a_point_without_a_displacement_has_a_reason_in_every_form(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table = "\n".join(line for line in coordinates().splitlines() if not line.startswith("epoch 1,left,P7,")) + "\n"
+    survey = write(tmp_path, table=table)
+    document = answer(capsys, "displacement", survey)
+    (point,) = [each for each in document["points"] if each["id"] == "P7"]
+    assert point["epochs"][1] == {"epoch": "epoch 1", "reason": "not measured"}
+    assert "rate" in point
+    _, out, _ = call(capsys, "displacement", survey, "--format", "csv", "-q")
+    (row,) = [each for each in rows(out) if (each["point"], each["epoch"]) == ("P7", "epoch 1")]
+    assert (row["dx"], row["reason"]) == ("", "not measured")
+    _, text, _ = call(capsys, "displacement", survey)
+    assert re.search(r"^P7 +– .* not measured$", text, re.MULTILINE)
+
+
+# --------------------------------------------------------------------------------------------------------- pictures
+
+
+def texts(svg: bytes) -> str:
+    root = ET.fromstring(svg)  # noqa: S314 (our own file)
+    return " ".join(" ".join(each.itertext()) for each in root.iter("{http://www.w3.org/2000/svg}text"))
+
+
+def test_pictures_are_svg_with_the_numbers_of_the_document(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    plot = tmp_path / "p.svg"
+    assert call(capsys, "directions", "accuracy", *UMK, "--plot", plot)[0] == 0
+    shown = texts(plot.read_bytes())
+    assert "UMK 10/1318, f = 100 mm: accuracy of directions for 5 µm in the photo (exact)" in shown
+    for part in ("m_lambda, seconds of arc", "m_beta, seconds of arc", "x, mm", "9.6"):
+        assert part in shown
+    assert call(capsys, "directions", "theodolite", *UMK, "--sigma-arcsec", 2, "--plot", plot)[0] == 0
+    assert "supported image accuracy, µm" in texts(plot.read_bytes())
+    assert call(capsys, "displacement", write(tmp_path), "--plot", plot)[0] == 0
+    shown = texts(plot.read_bytes())
+    assert "quarry: displacements from epoch 0 to epoch 2" in shown
+    assert all(f"P{number}" in shown for number in range(12))
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("directions", "accuracy", *UMK),
+        ("directions", "theodolite", *UMK, "--sigma-arcsec", 2),
+        ("displacement", "x.yaml"),
+    ],
+)
+def test_without_matplotlib_the_extra_is_named(
+    command: tuple[object, ...], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    code, out, err = call(capsys, *command, "--plot", "p.svg")
+    assert (code, out) == (2, "")
+    assert err == ("error: --plot: pictures need matplotlib, which is not installed; pip install photostrip[report]\n")
+
+
+def test_nothing_but_a_picture_loads_matplotlib(tmp_path: Path) -> None:
+    code = (
+        "import sys\nfrom photostrip.cli.main import main\n"
+        f"assert main(['terrestrial', 'displacement', {str(write(tmp_path))!r}]) == 0\n"
+        "assert 'matplotlib' not in sys.modules"
+    )
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, check=True)
+
+
+# --------------------------------------------------------------------------------------------------------- refusals
+
+
+@pytest.mark.parametrize(
+    ("command", "expected"),
+    [
+        ("directions from-photo --at 1,2", "--camera: nothing says which camera it is; expected one of Photheo 19/1318, UMK 10/1318, or --principal-distance"),
+        ("directions from-photo --camera UMK --at 1,2", "--camera: there is no camera `UMK`; expected one of Photheo 19/1318, UMK 10/1318; give --principal-distance"),
+        ("directions from-photo --camera Phoheo_19/1318 --at 1,2", "--camera: there is no camera `Phoheo 19/1318`; expected one of Photheo 19/1318, UMK 10/1318; did you mean `Photheo 19/1318`?"),
+        ("directions from-photo --principal-distance 100", "TABLE: no points are given; expected a table or --at x,z"),
+        ("directions from-photo points.csv --at 1,2 --principal-distance 100", "TABLE: points are given twice"),
+        ("directions from-photo --principal-distance -5 --at 1,2", "--principal-distance: -5 is out of range; expected a number larger than 0 (mm)"),
+        ("directions from-photo --principal-distance nan --at 1,2", "--principal-distance: nan is out of range"),
+        ("directions from-photo --principal-distance 100 --at 1", "--at: `1` is not a pair; expected two numbers A,B"),
+        ("directions from-photo --principal-distance 100 --at 1,x", "--at: `x` is not a number; expected two numbers A,B"),
+        ("directions from-photo --principal-distance 100 --at 1,2 --alpha inf", "--alpha: inf is no angle; expected a number (deg)"),
+        ("directions from-photo --principal-distance 100 --at 1,2 --omega 90", "--omega: with 90 deg the camera looks straight up or down"),
+        ("directions from-photo --principal-distance 100 --at 1,2 --principal-point 1", "--principal-point: `1` is not a pair"),
+        ("directions from-photo --principal-distance 100 missing.csv", "missing.csv: does not exist"),
+        ("directions from-photo --principal-distance 100 wrong.csv", "wrong.csv:2:3: x: `a` is not a number; expected a number"),
+        ("directions from-photo --principal-distance 100 twice.csv", "twice.csv:3:1: point: point A stands in line 2 already; keep one of the two"),
+        ("directions to-photo --principal-distance 100 --at 100,2", "--at: the direction to point 1 is 90 degrees or more from the optical axis; expected a direction into the photo"),
+        ("directions to-photo --principal-distance 100 behind.csv", "behind.csv:3:3: lambda: the direction to point B is 90 degrees or more from the optical axis"),
+        ("directions to-photo --principal-distance 100 behind.csv", "behind.csv:4:5: beta: the direction to point C is not below the zenith; expected an elevation between -90 and 90 degrees"),
+        ("directions accuracy --principal-distance 100", "--photo-format: the camera camera has no format; expected WIDTH,HEIGHT in mm"),
+        ("directions accuracy --principal-distance 100 --photo-format 0,3", "--photo-format: 0 is out of range"),
+        ("directions accuracy --principal-distance 100 --photo-format 100,80 --step 0", "--step: 0 is out of range"),
+        ("directions accuracy --principal-distance 100 --photo-format 100,80 --step 0.1", "--step: a step of 0.1 mm gives more than 20000 points; expected a larger step"),
+        ("directions accuracy --principal-distance 100 --photo-format 100,80 --sigma-um 0", "--sigma-um: 0 is out of range; expected a number larger than 0 (µm)"),
+        ("directions accuracy --principal-distance 100 --photo-format 100,80 --as-printed --omega 3", "--as-printed: the printed formulas hold for a level camera; leave out --omega and --kappa"),
+        ("directions accuracy --principal-distance 100 --photo-format 100,80 --plot p.png", "p.png: --plot: pictures are written as SVG; expected a name that ends in .svg"),
+        ("directions theodolite --sigma-arcsec -1 --principal-distance 100", "--sigma-arcsec: -1 is out of range"),
+        ("directions orient sights.csv --principal-distance 100 --free f", "--free: `f` cannot be determined; expected principal-distance, principal-point, or both with a comma between"),
+        ("directions orient sights.csv --principal-distance 100 --significance 1", "--significance: 1 is out of range; expected a number between 0 and 1"),
+        ("directions orient sights.csv --principal-distance 100", "sights.csv:3:7: lambda: neither direction to point B is given; expected lambda, beta or both"),
+        ("directions orient zenith.csv --principal-distance 100", "zenith.csv:2:8: beta: 95 deg is not below the zenith; expected an elevation between -90 and 90 degrees, not a zenith distance"),
+        ("displacement pseudo.csv --principal-distance 100", "--base: a table of the normal case needs its base; expected metres; or name a project file"),
+        ("displacement pseudo.csv --base 50", "--camera: nothing says which camera it is"),
+        ("displacement pseudo.csv --base 0 --principal-distance 100", "--base: 0 is out of range; expected a number larger than 0 (m)"),
+        ("displacement pseudo.csv --base 50 --principal-distance 100", "pseudo.csv:2: sigma: 1 row has no standard deviation (sigma), and none is given for all"),
+        ("displacement pseudo.csv --base 50 --principal-distance 100 --sigma 0", "--sigma: 0 is out of range; expected a number larger than 0 (mm)"),
+        ("displacement pseudo.csv --base 50 --principal-distance 100 --sigma 1 --stable Z", "stable[0]: pseudo.csv has no point Z"),
+        ("displacement pseudo.csv --base 50 --principal-distance 100 --set a=1", "--set: a table has no keys that could be set; use the options"),
+        ("displacement survey.yaml --base 50", "--base: --base describes a table (.csv), and survey.yaml is a project; write it into the project, or override a key with --set"),
+        ("displacement survey.yaml --set processing.signif=1", "--set: processing.signif: the key `signif` is not known; did you mean `significance`?"),
+        ("displacement nothing.yaml", "nothing.yaml: does not exist"),
+    ],
+)  # fmt: skip
+def test_wrong_usage_and_data_are_told_with_exit_2(
+    command: str, expected: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path)
+    for name, text in {
+        "wrong.csv": "point,x,z\nA,a,2\n",
+        "twice.csv": "point,x,z\nA,1,2\nA,3,2\n",
+        "behind.csv": "point,lambda,beta\nA,10,2\nB,100,2\nC,0,90\n",
+        "sights.csv": "point,x,z,lambda,beta\nA,1,2,3,4\nB,1,3,,\n",
+        "zenith.csv": "point,x,z,lambda,beta\nA,1,2,,95\n",
+        "pseudo.csv": "point,x,z,p,dx,dz,dx_right\n1,30,-12,80,0.35,-0.2,0.1\n",
+    }.items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    code, out, err = call(capsys, *(part.replace("_", " ") for part in command.split()))
+    assert (code, out) == (2, "")
+    lines = err.splitlines()
+    assert all(line.startswith("error: ") for line in lines)
+    assert any(line.removeprefix("error: ").startswith(expected) for line in lines), err
+
+
+def test_wrong_options_are_wrong_usage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for command, word in [
+        (("directions", "accuracy", "--angles", "grad"), "grad"),
+        (("directions", "theodolite"), "--sigma-arcsec"),
+        (("directions", "theodolite", "--sigma-arcsec", 2, "--rounds", 0), "rounds"),
+        (("directions", "nothing"), "nothing"),
+        (("displacement",), "PROJECT"),
+        (("displacement", write(tmp_path), "--depfile", "d"), "--output"),
+        (("displacement", write(tmp_path), "--format", "xml"), "xml"),
+    ]:
+        code, out, err = call(capsys, *command)
+        assert (code, out) == (2, "")
+        assert word in err
+        assert err.count("\n") == 1
+
+
+def test_weak_geometry_has_exit_3(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = project().replace("[1040.0, 2005.0, 152.0]", "[1000.0, 2000.0, 150.0]")
+    code, out, err = call(capsys, "displacement", write(tmp_path, text))
+    assert (code, out) == (3, "")
+    assert err == "error: the left and the right station are at the same place: there is no base\n"
+    table = tmp_path / "s.csv"
+    table.write_text("point,x,z,lambda,beta\nA,1,2,3,4\n", encoding="utf-8")
+    code, _, err = call(capsys, "directions", "orient", table, *UMK)
+    assert code == 3
+    assert "1 points with 2 directions do not determine alpha, omega, kappa" in err
+
+
+def test_failures_are_json_where_json_was_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = call(capsys, "displacement", tmp_path / "x.yaml", "--format", "json")
+    assert (code, err) == (2, "")
+    assert "does not exist" in out
+    json.loads(out)
+
+
+def test_nothing_is_written_when_something_is_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    survey = write(tmp_path, table="epoch,photo,point,x,z\n")
+    before = sorted(path.name for path in tmp_path.iterdir())
+    assert call(capsys, "displacement", survey, "-o", tmp_path / "out", "--plot", tmp_path / "p.svg")[0] == 2
+    assert sorted(path.name for path in tmp_path.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("displacement",),
+        ("directions",),
+        *(
+            ("directions", name)
+            for name in ("from-photo", "to-photo", "accuracy", "theodolite", "orient", "examples", "cameras")
+        ),
+    ],
+)
+def test_every_command_has_help_with_an_example(command: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, err = call(capsys, *command, "-h")
+    assert (code, err) == (0, "")
+    assert f"Usage: photostrip terrestrial {' '.join(command)}" in out
+    if command != ("directions",):
+        assert f"photostrip terrestrial {' '.join(command)}" in out.partition("Example")[2]

@@ -1,0 +1,236 @@
+"""A photo oriented by directions: exact recovery, an independent optimiser, simulated and gross errors, refusals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from photostrip.errors import GeometryError
+from photostrip.simulate.draws import Draws, Purpose
+from photostrip.terrestrial.frame import ground_from_photo
+from photostrip.terrestrial.orientation import Settings, Sightings, orient
+from tests.terrestrial.simulated import ARCSECOND, attitude
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+F, CENTRE = 100.25, (0.12, -0.21)
+SIGMA_XZ, SIGMA_DIRECTION = 0.005, 2 * ARCSECOND
+EVERYTHING = ("principal-distance", "principal-point")
+PLACES = np.array(
+    [(-75, 50), (0, 55), (72, 48), (-70, -5), (5, 2), (74, 3), (-72, -52), (3, -55), (70, -50), (-35, 25), (38, -24)],
+    float,
+)
+
+
+def directions(xz: Floats, angles: tuple[float, float, float], f: float = F) -> Floats:
+    """Directions of image points, written apart from the program."""
+    ray = np.column_stack([xz[:, 0] - CENTRE[0], np.full(len(xz), f), xz[:, 1] - CENTRE[1]]) @ attitude(*angles).T
+    return np.column_stack([np.arctan2(ray[:, 0], ray[:, 1]), np.arctan2(ray[:, 2], np.hypot(ray[:, 0], ray[:, 1]))])
+
+
+def sightings(angles: tuple[float, float, float], seed: int | None = None, places: Floats = PLACES) -> Sightings:
+    """Measure the points, without errors when there is no seed."""
+    exact = directions(places, angles)
+    noise = np.zeros((2, *places.shape)) if seed is None else Draws(seed, Purpose.IMAGE).normal(2, *places.shape)
+    return Sightings(
+        tuple(f"P{number}" for number in range(len(places))),
+        places + SIGMA_XZ * noise[0],
+        exact + SIGMA_DIRECTION * noise[1],
+        np.full(places.shape, SIGMA_XZ),
+        np.full(places.shape, SIGMA_DIRECTION),
+    )
+
+
+def spoiled(given_: Sightings, point: int, image: tuple[float, float]) -> Sightings:
+    xz = given_.xz.copy()
+    xz[point] += image
+    return replace(given_, xz=xz)
+
+
+def without(given_: Sightings, *cells: tuple[int, int]) -> Sightings:
+    measured = given_.directions.copy()
+    for cell in cells:
+        measured[cell] = np.nan
+    return replace(given_, directions=measured)
+
+
+# ------------------------------------------------------------------------------------------------------ recovery
+
+
+@given(st.floats(-np.pi, np.pi), st.floats(-1.2, 1.2), st.floats(-np.pi, np.pi))
+def test_any_orientation_comes_back_from_points_without_errors(alpha: float, omega: float, kappa: float) -> None:
+    found = orient(sightings((alpha, omega, kappa)), 100.0, settings=Settings(EVERYTHING))
+    np.testing.assert_allclose(found.rotation, ground_from_photo(alpha, omega, kappa), atol=1e-11)
+    np.testing.assert_allclose(found.values[3:], [F, *CENTRE], atol=1e-8)
+    assert (found.principal_distance, found.principal_point) == (found.values[3], tuple(found.values[4:]))
+    assert found.weighted_sum < 1e-10
+    assert not found.rejected
+
+
+def test_two_points_are_enough_for_the_angles() -> None:
+    angles = (0.5, 0.1, -0.05)
+    found = orient(sightings(angles, places=PLACES[[0, 8]]), F, CENTRE)
+    np.testing.assert_allclose(found.values, angles, atol=1e-11)
+    assert found.dof == 1
+    lower, upper = found.sigma0_range(0.05)
+    assert lower < 0.1
+    assert upper > 2
+
+
+def test_horizontal_directions_alone_determine_a_photo() -> None:
+    angles = (0.5, 0.1, -0.05)
+    given_ = without(sightings(angles), *((point, 1) for point in range(len(PLACES))))
+    found = orient(given_, F, CENTRE)
+    np.testing.assert_allclose(found.values, angles, atol=1e-10)
+    assert found.dof == len(PLACES) - 3
+    assert np.isnan(found.residuals[:, 1]).all()
+
+
+def test_directions_that_were_not_measured_do_not_count() -> None:
+    given_ = sightings((0.5, 0.1, -0.05), seed=3)
+    partly = without(given_, (0, 1), (4, 0))
+    found = orient(partly, F, CENTRE)
+    assert found.dof == 2 * len(PLACES) - 2 - 3
+    assert np.isnan(found.residuals[0, 1])
+    assert np.isnan(found.redundancy[4, 0])
+    assert np.nansum(found.redundancy) == pytest.approx(found.dof)
+
+
+def test_the_zero_of_the_circle_goes_into_alpha_alone() -> None:
+    given_ = sightings((0.5, 0.1, -0.05), seed=3)
+    turned = replace(given_, directions=given_.directions + np.array([2.5, 0.0]))
+    first, second = orient(given_, F, CENTRE), orient(turned, F, CENTRE)
+    np.testing.assert_allclose(second.values - first.values, [2.5, 0, 0], atol=1e-10)
+    np.testing.assert_allclose(second.residuals, first.residuals, atol=1e-12)
+
+
+# ------------------------------------------------------------------------------------- against another adjustment
+
+
+@pytest.mark.parametrize("free", [(), ("principal-distance",), EVERYTHING])
+def test_the_estimate_is_that_of_a_full_adjustment(free: tuple[str, ...]) -> None:
+    """An optimiser moves true image points as well as the unknowns: nothing of the covariance algebra is used."""
+    from scipy.optimize import least_squares
+
+    angles = (0.9, 0.2, -0.1)
+    given_ = sightings(angles, seed=11)
+    found = orient(given_, F, CENTRE, Settings(free, screening="none"))
+    count = len(found.names)
+
+    def misfit(unknown: Floats) -> Floats:
+        values = dict(zip(found.names, unknown[:count] * ([1] * 3 + [F] * (count - 3)), strict=True))
+        true = unknown[count:].reshape(-1, 2)
+        shifted = true - [values.get("x0", CENTRE[0]), values.get("z0", CENTRE[1])] + np.array(CENTRE)
+        turn = (values["alpha"], values["omega"], values["kappa"])
+        computed = directions(shifted, turn, values.get("f", F))
+        image = (given_.xz - true) / SIGMA_XZ
+        angle = np.angle(np.exp(1j * (given_.directions - computed))) / SIGMA_DIRECTION
+        return np.concatenate([image.ravel(), angle.ravel()])
+
+    start = np.concatenate([[*angles, 1.0, *(np.array(CENTRE) / F)][:count], given_.xz.ravel()])
+    solved = least_squares(misfit, start, xtol=1e-15, ftol=1e-15, gtol=1e-15, x_scale="jac")
+    scale = np.array([1] * 3 + [F] * (count - 3))
+    jac = np.asarray(solved.jac, float)
+    covariance = np.linalg.inv(jac.T @ jac)[:count, :count] * np.outer(scale, scale)
+    np.testing.assert_allclose((solved.x[:count] * scale - found.values) / found.sigma, 0.0, atol=1e-3)
+    correlation = covariance / np.outer(found.sigma, found.sigma)  # second-order terms of the noise make 1e-4
+    np.testing.assert_allclose(found.cofactors / np.outer(found.sigma, found.sigma), correlation, atol=1e-3)
+    assert 2 * solved.cost == pytest.approx(found.weighted_sum, rel=1e-3)
+
+
+def test_stated_precision_is_the_scatter_of_repeated_measurements() -> None:
+    angles, runs = (1.2, 0.25, -0.15), 300
+    truth = np.array([*angles, F, *CENTRE])
+    found = [orient(sightings(angles, seed), 100.0, settings=Settings(EVERYTHING)) for seed in range(runs)]
+    errors = np.array([(each.values - truth) / each.sigma for each in found])
+    assert np.abs(errors.mean(axis=0)).max() < 4 / np.sqrt(runs)
+    spread = errors.std(axis=0)
+    assert spread.min() > 0.88
+    assert spread.max() < 1.12
+    assert np.mean([each.weighted_sum / each.dof for each in found]) == pytest.approx(1.0, abs=0.05)
+    inside = [each.sigma0_range(0.1)[0] < each.sigma0 < each.sigma0_range(0.1)[1] for each in found]
+    assert 0.85 < np.mean(inside) < 0.95
+
+
+# ----------------------------------------------------------------------------------------------------- screening
+
+
+@pytest.mark.parametrize(("method", "low", "high"), [("deletion", 0.02, 0.08), ("stated", 0.02, 0.08)])
+def test_clean_photos_lose_points_as_rarely_as_stated(method: str, low: float, high: float) -> None:
+    settings = Settings(("principal-distance",), method)
+    lost = [bool(orient(sightings((0.3, 0.1, 0.0), seed), 100.0, CENTRE, settings).rejected) for seed in range(300)]
+    assert low < np.mean(lost) < high
+
+
+@pytest.mark.parametrize("method", ["deletion", "stated"])
+@pytest.mark.parametrize("point", [0, 4, 7])
+@pytest.mark.parametrize("image", [(0.1, 0.0), (0.0, -0.1)])
+def test_a_gross_error_is_found_and_named(method: str, point: int, image: tuple[float, float]) -> None:
+    angles = (0.3, 0.1, 0.0)
+    found = orient(spoiled(sightings(angles, 5), point, image), F, CENTRE, Settings(screening=method))
+    (rejected,) = found.rejected
+    assert (rejected.point, rejected.test) == (point, method)
+    assert not found.used[point]
+    size = np.hypot(*rejected.residual)  # 0.1 mm at a distance of 100 mm and more, in radians
+    assert 0.4 * 0.1 / F < size < 1.6 * 0.1 / F
+    assert found.sigma0 < 1.6
+    np.testing.assert_allclose(found.values, angles, atol=6 * found.sigma.max())
+
+
+def test_two_gross_errors_are_found_one_after_the_other() -> None:
+    given_ = spoiled(spoiled(sightings((0.3, 0.1, 0.0), 5), 2, (0.15, 0.0)), 6, (0.0, 0.2))
+    found = orient(given_, F, CENTRE)
+    assert [each.point for each in found.rejected] == [6, 2]
+
+
+def test_without_screening_a_gross_error_stays_and_shows_in_sigma0() -> None:
+    found = orient(spoiled(sightings((0.3, 0.1, 0.0), 5), 2, (0.15, 0.0)), F, CENTRE, Settings(screening="none"))
+    assert not found.rejected
+    assert found.sigma0 > found.sigma0_range(0.05)[1] * 2
+
+
+def test_points_that_nothing_controls_are_not_rejected() -> None:
+    given_ = spoiled(sightings((0.3, 0.1, 0.0), 5, PLACES[[0, 8]]), 0, (5.0, 0.0))
+    assert not orient(given_, F, CENTRE).rejected
+
+
+# ------------------------------------------------------------------------------------------------------ refusals
+
+
+def test_too_few_directions_are_refused() -> None:
+    with pytest.raises(GeometryError, match=r"1 points with 2 directions do not determine alpha, omega, kappa"):
+        orient(sightings((0.3, 0.1, 0.0), places=PLACES[:1]), F)
+    with pytest.raises(GeometryError, match=r"2 points with 4 directions do not determine .*, f, x0, z0"):
+        orient(sightings((0.3, 0.1, 0.0), places=PLACES[[0, 8]]), F, settings=Settings(EVERYTHING))
+
+
+def test_what_the_points_cannot_separate_is_named() -> None:
+    close = np.array([(0.0, 0.0), (0.001, 0.001), (0.0, 0.001), (0.001, 0.0)])
+    with pytest.raises(GeometryError, match=r"cannot separate .*(f|x0|z0)") as error:
+        orient(sightings((0.3, 0.1, 0.0), places=close), F, settings=Settings(EVERYTHING))
+    assert error.value.exit_code == 3
+    assert error.value.points == ("P0", "P1", "P2", "P3")
+
+
+def test_points_in_one_place_do_not_determine_the_roll() -> None:
+    with pytest.raises(GeometryError, match=r"cannot (determine|separate) .*kappa"):
+        orient(sightings((0.3, 0.0, 0.0), places=np.array([CENTRE, CENTRE])), F, CENTRE)
+
+
+def test_directions_of_other_points_are_refused_or_scatter() -> None:
+    given_ = sightings((0.3, 0.1, 0.0), 5)
+    wrong = replace(given_, directions=given_.directions[::-1] * [1.0, -1.0])
+    try:
+        found = orient(wrong, F, CENTRE, Settings(screening="none"))
+    except GeometryError as error:
+        assert error.code in {"not-converged", "undetermined"}  # noqa: PT017
+    else:
+        assert found.sigma0 > 100
