@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from photostrip.cli.showing import Format
-from photostrip.errors import GeometryError, InputError
+from photostrip.errors import Fault, GeometryError, InputError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -48,6 +48,12 @@ class Talk:
         self._begin = now
 
 
+def as_fault(error: OSError) -> InputError:
+    """Give what the system refused (a full disk, a folder that must not be written to) the form of all faults."""
+    fix = "make room, or choose another place with -o"
+    return InputError(Fault(str(error.strerror or error).lower(), "system", str(error.filename or ""), fix=fix))
+
+
 @contextmanager
 def failures_as(form: Format) -> Iterator[None]:
     """Tell failures in the form that was asked for: as JSON or annotations on stdout, else as lines on stderr.
@@ -64,19 +70,22 @@ def failures_as(form: Format) -> Iterator[None]:
     """
     try:
         yield
-    except (InputError, GeometryError) as error:
+    except BrokenPipeError:
+        raise
+    except (InputError, GeometryError, OSError) as error:
         if form not in {Format.JSON, Format.GITHUB}:
             raise
         from photostrip.report import console, messages
 
-        findings = messages.findings_of(error)
+        told = as_fault(error) if isinstance(error, OSError) else error
+        findings = messages.findings_of(told)
         if form is Format.GITHUB:
             sys.stdout.write(messages.annotated(findings))
         else:
-            document = messages.as_document(findings, error.exit_code)
+            document = messages.as_document(findings, told.exit_code)
             text = json.dumps(document, ensure_ascii=not console.speaks_unicode(sys.stdout), indent=1)
             sys.stdout.write(f"{text}\n")
-        raise typer.Exit(error.exit_code) from error
+        raise typer.Exit(told.exit_code) from error
 
 
 @contextmanager

@@ -59,7 +59,7 @@ def triangulate(inputs: Inputs, settings: Settings, *, directory: Path | None = 
     _require(settings)
     _require_strips(inputs)
     frames, output = _frames(inputs, settings, directory)
-    _require_whole(inputs, frames)
+    require_whole(inputs, frames)
     observations, fiducial = _photo_coordinates(inputs, settings)
     overruling.require(settings.relative, observations)
     refined = _ideal_coordinates(observations, inputs, settings, frames)
@@ -107,8 +107,21 @@ def _require_strips(inputs: Inputs) -> None:
         raise InputError(Fault(message, code="photo-without-strip", key="strips"))
 
 
-def _require_whole(inputs: Inputs, frames: Sequence[GroundFrame]) -> None:
-    """Refuse geocentric points of which only some coordinates count: X, Y, Z are neither plan nor height."""
+def require_whole(inputs: Inputs, frames: Sequence[GroundFrame]) -> None:
+    """Refuse geocentric points of which only some coordinates count: X, Y, Z are neither plan nor height.
+
+    Parameters
+    ----------
+    inputs : Inputs
+        What is given.
+    frames : sequence of GroundFrame
+        Frames of the control lists.
+
+    Raises
+    ------
+    InputError
+        With a fault for each such point.
+    """
     control = inputs.control
     geocentric = np.array([frame.kind == "geocentric" for frame in frames])
     part = control.use.any(axis=1) & ~control.use.all(axis=1)

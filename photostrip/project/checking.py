@@ -8,19 +8,22 @@ coordinate gets and from where, and what became of every row of every table.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geodesy.crs import tie_frames
+from photostrip.pipeline import overruling
+from photostrip.pipeline.triangulate import require_whole
 from photostrip.project.document import fault_at, key_path
 from photostrip.project.loading import load_project
 from photostrip.project.rows import gaps_of, observations_used, table_rows
 from photostrip.triangulation import interior, refinement
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -84,7 +87,7 @@ def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
         project = load_project(path, overrides)
     except InputError as error:
         return Checked(str(path), error.faults, (), {})
-    faults: list[Fault] = []
+    faults = _refused(project, partial(overruling.require, project.settings.relative, project.inputs.observations))
     notes = list(project.hints)
     notes += _image_coordinates(project, faults)
     faults += [*_pairs(project), *_joints(project), *_control_of_strips(project)]
@@ -98,6 +101,16 @@ def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
         "rows": table_rows(project),
     }
     return Checked(str(path), tuple(dict.fromkeys(faults)), tuple(notes), document)
+
+
+def _refused(project: Project, test: Callable[[], None]) -> list[Fault]:
+    """Give what a test of the pipeline refuses, with its place in the project file."""
+    try:
+        with project.places():
+            test()
+    except InputError as error:
+        return list(error.faults)
+    return []
 
 
 # ----------------------------------------------------------------------------------------------- the photos
@@ -221,6 +234,7 @@ def _frames(project: Project, faults: list[Fault]) -> list[Document]:
     inputs = project.inputs
     with project.places():
         frames, output = tie_frames(inputs.frames, inputs.output, directory=project.directory)
+    faults += _refused(project, partial(require_whole, inputs, frames))
     found = []
     for number, frame in enumerate(frames):
         read = project.tables.control[number]

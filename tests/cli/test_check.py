@@ -312,3 +312,19 @@ def test_debug_by_variable(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caps
     assert "Traceback" in call(capsys, "run", tmp_path / "no.yaml")[2]
     monkeypatch.setenv("PHOTOSTRIP_DEBUG", "0")
     assert "Traceback" not in call(capsys, "run", tmp_path / "no.yaml")[2]
+
+
+def test_what_the_pipeline_would_refuse_is_told_with_its_place(
+    tmp_path: Path, project: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made = small(tmp_path)
+    made.change("project.yaml", "crs: EPSG:32633", "crs: geocentric")
+    made.change("project.yaml", "axes: [east, north, up]", "axes: [x, y, z]")
+    made.change("project.yaml", "    height: ellipsoidal\n", "")
+    faults = {fault.code: fault for fault in check_project(tmp_path / "project.yaml").faults}
+    assert (faults["geocentric-use"].line, faults["geocentric-use"].key) == (22, "control[0]")
+    arguments = [project, "--set", "processing.relative.drop=[9/9]"]
+    assert call(capsys, "check", *arguments)[0] == 2
+    code, _, err = call(capsys, "run", *arguments)
+    assert code == 2
+    assert err.startswith("error: --set: processing.relative.drop: `9/9` names no measurement")

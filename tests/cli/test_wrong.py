@@ -1,0 +1,193 @@
+"""Wrong projects and tables on the command line: words, place and exit code, whatever kind of file is at fault."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from photostrip.cli.main import main
+from tests.project.samples import FILES, MARKED_FILES, PROJECT, sample
+from tests.project.test_faults import MARKS, ONE_FAULT
+from tests.results import spec, write_project
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+WRONG = [*((FILES, *case) for case in ONE_FAULT), *((MARKED_FILES, *case) for case in MARKS)]
+
+
+def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
+    code = main([str(argument) for argument in arguments])
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+def test_the_table_is_long() -> None:
+    assert len(WRONG) >= 150
+
+
+@pytest.mark.parametrize("case", WRONG, ids=lambda case: f"{case[2]!r:.20}-{case[3]!r:.20}")
+def test_a_wrong_value_ends_with_2_and_its_words(
+    tmp_path: Path, case: tuple[Any, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    files, file, old, new, place = case[:5]
+    words = case[5:]
+    project = sample(tmp_path, files)
+    project.change(file, old, new)
+    out = tmp_path / "out"
+    code, printed, err = call(capsys, "run", tmp_path / "project.yaml", "-o", out)
+    lines = err.replace(f"{tmp_path}/", "").splitlines()
+    assert (code, printed) == (2, "")
+    assert all(line.startswith("error: ") for line in lines)
+    assert [line for line in lines if line.startswith(f"error: {place}") and all(word in line for word in words)]
+    assert not out.exists()
+    code, printed, _ = call(capsys, "check", tmp_path / "project.yaml", "--format", "json")
+    findings = [each for each in json.loads(printed)["projects"][0]["findings"] if each["severity"] == "error"]
+    assert code == 2
+    number = int((place.split(":")[1:2] or ["0"])[0] or 0)
+    assert number in {each["line"] for each in findings} | {0}
+
+
+# ---------------------------------------------------------------------------------------------- other exit codes
+
+GEOMETRY = [
+    ("observations.csv", lambda rows: [row for row in rows if not row.startswith("1003,")] + ["1003,X1,1,2"], "1003"),
+    ("observations.csv", lambda rows: [row for row in rows if not row.startswith("1002,")] + ["1002,X1,1,2"], "1002"),
+    ("observations.csv", lambda rows: rows[:1] + [row.rpartition(",")[0] + ",0" for row in rows[1:]], "1001"),
+    ("control.csv", lambda rows: rows[:2], "at least 2 control points in plan and 3 in height"),
+    ("control.csv", lambda rows: rows[:3], "at least 2 control points in plan and 3 in height"),
+    ("control.csv", lambda rows: [row.replace("xyz", "z") for row in rows], "plan"),
+    ("control.csv", lambda rows: [row.replace("xyz", "xy") for row in rows], "0 in height"),
+    ("control.csv", lambda rows: [row.replace(",control", ",check") for row in rows], "control"),
+    ("control.csv", lambda rows: [row.replace("xyz", "off") for row in rows], "control"),
+    ("control.csv", lambda rows: [rows[0]] + ["N" + row for row in rows[1:]], "control"),
+]
+
+
+@pytest.mark.parametrize(("file", "harm", "words"), GEOMETRY)
+def test_weak_geometry_ends_with_3(
+    tmp_path: Path, file: str, harm: Callable[[list[str]], list[str]], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write_project(tmp_path / "p", spec())
+    table = path.parent / file
+    table.write_text("\n".join(harm(table.read_text(encoding="utf-8").splitlines())) + "\n", encoding="utf-8")
+    code, out, err = call(capsys, "run", path, "-o", tmp_path / "out")
+    assert (code, out) == (3, "")
+    assert err.startswith("error: ")
+    assert words in err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_tolerance_that_is_not_kept_ends_with_1(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = write_project(tmp_path / "p", spec())
+    assert call(capsys, "run", path, "--set", "tolerances.check_rms_xy=1e-6", "-o", tmp_path / "out")[0] == 1
+    assert (tmp_path / "out" / "result.json").exists()
+    code, out, _ = call(capsys, "run", path, "--set", "tolerances.check_rms_xy=1e-6", "--format", "github")
+    assert code == 1
+    assert out.startswith("::error title=photostrip tolerance::tolerances.check_rms_xy: ")
+
+
+# ------------------------------------------------------------------------------------ files as such, in one form
+
+
+def missing(path: Path) -> None:
+    path.unlink()
+
+
+def folder(path: Path) -> None:
+    path.unlink()
+    path.mkdir()
+
+
+def empty(path: Path) -> None:
+    path.write_bytes(b"")
+
+
+def huge(path: Path) -> None:
+    with path.open("wb") as stream:
+        stream.truncate(2_000_000_000)  # a hole: it takes no room
+
+
+def binary(path: Path) -> None:
+    path.write_bytes(b"PK\x03\x04" + bytes(100))
+
+
+def pipe(path: Path) -> None:
+    path.unlink()
+    os.mkfifo(path)
+
+
+HARMS = [
+    (missing, "file-missing", "does not exist"),
+    (folder, "file-directory", "is a folder; expected a file"),
+    (empty, "file-empty", "is empty"),
+    (huge, "file-size", "has 2000 MB; expected at most"),
+    (binary, "binary", "is a zip archive or a spreadsheet; expected text"),
+    (pipe, "file-kind", "is a device or a pipe; expected a file"),
+]
+
+
+@pytest.mark.parametrize("name", ["project.yaml", "preset.yaml", "observations.csv", "fiducials.csv", "control.csv"])
+@pytest.mark.parametrize(("harm", "kind", "words"), HARMS)
+def test_every_file_is_refused_in_the_same_words(
+    tmp_path: Path, name: str, harm: Callable[[Path], None], kind: str, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    project = sample(tmp_path, MARKED_FILES | {"preset.yaml": "photostrip: 1\n"})
+    project.change("project.yaml", "name: sample", "name: sample\nextends: preset.yaml")
+    harm(tmp_path / name)
+    code, printed, _ = call(capsys, "check", tmp_path / "project.yaml", "--format", "json")
+    findings = json.loads(printed)["projects"][0]["findings"]
+    found = [each for each in findings if each["code"] == kind]
+    assert code == 2
+    assert len(found) == 1
+    assert (found[0]["line"] > 0) == (name != "project.yaml")  # a file that another one names is told where it is named
+    line = next(each for each in call(capsys, "run", tmp_path / "project.yaml")[2].splitlines() if words in each)
+    assert line.startswith(f"error: {tmp_path}/project.yaml:")
+
+
+@pytest.mark.parametrize(("command", "options"), [("simulate", ["-o", "out"]), ("report", []), ("run", [])])
+@pytest.mark.parametrize(("harm", "kind", "words"), HARMS)
+def test_every_command_refuses_its_file_in_the_same_words(
+    tmp_path: Path,
+    command: str,
+    options: list[str],
+    harm: Callable[[Path], None],
+    kind: str,
+    words: str,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    path = tmp_path / "file"
+    path.write_text(PROJECT, encoding="utf-8")
+    harm(path)
+    code, out, err = call(capsys, command, path, *options)
+    assert (code, out) == (2, "")
+    if (command, harm) == ("report", folder):  # a folder stands for the result.json in it
+        assert err.startswith(f"error: {path}/result.json: does not exist")
+    elif (command, harm) == ("report", binary):
+        assert err.startswith(f"error: {path}: ")
+    else:
+        assert err.startswith(f"error: {path}: {words}"), kind
+
+
+@pytest.mark.parametrize("form", ["text", "json", "github"])
+def test_a_full_disk_takes_the_same_form(
+    tmp_path: Path, form: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = write_project(tmp_path / "p", spec())
+
+    def full(self: Path, _data: bytes) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device", str(self))
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    code, out, err = call(capsys, "run", path, "-o", tmp_path / "out", "--format", form)
+    assert code == 2
+    assert "no space left on device" in (out + err).lower()
+    if form == "json":
+        assert json.loads(out)["findings"][0]["code"] == "system"
+    assert out.startswith({"text": "", "json": "{", "github": "::error file="}[form])
+    assert list((tmp_path / "out").iterdir()) == []
