@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photostrip.errors import Fault, GeometryError, InputError
+from photostrip.formats.findings import Findings
 from photostrip.geodesy.crs import tie_frames
 from photostrip.pipeline import overruling
 from photostrip.pipeline.triangulate import require_whole
@@ -100,7 +101,9 @@ def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
         "control": list(_control(project)),
         "rows": table_rows(project),
     }
-    return Checked(str(path), tuple(dict.fromkeys(faults)), tuple(notes), document)
+    findings = Findings()  # of too many faults in one file they only count the rest
+    findings.add(*dict.fromkeys(faults))
+    return Checked(str(path), findings.faults, tuple(notes), document)
 
 
 def _refused(project: Project, test: Callable[[], None]) -> list[Fault]:

@@ -124,6 +124,17 @@ def test_three_photos_without_a_common_point(project: Path, tmp_path: Path) -> N
     assert f"no point is common to photos {photos[0]}, {photos[1]} and {photos[2]}" in faults[0].message
 
 
+def test_very_many_faults_are_only_counted(tmp_path: Path) -> None:
+    made = small(tmp_path)
+    photos = [f"N{n}" for n in range(300)]
+    made.change("project.yaml", "[1001, 1002]", f"[{', '.join(photos)}]")
+    rows = "".join(f"{photo},Q{photo},1,2\n" for photo in photos)
+    made.write("observations.csv", OBSERVATIONS + rows)
+    faults = check_project(tmp_path / "project.yaml").faults
+    assert len(faults) == 201
+    assert faults[-1].code == "more"
+
+
 def test_what_check_refuses_run_refuses_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = small(tmp_path).folder / "project.yaml"
     code, _, err = call(capsys, "run", path)

@@ -1,0 +1,46 @@
+"""``photostrip check`` on a thousand photos: a second at most, and little memory."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from typing import TYPE_CHECKING
+
+import pytest
+
+from photostrip.simulate.spec import Control, Flight, Points, Spec
+from tests.results import write_project
+from tests.source_tree import ROOT
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+SECONDS = 1.0
+MEMORY_MB = 200
+
+
+@pytest.mark.slow
+def test_a_thousand_photos_are_checked_in_a_second(tmp_path: Path) -> None:
+    """Seconds of the processor, the best of three: what else the machine does hardly shows there."""
+    spec = Spec(
+        name="big",
+        flight=Flight(photos=250, strips=4, side_lap_percent=30.0),
+        points=Points(extra_per_model=6),
+        control=Control(bands=12, per_band=3, check=200),
+    )
+    path = write_project(tmp_path / "big", spec)
+    assert (path.parent / "observations.csv").read_text(encoding="utf-8").count("\n") > 30_000
+    command = [sys.executable, "-m", "photostrip", "check", str(path)]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    taken = []
+    for _ in range(3):
+        with (tmp_path / "out.txt").open("w+", encoding="utf-8") as out:
+            process = subprocess.Popen(command, env=environment, stdout=out)
+            _, status, used = os.wait4(process.pid, 0)
+            process.returncode = os.waitstatus_to_exitcode(status)
+        assert process.returncode == 0
+        taken.append(used.ru_utime + used.ru_stime)
+        assert used.ru_maxrss < MEMORY_MB * 1024
+    assert "1000 in 4 strips" in (tmp_path / "out.txt").read_text(encoding="utf-8")
+    assert min(taken) < SECONDS
