@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import tempfile
 from pathlib import Path
 from random import Random
@@ -14,6 +16,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from tests.fuzzing import HARMS, Case, damaged, projects, tried
+from tests.source_tree import ROOT
 
 
 @pytest.fixture(scope="module")
@@ -27,6 +30,16 @@ def test_a_damaged_project_ends_well(right: list[dict[str, bytes]], seed: int, c
     case = damaged(right, Random(seed))
     with tempfile.TemporaryDirectory() as folder:
         assert tried(case, Path(folder), command).faults == (), case.done
+
+
+@pytest.mark.slow
+def test_the_benchmark_prints_its_table() -> None:
+    command = [sys.executable, str(ROOT / "benchmarks" / "fuzz.py"), "40", "7"]
+    out = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert out.startswith("40 cases, seed 7")
+    assert "wrong: 0" in out
+    numbers = [int(word) for line in out.splitlines() if line.startswith(("run", "check")) for word in line.split()[1:]]
+    assert sum(numbers) == 40
 
 
 @pytest.mark.parametrize("command", ["check", "run"])
