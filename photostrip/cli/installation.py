@@ -19,6 +19,7 @@ FORMATS = {
         "image coordinates, fiducial marks, control (.csv, .csv.gz): photostrip check, run",
         "simulation (YAML): photostrip simulate",
         "result.json: photostrip report",
+        "phototheodolite projects and tables (YAML, .csv): photostrip terrestrial",
     ],
     "written": [
         "result.json, points.csv, photos.csv, residuals.csv, parallaxes.csv, rejected.csv: photostrip run -o",
