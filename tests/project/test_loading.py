@@ -410,7 +410,8 @@ def test_unused_cameras_and_columns(tmp_path: Path) -> None:
     found = notes(project.load())
     assert found["unused-camera"].message == "1 camera belongs to no strip: old"
     assert found["unused-column"].message == "1 column not used: remark; used: point, x, y, z"
-    assert [(note.file, note.line, note.key) for note in map(found.__getitem__, ("unused-camera", "unused-column"))] == [
+    told = [found[code] for code in ("unused-camera", "unused-column")]
+    assert [(note.file, note.line, note.key) for note in told] == [
         (f"{tmp_path}/project.yaml", 9, "cameras.old"),
         (f"{tmp_path}/control.csv", 1, ""),
     ]
