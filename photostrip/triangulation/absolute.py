@@ -32,7 +32,8 @@ if TYPE_CHECKING:
 
 LARGEST_STEP = 5.0  # of the logarithm of the scale, in one iteration
 ITERATIONS = 50
-CONVERGED = 1e-12  # of the strip's half length
+CONVERGED = 1e-10  # of the strip's half length; the next step would be its square
+SETTLED = 2  # iteration after which the directions of the ground axes no longer change
 RANK_LIMIT = 1e-3  # smallest over largest singular value: a motion of the strip of which the control sees a thousandth
 WEAK_LIMIT = 1 / 8  # well spread control has about 1; at an eighth errors of the control grow eightfold somewhere
 PARAMETERS = 7
@@ -246,13 +247,16 @@ def orient(strip: Floats, targets: Targets, weight: Floats, reach: Floats | None
     _refuse_too_few(targets.control)
     similarity = _start(strip, targets, weight)
     half = max(float(np.ptp(similarity(strip), axis=0).max()) / 2, 1e-6)
-    for iteration in range(1, ITERATIONS + 1):  # noqa: B007
+    axes = targets.axes(similarity(strip))
+    for iteration in range(1, ITERATIONS + 1):
         xyz = similarity(strip)
-        design, free = _design(xyz, targets, weight, half)
+        if iteration == SETTLED:
+            axes = targets.axes(xyz)
+        plain, free = _design(xyz, targets, axes, half)
         root = _motion(None if reach is None else similarity(reach), xyz.mean(axis=0), half)
-        plain, _ = _design(xyz, targets, targets.control.use.astype(float), half)  # weights do not decide what is free
-        _refuse_deficient(plain, root, xyz, targets, half)
-        step = np.asarray(np.linalg.lstsq(design, free, rcond=None)[0], float)
+        _refuse_deficient(plain, root, xyz, targets, half)  # weights do not decide what is free
+        share = np.sqrt(weight[targets.control.use])
+        step = np.asarray(np.linalg.lstsq(plain * share[:, None], free * share, rcond=None)[0], float)
         similarity = _corrected(similarity, step, xyz.mean(axis=0), half)
         if np.abs(step).max() < CONVERGED * half:
             break
@@ -323,19 +327,16 @@ def _start_apart(strip: Floats, targets: Targets) -> Similarity:
     return Similarity(scale, rotation, center + lift - scale * rotation @ middle)
 
 
-def _design(xyz: Floats, targets: Targets, weight: Floats, half: float) -> tuple[Floats, Floats]:
-    """Weighted design and free terms of one step: shifts, rotations, scale, all in metres at the strip's end."""
-    axes = targets.axes(xyz)
+def _design(xyz: Floats, targets: Targets, axes: Floats, half: float) -> tuple[Floats, Floats]:
+    """Design and free terms of one step: shifts, rotations, scale, all in metres at the strip's end."""
     arm = (xyz - xyz.mean(axis=0)) / half
     columns = np.empty((len(xyz), 3, PARAMETERS))
     columns[:, :, :3] = axes
-    # axes . (theta x arm) = theta . (arm x axes)
-    columns[:, :, 3:6] = np.cross(arm[:, None, :], axes)
+    columns[:, :, 3:6] = axes @ -cross_matrix(arm)  # axes . (theta x arm)
     columns[:, :, 6] = np.einsum("nij,nj->ni", axes, arm)
-    root = np.sqrt(weight)
-    free = -np.einsum("nij,nj->ni", axes, xyz - targets.of(xyz)) * root
+    free = -np.einsum("nij,nj->ni", axes, xyz - targets.of(xyz))
     used = targets.control.use
-    return (columns * root[:, :, None])[used], free[used]
+    return columns[used], free[used]
 
 
 def _corrected(similarity: Similarity, step: Floats, center: Floats, half: float) -> Similarity:
