@@ -42,6 +42,7 @@ LARGEST_SHARE = 0.34  # of the control coordinates of plan or height that may be
 CONSPICUOUS = 6.0  # largest over median misclosure that asks for a robust start
 GROSS = 12.0  # standard deviations from the median, in the robust start
 ROBUST_STEPS = 20
+SETTLED = 0.1  # of the median misclosure: the robust start is to find large errors, not digits
 NORMAL = 1.4826
 EXCHANGED = 0.2  # misclosures left by an exchange, over those before
 AXES = ("east", "north", "up")
@@ -131,6 +132,8 @@ def screen(control: ControlPoints, setting: Setting) -> tuple[ControlPoints, tup
     try:
         start = _without(control, _gross(control, setting))
         kept = _snoop(start, setting)
+        if np.array_equal(kept.use, control.use):
+            return control, ()
         kept = _taken_back(control, kept, setting)
         return kept, _log(control, kept, setting)
     except PhotostripError:
@@ -154,7 +157,9 @@ def _gross(control: ControlPoints, setting: Setting) -> Flags:
     for _ in range(ROBUST_STEPS):
         floor = max(float(np.median(size[control.use])), 1e-6)
         result = absolute.orient(setting.strip, targets, weight / np.maximum(size / floor, 1.0) * control.use)
-        size = np.abs(result.misclosures)
+        before, size = size, np.abs(result.misclosures)
+        if np.abs(size - before).max() < SETTLED * floor:
+            break
     scatter = NORMAL * np.array([np.median(size[:, axes][control.use[:, axes]]) for axes in ([0, 1], [0, 1], [2])])
     far = np.array(control.use & (size > GROSS * scatter), bool)
     far[:, PLAN] = far[:, PLAN].any(axis=1, keepdims=True) & control.use[:, PLAN]
