@@ -30,8 +30,9 @@ terrestrial = typer.Typer(
 )
 terrestrial.add_typer(directions, name="directions")
 
-EXAMPLE = "\b\nExamples:\n  photostrip terrestrial displacement survey.yaml -o result --plot result/survey.svg"
-EXAMPLE += "\n  photostrip terrestrial displacement pseudo.csv --base 50 --principal-distance 1000 --sigma 0.005"
+EXAMPLE = "\b\nExamples:\n  photostrip terrestrial displacement survey.yaml --plot survey.svg"
+EXAMPLE += "\n  photostrip terrestrial displacement pseudo.csv --base 50 --sigma 0.005 \\"
+EXAMPLE += "\n      --principal-distance 1000"
 TABLE_ENDS = (".csv", ".csv.gz")
 
 
@@ -121,8 +122,10 @@ def _from_table(
 ) -> Survey:
     """Read a table of the normal case, which the options describe."""
     from photostrip.errors import Fault, InputError
+    from photostrip.project.terrestrial_file import MILLIMETRES
     from photostrip.project.terrestrial_loading import load_normal_case
-    from photostrip.project.terrestrial_options import CameraOptions, chosen_camera, positive
+    from photostrip.project.terrestrial_options import CameraOptions, chosen_camera
+    from photostrip.project.terrestrial_ranges import BASE, IMAGE_SIGMA, Range, within
     from photostrip.project.terrestrial_series import Table
     from photostrip.terrestrial.monitoring import Settings
 
@@ -135,10 +138,11 @@ def _from_table(
     kind, unit, sigma, sigma_d = numbers
     for option, value in (("--sigma", sigma), ("--sigma-d", sigma_d)):
         if value is not None:
-            positive(option, value, unit)
+            scale = MILLIMETRES[unit]
+            within(option, value, Range(IMAGE_SIGMA.least / scale, IMAGE_SIGMA.most / scale, unit))
     meaning = Table((kind or "pseudo-parallaxes").replace("-", "_"), unit, "up", sigma, sigma_d)
     names = [part.strip() for part in (stable or "").split(",") if part.strip()]
-    return load_normal_case(str(table), chosen, positive("--base", base, "m"), meaning, names, Settings())
+    return load_normal_case(str(table), chosen, within("--base", base, BASE), meaning, names, Settings())
 
 
 def _from_project(project: Path, assignments: list[str], only_for_tables: list[str]) -> Survey:

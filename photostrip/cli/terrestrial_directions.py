@@ -50,16 +50,15 @@ AngleUnit = Annotated[Literal["deg", "gon"], typer.Option("--angles", help="Unit
 Unit = Annotated[Literal["mm", "um"], typer.Option("--unit", help="Unit of image coordinates.")]
 Format = Annotated[Form, typer.Option("--format", help="How to print it.")]
 Plot = Annotated[Path | None, typer.Option("--plot", metavar="FILE.svg", help="Draw it, too.")]
-ImageTable = Annotated[
-    str | None, typer.Argument(metavar="[TABLE]", help="Table `point,x,z` (CSV).", show_default=False)
-]
+ImageTable = Annotated[str | None, typer.Argument(metavar="TABLE", help="Table `point,x,z` (CSV).", show_default=False)]
 DirectionTable = Annotated[
-    str | None, typer.Argument(metavar="[TABLE]", help="Table `point,lambda,beta` (CSV).", show_default=False)
+    str | None, typer.Argument(metavar="TABLE", help="Table `point,lambda,beta` (CSV).", show_default=False)
 ]
 
 
 def _command(name: str, example: str) -> Callable[[Command], Command]:
-    epilog = f"\b\nExample:\n  {COMMAND} {name} {example}".rstrip()
+    arguments = f" \\\n      {example}" if example else ""  # a page is 80 characters wide
+    epilog = f"\b\nExample:\n  {COMMAND} {name}{arguments}"
     return directions.command(name, context_settings=HELP_NAMES, epilog=epilog)
 
 
@@ -88,11 +87,12 @@ def from_photo(  # noqa: PLR0913, PLR0917 (an argument for each option)
     """
     with told(form):
         from photostrip.formats.terrestrial_directions import conversion
-        from photostrip.project.terrestrial_options import CameraOptions, chosen_camera, image_points, looking, positive
+        from photostrip.project import terrestrial_ranges as ranges
+        from photostrip.project.terrestrial_options import CameraOptions, chosen_camera, image_points, looking
 
         chosen = chosen_camera(CameraOptions(camera, presets, principal_distance, principal_point))
         radians, rotation = looking(alpha, omega, kappa, angles)
-        sigma = None if sigma_um is None else positive("--sigma-um", sigma_um, "µm") / 1000
+        sigma = None if sigma_um is None else ranges.within("--sigma-um", sigma_um, ranges.IMAGE_SIGMA_UM) / 1000
         ids, xz, notes = image_points(table, at or [], unit)
         say(notes, quiet=quiet)
         _print(conversion(chosen, radians, rotation, (ids, xz), (angles, sigma)), form)
@@ -150,7 +150,8 @@ def accuracy(  # noqa: PLR0913, PLR0917 (an argument for each option)
     """Tell how accurately correction directions must be measured, all over the photo."""
     with told(form):
         from photostrip.formats.terrestrial_directions import required_accuracy
-        from photostrip.project.terrestrial_options import CameraOptions, looking, positive
+        from photostrip.project import terrestrial_ranges as ranges
+        from photostrip.project.terrestrial_options import CameraOptions, looking
 
         radians, rotation = looking(alpha, omega, kappa, angles)
         level = omega == 0 and kappa == 0
@@ -159,7 +160,7 @@ def accuracy(  # noqa: PLR0913, PLR0917 (an argument for each option)
 
             message = "the printed formulas hold for a level camera"
             raise InputError(Fault(message, "as-printed", key="--as-printed", fix="leave out --omega and --kappa"))
-        sigma = positive("--sigma-um", sigma_um, "µm") / 1000
+        sigma = ranges.within("--sigma-um", sigma_um, ranges.IMAGE_SIGMA_UM) / 1000
         options = CameraOptions(camera, presets, principal_distance, None, photo_format)
 
         def document(chosen: Phototheodolite, net: Net) -> dict[str, Any]:
@@ -200,12 +201,17 @@ def theodolite(  # noqa: PLR0913, PLR0917 (an argument for each option)
     """Tell which image accuracy a theodolite can vouch for, all over the photo."""
     with told(form):
         from photostrip.formats.terrestrial_directions import theodolite_accuracy
-        from photostrip.project.terrestrial_options import CameraOptions, looking, positive
+        from photostrip.project import terrestrial_ranges as ranges
+        from photostrip.project.terrestrial_options import CameraOptions, looking
 
         radians, rotation = looking(alpha, omega, kappa, angles)
-        horizontal = positive("--sigma-arcsec", sigma_arcsec, "″")
-        vertical = horizontal if vertical_arcsec is None else positive("--vertical-arcsec", vertical_arcsec, "″")
-        wanted = None if sigma_um is None else positive("--sigma-um", sigma_um, "µm") / 1000
+        horizontal = ranges.within("--sigma-arcsec", sigma_arcsec, ranges.DIRECTION_SIGMA)
+        vertical = (
+            horizontal
+            if vertical_arcsec is None
+            else ranges.within("--vertical-arcsec", vertical_arcsec, ranges.DIRECTION_SIGMA)
+        )
+        wanted = None if sigma_um is None else ranges.within("--sigma-um", sigma_um, ranges.IMAGE_SIGMA_UM) / 1000
         options = CameraOptions(camera, presets, principal_distance, None, photo_format)
         measured = (horizontal, vertical, rounds)
 
@@ -225,7 +231,8 @@ def _over_the_photo(
     form: Form,
 ) -> None:
     """Compute a table over the photo and print it; draw it on a finer one."""
-    from photostrip.project.terrestrial_options import chosen_camera, positive
+    from photostrip.project import terrestrial_ranges as ranges
+    from photostrip.project.terrestrial_options import chosen_camera
     from photostrip.report.plots_terrestrial import FINE, check_plot
     from photostrip.terrestrial.accuracy import grid
 
@@ -234,7 +241,7 @@ def _over_the_photo(
         check_plot(str(plot))
     chosen = chosen_camera(options, with_format=True)
     width, height = chosen.format or (0.0, 0.0)
-    step = positive("--step", spacing[0], "mm")
+    step = ranges.within("--step", spacing[0], ranges.STEP)
     _limit_rows(step, width, height)
     found = document(chosen, grid((width, height), step, level=spacing[1]))
     if plot is not None:
@@ -297,16 +304,21 @@ def orient(  # noqa: PLR0913, PLR0917 (an argument for each option)
     with told(form):
         from photostrip.formats.terrestrial_directions import oriented
         from photostrip.project import terrestrial_options as given
+        from photostrip.project import terrestrial_ranges as ranges
         from photostrip.terrestrial import orientation
 
         chosen = given.chosen_camera(given.CameraOptions(camera, presets, principal_distance, principal_point))
         settings = orientation.Settings(
-            given.free_elements(free), screening, given.fraction("--significance", significance)
+            given.free_elements(free), screening, ranges.within("--significance", significance, ranges.SIGNIFICANCE)
         )
-        horizontal = given.positive("--sigma-arcsec", sigma_arcsec, "″")
-        vertical = horizontal if vertical_arcsec is None else given.positive("--vertical-arcsec", vertical_arcsec, "″")
+        horizontal = ranges.within("--sigma-arcsec", sigma_arcsec, ranges.DIRECTION_SIGMA)
+        vertical = (
+            horizontal
+            if vertical_arcsec is None
+            else ranges.within("--vertical-arcsec", vertical_arcsec, ranges.DIRECTION_SIGMA)
+        )
         root = rounds**0.5
-        sigma = given.positive("--sigma-um", sigma_um, "µm") / 1000
+        sigma = ranges.within("--sigma-um", sigma_um, ranges.IMAGE_SIGMA_UM) / 1000
         options = given.SightingOptions(unit, angles, sigma, horizontal / root, vertical / root)
         sightings, notes = given.read_sightings(table, options)
         say(notes, quiet=quiet)

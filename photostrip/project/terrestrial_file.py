@@ -9,10 +9,8 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.project.schema import (
     Axes,
-    Fraction,
     Id,
     Number,
-    Pair,
     Positive,
     Section,
     Words,
@@ -20,12 +18,16 @@ from photostrip.project.schema import (
     key,
     wrong,
 )
-from photostrip.project.terrestrial_presets import one_of
+from photostrip.project.terrestrial_presets import Distance, Place, Size, one_of
+from photostrip.project.terrestrial_ranges import BASE, DEGREES, IMAGE_SIGMA, POSITION, SIGNIFICANCE, TIME, bounded
 from photostrip.terrestrial.monitoring import MOVED_CAMERA, Settings
 
 SCHEMA_NUMBER = "1"
+MILLIMETRES = {"mm": 1.0, "um": 1e-3}
 USUAL = Settings()
-Three = tuple[Number, Number, Number]
+Coordinate = Annotated[Number, AfterValidator(bounded(POSITION))]
+Three = tuple[Coordinate, Coordinate, Coordinate]
+Angle = Annotated[Number, AfterValidator(bounded(DEGREES))]
 
 
 def _short_epoch(value: object) -> object:
@@ -43,15 +45,13 @@ class Camera(Section):
     """One camera: a preset, or its own numbers, or a preset and what is different from it."""
 
     preset: Words | None = key("Name of a camera of the list that comes with the program, or of `presets`", None)
-    principal_distance: Positive | None = key("Principal distance; default: that of the preset", None, unit="mm")
-    principal_point: Pair | None = key(
+    principal_distance: Distance | None = key("Principal distance; default: that of the preset", None, unit="mm")
+    principal_point: Place | None = key(
         "Principal point x0, z0 in the system of the image coordinates; default: that of the preset, or 0, 0",
         None,
         unit="mm",
     )
-    format: tuple[Positive, Positive] | None = key(
-        "Width and height of the field in which points are measured", None, unit="mm"
-    )
+    format: Size | None = key("Width and height of the field in which points are measured", None, unit="mm")
 
     @model_validator(mode="after")
     def _has_a_principal_distance(self) -> Self:
@@ -66,9 +66,9 @@ class Station(Section):
 
     camera: Id = key("Camera, a key of `cameras`")
     position: Three | None = key("Perspective centre in the order of `axes`", None, unit="m")
-    alpha: Number | None = key("Azimuth of the optical axis, clockwise from north", None, unit="angle_unit")
-    omega: Number | None = key("Elevation of the optical axis, upwards; default: 0", None, unit="angle_unit")
-    kappa: Number | None = key(
+    alpha: Angle | None = key("Azimuth of the optical axis, clockwise from north", None, unit="angle_unit")
+    omega: Angle | None = key("Elevation of the optical axis, upwards; default: 0", None, unit="angle_unit")
+    kappa: Angle | None = key(
         "Roll, the photo's x axis turning counter-clockwise for the photographer; default: 0", None, unit="angle_unit"
     )
 
@@ -99,7 +99,7 @@ class Epoch(Section):
     """One epoch."""
 
     id: Id = key("Id of the epoch, as in the table")
-    time: Number | None = key("Its time, for rates", None, unit="time_unit")
+    time: Annotated[Number, AfterValidator(bounded(TIME))] | None = key("Its time, for rates", None, unit="time_unit")
 
 
 class Measurements(Section):
@@ -124,13 +124,19 @@ class Measurements(Section):
         if self.coordinates is not None and self.sigma_d is not None:
             message = "coordinates have no pseudo-parallaxes that could have a standard deviation"
             raise wrong(message, at="sigma_d", fix="remove it; use `sigma`")
+        for name, value in (("sigma", self.sigma), ("sigma_d", self.sigma_d)):
+            if value is not None and not IMAGE_SIGMA.holds(value * MILLIMETRES[self.unit]):
+                message = f"{value:g} {self.unit} is out of range"
+                raise wrong(message, code="range", at=name, expected=f"{IMAGE_SIGMA}: is the unit right?")
         return self
 
 
 class Processing(Section):
     """How displacements are judged."""
 
-    significance: Fraction = key("Probability of calling a point moved that did not move", USUAL.significance)
+    significance: Annotated[Number, AfterValidator(bounded(SIGNIFICANCE))] = key(
+        "Probability of calling a point moved that did not move", USUAL.significance
+    )
     moved_camera: Annotated[Words, AfterValidator(one_of(*MOVED_CAMERA))] = key(
         "Turn of a camera that the stable points show: taken out `always`, when significant (`auto`), or `never`",
         USUAL.moved_camera,
@@ -150,7 +156,9 @@ class TerrestrialFile(Section):
         "Order of the coordinates of the stations and of the results: a permutation of east, north, up", None
     )
     angle_unit: Annotated[Words, AfterValidator(one_of("deg", "gon"))] = key("Unit of alpha, omega, kappa", "deg")
-    base: Positive | None = key("Base of the normal case, instead of positions and angles", None, unit="m")
+    base: Annotated[Number, AfterValidator(bounded(BASE))] | None = key(
+        "Base of the normal case, instead of positions and angles", None, unit="m"
+    )
     epochs: list[Annotated[Epoch, BeforeValidator(_short_epoch)]] | None = key(
         "Epochs, the first being the reference; default: as they stand in the table", None
     )

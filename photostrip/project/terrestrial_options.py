@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import isfinite
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +11,20 @@ from photostrip.errors import Fault, InputError
 from photostrip.formats.findings import Findings
 from photostrip.formats.numbers import NotANumber, number, shown
 from photostrip.formats.terrestrial import DIRECTION_POINTS, IMAGE_POINTS, SIGHTINGS, PointTable, read_points
+from photostrip.project.terrestrial_file import MILLIMETRES
 from photostrip.project.terrestrial_presets import preset, read_presets
+from photostrip.project.terrestrial_ranges import (
+    COORDINATE,
+    DEGREES,
+    DIRECTION_SIGMA,
+    FORMAT,
+    GON,
+    IMAGE_SIGMA,
+    PRINCIPAL_DISTANCE,
+    Range,
+    refuse_outside,
+    within,
+)
 from photostrip.terrestrial.directions import Phototheodolite, photo_from_directions
 from photostrip.terrestrial.frame import ARCSECONDS, ground_from_photo
 from photostrip.terrestrial.orientation import FREE, Sightings
@@ -22,12 +34,12 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from photostrip.formats.tables import Column
     from photostrip.notes import Note
 
     Floats = NDArray[np.float64]
 
 RADIANS = {"deg": np.pi / 180, "gon": np.pi / 200}
-MILLIMETRES = {"mm": 1.0, "um": 1e-3}
 STEEPEST = np.radians(89.9999)
 GIMBAL = 1e-6  # cosine of the elevation of the camera below which azimuth and roll are one
 
@@ -86,54 +98,21 @@ def chosen_camera(options: CameraOptions, *, with_format: bool = False) -> Photo
     else:
         camera = Phototheodolite("camera", 0.0)
     if options.principal_distance is not None:
-        distance = positive("--principal-distance", options.principal_distance, "mm")
+        distance = within("--principal-distance", options.principal_distance, PRINCIPAL_DISTANCE)
         camera = replace(camera, principal_distance=distance)
     if options.principal_point is not None:
-        camera = replace(camera, principal_point=pair("--principal-point", options.principal_point))
+        x0, z0 = (
+            within("--principal-point", each, COORDINATE) for each in pair("--principal-point", options.principal_point)
+        )
+        camera = replace(camera, principal_point=(x0, z0))
     if options.photo_format is not None:
         width, height = pair("--photo-format", options.photo_format)
-        camera = replace(
-            camera, format=(positive("--photo-format", width, "mm"), positive("--photo-format", height, "mm"))
-        )
+        size = (within("--photo-format", width, FORMAT), within("--photo-format", height, FORMAT))
+        camera = replace(camera, format=size)
     if with_format and camera.format is None:
         message = f"the camera {camera.name} has no format"
         raise InputError(Fault(message, "no-format", key="--photo-format", expected="WIDTH,HEIGHT in mm"))
     return camera
-
-
-def positive(option: str, value: float, unit: str) -> float:
-    """Require a finite number larger than 0.
-
-    Parameters
-    ----------
-    option : str
-        Name of the option.
-    value : float
-        What the user typed.
-    unit : str
-        Its unit, for the message.
-
-    Returns
-    -------
-    float
-        The number.
-
-    Raises
-    ------
-    InputError
-        When it is none.
-    """
-    if not (isfinite(value) and value > 0):
-        expected = f"a number larger than 0 ({unit})" if unit else "a number larger than 0"
-        raise InputError(Fault(f"{value:g} is out of range", "range", key=option, expected=expected))
-    return value
-
-
-def fraction(option: str, value: float) -> float:
-    """Require a number between 0 and 1; see :func:`positive`."""
-    if not 0 < value < 1:
-        raise InputError(Fault(f"{value:g} is out of range", "range", key=option, expected="a number between 0 and 1"))
-    return value
 
 
 def pair(option: str, text: str) -> tuple[float, float]:
@@ -188,8 +167,7 @@ def looking(alpha: float, omega: float, kappa: float, unit: str) -> tuple[tuple[
         When one of them is no number, or the camera looks straight up or down.
     """
     for option, value in (("--alpha", alpha), ("--omega", omega), ("--kappa", kappa)):
-        if not isfinite(value):
-            raise InputError(Fault(f"{value:g} is no angle", "range", key=option, expected=f"a number ({unit})"))
+        within(option, value, DEGREES if unit == "deg" else GON)
     angles = (alpha * RADIANS[unit], omega * RADIANS[unit], kappa * RADIANS[unit])
     if abs(np.cos(angles[1])) < GIMBAL:
         message = f"with {omega:g} {unit} the camera looks straight up or down, which leaves it without an azimuth"
@@ -226,8 +204,7 @@ def image_points(file: str | None, at: Sequence[str], unit: str) -> tuple[tuple[
     InputError
         With every fault.
     """
-    table, ids, values, notes = _given(file, at, IMAGE_POINTS, ("x", "z"))
-    del table
+    _, ids, values, notes = _given(file, at, IMAGE_POINTS, ("x", "z"), (COORDINATE, MILLIMETRES[unit], unit))
     return ids, values * MILLIMETRES[unit], notes
 
 
@@ -263,7 +240,7 @@ def direction_points(
     InputError
         With every fault.
     """
-    table, ids, values, notes = _given(file, at, DIRECTION_POINTS, ("lambda", "beta"))
+    table, ids, values, notes = _given(file, at, DIRECTION_POINTS, ("lambda", "beta"), (DEGREES, 1.0, unit))
     directions = values * RADIANS[unit]
     steep = np.abs(directions[:, 1]) > STEEPEST
     behind = np.isnan(photo_from_directions(directions, camera.principal_distance, rotation)).any(axis=1)
@@ -286,20 +263,28 @@ def _at(table: PointTable | None, row: int, column: str, message: str) -> Fault:
 
 
 def _given(
-    file: str | None, at: Sequence[str], layout: Sequence[object], names: tuple[str, str]
+    file: str | None,
+    at: Sequence[str],
+    layout: Sequence[Column],
+    names: tuple[str, str],
+    limits: tuple[Range, float, str],
 ) -> tuple[PointTable | None, tuple[str, ...], Floats, tuple[Note, ...]]:
     """Read points from one of the two sources."""
+    bounds, scale, unit = limits
     if (file is None) == (not at):
         message = "points are given twice, in a table and with --at" if at else "no points are given"
         raise InputError(Fault(message, "no-points", key="TABLE", expected=f"a table or --at {','.join(names)}"))
     if file is None:
         values = np.array([pair("--at", text) for text in at])
+        for each in values.ravel():
+            within("--at", each, Range(bounds.least / scale, bounds.most / scale, unit))
         return None, tuple(map(str, range(1, len(at) + 1))), values, ()
     findings = Findings()
-    read = read_points(file, layout, findings)  # type: ignore[arg-type]
+    read = read_points(file, layout, findings)
+    if read is None:
+        raise InputError(findings.faults)
+    refuse_outside(read.table, names, bounds, findings, scale=scale, unit=unit)
     findings.stop()
-    if read is None:  # cannot be: stop() told the reason
-        raise InputError(f"{file} cannot be read")
     return read, read.ids, read.columns(*names), tuple(findings.notes)
 
 
@@ -353,6 +338,11 @@ def read_sightings(file: str, options: SightingOptions) -> tuple[Sightings, tupl
     read = read_points(file, SIGHTINGS, findings)
     if read is None:
         raise InputError(findings.faults)
+    scale = MILLIMETRES[options.unit]
+    refuse_outside(read.table, ("x", "z"), COORDINATE, findings, scale=scale, unit=options.unit)
+    refuse_outside(read.table, ("sx", "sz"), IMAGE_SIGMA, findings, scale=scale, unit=options.unit)
+    refuse_outside(read.table, ("s_lambda", "s_beta"), DIRECTION_SIGMA, findings)
+    refuse_outside(read.table, ("lambda",), DEGREES, findings, unit=options.angles)
     directions = read.columns("lambda", "beta")
     for row in np.flatnonzero(np.isnan(directions).all(axis=1)):
         if not findings.number(file):
@@ -363,7 +353,6 @@ def read_sightings(file: str, options: SightingOptions) -> tuple[Sightings, tupl
         expected = "an elevation between -90 and 90 degrees, not a zenith distance"
         findings.add(read.table.fault(int(row), "beta", message, "range", expected=expected))
     findings.stop()
-    scale = MILLIMETRES[options.unit]
     image, angular = read.columns("sx", "sz") * scale, read.columns("s_lambda", "s_beta")
     usual = np.array([options.horizontal, options.vertical])
     sightings = Sightings(

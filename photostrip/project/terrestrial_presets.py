@@ -11,7 +11,8 @@ from photostrip.errors import Fault, InputError
 from photostrip.formats.findings import Findings, suggestion
 from photostrip.formats.numbers import shown
 from photostrip.project.document import parse, read_document
-from photostrip.project.schema import Id, Pair, Positive, Section, Words, key, wrong
+from photostrip.project.schema import Id, Number, Section, Words, key, wrong
+from photostrip.project.terrestrial_ranges import COORDINATE, FORMAT, PRINCIPAL_DISTANCE, bounded
 from photostrip.project.validation import checked
 from photostrip.terrestrial.directions import Phototheodolite
 
@@ -37,14 +38,19 @@ def one_of(*words: str) -> Callable[[str], str]:
     return check
 
 
+Distance = Annotated[Number, AfterValidator(bounded(PRINCIPAL_DISTANCE))]
+Place = tuple[
+    Annotated[Number, AfterValidator(bounded(COORDINATE))], Annotated[Number, AfterValidator(bounded(COORDINATE))]
+]
+Size = tuple[Annotated[Number, AfterValidator(bounded(FORMAT))], Annotated[Number, AfterValidator(bounded(FORMAT))]]
+
+
 class Preset(Section):
     """One camera of a list."""
 
-    principal_distance: Positive = key("Principal distance", unit="mm")
-    principal_point: Pair = key("Principal point x0, z0 in the system of the image coordinates", (0.0, 0.0), unit="mm")
-    format: tuple[Positive, Positive] | None = key(
-        "Width and height of the field in which points are measured", None, unit="mm"
-    )
+    principal_distance: Distance = key("Principal distance", unit="mm")
+    principal_point: Place = key("Principal point x0, z0 in the system of the image coordinates", (0.0, 0.0), unit="mm")
+    format: Size | None = key("Width and height of the field in which points are measured", None, unit="mm")
 
 
 class PresetFile(Section):

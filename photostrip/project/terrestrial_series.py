@@ -11,6 +11,8 @@ import numpy as np
 from photostrip.errors import Fault
 from photostrip.formats.findings import counted, listed, suggestion
 from photostrip.formats.terrestrial import (
+    COORDINATES,
+    PSEUDO_PARALLAXES,
     SIDES,
     EpochTable,
     read_coordinates,
@@ -18,6 +20,8 @@ from photostrip.formats.terrestrial import (
     reference_values,
 )
 from photostrip.notes import Note
+from photostrip.project.terrestrial_file import MILLIMETRES
+from photostrip.project.terrestrial_ranges import COORDINATE, IMAGE_SIGMA, refuse_outside
 from photostrip.terrestrial.monitoring import Series
 
 if TYPE_CHECKING:
@@ -28,7 +32,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
 
-MILLIMETRES = {"mm": 1.0, "um": 1e-3}
+LAYOUTS = {"coordinates": COORDINATES, "pseudo_parallaxes": PSEUDO_PARALLAXES}
 REFERENCE, SECOND = "first", "second"  # names of epochs that have none
 FEWEST_EPOCHS = 2
 
@@ -100,6 +104,11 @@ def read_series(file: str, table: Table, centre: Floats, wanted: Wanted, finding
     read = reader(file, findings)
     if read is None or findings.number(file):
         return None
+    scale = MILLIMETRES[table.unit]
+    coordinates = [each.name for each in LAYOUTS[table.kind] if each.number and not each.positive]
+    deviations = [each.name for each in LAYOUTS[table.kind] if each.number and each.positive]
+    refuse_outside(read.table, coordinates, COORDINATE, findings, scale=scale, unit=table.unit)
+    refuse_outside(read.table, deviations, IMAGE_SIGMA, findings, scale=scale, unit=table.unit)
     epochs = _epochs(read, table.kind, wanted, findings)
     stable = _stable(read, wanted.stable, findings)
     build = _from_coordinates if table.kind == "coordinates" else _from_pseudo_parallaxes

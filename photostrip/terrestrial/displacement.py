@@ -153,4 +153,5 @@ def ellipses(covariance: ArrayLike, probability: float) -> tuple[Floats, Floats,
     radius = np.hypot(half_difference, c[..., 0, 1])
     factor = chi2_quantile(probability, 2)
     azimuth = np.mod(np.arctan2(c[..., 0, 1], half_difference) / 2, np.pi)
-    return np.sqrt(factor * (half_sum + radius)), np.sqrt(factor * np.maximum(half_sum - radius, 0)), azimuth
+    major, minor = (np.sqrt(factor * np.maximum(half_sum + each, 0)) for each in (radius, -radius))
+    return major, minor, azimuth

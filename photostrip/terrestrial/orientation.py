@@ -38,6 +38,7 @@ SCREENINGS = ("deletion", "stated", "none")
 ITERATIONS = 50
 CONVERGED = 1e-11  # of the normalised unknowns: rad, and mm over the principal distance
 WEAKEST = 1e6  # condition number of the scaled equations from which a photo counts as not determined
+SINGULAR = 1e-100  # eigenvalue that stands for zero
 MINIMUM_POINTS = 2
 NEGLIGIBLE = 1e-18  # weighted sum of squares of error-free data: rounding, nothing to be screened
 
@@ -357,7 +358,7 @@ def _condition(normal: Floats, names: Sequence[str], sightings: Sightings) -> fl
         lost = [name for name, each in zip(names, length, strict=True) if not each]
         raise _undetermined(lost, sightings)
     values, vectors = np.linalg.eigh(normal / np.outer(length, length))
-    condition = float(np.sqrt(values[-1] / max(values[0], np.finfo(float).tiny)))
+    condition = float(np.sqrt(values[-1] / max(values[0], SINGULAR)))
     if condition > WEAKEST:
         share = np.abs(vectors[:, 0])
         raise _undetermined([n for n, each in zip(names, share, strict=True) if each > 0.3 * share.max()], sightings)

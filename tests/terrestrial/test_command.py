@@ -68,7 +68,7 @@ def test_from_photo_and_to_photo_are_inverse(tmp_path: Path, capsys: pytest.Capt
     assert (code, err) == (0, "")
     assert [row["point"] for row in rows(out)] == ["A", "B", "C"]
     back = [[float(row["x"]), float(row["z"])] for row in rows(out)]
-    np.testing.assert_allclose(back, [[80, 60], [-70.5, 12.25], [0, 0]], atol=1e-5)
+    np.testing.assert_allclose(np.array(back), np.array([[80.0, 60.0], [-70.5, 12.25], [0.0, 0.0]]), atol=1e-5)
 
 
 def test_from_photo_gives_the_numbers_of_the_source(capsys: pytest.CaptureFixture[str]) -> None:
@@ -436,14 +436,22 @@ def test_nothing_but_a_picture_loads_matplotlib(tmp_path: Path) -> None:
     [
         ("directions from-photo --at 1,2", "--camera: nothing says which camera it is; expected one of Photheo 19/1318, UMK 10/1318, or --principal-distance"),
         ("directions from-photo --camera UMK --at 1,2", "--camera: there is no camera `UMK`; expected one of Photheo 19/1318, UMK 10/1318; give --principal-distance"),
-        ("directions from-photo --camera Phoheo_19/1318 --at 1,2", "--camera: there is no camera `Phoheo 19/1318`; expected one of Photheo 19/1318, UMK 10/1318; did you mean `Photheo 19/1318`?"),
+        ("directions from-photo --camera Phoheo~19/1318 --at 1,2", "--camera: there is no camera `Phoheo 19/1318`; expected one of Photheo 19/1318, UMK 10/1318; did you mean `Photheo 19/1318`?"),
         ("directions from-photo --principal-distance 100", "TABLE: no points are given; expected a table or --at x,z"),
         ("directions from-photo points.csv --at 1,2 --principal-distance 100", "TABLE: points are given twice"),
-        ("directions from-photo --principal-distance -5 --at 1,2", "--principal-distance: -5 is out of range; expected a number larger than 0 (mm)"),
+        ("directions from-photo --principal-distance -5 --at 1,2", "--principal-distance: -5 is out of range; expected 1 to 100000 mm"),
+        ("directions from-photo --principal-distance 100 --at 1,20000", "--at: 20000 is out of range; expected -10000 to 10000 mm"),
+        ("directions from-photo --principal-distance 100 far.csv", "far.csv:2:5: z: 2e+09 is out of range; expected -10000 to 10000 mm"),
+        ("directions from-photo --principal-distance 100 far.csv --unit um", "far.csv:2:5: z: 2e+09 is out of range; expected -1e+07 to 1e+07 um"),
+        ("directions to-photo --principal-distance 100 --at 1001,2", "--at: 1001 is out of range; expected -1000 to 1000 deg"),
+        ("directions orient sigma.csv --principal-distance 100", "sigma.csv:2:11: sx: 50 is out of range; expected 1e-06 to 10 mm"),
+        ("displacement wide.csv --base 50 --principal-distance 100 --sigma 1", "wide.csv:2:7: p: 80000 is out of range; expected -10000 to 10000 mm"),
+        ("displacement survey.yaml --set measurements.sigma=50", "--set: measurements.sigma: 50 mm is out of range; expected 1e-06 to 10 mm: is the unit right?"),
+        ("displacement survey.yaml --set cameras.long.principal_distance=0.19", "--set: cameras.long.principal_distance: 0.19 is out of range; expected 1 to 100000 mm"),
         ("directions from-photo --principal-distance nan --at 1,2", "--principal-distance: nan is out of range"),
         ("directions from-photo --principal-distance 100 --at 1", "--at: `1` is not a pair; expected two numbers A,B"),
         ("directions from-photo --principal-distance 100 --at 1,x", "--at: `x` is not a number; expected two numbers A,B"),
-        ("directions from-photo --principal-distance 100 --at 1,2 --alpha inf", "--alpha: inf is no angle; expected a number (deg)"),
+        ("directions from-photo --principal-distance 100 --at 1,2 --alpha inf", "--alpha: inf is out of range; expected -1000 to 1000 deg"),
         ("directions from-photo --principal-distance 100 --at 1,2 --omega 90", "--omega: with 90 deg the camera looks straight up or down"),
         ("directions from-photo --principal-distance 100 --at 1,2 --principal-point 1", "--principal-point: `1` is not a pair"),
         ("directions from-photo --principal-distance 100 missing.csv", "missing.csv: does not exist"),
@@ -456,19 +464,19 @@ def test_nothing_but_a_picture_loads_matplotlib(tmp_path: Path) -> None:
         ("directions accuracy --principal-distance 100 --photo-format 0,3", "--photo-format: 0 is out of range"),
         ("directions accuracy --principal-distance 100 --photo-format 100,80 --step 0", "--step: 0 is out of range"),
         ("directions accuracy --principal-distance 100 --photo-format 100,80 --step 0.1", "--step: a step of 0.1 mm gives more than 20000 points; expected a larger step"),
-        ("directions accuracy --principal-distance 100 --photo-format 100,80 --sigma-um 0", "--sigma-um: 0 is out of range; expected a number larger than 0 (µm)"),
+        ("directions accuracy --principal-distance 100 --photo-format 100,80 --sigma-um 0", "--sigma-um: 0 is out of range; expected 0.001 to 10000 µm"),
         ("directions accuracy --principal-distance 100 --photo-format 100,80 --as-printed --omega 3", "--as-printed: the printed formulas hold for a level camera; leave out --omega and --kappa"),
         ("directions accuracy --principal-distance 100 --photo-format 100,80 --plot p.png", "p.png: --plot: pictures are written as SVG; expected a name that ends in .svg"),
-        ("directions theodolite --sigma-arcsec -1 --principal-distance 100", "--sigma-arcsec: -1 is out of range"),
+        ("directions theodolite --sigma-arcsec -1 --principal-distance 100", "--sigma-arcsec: -1 is out of range; expected 0.0001 to 36000 ″"),
         ("directions orient sights.csv --principal-distance 100 --free f", "--free: `f` cannot be determined; expected principal-distance, principal-point, or both with a comma between"),
-        ("directions orient sights.csv --principal-distance 100 --significance 1", "--significance: 1 is out of range; expected a number between 0 and 1"),
+        ("directions orient sights.csv --principal-distance 100 --significance 1", "--significance: 1 is out of range; expected 1e-06 to 0.5"),
         ("directions orient sights.csv --principal-distance 100", "sights.csv:3:7: lambda: neither direction to point B is given; expected lambda, beta or both"),
         ("directions orient zenith.csv --principal-distance 100", "zenith.csv:2:8: beta: 95 deg is not below the zenith; expected an elevation between -90 and 90 degrees, not a zenith distance"),
         ("displacement pseudo.csv --principal-distance 100", "--base: a table of the normal case needs its base; expected metres; or name a project file"),
         ("displacement pseudo.csv --base 50", "--camera: nothing says which camera it is"),
-        ("displacement pseudo.csv --base 0 --principal-distance 100", "--base: 0 is out of range; expected a number larger than 0 (m)"),
+        ("displacement pseudo.csv --base 0 --principal-distance 100", "--base: 0 is out of range; expected 0.001 to 1e+06 m"),
         ("displacement pseudo.csv --base 50 --principal-distance 100", "pseudo.csv:2: sigma: 1 row has no standard deviation (sigma), and none is given for all"),
-        ("displacement pseudo.csv --base 50 --principal-distance 100 --sigma 0", "--sigma: 0 is out of range; expected a number larger than 0 (mm)"),
+        ("displacement pseudo.csv --base 50 --principal-distance 100 --sigma 0", "--sigma: 0 is out of range; expected 1e-06 to 10 mm"),
         ("displacement pseudo.csv --base 50 --principal-distance 100 --sigma 1 --stable Z", "stable[0]: pseudo.csv has no point Z"),
         ("displacement pseudo.csv --base 50 --principal-distance 100 --set a=1", "--set: a table has no keys that could be set; use the options"),
         ("displacement survey.yaml --base 50", "--base: --base describes a table (.csv), and survey.yaml is a project; write it into the project, or override a key with --set"),
@@ -486,11 +494,14 @@ def test_wrong_usage_and_data_are_told_with_exit_2(
         "twice.csv": "point,x,z\nA,1,2\nA,3,2\n",
         "behind.csv": "point,lambda,beta\nA,10,2\nB,100,2\nC,0,90\n",
         "sights.csv": "point,x,z,lambda,beta\nA,1,2,3,4\nB,1,3,,\n",
+        "far.csv": "point,x,z\nA,1,2e9\n",
+        "sigma.csv": "point,x,z,lambda,beta,sx,sz\nA,1,2,3,4,50,1\n",
+        "wide.csv": "point,x,z,p,dx,dz,dx_right\n1,1,1,80000,0.1,0.1,0.1\n",
         "zenith.csv": "point,x,z,lambda,beta\nA,1,2,,95\n",
         "pseudo.csv": "point,x,z,p,dx,dz,dx_right\n1,30,-12,80,0.35,-0.2,0.1\n",
     }.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
-    code, out, err = call(capsys, *(part.replace("_", " ") for part in command.split()))
+    code, out, err = call(capsys, *(part.replace("~", " ") for part in command.split()))
     assert (code, out) == (2, "")
     lines = err.splitlines()
     assert all(line.startswith("error: ") for line in lines)
@@ -550,9 +561,13 @@ def test_nothing_is_written_when_something_is_wrong(tmp_path: Path, capsys: pyte
         ),
     ],
 )
-def test_every_command_has_help_with_an_example(command: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_command_has_help_with_an_example(
+    command: tuple[str, ...], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
     code, out, err = call(capsys, *command, "-h")
     assert (code, err) == (0, "")
+    assert max(map(len, out.splitlines())) <= 80
     assert f"Usage: photostrip terrestrial {' '.join(command)}" in out
     if command != ("directions",):
         assert f"photostrip terrestrial {' '.join(command)}" in out.partition("Example")[2]

@@ -241,7 +241,7 @@ def test_a_wrong_list_is_told_with_its_place(tmp_path: Path, text: str, expected
         ("coordinates: c", "pseudo_parallaxes: p.csv, coordinates: c", "survey.yaml:11:15: measurements: two tables are named; expected either `coordinates` or `pseudo_parallaxes`"),
         ("coordinates.csv", "coordinate.csv", "survey.yaml:11:29: measurements.coordinates: coordinate.csv does not exist; did you mean `coordinates.csv`?"),
         ("name: quarry", "presets: mine.yaml", "survey.yaml:2:10: presets: mine.yaml does not exist"),
-        ("stable:", "processing: {significance: 1.5}\nstable:", "survey.yaml:12:28: processing.significance: 1.5 is out of range; expected a number between 0 and 1"),
+        ("stable:", "processing: {significance: 1.5}\nstable:", "survey.yaml:12:28: processing.significance: 1.5 is out of range; expected 1e-06 to 0.5"),
         ("stable:", "processing: {moved_camera: sometimes}\nstable:", "survey.yaml:12:28: processing.moved_camera: `sometimes` is not known; expected one of always, auto, never"),
     ],
 )  # fmt: skip
