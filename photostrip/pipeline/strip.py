@@ -80,25 +80,19 @@ def adjust_strip(
 
     here, rows = _control_of(formed, control, observations)
     intermediate, orientation, precision = _to_ground(strip, formed, here, rows, frames, oriented, sigma)
-    spacing, breadth = _extent(formed, orientation)
     wrong: tuple[control_screening.ControlRejection, ...] = ()
     if settings.relative.screening != "none":
-        place = control_screening.Setting(formed.xyz[rows], frames, intermediate, precision, spacing, breadth)
+        extent = _extent(formed, orientation)
+        place = control_screening.Setting(formed.xyz[rows], frames, intermediate, precision, *extent)
         here, wrong = control_screening.screen(here, place)
     if wrong:
         intermediate, orientation, precision = _to_ground(strip, formed, here, rows, frames, oriented, sigma)
-        spacing, breadth = _extent(formed, orientation)
     xyz = orientation.similarity(formed.xyz)
     correction = None
     if settings.adjustment == "polynomial":
         targets = absolute.Targets(here, frames, intermediate)
-        problem = polynomial.Problem(
-            xyz[rows],
-            targets,
-            absolute.weights(targets.turned(xyz[rows]), precision),
-            spacing=spacing,
-            breadth=breadth,
-        )
+        weight = absolute.weights(targets.turned(xyz[rows]), precision)
+        problem = polynomial.Problem(xyz[rows], targets, weight, *_extent(formed, orientation))
         correction = polynomial.fit(problem, settings.polynomial)
     adjusted = xyz if correction is None else correction(xyz)
     resection, image_rows = _orient_photos(strip, observations, oriented, formed, adjusted, orientation)
