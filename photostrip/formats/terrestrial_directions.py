@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 SCHEMA = 1
-ANGLE, ARCSEC, MILLIMETRE, MICROMETRE, RATIO = 8, 5, 6, 4, 3  # decimals: finer than any report prints
+ANGLE, ARCSEC, MILLIMETRE, MICROMETRE, RATIO = 8, 5, 6, 4, 5  # decimals: finer than any report prints
 PER_RADIAN = {"deg": 180 / np.pi, "gon": 200 / np.pi}
 FULL_CIRCLE = 2 * np.pi
 ROUNDING = 1e-12  # rad

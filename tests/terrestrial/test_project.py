@@ -3,6 +3,7 @@
 # ruff: noqa: E501 (a message stands on one line, as the user reads it)
 from __future__ import annotations
 
+import zipfile
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +14,7 @@ from photostrip.project.terrestrial_loading import load_survey
 from photostrip.project.terrestrial_presets import own_presets, read_presets
 from photostrip.terrestrial.epochs import monitor
 from tests.terrestrial.files import CENTERS, TRUTH, coordinates, project, pseudo_parallaxes, write
+from tests.test_packaging import build
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -163,6 +165,12 @@ def test_the_cameras_of_the_source_are_there() -> None:
     known = own_presets()
     assert (known["Photheo 19/1318"].principal_distance, known["UMK 10/1318"].principal_distance) == (190.0, 100.0)
     assert known["UMK 10/1318"].format == (160.0, 120.0)
+
+
+@pytest.mark.slow
+def test_the_list_of_cameras_is_installed_with_the_program(tmp_path: Path) -> None:
+    with zipfile.ZipFile(build("wheel", tmp_path)) as wheel:
+        assert "photostrip/terrestrial/phototheodolites.yaml" in wheel.namelist()
 
 
 PRESETS = """\
