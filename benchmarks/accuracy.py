@@ -425,7 +425,7 @@ def case_b(pool: Pool, seeds: int) -> None:
         f"    {seeds} strips of each kind; rms in plan (of one coordinate) and height at points that are not control, m"
     )
     print(
-        "    for the bundle what another one reached stands under limit; on the right both columns divided by those of it\n"
+        "    the limit of the bundle is what another one reached; on the right both columns divided by their bundle\n"
     )
     rows, autos = [], []
     for layout in (USUAL, replace(SPARSE, title="5 rows and 1 more", more=1), SPARSE):

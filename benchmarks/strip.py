@@ -2,8 +2,9 @@
 
 Simulated film strips with about 30 points on a photo and three control points every five models. A whole process is
 timed from its start to its end, reading and writing included, by a small process of its own, so that nothing of this
-program counts for it. Parts are timed inside one process, as the command runs them. Of several repetitions the fastest
-counts. The numbers hold for the machine; ratios say more.
+program counts for it. Parts are timed inside one process, as the command runs them, in seconds of computing: other work
+on the machine does not count. Of several repetitions the fastest counts. The numbers hold for the machine; ratios say
+more.
 
 Usage: python benchmarks/strip.py [--photos N] [--sizes N ...] [--repeat N]
 """
@@ -143,11 +144,11 @@ class Stopwatch:
     @contextmanager
     def on(self, name: str) -> Iterator[None]:
         """Add the time of a block to a name."""
-        start = time.perf_counter()
+        start = time.process_time()
         try:
             yield
         finally:
-            self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
+            self.seconds[name] = self.seconds.get(name, 0.0) + time.process_time() - start
 
     @contextmanager
     def watching(self, watched: Sequence[tuple[str, Any, str]]) -> Iterator[None]:
@@ -229,9 +230,9 @@ def triangulation(project: Project, repeat: int) -> float:
     found = []
     for _ in range(repeat):
         with no_collector():
-            start = time.perf_counter()
+            start = time.process_time()
             triangulate(project.inputs, project.settings)
-            found.append(time.perf_counter() - start)
+            found.append(time.process_time() - start)
     return min(found)
 
 
@@ -258,18 +259,18 @@ def pairs_in_one_batch(pairs: int, repeat: int) -> tuple[float, float, float]:
         raise RuntimeError("a pair has too few points")
     whole, inner = [], []
     for _ in range(repeat):
-        start = time.perf_counter()
+        start = time.process_time()
         relative.orient(batch, point[kept], rows[kept], strip.photos)
-        whole.append(time.perf_counter() - start)
-        start = time.perf_counter()
+        whole.append(time.process_time() - start)
+        start = time.process_time()
         relative.iterate(relative.start_values(batch), batch)
-        inner.append(time.perf_counter() - start)
+        inner.append(time.process_time() - start)
     some = min(pairs, 50)
-    start = time.perf_counter()
+    start = time.process_time()
     for number in range(some):
         one, of = batch.take(np.array([number]))
         relative.orient(one, point[kept][of], rows[kept][of], strip.photos[number : number + 2])
-    alone = time.perf_counter() - start
+    alone = time.process_time() - start
     return 1e6 * min(whole) / pairs, 1e6 * min(inner) / pairs, 1e6 * alone / some
 
 
