@@ -30,12 +30,12 @@ def test_accuracy_prints_limits_and_what_was_measured() -> None:
 @pytest.mark.slow
 def test_strip_prints_seconds_memory_parts_and_growth() -> None:
     out = printed("strip.py", "--photos", "30", "--sizes", "10", "20", "--repeat", "1")
-    assert re.search(
-        r"^30 photos x \d\d points: photostrip run PROJECT -o DIR +\d+\.\d{3} s +target 1\.5 s", out, re.MULTILINE
-    )
+    for control in ("5 bands of control", "control every 5 models"):
+        title = rf"^30 photos x \d\d points, {control}: whole run"
+        assert re.search(title + r" +\d+\.\d{3} s +target 1\.5 s", out, re.MULTILINE)
     assert re.search(r"peak memory +\d+ MB +target 250 MB, ratio 0\.\d\d", out)
     assert re.search(r"30 pairs of 24 points in one batch +\d+ us", out)
     assert re.search(r"^exponent of triangulate from 10 to 20 photos +-?\d", out, re.MULTILINE)
-    shares = [float(value) for value in re.findall(r"^\w[\w ]+ +\d\.\d{4} +(\d+\.\d)%", out, re.MULTILINE)]
+    shares = [float(value) for value in re.findall(r"^\w[\w ,]+ +\d\.\d{4} +(\d+\.\d)%", out, re.MULTILINE)]
     assert shares[-1] == 100.0
     assert sum(shares[:-1]) == pytest.approx(100.0, abs=0.5)
