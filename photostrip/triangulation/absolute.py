@@ -375,7 +375,9 @@ def _seen(design: Floats, root: Floats) -> Floats:
 
 def _refuse_deficient(design: Floats, root: Floats, xyz: Floats, targets: Targets, half: float) -> None:
     """Raise when the control leaves a motion free, and name that motion."""
-    _, values, vt = np.linalg.svd(_seen(design, root), full_matrices=True)
+    seen = _seen(design, root)
+    # the triangular factor has the same singular values and directions, however many control points there are
+    _, values, vt = np.linalg.svd(np.linalg.qr(seen, mode="r") if len(seen) > PARAMETERS else seen)
     if len(values) == PARAMETERS and values[-1] > RANK_LIMIT * values[0]:
         return
     points = targets.control.ids

@@ -309,17 +309,24 @@ def choose_terms(xyz: Floats, degree: int, problem: Problem, *, forced: bool = F
     Six points are necessary for six terms, not sufficient: [001] after eq. 151 says six, a cubic needs four stations.
     """
     stations = count_stations(xyz[:, 0], problem.spacing)
-    points = len(xyz) if forced else len(xyz) - 1
-    terms: list[str] = []
-    for candidate, power, needed, exact in LADDER:
-        if power <= degree and stations >= needed and points >= exact:
-            terms = list(candidate)
-            break
+    terms = _ladder(stations, len(xyz) if forced else len(xyz) - 1, degree)
     for drop in DROP_ORDER:
         if not terms or _condition(xyz, terms, problem) < 1 / RANK_LIMIT:
             break
-        terms = [t for t in terms if t != drop]
-    return tuple(terms)
+        terms = _dropped(terms, drop)
+    return terms
+
+
+def _ladder(stations: int, points: int, degree: int) -> tuple[str, ...]:
+    """Most terms that so many stations and points carry, up to a degree."""
+    for candidate, power, needed, exact in LADDER:
+        if power <= degree and stations >= needed and points >= exact:
+            return candidate
+    return ()
+
+
+def _dropped(terms: tuple[str, ...], drop: str) -> tuple[str, ...]:
+    return tuple(term for term in terms if term != drop)
 
 
 def _scales(terms: Sequence[str], problem: Problem) -> Floats:
@@ -525,15 +532,44 @@ def _left_out_errors(
     counted = np.flatnonzero(_counted(problem, axes[0]))
     group = bands(problem.xyz[counted, 0], problem.spacing)
     inner = [counted[group == band] for band in range(1, int(group.max(initial=0)))]
-    if inner and all(_carried(problem, np.setdiff1d(counted, rows), candidates[-1]) for rows in inner):
+    if inner and _carried_without(problem, counted, inner, candidates[-1]):
         return [_left_out(problem, all_axes, axes, inner) for all_axes in fits], "band"
     single = [np.array([row]) for row in counted]
     return [_left_out(problem, all_axes, axes, single) for all_axes in fits], "point"
 
 
-def _carried(problem: Problem, rows: Numbers, terms: tuple[str, ...]) -> bool:
-    """Whether some of the control still carries all terms."""
-    return choose_terms(problem.xyz[rows], _degree_of(terms), problem, forced=True) == terms
+def _carried_without(problem: Problem, counted: Numbers, inner: Sequence[Numbers], terms: tuple[str, ...]) -> bool:
+    """Whether the control carries all terms without any one of its inner bands.
+
+    The same choice as :func:`choose_terms` makes for what is left. A band that goes takes one station with it: the next
+    band begins at the same point as before. The squares of singular values are those of the whole design less
+    the band's share, so that nothing is fitted again.
+    """
+    stations = count_stations(problem.xyz[counted, 0], problem.spacing) - 1
+    degree = _degree_of(terms)
+    sizes = np.array([len(rows) for rows in inner])
+    for size in np.unique(sizes).tolist():
+        chosen = _ladder(stations, len(counted) - size, degree)
+        left = np.array([rows for rows in inner if len(rows) == size])
+        for drop in DROP_ORDER:
+            if not chosen or not len(left):
+                break
+            good = _conditions_without(problem, counted, left, chosen) < 1 / RANK_LIMIT
+            if good.any() and chosen != terms:
+                return False
+            left, chosen = left[~good], _dropped(chosen, drop)
+        if len(left) and chosen != terms:
+            return False
+    return True
+
+
+def _conditions_without(problem: Problem, counted: Numbers, groups: Numbers, terms: tuple[str, ...]) -> Floats:
+    """Condition numbers of the scaled design without each of several groups of points of equal size."""
+    scaled = _columns(problem.xyz, terms) / _scales(terms, problem)
+    parts = scaled[groups]
+    squares = np.linalg.eigvalsh(scaled[counted].T @ scaled[counted] - parts.transpose(0, 2, 1) @ parts)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(squares[:, 0] > 0, np.sqrt(squares[:, -1] / squares[:, 0]), np.inf)
 
 
 def _left_out(problem: Problem, fits: Sequence[AxisFit], axes: tuple[int, ...], groups: Sequence[Numbers]) -> float:
@@ -547,11 +583,15 @@ def _left_out(problem: Problem, fits: Sequence[AxisFit], axes: tuple[int, ...], 
     for axis in axes:
         fit_, total = fits[axis], int(_counted(problem, axis).sum())
         root = np.sqrt(np.where(_counted(problem, axis), problem.by_axis[:, axis], 1.0))
-        for rows in groups:
-            hat = fit_.basis[rows] @ fit_.basis[rows].T if fit_.terms else np.eye(len(rows)) * min(share / total, 0.9)
-            rest = np.eye(len(rows)) - hat
-            if np.linalg.eigvalsh(rest)[0] < SMALLEST_REST:
-                errors.append(np.full(len(rows), np.inf))  # the group alone determines part of the fit
-            else:
-                errors.append(np.linalg.solve(rest, fit_.residuals[rows] * root[rows]) / root[rows])
+        for size in np.unique([len(rows) for rows in groups]).tolist():
+            rows = np.array([each for each in groups if len(each) == size])
+            parts = fit_.basis[rows]
+            hat = parts @ parts.transpose(0, 2, 1) if fit_.terms else np.eye(size) * min(share / total, 0.9)
+            rest = np.broadcast_to(np.eye(size) - hat, (len(rows), size, size))
+            free = np.linalg.eigvalsh(rest)[:, 0] >= SMALLEST_REST
+            # a group that alone determines part of the fit cannot be predicted by the others
+            errors.append(np.full(int((~free).sum()) * size, np.inf))
+            if free.any():
+                residuals = (fit_.residuals[rows] * root[rows])[free]
+                errors.append((np.linalg.solve(rest[free], residuals[:, :, None])[:, :, 0] / root[rows][free]).ravel())
     return _rms(np.concatenate(errors))

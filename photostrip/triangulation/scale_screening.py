@@ -81,12 +81,12 @@ def spreads(
     single = np.sqrt(coordinate * factor) / orientation.pairs.focal
     variance = np.zeros(len(joint))
     if len(joint):
-        for side, model, place in ((1, joint, before), (0, joint + 1, after)):
-            slope = _slopes(orientation, side)[place]
+        cofactors, (from_left, from_right) = _cofactors(orientation), _slopes(orientation)
+        for slope, model in ((from_right[before], joint), (from_left[after], joint + 1)):
             count = np.bincount(joint, minlength=joint.max() + 1)
             mean = np.column_stack([np.bincount(joint, slope[:, k]) for k in range(5)]) / np.maximum(count, 1)[:, None]
-            slope = slope - mean[joint]
-            variance += np.einsum("ti,tij,tj->t", slope, _cofactors(orientation)[model], slope) * scatter[model] ** 2
+            own = slope - mean[joint]
+            variance += np.einsum("ti,tij,tj->t", own, cofactors[model], own) * scatter[model] ** 2
     return single, np.sqrt(np.maximum(variance, 0.0))
 
 
@@ -97,15 +97,16 @@ def _scatter(orientation: Orientation) -> Floats:
     return np.full(orientation.pairs.size, max(value, SMALLEST_SIGMA))
 
 
-def _slopes(orientation: Orientation, side: int) -> Floats:
-    """Differentiate the logarithms of distances by the five elements, shape (m, 5)."""
+def _slopes(orientation: Orientation) -> tuple[Floats, Floats]:
+    """Differentiate the logarithms of the distances from both centres by the five elements, shapes (m, 5)."""
     columns = []
     for number in range(5):
         step = np.zeros(5)
         step[number] = DIFFERENCE
-        up, down = (_distances(orientation, orientation.elements + sign * step)[side] for sign in (1, -1))
-        columns.append((up - down) / (2 * DIFFERENCE))
-    return np.nan_to_num(np.column_stack(columns))
+        up, down = (_distances(orientation, orientation.elements + sign * step) for sign in (1, -1))
+        columns.append([(above - below) / (2 * DIFFERENCE) for above, below in zip(up, down, strict=True)])
+    left, right = (np.nan_to_num(np.column_stack(side)) for side in zip(*columns, strict=True))
+    return left, right
 
 
 def _cofactors(orientation: Orientation) -> Floats:

@@ -355,6 +355,25 @@ def test_points_left_out_in_closed_form_are_refitted(seed: int) -> None:
             assert evidence.left_out == pytest.approx(left_out_by_refitting(one, terms, axes, single), rel=1e-6)
 
 
+@given(SEEDS, st.integers(4, 9), st.integers(1, 3))
+@examples(max_examples=40)
+def test_bands_are_left_out_when_the_ladder_says_so_of_what_is_left(seed: int, stations: int, per_band: int) -> None:
+    """By choosing the terms anew for the control without each inner band, which takes a time quadratic in the bands."""
+    rng = np.random.default_rng(seed)
+    spread = rng.uniform(0.01, 1.0)  # narrow control carries fewer terms
+    rows = np.linspace(-1400.0, 1400.0, per_band) * spread
+    xyz = layout(rng.permutation(np.linspace(-9000, 9000, stations)) * rng.uniform(0.05, 1.0, stations), rows.tolist())
+    one = problem(xyz, xyz + rng.normal(0, 0.1, xyz.shape))
+    found = fit(one, Settings("auto"))
+    group = bands(xyz[:, 0], one.spacing)
+    for kind, _ in polynomial.GROUPS:
+        richest = steps(found, kind)[-1]
+        terms = choose_terms(xyz, 3, one)
+        rest = [xyz[group != band] for band in range(1, group.max())]
+        carried = [choose_terms(left, richest.degree, one, forced=True) == terms for left in rest]
+        assert richest.left_out_by == ("band" if rest and all(carried) else "point")
+
+
 def test_the_similarity_left_out_is_nearly_that_refitted() -> None:
     """Its leverage is taken as the same for all points; refitting it without each point agrees within a tenth."""
     xyz, ratios = layout(SEVEN), []
