@@ -184,6 +184,39 @@ def from_angles(values: ArrayLike, system: str) -> NDArray[np.float64]:
     return from_alpha_omega_kappa(-first if system == "phi-omega-kappa" else first, second, kappa)
 
 
+def angle_rates(values: ArrayLike, system: str) -> NDArray[np.float64]:
+    """Small rotations that small changes of the angles make.
+
+    Parameters
+    ----------
+    values : array_like, shape (..., 3)
+        Angles in radians, in the order of the system's name.
+    system : str
+        One of :data:`SYSTEMS`.
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+        D with ``theta = D d(angles)``, where ``exp([theta]) R`` is the rotation of the changed angles; theta refers to
+        the axes of the object. Singular where the middle angle is 90 degrees.
+    """
+    first, second, _ = np.moveaxis(np.asarray(values, float), -1, 0)
+    if system == "omega-phi-kappa":
+        turns, axes, sign = (rotation_x(first), rotation_y(second)), (0, 1, 2), 1.0
+    elif system in SYSTEMS:
+        sign = 1.0 if system == "phi-omega-kappa" else -1.0  # alpha turns the other way about Y
+        turns, axes = (rotation_y(sign * first), rotation_x(second)), (1, 0, 2)
+    else:
+        msg = f"unknown system of angles {system!r}"
+        raise ValueError(msg)
+    columns = [
+        np.broadcast_to(sign * np.eye(3)[axes[0]], turns[0].shape[:-1]),
+        turns[0][..., :, axes[1]],
+        (turns[0] @ turns[1])[..., :, axes[2]],
+    ]
+    return np.stack(columns, axis=-1)
+
+
 def from_vector(vector: ArrayLike) -> NDArray[np.float64]:
     """Rotation about a vector by its length (Rodrigues' formula).
 

@@ -1,7 +1,7 @@
 """The method from measured coordinates to the result: no disk, no YAML, no printing."""
 
 from photostrip.pipeline.inputs import ADJUSTMENTS, Inputs, Settings, Strip
-from photostrip.pipeline.results import CHECK, CONTROL, NEW, Adjusted, Result, StripResult, Ties
+from photostrip.pipeline.results import CHECK, CONTROL, NEW, Adjusted, Precision, Result, StripResult, Ties
 from photostrip.pipeline.triangulate import triangulate
 
 __all__ = [
@@ -11,6 +11,7 @@ __all__ = [
     "NEW",
     "Adjusted",
     "Inputs",
+    "Precision",
     "Result",
     "Settings",
     "Strip",

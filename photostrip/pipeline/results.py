@@ -147,6 +147,33 @@ class Ties:
 
 
 @dataclass(frozen=True, eq=False)
+class Precision:
+    """How precise points and photos are: covariances carried from the image coordinates and the control.
+
+    Every way of adjusting fills the same columns. All covariances refer to the axes of the project's Cartesian frame,
+    as ``Adjusted.cartesian`` does; they are turned into the axes of the output where they are written.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, 3, 3)
+        Covariances of the points of ``Adjusted.number``, metres^2; NaN where one is not known.
+    photos : tuple of ndarray, shape (m, 6, 6)
+        One array for each strip, photos in flight order: perspective centre in metres, then the small rotation in
+        radians that turns the photo about the axes of the frame, ``R_true = exp([theta]) R``; NaN where not known.
+    sigma : tuple of float
+        Standard deviation of an image coordinate of weight one behind the covariances, mm, for each strip.
+    basis : tuple of str
+        For each strip: ``"a-priori"`` when that is the stated one, ``"a-posteriori"`` when it was found by the
+        adjustment.
+    """
+
+    points: Floats
+    photos: tuple[Floats, ...]
+    sigma: tuple[float, ...]
+    basis: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class Result:
     """What a run found, stage by stage; everything written and printed is rendered from it.
 
@@ -177,6 +204,8 @@ class Result:
         Points without coordinates and why.
     notes : tuple of Note
         What the surveyor should know.
+    precision : Precision or None
+        How precise points and photos are; None when it was not computed.
     """
 
     inputs: Inputs
@@ -192,6 +221,7 @@ class Result:
     ties: Ties
     not_determined: dict[str, str]
     notes: tuple[Note, ...]
+    precision: Precision | None = None
 
     @property
     def roles(self) -> tuple[str, ...]:

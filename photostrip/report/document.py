@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from photostrip.errors import Fault, InputError
-from photostrip.report import decision_sections, ground_sections, strip_sections
+from photostrip.report import decision_sections, ground_sections, precision_sections, strip_sections
 from photostrip.report.figures import counted, fixed, metres, micrometres, short, unit
 from photostrip.report.parts import Column, Facts, Part, Section, Table, Words
 
@@ -51,6 +51,7 @@ def sections_of(document: Document, *, everything: bool = False) -> tuple[Sectio
         strip_sections.absolute_section(document),
         *([strip_sections.polynomial_section(document, everything=everything)] if document.get("polynomials") else []),
         decision_sections.weights_section(document, everything=everything),
+        *([precision_sections.precision_section(document, everything=everything)] if "precision" in document else []),
         ground_sections.control_section(document, everything=everything),
         ground_sections.check_section(document, everything=everything),
         *([ground_sections.ties_section(document, everything=everything)] if several else []),

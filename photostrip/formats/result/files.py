@@ -18,7 +18,9 @@ LARGEST_RESULT = 1000 * MEGABYTE
 SCHEMA = 1
 LINE = 160  # characters up to which a dictionary stands on one line
 NEEDS_QUOTES = re.compile(r'[",\r\n]|^\s|\s$')
-GEOGRAPHIC_DECIMALS, GROUND_DECIMALS = 10, 4
+GEOGRAPHIC_DECIMALS, GROUND_DECIMALS, COVARIANCE_DECIMALS = 10, 4, 8
+COVARIANCES = ("cov_xy", "cov_xz", "cov_yz")
+ELLIPSE = "ellipse_a,ellipse_b,ellipse_azimuth_deg"
 
 _encode = json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode
 _encode_ascii = json.JSONEncoder(ensure_ascii=True, allow_nan=False).encode
@@ -148,13 +150,16 @@ def _coordinates(document: Document) -> Callable[[Document], str]:
 def points_csv(document: Document) -> str:
     """Give points.csv: all points with their coordinates."""
     place, metre, micrometre = _coordinates(document), _number(GROUND_DECIMALS), _number(2)
-    header = "point,role,x,y,z,sigma_x,sigma_y,sigma_z,rays,models,image_rms_um"
+    header = f"point,role,x,y,z,sigma_x,sigma_y,sigma_z,rays,models,image_rms_um,{','.join(COVARIANCES)},{ELLIPSE}"
+    square, degree = _number(COVARIANCE_DECIMALS), _number(1)
     return _table(
         header,
         (
             f"{_cell(row['id'])},{row['role']},{place(row)},"
             f"{metre(row['sigma_x'])},{metre(row['sigma_y'])},{metre(row['sigma_z'])},"
-            f"{row['rays']},{row['models']},{micrometre(row['image_rms_um'])}\n"
+            f"{row['rays']},{row['models']},{micrometre(row['image_rms_um'])},"
+            f"{','.join(square(row.get(key)) for key in COVARIANCES)},"
+            f"{metre(row.get('ellipse_a'))},{metre(row.get('ellipse_b'))},{degree(row.get('ellipse_azimuth_deg'))}\n"
             for row in document["points"]
         ),
     )
@@ -168,15 +173,26 @@ def photos_csv(document: Document) -> str:
     names = [f"{name}_{angles['unit']}" for name in angles["system"].split("-")]
     angle = _number(9 if angles["unit"] == "rad" else 6)
     matrix = ",".join(f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3))
+    metre = _number(GROUND_DECIMALS)
+    sigmas = ",".join(f"sigma_{name}" for name in ("x", "y", "z", *names))
     return _table(
-        f"photo,strip,x,y,z,{','.join(names)},{matrix},image_rms_um,points",
+        f"photo,strip,x,y,z,{','.join(names)},{matrix},image_rms_um,points,{sigmas}",
         (
             f"{_cell(row['id'])},{_cell(row['strip'])},{place(row)},"
             f"{','.join(map(angle, row['angles']['values'] or (None,) * 3))},"
-            f"{','.join(map(cosine, row['rotation']))},{micrometre(row['image_rms_um'])},{row['points']}\n"
+            f"{','.join(map(cosine, row['rotation']))},{micrometre(row['image_rms_um'])},{row['points']},"
+            f"{_photo_sigmas(row['sigma'], metre, angle)}\n"
             for row in photos
         ),
     )
+
+
+def _photo_sigmas(
+    sigma: Document | None, metre: Callable[[float | None], str], angle: Callable[[float | None], str]
+) -> str:
+    if sigma is None:
+        return ",,,,,"
+    return ",".join([*(metre(sigma[axis]) for axis in "xyz"), *map(angle, sigma["angles"])])
 
 
 def residuals_csv(document: Document) -> str:

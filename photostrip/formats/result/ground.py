@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.formats.result.numbers import GEOGRAPHIC, GROUND, Document, Plain, natural_rank, rounded
+from photostrip.formats.result.precision import point_columns
 from photostrip.geodesy.frame_spec import GROUND_AXES
 
 if TYPE_CHECKING:
@@ -119,14 +120,15 @@ def points_of(result: Result, image_rms: Floats, rank: Numbers) -> list[Document
         points.rays.tolist(),
         models[points.number].tolist(),
         rounded(image_rms[points.number] * 1000, 2),
+        point_columns(result),
         strict=True,
     )
     rows = [
         {
-            "id": name, "role": role, "x": x, "y": y, "z": z, "sigma_x": None, "sigma_y": None, "sigma_z": None,
+            "id": name, "role": role, "x": x, "y": y, "z": z, **sigmas,
             "rays": rays, "models": count, "image_rms_um": image,
         }
-        for name, role, (x, y, z), rays, count, image in columns
+        for name, role, (x, y, z), rays, count, image, sigmas in columns
     ]  # fmt: skip
     return [rows[row] for row in np.argsort(rank[points.number])]
 

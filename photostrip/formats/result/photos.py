@@ -18,6 +18,7 @@ from photostrip.formats.result.numbers import (
     micrometres,
     rounded,
 )
+from photostrip.formats.result.precision import photo_columns
 from photostrip.geometry.rotation import angles
 from photostrip.triangulation.exterior import project
 
@@ -87,11 +88,13 @@ class ImageResiduals:
 def photos_of(result: Result, residuals: list[ImageResiduals]) -> list[Document]:
     """Give the list ``photos``: exterior orientations in the frame of the result, in flight order."""
     return [
-        photo for strip, image in zip(result.strips, residuals, strict=True) for photo in _photos(result, strip, image)
+        photo
+        for number, (strip, image) in enumerate(zip(result.strips, residuals, strict=True))
+        for photo in _photos(result, number, strip, image)
     ]
 
 
-def _photos(result: Result, strip: StripResult, image: ImageResiduals) -> list[Document]:
+def _photos(result: Result, number: int, strip: StripResult, image: ImageResiduals) -> list[Document]:
     photos, resection = strip.strip.photos, strip.resection
     cartesian = strip.intermediate.cartesian_from_intermediate(resection.centers)
     ground = result.output.ground_from_cartesian(cartesian, ids=[f"at the center of photo {p}" for p in photos])
@@ -106,15 +109,16 @@ def _photos(result: Result, strip: StripResult, image: ImageResiduals) -> list[D
         micrometres(resection.rms),
         np.bincount(image.photo[image.used], minlength=len(photos)).tolist(),
         resection.solved.tolist(),
+        photo_columns(result, number, cartesian, rotations),
         strict=True,
     )
     return [
         {
             "id": photo, "strip": strip.strip.id, "x": x, "y": y, "z": z, "rotation": rotation,
-            "angles": {"system": system, "unit": unit, "values": values}, "sigma": None,
+            "angles": {"system": system, "unit": unit, "values": values}, **sigmas,
             "image_rms_um": rms, "points": points, "resected": solved,
         }
-        for photo, (x, y, z), rotation, values, rms, points, solved in rows
+        for photo, (x, y, z), rotation, values, rms, points, solved, sigmas in rows
     ]  # fmt: skip
 
 
