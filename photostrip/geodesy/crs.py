@@ -443,7 +443,11 @@ def _grids_missing(source: CRS, target: CRS) -> str:
 
 
 def tie_frames(
-    specs: Sequence[FrameSpec], output: FrameSpec | None = None, *, directory: Path | None = None
+    specs: Sequence[FrameSpec],
+    output: FrameSpec | None = None,
+    *,
+    directory: Path | None = None,
+    keys: Sequence[str] = (),
 ) -> tuple[list[GroundFrame], GroundFrame]:
     """Tie the frames of all control lists and of the output to one Cartesian frame.
 
@@ -455,6 +459,8 @@ def tie_frames(
         Frame of the results; None: that of the first control list.
     directory : Path, optional
         Where grid files named in PROJ strings are looked for first: the project file's directory.
+    keys : sequence of str, optional
+        Key of each frame in the project file; without it they are those of the control lists.
 
     Returns
     -------
@@ -468,7 +474,7 @@ def tie_frames(
         With every fault of every frame: unknown or unsuitable CRS, contradictory heights, missing geoid grid, no
         sound operation between two datums, local and geodetic frames in one project.
     """
-    wanted = [(f"control[{i}]", spec) for i, spec in enumerate(specs)]
+    wanted = list(zip(keys or [f"control[{i}]" for i in range(len(specs))], specs, strict=True))
     if output is not None:
         wanted.append(("output", output))
     if not wanted:

@@ -6,13 +6,20 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from photostrip.triangulation import absolute, formation, interior, polynomial, refinement, relative
+from photostrip.triangulation.bundle import settings as bundle
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from photostrip.camera import Camera
     from photostrip.geodesy.frame_spec import FrameSpec
     from photostrip.points import ControlPoints, PhotoPoints
 
-ADJUSTMENTS = ("similarity", "polynomial")
+    Floats = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
+
+ADJUSTMENTS = ("similarity", "polynomial", "bundle")
 
 
 @dataclass(frozen=True)
@@ -26,12 +33,83 @@ class Strip:
     camera : Camera
         The camera of all its photos.
     photos : tuple of str
-        Photos in flight order.
+        Photos in flight order; a single one only in a bundle adjustment.
+    calibrate : tuple of str
+        Parameters of its camera that a bundle adjustment estimates, of ``bundle.settings.CALIBRATION``.
     """
 
     id: str
     camera: Camera
     photos: tuple[str, ...]
+    calibrate: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class CameraPositions:
+    """Measured positions of cameras (GNSS).
+
+    Parameters
+    ----------
+    photos : tuple of str
+        Photos, unique.
+    frame : FrameSpec
+        Ground frame of the positions.
+    enu : ndarray, shape (n, 3)
+        Coordinates in the units of the frame, internal order; NaN where one is not given.
+    use : ndarray of bool, shape (n, 3)
+        Which coordinates count.
+    sigma : ndarray, shape (n, 3)
+        Standard deviations in metres.
+    time : ndarray, shape (n,)
+        Time of exposure; NaN without one.
+    lever_arm : tuple of float
+        Antenna from the perspective centre along the image axes (x right, y up, z towards the viewer), metres.
+    correction : str
+        What the positions of one strip share beside the truth: ``"none"``, ``"offset"`` or ``"drift"``.
+    """
+
+    photos: tuple[str, ...]
+    frame: FrameSpec
+    enu: Floats
+    use: Flags
+    sigma: Floats
+    time: Floats
+    lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    correction: str = "none"
+
+
+@dataclass(frozen=True, eq=False)
+class GivenOrientations:
+    """Given exterior orientations.
+
+    Parameters
+    ----------
+    photos : tuple of str
+        Photos, unique.
+    frame : FrameSpec
+        Ground frame of the centres; the rotations refer to its axes at each centre.
+    enu : ndarray, shape (n, 3)
+        Perspective centres in the units of the frame, internal order.
+    angles : ndarray, shape (n, 3)
+        Angles of ``system``, radians.
+    system : str
+        One of ``geometry.rotation.SYSTEMS``.
+    sigma : ndarray, shape (n, 3)
+        Standard deviations of the centres, metres.
+    sigma_angles : ndarray, shape (n, 3)
+        Standard deviations of the angles, radians.
+    observed : bool
+        Whether they are observations; otherwise a start without influence, and the standard deviations are NaN.
+    """
+
+    photos: tuple[str, ...]
+    frame: FrameSpec
+    enu: Floats
+    angles: Floats
+    system: str
+    sigma: Floats
+    sigma_angles: Floats
+    observed: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +133,10 @@ class Inputs:
         Ground frame of the result; None: that of the first control list.
     fiducials : PhotoPoints or None
         Measured fiducial marks (``point_ids`` are the marks), in mm, y up.
+    positions : CameraPositions or None
+        Measured positions of the cameras.
+    orientations : GivenOrientations or None
+        Given exterior orientations.
     """
 
     name: str
@@ -64,6 +146,8 @@ class Inputs:
     frames: tuple[FrameSpec, ...]
     output: FrameSpec | None = None
     fiducials: PhotoPoints | None = None
+    positions: CameraPositions | None = None
+    orientations: GivenOrientations | None = None
 
 
 @dataclass(frozen=True)
@@ -73,8 +157,8 @@ class Settings:
     Parameters
     ----------
     adjustment : str
-        ``"similarity"`` or ``"polynomial"``.
-    relative, formation, absolute, polynomial, interior, refinement
+        One of :data:`ADJUSTMENTS`.
+    relative, formation, absolute, polynomial, bundle, interior, refinement
         Settings of the operations.
     angle_system, angle_unit : str
         System (``geometry.rotation.SYSTEMS``) and unit (``"deg"``, ``"gon"``, ``"rad"``) of exported angles.
@@ -87,6 +171,7 @@ class Settings:
     formation: formation.Settings = field(default_factory=formation.Settings)
     absolute: absolute.Settings = field(default_factory=absolute.Settings)
     polynomial: polynomial.Settings = field(default_factory=polynomial.Settings)
+    bundle: bundle.Settings = field(default_factory=bundle.Settings)
     interior: interior.Settings = field(default_factory=interior.Settings)
     refinement: refinement.Settings = field(default_factory=refinement.Settings)
     angle_system: str = "alpha-omega-kappa"

@@ -88,7 +88,7 @@ def triangulate(inputs: Inputs, settings: Settings, *, directory: Path | None = 
 
 def _require(settings: Settings) -> None:
     """Refuse what does not exist, by name."""
-    if settings.adjustment not in ADJUSTMENTS:
+    if settings.adjustment not in ADJUSTMENTS or settings.adjustment == "bundle":
         fault = Fault(
             f"adjustment {settings.adjustment!r} is not available",
             code="not-available",

@@ -13,6 +13,7 @@ import numpy as np
 from photostrip import camera
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec
 from photostrip.pipeline import Settings, Strip
+from photostrip.pipeline.inputs import CameraPositions, GivenOrientations
 from photostrip.points import ControlPoints, PhotoPoints
 
 if TYPE_CHECKING:
@@ -21,12 +22,14 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.formats.control import ControlTable
+    from photostrip.formats.exterior import OrientationTable, PositionTable
     from photostrip.formats.observations import Measurements
     from photostrip.project import schema
 
     Floats = NDArray[np.float64]
 
 MICROMETRES = 1000.0  # in a millimetre
+RADIANS = {"deg": np.pi / 180, "gon": np.pi / 200, "rad": 1.0}  # in a unit of angles
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +103,17 @@ def strips(project: schema.ProjectFile, known: Mapping[str, camera.Camera]) -> t
     tuple of Strip
         In the project's order.
     """
-    return tuple(Strip(str(each.id), known[each.camera], tuple(map(str, each.photos))) for each in project.strips)
+    usual = project.processing.bundle.self_calibration
+    own = {name: each.self_calibration for name, each in project.cameras.items()}
+    return tuple(
+        Strip(
+            str(each.id),
+            known[each.camera],
+            tuple(map(str, each.photos)),
+            tuple(dict.fromkeys(usual if (wanted := own[each.camera]) is None else wanted)),
+        )
+        for each in project.strips
+    )
 
 
 def photo_points(read: Measurements, system: ImageSystem, photos: Mapping[str, camera.Camera]) -> PhotoPoints:
@@ -174,12 +187,12 @@ def _renumbered(ids: Sequence[str], codes: NDArray[np.intp]) -> tuple[tuple[str,
 # --------------------------------------------------------------------------------------------------- the ground
 
 
-def frame_spec(control: schema.Control) -> FrameSpec:
-    """Give the frame of a control list.
+def frame_spec(control: schema.Control | schema.CameraPositions | schema.Orientations) -> FrameSpec:
+    """Give the frame of a list of ground coordinates.
 
     Parameters
     ----------
-    control : Control
+    control : Control, CameraPositions or Orientations
         The list as the project describes it.
 
     Returns
@@ -198,6 +211,25 @@ def frame_spec(control: schema.Control) -> FrameSpec:
 
 def _semi_axes(given: schema.Ellipsoid | None) -> tuple[float, float] | None:
     return None if given is None else (given.a, given.b)
+
+
+def first_frame(project: schema.ProjectFile) -> FrameSpec:
+    """Give the frame that stands in where the output says nothing.
+
+    Parameters
+    ----------
+    project : ProjectFile
+        The project.
+
+    Returns
+    -------
+    FrameSpec
+        That of the first control list, of the camera positions or of the orientations; ``local`` when nothing is given.
+    """
+    for given in (*project.control, project.camera_positions, project.orientations):
+        if given is not None:
+            return frame_spec(given)
+    return FrameSpec("local", GROUND_AXES)
 
 
 def output_spec(output: schema.Output, first: FrameSpec) -> FrameSpec | None:
@@ -256,6 +288,9 @@ def control_points(tables: Sequence[ControlTable], lists: Sequence[schema.Contro
         xyz, use = read.xyz[rows][:, columns], read.use[rows][:, columns]
         parts.append((xyz, use, read.check[rows], sigma[:, columns], np.full(len(rows), number, np.intp)))
         ids += [read.ids[row] for row in rows]
+    if not parts:
+        nothing = np.zeros((0, 3))
+        return ControlPoints((), nothing, nothing.astype(bool), np.zeros(0, bool), nothing, np.zeros(0, np.intp))
     enu, use, check, sigma, frame = (np.concatenate(each) for each in zip(*parts, strict=True))
     return ControlPoints(tuple(ids), enu, use, check, sigma, frame)
 
@@ -264,6 +299,81 @@ def _columns(spec: FrameSpec) -> list[int]:
     """Which of the columns x, y, z is east, which north, which up (or X, Y, Z)."""
     names = CARTESIAN_AXES if "x" in spec.axes else GROUND_AXES
     return [spec.axes.index(name) for name in names]
+
+
+def camera_positions(
+    read: PositionTable, given: schema.CameraPositions, photos: Mapping[str, camera.Camera]
+) -> CameraPositions:
+    """Give the measured positions of the cameras, in the internal order of axes.
+
+    Parameters
+    ----------
+    read : PositionTable
+        The table.
+    given : CameraPositions
+        What the project says about it.
+    photos : mapping of str to Camera
+        Photos of the strips; rows of others are left out.
+
+    Returns
+    -------
+    pipeline.CameraPositions
+        The positions that count.
+    """
+    rows = np.array([row for row, name in enumerate(read.ids) if name in photos and read.used[row]], np.intp)
+    spec = frame_spec(given)
+    columns = _columns(spec)
+    sigma = _filled(read.sigma[rows], given.sigma)[:, columns]
+    use = read.use[rows][:, columns]
+    return CameraPositions(
+        tuple(read.ids[row] for row in rows),
+        spec,
+        read.xyz[rows][:, columns],
+        use,
+        sigma,
+        read.time[rows],
+        given.lever_arm,
+        given.correction,
+    )
+
+
+def given_orientations(
+    read: OrientationTable, given: schema.Orientations, photos: Mapping[str, camera.Camera]
+) -> GivenOrientations:
+    """Give the orientations that are known beforehand, in the internal order of axes and in radians.
+
+    Parameters
+    ----------
+    read : OrientationTable
+        The table.
+    given : Orientations
+        What the project says about it.
+    photos : mapping of str to Camera
+        Photos of the strips; rows of others are left out.
+
+    Returns
+    -------
+    pipeline.GivenOrientations
+        The orientations.
+    """
+    rows = np.array([row for row, name in enumerate(read.ids) if name in photos], np.intp)
+    spec = frame_spec(given)
+    columns, radians = _columns(spec), RADIANS[given.angles.unit]
+    return GivenOrientations(
+        tuple(read.ids[row] for row in rows),
+        spec,
+        read.xyz[rows][:, columns],
+        read.angles[rows] * radians,
+        given.angles.system,
+        _filled(read.sigma[rows], given.sigma)[:, columns],
+        _filled(read.sigma_angles[rows], given.sigma_angles) * radians,
+        given.role == "observed",
+    )
+
+
+def _filled(sigma: Floats, default: Sequence[float] | None) -> Floats:
+    """Put the default where a row has no standard deviation of its own."""
+    return sigma if default is None else np.where(np.isnan(sigma), default, sigma)
 
 
 # ------------------------------------------------------------------------------------------------- the settings
@@ -289,6 +399,16 @@ def settings(project: schema.ProjectFile) -> Settings:
         formation=replace(usual.formation, scale_transfer=wanted.scale_transfer),
         absolute=replace(usual.absolute, earth_curvature=wanted.earth_curvature, earth_radius=wanted.earth_radius),
         polynomial=replace(usual.polynomial, degree=wanted.polynomial.degree),
+        bundle=replace(
+            usual.bundle,
+            screening=wanted.bundle.screening,
+            test=wanted.bundle.test,
+            alpha=wanted.bundle.alpha,
+            power=wanted.bundle.power,
+            variance_components=wanted.bundle.variance_components,
+            self_calibration=tuple(wanted.bundle.self_calibration),
+            calibration_sigma=dict(wanted.bundle.calibration_sigma),
+        ),
         interior=replace(usual.interior, transform=wanted.interior.transform),
         refinement=replace(
             usual.refinement,

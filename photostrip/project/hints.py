@@ -15,30 +15,24 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from photostrip.formats.control import ControlTable
+    from photostrip.formats.exterior import OrientationTable, PositionTable
     from photostrip.formats.observations import Measurements
     from photostrip.project import schema
     from photostrip.project.document import Node
+    from photostrip.project.tables import Tables
 
 NEAR_NAMED = 3
 
 
-def hints(
-    project: schema.ProjectFile,
-    observations: Measurements,
-    fiducials: Measurements | None,
-    control: Sequence[ControlTable],
-    root: Node,
-) -> Iterator[Note]:
+def hints(project: schema.ProjectFile, tables: Tables, root: Node) -> Iterator[Note]:
     """Explain every row and every definition that is not used.
 
     Parameters
     ----------
     project : ProjectFile
         The project.
-    observations, fiducials : Measurements
-        Measured points and marks.
-    control : sequence of ControlTable
-        Control lists.
+    tables : Tables
+        Its tables.
     root : Node
         The project file, which knows where its values stand.
 
@@ -49,15 +43,38 @@ def hints(
     """
     photos = {str(photo) for strip in project.strips for photo in strip.photos}
     yield from _unused_cameras(project, root)
-    for measured in (observations, fiducials):
+    for measured in (tables.observations, tables.fiducials):
         if measured is not None:
             yield from _photos_in_no_strip(measured, photos)
+    observations, control = tables.observations, [read for read in tables.control if read is not None]
+    if observations is None:
+        return
     count = rays(observations, photos)
     given = {read.ids[row] for read in control for row in range(len(read.ids)) if read.used[row]}
     yield from _measured_once(observations, count, given)
     for read in control:
         yield from _switched_off(read)
         yield from _never_measured(read, count, given)
+    for name, given_cameras in (("camera_positions", tables.positions), ("orientations", tables.orientations)):
+        if given_cameras is not None:
+            yield from _cameras_not_used(project, name, given_cameras, photos)
+
+
+def _cameras_not_used(
+    project: schema.ProjectFile, name: str, read: PositionTable | OrientationTable, photos: set[str]
+) -> Iterator[Note]:
+    """Say which rows of a table of cameras are not used, and that the strip method uses none."""
+    what = name.replace("_", " ")
+    if project.processing.adjustment != "bundle":
+        message = f"the {what} are not used: the strip method has no place for them, `adjustment: bundle` has"
+        yield Note("cameras-not-used", message, file=read.table.file, key=name)
+        return
+    others = [name for name in read.ids if name not in photos]
+    if others:
+        message = f"{counted(len(others), 'row')} of {counted(len(others), 'photo')} in no strip not used"
+        file, line = read.table.file, int(read.table.lines[read.ids.index(others[0])])
+        message = f"{message}: {listed(others)}{_twins(alike(others, photos))}"
+        yield Note("photo-in-no-strip", message, "note", photos=tuple(others), file=file, line=line, key="photo")
 
 
 def _unused_cameras(project: schema.ProjectFile, root: Node) -> Iterator[Note]:

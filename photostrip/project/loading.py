@@ -18,9 +18,12 @@ from photostrip.pipeline import Inputs, Settings
 from photostrip.project import schema
 from photostrip.project.conversion import (
     ImageSystem,
+    camera_positions,
     cameras,
     control_points,
+    first_frame,
     frame_spec,
+    given_orientations,
     output_spec,
     photo_points,
     settings,
@@ -39,7 +42,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from photostrip.camera import Camera
+    from photostrip.geodesy.frame_spec import FrameSpec
     from photostrip.notes import Note
+    from photostrip.pipeline.inputs import CameraPositions, GivenOrientations
     from photostrip.points import PhotoPoints
 
 __all__ = ["Project", "json_schema", "load_project"]
@@ -150,15 +155,26 @@ def _seen_from(file: str, folder: Path) -> str:
 def _check_frames(root: Node, directory: Path, findings: Findings) -> None:
     """Tie the ground frames together once, to find out whether that can be done."""
     node = root.find("control")
-    lists = [valid_section(schema.Control, each) for each in (node.elements if node is not None else [])]
+    specs: dict[str, FrameSpec | None] = {}
+    for i, each in enumerate(node.elements if node is not None else []):
+        specs[f"control[{i}]"] = _spec(valid_section(schema.Control, each))
+    if (positions := root.find("camera_positions")) is not None:
+        specs["camera_positions"] = _spec(valid_section(schema.CameraPositions, positions))
+    if (orientations := root.find("orientations")) is not None:
+        specs["orientations"] = _spec(valid_section(schema.Orientations, orientations))
     output = valid_section(schema.Output, root.find("output"))
-    specs = [frame_spec(each) for each in lists if each is not None]
-    if not specs or len(specs) != len(lists) or output is None:
+    known = {name: spec for name, spec in specs.items() if spec is not None}
+    if not known or len(known) != len(specs) or output is None:
         return  # the schema has told what is wrong with them
     try:
-        tie_frames(specs, output_spec(output, specs[0]), directory=directory)
+        target = output_spec(output, next(iter(known.values())))
+        tie_frames(list(known.values()), target, directory=directory, keys=list(known))
     except InputError as error:
         findings.add(*(_placed(root, fault) for fault in error.faults))
+
+
+def _spec(given: schema.Control | schema.CameraPositions | schema.Orientations | None) -> FrameSpec | None:
+    return None if given is None else frame_spec(given)
 
 
 def _placed(root: Node, fault: Fault) -> Fault:
@@ -176,17 +192,34 @@ def _inputs(project: schema.ProjectFile, tables: Tables, root: Node) -> tuple[In
     frames = tuple(frame_spec(each) for each in project.control)
     given = project.observations
     system = ImageSystem(given.unit, given.y_axis or "up", given.origin or "center", given.sigma)
-    output = output_spec(project.output, frames[0])
+    first = first_frame(project)
+    output = output_spec(project.output, first)
     inputs = Inputs(
         name=str(project.name),
         strips=strips(project, known),
         observations=photo_points(tables.observations, system, photos),
         control=control_points(control, project.control),
         frames=frames,
-        output=None if output == frames[0] else output,
+        output=(output or first) if not frames else None if output == first else output,
         fiducials=_fiducials(project, tables, photos),
+        positions=_positions(project, tables, photos),
+        orientations=_orientations(project, tables, photos),
     )
-    return inputs, list(hints(project, tables.observations, tables.fiducials, control, root))
+    return inputs, list(hints(project, tables, root))
+
+
+def _positions(project: schema.ProjectFile, tables: Tables, photos: dict[str, Camera]) -> CameraPositions | None:
+    """Measured positions of the cameras of the strips."""
+    if project.camera_positions is None or tables.positions is None:
+        return None
+    return camera_positions(tables.positions, project.camera_positions, photos)
+
+
+def _orientations(project: schema.ProjectFile, tables: Tables, photos: dict[str, Camera]) -> GivenOrientations | None:
+    """Give the orientations of photos of the strips that are known beforehand."""
+    if project.orientations is None or tables.orientations is None:
+        return None
+    return given_orientations(tables.orientations, project.orientations, photos)
 
 
 def _fiducials(project: schema.ProjectFile, tables: Tables, photos: dict[str, Camera]) -> PhotoPoints | None:

@@ -69,6 +69,8 @@ def check_references(root: Node, findings: Findings) -> None:
     _system_of_coordinates(root, findings)
     _units_of_sigma(root, findings)
     _curvature(root, findings)
+    _needs_of_the_strip_method(root, findings)
+    _camera_positions(root, findings)
 
 
 def _strips(root: Node, findings: Findings) -> None:
@@ -166,3 +168,34 @@ def _curvature(root: Node, findings: Findings) -> None:
         fix = "remove earth_curvature, or give plane coordinates of an unknown projection as `crs: local`"
         path = ("processing", "earth_curvature")
         findings.add(fault_at(root, path, message, "curvature-twice", expected="auto", fix=fix))
+
+
+def _needs_of_the_strip_method(root: Node, findings: Findings) -> None:
+    """Ask for two photos in each strip and for control, which a bundle adjustment can do without."""
+    if root.word("processing", "adjustment") == "bundle":
+        return
+    strips, control = root.find("strips"), root.find("control")
+    for number, strip in enumerate(strips.elements if strips is not None else []):
+        photos = strip.find("photos")
+        if photos is not None and len(photos.elements) == 1:
+            path, fix = ("strips", number, "photos"), "or `processing.adjustment: bundle`, which takes single photos"
+            message = "there is only one photo"
+            findings.add(fault_at(root, path, message, "length", expected="at least 2 photos", fix=fix))
+    if control is None:
+        expected = "lists of given ground coordinates, each in its own frame"
+        findings.add(fault_at(root, ("control",), "`control` is missing", "missing-key", expected=expected))
+    elif isinstance(control.value, list) and not control.value:
+        expected = "at least 1 control list"
+        findings.add(fault_at(root, ("control",), "there is no control list", "length", expected=expected))
+
+
+def _camera_positions(root: Node, findings: Findings) -> None:
+    """Refuse curvature by eq. 153 for positions that carry it: they must lie in the control's frame."""
+    if root.word("processing", "earth_curvature") != "model":
+        return
+    for section in ("camera_positions", "orientations"):
+        crs = root.word(section, "crs")
+        if crs not in {"", "local"}:
+            message = f"Earth curvature would be counted twice: {section} in {shown(crs)} carry it already"
+            fix = "remove earth_curvature, or give the positions in the `local` frame of the control"
+            findings.add(fault_at(root, (section, "crs"), message, "curvature-twice", expected="local", fix=fix))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import BaseModel
 
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES
-from photostrip.project.conversion import frame_spec, output_spec
+from photostrip.project.conversion import first_frame, output_spec
 from photostrip.project.merging import path_of
 from photostrip.project.schema import Distortion, Ellipsoid, ProjectFile, Text
 
@@ -24,6 +24,7 @@ HEADER = (
     "# A project of photostrip with all defaults filled in. Paths are relative to the folder of the project file.\n"
 )
 AUTO = {"parallax_limit", "flying_height", "ground_height"}  # keys of which no value means `auto`
+EMPTY = {"self_calibration"}  # lists of which none is not the same as no word
 LONGEST_LINE = 110
 _NOT_PRINTED = re.compile("[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
 
@@ -68,7 +69,12 @@ def completed(project: ProjectFile, root: Node, path: str) -> ProjectFile:
         each.model_copy(update={"file": _relative(root, path, "control", i), "axes": each.axes or CARTESIAN_AXES})
         for i, each in enumerate(project.control)
     ]
-    spec = output_spec(project.output, frame_spec(control[0])) or frame_spec(control[0])
+    cameras: dict[str, Any] = {
+        name: each.model_copy(update={"file": _relative(root, path, name), "axes": each.axes or CARTESIAN_AXES})
+        for name in ("camera_positions", "orientations")
+        if (each := getattr(project, name)) is not None
+    }
+    spec = output_spec(project.output, first_frame(project)) or first_frame(project)
     ellipsoid = None if spec.ellipsoid is None else Ellipsoid.model_construct(a=spec.ellipsoid[0], b=spec.ellipsoid[1])
     frame: dict[str, Any] = {
         "crs": Text(spec.crs),
@@ -83,6 +89,7 @@ def completed(project: ProjectFile, root: Node, path: str) -> ProjectFile:
         "observations": observations,
         "fiducial_measurements": marks,
         "control": control,
+        **cameras,
         "output": project.output.model_copy(update=frame),
     }
     return project.model_copy(update=filled)
@@ -124,7 +131,7 @@ def _plain(value: Any) -> Any:  # noqa: ANN401 (any value of a project)
         return {
             name: "auto" if each is None else _plain(each)
             for name, each in fields
-            if each not in (None, [], {}) or (each is None and name in AUTO)
+            if each not in (None, [], {}) or (each is None and name in AUTO) or (each == [] and name in EMPTY)
         }
     if isinstance(value, dict):
         return {Text(name): _plain(each) for name, each in value.items()}

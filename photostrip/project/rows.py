@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from photostrip.formats.exterior import OrientationTable, PositionTable
 from photostrip.project.tables import rays
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ IN_NO_STRIP = "its photo belongs to no strip"
 ONCE = "the point is measured on one photo only"
 NO_NEIGHBOUR = "the point is on no two neighbouring photos of one strip"
 OFF = "switched off (use: off)"
+NO_BUNDLE = "only the bundle adjustment uses it"
 NOT_MEASURED = "not measured on any photo of the strips"
 
 
@@ -93,7 +95,18 @@ def table_rows(project: Project) -> list[Document]:
     count = {} if tables.observations is None else rays(tables.observations, photos)
     apart = set(gaps_of(inputs))
     found += [_given(read, count, apart) for read in tables.control if read is not None]
+    bundle = project.settings.adjustment == "bundle"
+    found += [_cameras(read, photos, bundle) for read in (tables.positions, tables.orientations) if read is not None]
     return found
+
+
+def _cameras(read: PositionTable | OrientationTable, photos: set[str], bundle: bool) -> Document:  # noqa: FBT001
+    names = np.array(read.ids, object)
+    stranger = np.array([name not in photos for name in read.ids], bool)
+    off = ~read.used if isinstance(read, PositionTable) else np.zeros(len(names), bool)
+    idle = ~stranger & ~off & (not bundle)
+    reasons = [(IN_NO_STRIP, stranger, names), (OFF, ~stranger & off, names), (NO_BUNDLE, idle, names)]
+    return _block(read.table.file, read.table.lines, reasons)
 
 
 def _measured(read: Measurements, photos: set[str], gaps: set[str]) -> Document:

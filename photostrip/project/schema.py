@@ -9,7 +9,7 @@ from __future__ import annotations
 import warnings
 from copy import deepcopy
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainValidator, model_validator
 from pydantic_core import PydanticCustomError
@@ -21,6 +21,7 @@ from photostrip.formats.tables import CONTROL_CHARACTER
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.geometry.rotation import SYSTEMS
 from photostrip.pipeline import ADJUSTMENTS, Settings
+from photostrip.triangulation.bundle.settings import CALIBRATION, SCREENINGS, TESTS
 from photostrip.triangulation.formation import SCALE_TRANSFERS
 from photostrip.triangulation.polynomial import DEGREES
 from photostrip.triangulation.screening import METHODS
@@ -172,6 +173,7 @@ Axes = Annotated[tuple[str, str, str], *_typed(_axes, _AXES)]
 Unit = Annotated[str, *_choice(("mm", "um", "px"))]
 YAxis = Annotated[str, *_choice(("up", "down"))]
 Height = Annotated[str, *_choice(("ellipsoidal", "orthometric"))]
+Parameter = Annotated[str, *_choice(CALIBRATION)]
 
 
 def _or(words: tuple[str, ...]) -> str:
@@ -257,6 +259,10 @@ class Camera(Section):
         "Calibrated coordinates of the fiducial marks, by mark", {}, unit="mm"
     )
     distortion: Distortion | None = key("Lens distortion", None)
+    self_calibration: list[Parameter] | None = key(
+        "Parameters of this camera that the bundle adjustment estimates. Default: `processing.bundle.self_calibration`",
+        None,
+    )
 
 
 class Strip(Section):
@@ -264,7 +270,9 @@ class Strip(Section):
 
     id: Id = key("Id of the strip")
     camera: Id = key("Camera of all its photos, a key of `cameras`")
-    photos: Annotated[list[Id], Field(min_length=2)] = key("Photos in flight order")
+    photos: Annotated[list[Id], Field(min_length=1)] = key(
+        "Photos in flight order: two at least, or one in a bundle adjustment"
+    )
 
 
 class Observations(Section):
@@ -304,6 +312,14 @@ class Ellipsoid(Section):
 CRS = "An authority code (`EPSG:32633`), a PROJ string, WKT, `geocentric`, or `local` (right-handed, metres)"
 
 
+def _require_axes(axes: tuple[str, str, str] | None, crs: str) -> None:
+    """Require the order of the columns, but for geocentric coordinates."""
+    if axes is None and crs != "geocentric":
+        expected = "axes: [east, north, up], or [north, east, up] where x points north"
+        message = "nothing says which of the columns x, y, z is east"
+        raise wrong(message, code="missing-key", at="axes", expected=expected)
+
+
 class Control(Section):
     """One list of given ground coordinates."""
 
@@ -323,11 +339,40 @@ class Control(Section):
 
     @model_validator(mode="after")
     def _axes_are_said(self) -> Self:
-        if self.axes is None and self.crs != "geocentric":
-            expected = "axes: [east, north, up], or [north, east, up] where x points north"
-            raise wrong(
-                "nothing says which of the columns x, y, z is east", code="missing-key", at="axes", expected=expected
-            )
+        _require_axes(self.axes, self.crs)
+        return self
+
+
+class CameraPositions(Section):
+    """Measured positions of the cameras, for the bundle adjustment."""
+
+    file: Words = key("Table `photo,x,y,z[,use][,time][,sx,sy,sz]`, .csv or .csv.gz")
+    crs: Words = key(CRS)
+    axes: Axes | None = key(
+        "What the columns x, y, z are: a permutation of east, north, up; required, except for geocentric", None
+    )
+    height: Height = key("`ellipsoidal` or `orthometric`", "ellipsoidal")
+    geoid_undulation: Number | None = key(
+        "Height of the geoid above the ellipsoid, for orthometric heights", None, unit="m"
+    )
+    ellipsoid: Ellipsoid | None = key("Ellipsoid of geocentric coordinates; default: WGS 84", None)
+    sigma: tuple[Positive, Positive, Positive] | None = key(
+        "Standard deviations of rows without sx, sy, sz, in the order of `axes`", None, unit="m"
+    )
+    lever_arm: tuple[Number, Number, Number] = key(
+        "Antenna as seen from the perspective centre along the image axes: x right, y up, z towards the viewer",
+        (0.0, 0.0, 0.0),
+        unit="m",
+    )
+    correction: Annotated[str, *_choice(("none", "offset", "drift"))] = key(
+        "Unknown error that the positions of one strip share: `none`, `offset` (constant) or `drift` (constant and"
+        " linear in `time`; without times in the number of the photo)",
+        "none",
+    )
+
+    @model_validator(mode="after")
+    def _axes_are_said(self) -> Self:
+        _require_axes(self.axes, self.crs)
         return self
 
 
@@ -338,6 +383,40 @@ class Angles(Section):
         "`alpha-omega-kappa`, `omega-phi-kappa` or `phi-omega-kappa`", DEFAULTS.angle_system
     )
     unit: Annotated[str, *_choice(("deg", "gon", "rad"))] = key("`deg`, `gon` or `rad`", DEFAULTS.angle_unit)
+
+
+class Orientations(Section):
+    """Given exterior orientations, for the bundle adjustment."""
+
+    file: Words = key(
+        "Table `photo,x,y,z` and the angles by name, as `alpha,omega,kappa`, [,sx,sy,sz][,s_alpha,s_omega,s_kappa]"
+    )
+    crs: Words = key(CRS)
+    axes: Axes | None = key(
+        "What the columns x, y, z are: a permutation of east, north, up; required, except for geocentric", None
+    )
+    height: Height = key("`ellipsoidal` or `orthometric`", "ellipsoidal")
+    geoid_undulation: Number | None = key(
+        "Height of the geoid above the ellipsoid, for orthometric heights", None, unit="m"
+    )
+    ellipsoid: Ellipsoid | None = key("Ellipsoid of geocentric coordinates; default: WGS 84", None)
+    angles: Angles = key("System and unit of the angles", Angles.model_construct())
+    role: Annotated[str, *_choice(("observed", "approximate"))] = key(
+        "`observed`: observations with their standard deviations; `approximate`: a start, without influence", "observed"
+    )
+    sigma: tuple[Positive, Positive, Positive] | None = key(
+        "Standard deviations of rows without sx, sy, sz, in the order of `axes`", None, unit="m"
+    )
+    sigma_angles: tuple[Positive, Positive, Positive] | None = key(
+        "Standard deviations of the angles of rows without them, in the order of their system",
+        None,
+        unit="the angles' unit",
+    )
+
+    @model_validator(mode="after")
+    def _axes_are_said(self) -> Self:
+        _require_axes(self.axes, self.crs)
+        return self
 
 
 class Output(Section):
@@ -392,13 +471,49 @@ class Interior(Section):
     )
 
 
+class Bundle(Section):
+    """Bundle adjustment of all strips together."""
+
+    screening: Annotated[str, *_choice(SCREENINGS)] = key(
+        "How gross errors are searched for: `snooping` (one after the other), `robust` (re-weighted first) or `none`",
+        DEFAULTS.bundle.screening,
+    )
+    test: Annotated[str, *_choice(TESTS)] = key(
+        "`tau`: residuals against the sigma0 found; `baarda`: against the stated standard deviations",
+        DEFAULTS.bundle.test,
+    )
+    alpha: Fraction = key("Probability of rejecting one good observation", DEFAULTS.bundle.alpha)
+    power: Fraction = key("Probability with which the minimal detectable errors are found", DEFAULTS.bundle.power)
+    variance_components: Flag = key(
+        "Estimate the standard deviations of image coordinates, control and camera positions",
+        DEFAULTS.bundle.variance_components,
+    )
+    self_calibration: list[Parameter] = key(f"Parameters of the cameras that are estimated: {_or(CALIBRATION)}", [])
+    calibration_sigma: Annotated[dict[str, Positive], BeforeValidator(_if_empty)] = key(
+        "A-priori standard deviations of these parameters, by name; free without one",
+        {},
+        unit="mm, mm^-2 for k1 and so on; 1 for affinity and shear",
+    )
+
+    @model_validator(mode="after")
+    def _known_parameters(self) -> Self:
+        for name in self.calibration_sigma:
+            if name not in CALIBRATION:
+                message = f"`{shown(name)}` is no parameter of a camera"
+                expected, fix = f"one of {', '.join(CALIBRATION)}", suggestion(name, CALIBRATION)
+                raise wrong(message, code="word", at="calibration_sigma", expected=expected, fix=fix)
+        return self
+
+
 class Processing(Section):
     """What is computed and how."""
 
-    adjustment: Annotated[str, *_choice(ADJUSTMENTS, "covariance", "bundle")] = key(
-        "`polynomial` (the strip method) or `similarity` (without a polynomial)", DEFAULTS.adjustment
+    adjustment: Annotated[str, *_choice(ADJUSTMENTS, "covariance")] = key(
+        "`polynomial` (the strip method), `similarity` (without a polynomial) or `bundle` (all strips rigorously)",
+        DEFAULTS.adjustment,
     )
     polynomial: Polynomial = key("Polynomial adjustment", Polynomial.model_construct())
+    bundle: Bundle = key("Bundle adjustment", Bundle.model_construct())
     relative: Relative = key("Relative orientation", Relative.model_construct())
     scale_transfer: Annotated[str, *_choice(SCALE_TRANSFERS)] = key(
         "`least_squares`: all common points with their precision; `distances`: the textbook's mean of ratios",
@@ -451,18 +566,16 @@ class ProjectFile(Section):
     strips: Annotated[list[Strip], Field(min_length=1)] = key("Strips")
     observations: Observations = key("Points measured on photos")
     fiducial_measurements: FiducialMeasurements | None = key("Fiducial marks measured on photos", None)
-    control: Annotated[list[Control], Field(min_length=1)] = key(
-        "Lists of given ground coordinates, each in its own frame"
+    control: list[Control] = key(
+        "Lists of given ground coordinates, each in its own frame; a bundle adjustment may do without", []
     )
+    camera_positions: CameraPositions | None = key("Measured positions of the cameras, for the bundle adjustment", None)
+    orientations: Orientations | None = key("Given exterior orientations, for the bundle adjustment", None)
     output: Output = key("Frame and angles of the results", Output.model_construct())
     processing: Processing = key("What is computed and how", Processing.model_construct())
     tolerances: Tolerances = key(
         "Largest allowed values; where one is exceeded the exit code is 1", Tolerances.model_construct()
     )
-
-
-NOT_YET: dict[str, Literal["needs the bundle adjustment"]] = {"camera_positions": "needs the bundle adjustment"}
-"""Keys of the project file that are known but cannot be used yet, and why."""
 
 
 def json_schema() -> dict[str, Any]:
@@ -473,7 +586,7 @@ def json_schema() -> dict[str, Any]:
     dict
         JSON Schema, draft 2020-12; the same on every call.
     """
-    for section in (Angles, Output, Relative, Polynomial, Interior, Processing, Tolerances):
+    for section in (Angles, Output, Relative, Bundle, Polynomial, Interior, Processing, Tolerances):
         section.model_rebuild()  # early versions of pydantic cannot describe a default of a section not built yet
     return described(ProjectFile, "photostrip project")
 

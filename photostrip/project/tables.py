@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.formats.control import ControlTable, read_control, refuse_repeated
+from photostrip.formats.exterior import OrientationTable, PositionTable, read_orientations, read_positions
 from photostrip.formats.findings import Findings, listed, suggestion
 from photostrip.formats.observations import Measurements, read_measurements
+from photostrip.geometry.rotation import SYSTEMS
 from photostrip.project.document import fault_at
 from photostrip.project.merging import path_of, told_where_named
 from photostrip.project.references import listed_photos
@@ -41,11 +43,17 @@ class Tables:
         Points and fiducial marks measured on photos.
     control : list of ControlTable or None
         Control lists in the project's order.
+    positions : PositionTable or None
+        Measured positions of cameras.
+    orientations : OrientationTable or None
+        Given exterior orientations.
     """
 
     observations: Measurements | None
     fiducials: Measurements | None
     control: list[ControlTable | None]
+    positions: PositionTable | None = None
+    orientations: OrientationTable | None = None
 
 
 def read_tables(root: Node, project: str, findings: Findings, files: list[str]) -> Tables:
@@ -82,7 +90,23 @@ def read_tables(root: Node, project: str, findings: Findings, files: list[str]) 
         for path, inner in _named(root, ("control", number), project, findings, files):
             control[-1] = read_control(path, _height_column(node), inner, default_sigma=node.has("sigma"))
     refuse_repeated(control, findings)
-    return Tables(observations, fiducials, control)
+    positions = orientations = None
+    for path, inner in _named(root, ("camera_positions",), project, findings, files):
+        node = root.entries["camera_positions"]
+        positions = read_positions(path, _height_column(node), inner, default_sigma=node.has("sigma"))
+    for path, inner in _named(root, ("orientations",), project, findings, files):
+        orientations = _orientations(path, root.entries["orientations"], inner)
+    return Tables(observations, fiducials, control, positions, orientations)
+
+
+def _orientations(path: str, node: Node, findings: Findings) -> OrientationTable | None:
+    """Read given orientations by the names of their angles; nothing when the system is not known, which is told."""
+    system = node.word("angles", "system") or SYSTEMS[0]
+    if system not in SYSTEMS:
+        return None
+    observed = node.word("role") in {"", "observed"}
+    needs = observed and not node.has("sigma"), observed and not node.has("sigma_angles")
+    return read_orientations(path, system.split("-"), node.word("angles", "unit") or "deg", findings, needs_sigma=needs)
 
 
 def _named(
@@ -126,6 +150,23 @@ def check_tables(root: Node, tables: Tables, findings: Findings) -> None:
     if tables.fiducials is not None:
         _every_photo(root, photos, tables.fiducials, "no fiducial mark", findings)
         _known_marks(root, photos, tables.fiducials, findings)
+    for section, read in (("camera_positions", tables.positions), ("orientations", tables.orientations)):
+        if read is not None:
+            _some_photo(root, photos, section, read, findings)
+
+
+def _some_photo(
+    root: Node, photos: list[ListedPhoto], section: str, read: PositionTable | OrientationTable, findings: Findings
+) -> None:
+    """Refuse a table of cameras that has none of the strips' photos."""
+    known = {photo.id for photo in photos}
+    if not known or known & set(read.ids) or not len(read.table):
+        return
+    near = alike([photo.id for photo in photos], read.ids)
+    named = f"; did you mean `{next(iter(near.values()))}`?" if near else ""
+    message = f"{read.table.file} has none of the photos of the strips; its photos are {listed(read.ids, 4)}{named}"
+    fix = "write the ids of the photos alike in both files"
+    findings.add(fault_at(root, (section, "file"), message, "not-measured", fix=fix))
 
 
 def _every_photo(root: Node, photos: list[ListedPhoto], read: Measurements, nothing: str, findings: Findings) -> None:

@@ -11,7 +11,7 @@ from photostrip.errors import Fault
 from photostrip.formats.findings import counted, suggestion
 from photostrip.formats.numbers import shown
 from photostrip.project.document import Node, fault_at, key_path, type_names
-from photostrip.project.schema import NOT_YET, ProjectFile, Section
+from photostrip.project.schema import ProjectFile, Section
 
 if TYPE_CHECKING:
     from photostrip.formats.findings import Findings
@@ -44,14 +44,7 @@ def validate(root: Node, findings: Findings) -> ProjectFile | None:
     ProjectFile or None
         The project with types and defaults; None when there are faults.
     """
-    waiting = [name for name in NOT_YET if name in root.entries]
-    for name in waiting:
-        place = root.keys[name]
-        message = f"`{name}` is not available yet: it {NOT_YET[name]}"
-        findings.add(Fault(message, "not-available", place.file, place.line, place.column, name, fix="remove it"))
-    usable = Node({name: node for name, node in root.entries.items() if name not in NOT_YET}, root.place, root.keys)
-    project = checked(ProjectFile, usable, findings)
-    return None if waiting else project
+    return checked(ProjectFile, root, findings)
 
 
 def checked(kind: type[T], root: Node, findings: Findings) -> T | None:
@@ -152,12 +145,8 @@ def _wrong_length(schema: Model, root: Node, path: Path) -> Fault:
         return fault_at(
             root, path, f"{counted(number, 'value')} in the list", "length", expected=f"{len(wanted)} values"
         )
-    least = 2 if path and path[-1] == "photos" else 1
-    what = {"photos": "photo", "cameras": "camera", "strips": "strip", "control": "control list"}.get(
-        str(path[-1]), "entry"
-    )
-    message = f"there is {'no' if not number else 'only one'} {what}"
-    return fault_at(root, path, message, "length", expected=f"at least {counted(least, what)}")
+    what = {"photos": "photo", "cameras": "camera", "strips": "strip"}.get(str(path[-1]), "entry")
+    return fault_at(root, path, f"there is no {what}", "length", expected=f"at least {counted(1, what)}")
 
 
 # ---------------------------------------------------------------------------------- looking into the schema

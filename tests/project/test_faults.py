@@ -107,7 +107,6 @@ SCHEMA = [
     (Y, "0.40", "-0.40", "project.yaml:32:28:", "out of range"),
 ]
 NOT_YET = [
-    (Y, "processing:", "processing:\n  adjustment: bundle", "project.yaml:30:15:", "`bundle` is not available yet"),
     (
         Y,
         "processing:",
@@ -117,7 +116,6 @@ NOT_YET = [
         "polynomial",
     ),
     (Y, "processing:", "processing:\n  earth_curvature: image", "project.yaml:30:20:", "`image` is not available yet"),
-    (Y, "output:", "camera_positions: {file: g.csv}\noutput:", "project.yaml:27:1: camera_positions:", "bundle"),
 ]
 REFERENCES = [
     (Y, "id: B\n    camera: RC30", "id: B\n    camera: RC3O", "project.yaml:14:13:", "no camera `RC3O`", "mean `RC30`"),

@@ -57,6 +57,13 @@ processing:
   adjustment: polynomial
   polynomial:
     degree: auto
+  bundle:
+    screening: snooping
+    test: tau
+    alpha: 0.001
+    power: 0.8
+    variance_components: false
+    self_calibration: []
   relative:
     screening: auto
     grubbs_alpha: 0.05

@@ -53,7 +53,7 @@ def test_units_stand_in_the_description_and_by_themselves() -> None:
 def test_editors_are_told_what_is_read() -> None:
     schema = json_schema()
     definitions = schema["$defs"]
-    assert schema["required"] == ["photostrip", "cameras", "strips", "observations", "control"]
+    assert schema["required"] == ["photostrip", "cameras", "strips", "observations"]
     assert schema["additionalProperties"] is False
     assert [name for name, each in definitions.items() if each.get("additionalProperties") is not False] == []
     assert definitions["Relative"]["properties"]["parallax_limit"]["default"] == "auto"
@@ -69,10 +69,16 @@ def test_the_schema_is_the_same_on_every_call() -> None:
     assert json.dumps(json_schema()) == json.dumps(json_schema())
 
 
+def _bundle() -> dict[str, object]:
+    given = Processing.model_validate({}).bundle.model_dump()
+    return given | {"self_calibration": tuple(given["self_calibration"])}
+
+
 @pytest.mark.parametrize(
     ("given", "part"),
     [
         (Processing.model_validate({}).relative.model_dump(), "relative"),
+        (_bundle(), "bundle"),
         ({"degree": Processing.model_validate({}).polynomial.degree}, "polynomial"),
         ({"transform": Processing.model_validate({}).interior.transform}, "interior"),
     ],
@@ -84,7 +90,8 @@ def test_defaults_are_those_of_the_mathematics(given: dict[str, object], part: s
 
 def test_every_setting_of_the_mathematics_has_a_key() -> None:
     settings = Settings()
-    names = {field.name for part in ("relative", "formation", "absolute", "polynomial", "interior", "refinement")
+    names = {field.name for part in ("relative", "formation", "absolute", "polynomial", "bundle", "interior",
+                                   "refinement")
              for field in fields(getattr(settings, part))}  # fmt: skip
     known = {name for name, _ in every_key()}
     assert names - known == set()
@@ -150,6 +157,8 @@ def test_the_model_is_the_contract() -> None:
         "observations",
         "fiducial_measurements",
         "control",
+        "camera_positions",
+        "orientations",
         "output",
         "processing",
         "tolerances",

@@ -1,0 +1,53 @@
+"""What is asked of the bundle adjustment beside the adjustment itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+SCREENINGS = ("snooping", "robust", "none")
+TESTS = ("tau", "baarda")
+CALIBRATION = ("principal_distance", "principal_point", "k1", "k2", "k3", "p1", "p2", "affinity", "shear")
+CALIBRATION_UNITS = {
+    "principal_distance": "mm",
+    "principal_point": "mm",
+    "k1": "mm^-2",
+    "k2": "mm^-4",
+    "k3": "mm^-6",
+    "p1": "mm^-1",
+    "p2": "mm^-1",
+    "affinity": "1",
+    "shear": "1",
+}
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is asked of the bundle adjustment.
+
+    Parameters
+    ----------
+    screening : str
+        How gross errors are searched for: ``"snooping"`` (one after the other, by the largest test value),
+        ``"robust"`` (re-weighted first, then tested) or ``"none"``.
+    test : str
+        ``"tau"``: residuals are compared with the sigma0 found; ``"baarda"``: with the stated standard deviations.
+    alpha : float
+        Probability that the test of one good observation rejects it.
+    power : float
+        Probability with which an error of the size of the minimal detectable one is found.
+    variance_components : bool
+        Whether the standard deviations of the groups of observations are estimated.
+    self_calibration : tuple of str
+        Parameters of every camera that are estimated, of :data:`CALIBRATION`.
+    calibration_sigma : dict of str to float
+        A-priori standard deviations of these parameters about the given calibration, in their units; without one a
+        parameter is free.
+    """
+
+    screening: str = "snooping"
+    test: str = "tau"
+    alpha: float = 0.001
+    power: float = 0.80
+    variance_components: bool = False
+    self_calibration: tuple[str, ...] = ()
+    calibration_sigma: dict[str, float] = field(default_factory=dict)
