@@ -54,6 +54,11 @@ COMMANDS = {
         "Print the accuracy report of a saved result again.",
         "photostrip report result/result.json",
     ),
+    "compare": Entry(
+        "photostrip.cli.compare",
+        "Compare a result with a baseline, within tolerances.",
+        "photostrip compare result baseline.json --tol exact.yaml",
+    ),
     "simulate": Entry(
         "photostrip.cli.simulate",
         "Write a synthetic project with known truth, ready to run.",

@@ -91,6 +91,9 @@ def frame_of(result: Result) -> Document:
         "kind": frame.kind,
         "plan_unit": frame.plan_unit,
         "height_unit": frame.height_unit,
+        "plan_factor": frame.plan_factor,
+        "height_factor": frame.height_factor,
+        "ellipsoid": None if frame.ellipsoid is None else list(frame.ellipsoid),
         "heights": frame.spec.height,
         "description": frame.describe(),
     }

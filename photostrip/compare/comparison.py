@@ -1,0 +1,292 @@
+"""The comparison of a result with a baseline, as one plain document from which every output is rendered."""
+
+from __future__ import annotations
+
+import math
+import sys
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from photostrip.compare.ground import difference_in_plan_and_height, plan_and_height
+from photostrip.compare.members import members_of, missing_and_new
+from photostrip.compare.quantities import Quantity, quantities_of
+from photostrip.compare.tolerances import SETS, UNITS, Tolerances
+from photostrip.errors import Fault, InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+Document = dict[str, Any]
+
+SCHEMA = 1
+LEFT_OUT = ("version", "residuals", "parallaxes")  # a number of ours, and what the other numbers are made of
+SAME_FRAME = {
+    "crs": "the CRS",
+    "kind": "the kind of frame",
+    "axes": "the order of the axes",
+    "plan_unit": "the unit of plan coordinates",
+    "height_unit": "the unit of heights",
+    "heights": "the heights",
+}
+
+
+def baseline_of(document: Document) -> Document:
+    """Give what of a result is kept as a baseline.
+
+    Parameters
+    ----------
+    document : dict
+        The document of a result.
+
+    Returns
+    -------
+    dict
+        The same without the residuals and parallaxes of single measurements, which make two thirds of it, and without
+        the version of the program.
+    """
+    return {key: value for key, value in document.items() if key not in LEFT_OUT}
+
+
+def compare_results(
+    document: Document, baseline: Document, tolerances: Tolerances | None = None, files: tuple[str, str] = ("", "")
+) -> Document:
+    """Compare a result with a baseline.
+
+    Parameters
+    ----------
+    document, baseline : dict
+        The documents of two results; the baseline may be a short one.
+    tolerances : Tolerances, optional
+        What they may differ by.
+    files : tuple of str
+        Their files, to name them.
+
+    Returns
+    -------
+    dict
+        ``status`` (``same``, ``different``); ``kinds``: for each kind of quantity how many were compared and how many
+        differ by more than allowed, and the worst; ``differences``: all of these, worst first; ``sets``: what is
+        missing and new in each set.
+
+    Raises
+    ------
+    InputError
+        When they cannot be compared: other frames, nothing in common, a document that is not whole.
+    """
+    _require_comparable(document, baseline, files)
+    tolerances = tolerances or Tolerances()
+    try:
+        rows = list(_compared(document, baseline, tolerances))
+        sets = [_set(kind, document, baseline, tolerances) for kind in SETS]
+    except (AttributeError, LookupError, TypeError, ValueError) as error:
+        what = f"key {error} is missing" if isinstance(error, KeyError) else f"a value is of another kind ({error})"
+        message = f"cannot be compared: {what}"
+        fix = "run the project again, or renew the baseline with --update"
+        raise InputError(Fault(message, "result-incomplete", files[0], expected="two whole results", fix=fix)) from None
+    kinds = [_kind(kind, rows, tolerances) for kind in UNITS]
+    differences = sorted((row for row in rows if row["differs"]), key=_rank)
+    different = bool(differences) or any(each["differs"] for each in sets)
+    return {
+        "photostrip_compare": SCHEMA,
+        "result": files[0],
+        "baseline": files[1],
+        "name": document["name"],
+        "status": "different" if different else "same",
+        "kinds": kinds,
+        "sets": sets,
+        "differences": [{key: value for key, value in row.items() if key != "differs"} for row in differences],
+    }
+
+
+def _require_comparable(document: Document, baseline: Document, files: tuple[str, str]) -> None:
+    """Refuse results of different frames, or of different strips, with all reasons."""
+    faults = []
+    own, other = (_frame(each) for each in (document, baseline))
+    for key, words in SAME_FRAME.items():
+        now, before = own.get(key), other.get(key)
+        if _folded(now) != _folded(before):
+            message = f"cannot be compared with {files[1] or 'the baseline'}: {words} is {_shown(now)}"
+            fix = "write both in one frame (`output` in the project), or renew the baseline with --update"
+            faults.append(Fault(message, "not-comparable", files[0], 0, 0, f"frame.{key}", _shown(before), fix))
+    if not faults and not _common_points(document, baseline):
+        message = f"cannot be compared with {files[1] or 'the baseline'}: no point is in both"
+        fix = "is it the baseline of another strip?"
+        faults.append(Fault(message, "not-comparable", files[0], 0, 0, "points", "the same strip", fix))
+    if faults:
+        raise InputError(faults)
+
+
+def _frame(document: Document) -> Document:
+    """Give the frame of a document; an empty one when there is none."""
+    found = document.get("frame")
+    return found if isinstance(found, dict) else {}
+
+
+def _common_points(document: Document, baseline: Document) -> bool:
+    ids = [
+        {row.get("id") for row in each.get("points") or [] if isinstance(row, dict)} for each in (document, baseline)
+    ]
+    return bool(ids[0] & ids[1])
+
+
+def _folded(value: object) -> object:
+    return value.casefold() if isinstance(value, str) else value
+
+
+def _shown(value: object) -> str:
+    return ", ".join(map(str, value)) if isinstance(value, list) else "missing" if value is None else str(value)
+
+
+# ------------------------------------------------------------------------------------------------------- numbers
+
+
+def _compared(document: Document, baseline: Document, tolerances: Tolerances) -> Iterator[Document]:
+    """Give a row for every number that stands in both."""
+    before = {(q.block, q.id, q.name): q for q in quantities_of(baseline)}
+    for now in quantities_of(document):
+        then = before.get((now.block, now.id, now.name))
+        if then is not None and not (now.value is None and then.value is None):
+            yield _row_of_number(now, then, tolerances)
+    frame = baseline["frame"]
+    yield from _ground(frame, document, baseline, "points", tolerances)
+    yield from _ground(frame, document, baseline, "photos", tolerances)
+    yield from _control(frame, document, baseline, tolerances)
+    yield from _rotations(document, baseline, tolerances)
+
+
+def _row_of_number(now: Quantity, then: Quantity, tolerances: Tolerances) -> Document:
+    known = then if then.value is not None else now
+    row: Document = {"kind": known.kind, "block": known.block, "id": known.id, "name": known.name}
+    row |= {"unit": known.unit, "before": then.value, "now": now.value}
+    if now.value is None or then.value is None:
+        return _judged(row, math.inf, 0.0, tolerances)
+    size = abs(now.value - then.value)
+    # a difference of decimal numbers has noise in its last bits: a tolerance of one digit lets one digit pass
+    noise = 4 * sys.float_info.epsilon * max(abs(now.value), abs(then.value))
+    return _judged(row, max(size - noise, 0.0), tolerances.allowed(known.kind, known.unit, then.value), tolerances)
+
+
+def _judged(row: Document, size: float, allowed: float, tolerances: Tolerances) -> Document:
+    """Complete a row: how large the difference is (None: a number appeared or is gone), whether it is too large."""
+    too_large = size > allowed and not tolerances.of(row["kind"]).ignore
+    known = float(f"{size:.6g}") if math.isfinite(size) else None
+    return row | {"difference": known, "allowed": allowed, "differs": too_large}
+
+
+def _rank(row: Document) -> tuple[float, str, str]:
+    """Worst first: what is gone or appeared, then by how often it exceeds what is allowed."""
+    if row["difference"] is None:
+        return -math.inf, row["block"], row["id"]
+    return -(row["difference"] / row["allowed"] if row["allowed"] else 1e9 * row["difference"]), row["block"], row["id"]
+
+
+def _kind(kind: str, rows: list[Document], tolerances: Tolerances) -> Document:
+    """Sum up one kind of quantity."""
+    tolerance, unit = tolerances.of(kind), UNITS[kind]
+    own = [row for row in rows if row["kind"] == kind]
+    worst = min(own, key=_rank, default=None)
+    allowed = {"absolute": tolerance.absolute, "relative": tolerance.relative}
+    if tolerance.absolute_um:
+        allowed["absolute_um"] = tolerance.absolute_um
+    return {
+        "kind": kind,
+        "unit": unit,
+        "ignored": tolerance.ignore,
+        "allowed": allowed,
+        "compared": len(own),
+        "different": sum(row["differs"] for row in own),
+        "worst": None if worst is None or worst["difference"] == 0 else _without_verdict(worst),
+    }
+
+
+def _without_verdict(row: Document) -> Document:
+    return {key: value for key, value in row.items() if key != "differs"}
+
+
+# --------------------------------------------------------------------------------------------- places and rotations
+
+
+def _ground(
+    frame: Document, document: Document, baseline: Document, block: str, tolerances: Tolerances
+) -> Iterator[Document]:
+    """Compare places, in plan and in height."""
+    ids, now, before = _shared(document[block], baseline[block], ("x", "y", "z"))
+    plan, height = plan_and_height(frame, now, before)
+    yield from _places(block, ids, plan, height, tolerances)
+
+
+def _control(frame: Document, document: Document, baseline: Document, tolerances: Tolerances) -> Iterator[Document]:
+    """Compare the differences at control, as far as all three are known."""
+    ids, now, before = _shared(document["control"], baseline["control"], ("dx", "dy", "dz"))
+    places = {row["id"]: [row[axis] for axis in "xyz"] for row in baseline["points"]}
+    known = [n for n, name in enumerate(ids) if name in places and not np.isnan(now[n] - before[n]).any()]
+    if known:
+        at = np.array([places[ids[n]] for n in known], float)
+        plan, height = difference_in_plan_and_height(frame, now[known] - before[known], at)
+        yield from _places("control", [ids[n] for n in known], plan, height, tolerances)
+
+
+def _places(block: str, ids: list[str], plan: Floats, height: Floats, tolerances: Tolerances) -> Iterator[Document]:
+    for kind, sizes in (("plan", plan), ("height", height)):
+        allowed = tolerances.of(kind).absolute
+        for name, size in zip(ids, sizes.tolist(), strict=True):
+            row = {"kind": kind, "block": block, "id": name, "name": kind, "unit": "m", "before": None, "now": None}
+            yield _judged(row, _finite(size), allowed, tolerances)
+
+
+def _finite(size: float) -> float:
+    """Take the difference of a number and none as infinite."""
+    return size if math.isfinite(size) else math.inf
+
+
+def _rotations(document: Document, baseline: Document, tolerances: Tolerances) -> Iterator[Document]:
+    """Compare rotations by the angle of the rotation from one to the other, which no convention of angles changes."""
+    shared = _pairs(document["photos"], baseline["photos"])
+    allowed = tolerances.of("rotation").absolute
+    for now, before in shared:
+        one, other = (np.array(row["rotation"], float).reshape(3, 3) for row in (now, before))
+        # 2 sqrt(2) sin(angle / 2) is the length of the difference: exact for the smallest angles, unlike the cosine
+        half = min(float(np.linalg.norm(one - other)) / math.sqrt(8.0), 1.0)
+        row = {"kind": "rotation", "block": "photos", "id": now["id"], "name": "rotation", "unit": "deg"}
+        row |= {"before": None, "now": None}
+        yield _judged(row, math.degrees(2.0 * math.asin(half)), allowed, tolerances)
+
+
+def _pairs(now: list[Document], before: list[Document]) -> list[tuple[Document, Document]]:
+    """Give the records that stand in both lists, by id."""
+    known = {row["id"]: row for row in before}
+    return [(row, known[row["id"]]) for row in now if row["id"] in known]
+
+
+def _shared(
+    now: list[Document], before: list[Document], keys: tuple[str, str, str]
+) -> tuple[list[str], Floats, Floats]:
+    """Give ids and three numbers of the records that stand in both lists; NaN where there is none."""
+    pairs = _pairs(now, before)
+    values = [[[row[key] for key in keys] for row in pair] for pair in pairs]
+    columns = np.array(values, float).reshape(-1, 2, 3)
+    return [row["id"] for row, _ in pairs], columns[:, 0], columns[:, 1]
+
+
+# ---------------------------------------------------------------------------------------------------------- sets
+
+
+def _set(kind: str, document: Document, baseline: Document, tolerances: Tolerances) -> Document:
+    """Compare one kind of set."""
+    tolerance = tolerances.of_set(kind)
+    missing, new = missing_and_new(members_of(document, kind), members_of(baseline, kind))
+    too_many = len(missing) > tolerance.missing or len(new) > tolerance.new
+    return {
+        "kind": kind,
+        "ignored": tolerance.ignore,
+        "allowed": {"missing": tolerance.missing, "new": tolerance.new},
+        "compared": len(members_of(baseline, kind)),
+        "missing": missing,
+        "new": new,
+        "differs": too_many and not tolerance.ignore,
+    }

@@ -1,0 +1,96 @@
+"""How far two ground points are apart, in metres in plan and in height, whatever the frame of their coordinates."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from photostrip.geodesy.curvature import meridian_radius, prime_vertical_radius
+from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+Document = dict[str, Any]
+
+
+def plan_and_height(frame: Document, now: Floats, before: Floats) -> tuple[Floats, Floats]:
+    """Give the distance of points from where they were, in plan and in height.
+
+    Parameters
+    ----------
+    frame : dict
+        The block ``frame`` of a result.
+    now, before : ndarray, shape (n, 3)
+        Coordinates in the order and the units of the frame.
+
+    Returns
+    -------
+    plan, height : ndarray, shape (n,)
+        Length in plan and size of the difference in height, metres. In a geocentric frame up is the normal of the
+        ellipsoid.
+    """
+    if frame["kind"] == "geocentric":
+        parts = _turned(frame, now - before, before)
+    else:
+        order = [list(frame["axes"]).index(axis) for axis in GROUND_AXES]
+        parts = _in_metres(frame, now[:, order], before[:, order])
+    return np.hypot(parts[:, 0], parts[:, 1]), np.abs(parts[:, 2])
+
+
+def difference_in_plan_and_height(frame: Document, delta: Floats, at: Floats) -> tuple[Floats, Floats]:
+    """Give the parts of differences that are in metres already.
+
+    Parameters
+    ----------
+    frame : dict
+        The block ``frame`` of a result.
+    delta : ndarray, shape (n, 3)
+        Differences in metres, in the order of the frame's axes.
+    at : ndarray, shape (n, 3)
+        Coordinates of the points.
+
+    Returns
+    -------
+    plan, height : ndarray, shape (n,)
+        Length in plan and size of the difference in height, metres.
+    """
+    if frame["kind"] == "geocentric":
+        parts = _turned(frame, delta, at)
+    else:
+        parts = delta[:, [list(frame["axes"]).index(axis) for axis in GROUND_AXES]]
+    return np.hypot(parts[:, 0], parts[:, 1]), np.abs(parts[:, 2])
+
+
+def _in_metres(frame: Document, now: Floats, before: Floats) -> Floats:
+    """Differences of east, north, up in metres; of degrees by the radii of curvature in between."""
+    plan, height = frame["plan_factor"], frame["height_factor"]
+    delta = (now - before) * (plan, plan, height)
+    if frame["kind"] == "geographic":
+        a, b = frame["ellipsoid"]
+        latitude = (now[:, 1] + before[:, 1]) / 2 * plan
+        up = (now[:, 2] + before[:, 2]) / 2 * height
+        turn = np.remainder(delta[:, 0] + np.pi, 2 * np.pi) - np.pi  # the short way round
+        delta[:, 0] = turn * (prime_vertical_radius(latitude, (a, b)) + up) * np.cos(latitude)
+        delta[:, 1] *= meridian_radius(latitude, (a, b)) + up
+    return delta
+
+
+def _turned(frame: Document, delta: Floats, at: Floats) -> Floats:
+    """Differences of X, Y, Z along east, north and the normal of the ellipsoid, metres."""
+    names = list(frame["axes"])
+    order = [names.index(axis) for axis in (CARTESIAN_AXES if "x" in names else GROUND_AXES)]
+    d, p = delta[:, order], at[:, order]
+    a, b = frame["ellipsoid"]
+    # latitude of a point on the ellipsoid; a few kilometres above it the normal is off by 1e-6, which is nothing here
+    distance = np.hypot(p[:, 0], p[:, 1])
+    latitude = np.arctan2(p[:, 2] * a**2, distance * b**2)
+    longitude = np.arctan2(p[:, 1], p[:, 0])
+    out = np.cos(longitude) * d[:, 0] + np.sin(longitude) * d[:, 1]
+    east = np.cos(longitude) * d[:, 1] - np.sin(longitude) * d[:, 0]
+    north = np.cos(latitude) * d[:, 2] - np.sin(latitude) * out
+    up = np.sin(latitude) * d[:, 2] + np.cos(latitude) * out
+    return np.column_stack([east, north, up])

@@ -1,0 +1,126 @@
+"""What two results may differ by: for each kind of quantity so much, or so much of the quantity itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+# Kinds of quantities and the unit of their absolute tolerances. Statistics have two: metres, micrometres.
+UNITS = {
+    "plan": "m",
+    "height": "m",
+    "rotation": "deg",
+    "sigma0": "um",
+    "scale": "",
+    "precision": "m",
+    "statistics": "m",
+    "counts": "",
+}
+SETS = ("ids", "choices", "rejected", "findings")
+
+
+@dataclass(frozen=True, slots=True)
+class Tolerance:
+    """Tolerance of one kind of quantity; the larger of its two parts counts.
+
+    Parameters
+    ----------
+    absolute : float
+        Difference allowed, in the unit of the kind.
+    relative : float
+        Difference allowed, as a share of the size in the baseline.
+    absolute_um : float
+        As `absolute`, for statistics in micrometres.
+    ignore : bool
+        Whether quantities of this kind are not compared.
+    """
+
+    absolute: float = 0.0
+    relative: float = 0.0
+    absolute_um: float = 0.0
+    ignore: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class SetTolerance:
+    """How many elements of a set may be missing or new.
+
+    Parameters
+    ----------
+    missing, new : int
+        Their largest number.
+    ignore : bool
+        Whether the set is not compared.
+    """
+
+    missing: int = 0
+    new: int = 0
+    ignore: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Tolerances:
+    """Tolerances of all kinds.
+
+    The defaults let pass what another processor or another version of the numerical libraries changes, and hardly
+    anything else: two units of the last digit that result.json shows.
+
+    Parameters
+    ----------
+    plan, height : Tolerance
+        Ground points, perspective centres and differences at control, metres.
+    rotation : Tolerance
+        Angle between two rotations, and elements of relative orientation, degrees.
+    sigma0 : Tolerance
+        Standard deviation of an image coordinate of weight one, micrometres.
+    scale : Tolerance
+        Scale factors of models, joints and of the strip, ratios.
+    precision : Tolerance
+        Standard deviations of points and photos.
+    statistics : Tolerance
+        Rms values, means, largest values, test values.
+    counts : Tolerance
+        Numbers of points, redundancies.
+    ids, choices, rejected, findings : SetTolerance
+        Photos, points, models and given points; adjustment, degrees, terms, roles, status and verdicts; measurements
+        taken out; notes and points without coordinates.
+    """
+
+    plan: Tolerance = Tolerance(absolute=0.0002)
+    height: Tolerance = Tolerance(absolute=0.0002)
+    rotation: Tolerance = Tolerance(absolute=2e-6)
+    sigma0: Tolerance = Tolerance(absolute=0.02)
+    scale: Tolerance = Tolerance(relative=1e-8)
+    precision: Tolerance = Tolerance(absolute=0.0002, relative=0.001)
+    statistics: Tolerance = Tolerance(absolute=0.0002, relative=0.001, absolute_um=0.11)
+    counts: Tolerance = Tolerance()
+    ids: SetTolerance = SetTolerance()
+    choices: SetTolerance = SetTolerance()
+    rejected: SetTolerance = SetTolerance()
+    findings: SetTolerance = SetTolerance()
+
+    def of(self, kind: str) -> Tolerance:
+        """Give the tolerance of a kind of quantity."""
+        found: Tolerance = getattr(self, kind)
+        return found
+
+    def allowed(self, kind: str, unit: str, before: float) -> float:
+        """Give the largest difference that is allowed for a number.
+
+        Parameters
+        ----------
+        kind : str
+            Its kind.
+        unit : str
+            Its unit. The absolute part of a tolerance holds for numbers in the unit of their kind only: a statistic
+            without a unit has the relative part alone.
+        before : float
+            The number in the baseline.
+        """
+        tolerance = self.of(kind)
+        absolute = tolerance.absolute if unit == UNITS[kind] else tolerance.absolute_um if unit == "um" else 0.0
+        return max(absolute, tolerance.relative * abs(before))
+
+    def of_set(self, kind: str) -> SetTolerance:
+        """Give the tolerance of a kind of set."""
+        found: SetTolerance = getattr(self, kind)
+        return found

@@ -1,0 +1,137 @@
+"""Tolerance profiles: YAML files that say what two results may differ by."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import PlainValidator
+
+from photostrip.compare import SetTolerance, Tolerance, Tolerances
+from photostrip.errors import InputError
+from photostrip.formats.findings import Findings
+from photostrip.formats.numbers import NotANumber, shown
+from photostrip.formats.numbers import number as read_number
+from photostrip.project.merging import read_tree
+from photostrip.project.schema import Flag, Section, Words, key, wrong
+from photostrip.project.validation import checked
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+SCHEMA_NUMBER = 1
+USUAL = Tolerances()
+
+
+def _size(value: object) -> float:
+    """Read a size: a number that is not negative."""
+    expected = "a number, 0 or larger"
+    try:
+        found = read_number(value) if isinstance(value, str) else -1.0
+    except NotANumber as why:
+        raise wrong(why.message, code="number", expected=expected, fix=why.fix) from None
+    if found < 0:
+        raise wrong(f"{shown(str(value))} is out of range", code="range", expected=expected)
+    return found
+
+
+def _whole(value: object) -> int:
+    found = _size(value)
+    if found != int(found):
+        raise wrong(f"{shown(str(value))} is not a whole number", code="number", expected="a whole number")
+    return int(found)
+
+
+def _schema_number(value: object) -> int:
+    if value != str(SCHEMA_NUMBER):
+        message = f"this version of photostrip does not read schema {shown(str(value))} of tolerances"
+        raise wrong(message, code="schema-number", expected=f"photostrip_tolerances: {SCHEMA_NUMBER}")
+    return SCHEMA_NUMBER
+
+
+Size = Annotated[float, PlainValidator(_size)]
+Whole = Annotated[int, PlainValidator(_whole)]
+
+
+class Absolute(Section):
+    """Tolerance of what has a size of its own."""
+
+    absolute: Size | None = key("Difference allowed, in the unit of the kind", None)
+    ignore: Flag = key("Do not compare this kind", default=False)
+
+
+class Both(Absolute):
+    """Tolerance that may grow with the quantity; the larger part counts."""
+
+    relative: Size | None = key("Difference allowed, as a share of the baseline", None)
+
+
+class Statistics(Both):
+    """Tolerance of statistics, which come in metres and in micrometres."""
+
+    absolute_um: Size | None = key("Difference allowed of statistics in micrometres", None)
+
+
+class Members(Section):
+    """Tolerance of a set."""
+
+    missing: Whole | None = key("Members that may be missing", None)
+    new: Whole | None = key("Members that may be new", None)
+    ignore: Flag = key("Do not compare this set", default=False)
+
+
+class ToleranceFile(Section):
+    """A tolerance profile. What is not named keeps its default."""
+
+    photostrip_tolerances: Annotated[int, PlainValidator(_schema_number)] = key("Number of this schema")
+    extends: Words | None = key("Another profile whose keys are taken where this one has none", None)
+    plan: Absolute = key("Places in plan", Absolute.model_construct(), unit="m")
+    height: Absolute = key("Heights", Absolute.model_construct(), unit="m")
+    rotation: Absolute = key("Angles of rotations", Absolute.model_construct(), unit="deg")
+    sigma0: Both = key("Standard deviation of unit weight", Both.model_construct(), unit="um")
+    scale: Both = key("Scale factors", Both.model_construct())
+    precision: Both = key("Standard deviations of points and photos", Both.model_construct(), unit="m")
+    statistics: Statistics = key("Rms values, means, test values", Statistics.model_construct(), unit="m")
+    counts: Both = key("Numbers of points, redundancies", Both.model_construct())
+    ids: Members = key("Photos, points, models, given points", Members.model_construct())
+    choices: Members = key("Degrees, terms, roles, verdicts", Members.model_construct())
+    rejected: Members = key("Measurements taken out", Members.model_construct())
+    findings: Members = key("Notes, points without coordinates", Members.model_construct())
+
+
+def load_tolerances(path: Path) -> tuple[Tolerances, tuple[str, ...]]:
+    """Read a tolerance profile.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    tolerances : Tolerances
+        The profile, defaults filled in.
+    files : tuple of str
+        Every file that was read.
+
+    Raises
+    ------
+    InputError
+        With every fault of the file.
+    """
+    findings, files = Findings(), list[str]()
+    root = read_tree(str(path), findings, files)
+    if root is None:
+        raise InputError(findings.faults)
+    given = checked(ToleranceFile, root, findings)
+    findings.stop()
+    if given is None:  # cannot be: checked() had a reason, and stop() told it
+        raise InputError(f"{path} is not a valid tolerance profile")
+    kinds = {name: _completed(getattr(USUAL, name), getattr(given, name)) for name in Tolerances.__dataclass_fields__}
+    return Tolerances(**kinds), tuple(files)
+
+
+def _completed(usual: Tolerance | SetTolerance, given: Section) -> Any:  # noqa: ANN401 (the type of `usual`)
+    """Lay what is given over the default."""
+    named = {name: getattr(given, name) for name in type(given).model_fields}
+    return replace(usual, **{name: value for name, value in named.items() if value is not None})

@@ -1,0 +1,271 @@
+"""``photostrip compare`` as it is typed: forms, exit codes, the baseline written anew, tolerance profiles."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import pytest
+
+from photostrip.cli.main import main
+from photostrip.compare import Tolerances, baseline_of
+from photostrip.errors import InputError
+from photostrip.formats.result.files import to_json
+from photostrip.formats.result.places import line_finder
+from photostrip.project.tolerance_profile import load_tolerances
+from photostrip.report.junit import Case, to_junit
+from tests.results import case
+from tests.source_tree import ROOT
+
+PROFILES = ROOT / "configs" / "tolerances"
+
+
+@pytest.fixture
+def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a result and its baseline; the baseline has a point and a model that differ."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "100")
+    document = case().document
+    (tmp_path / "result").mkdir()
+    (tmp_path / "result" / "result.json").write_text(to_json(document), encoding="utf-8")
+    baseline: dict[str, Any] = json.loads(json.dumps(baseline_of(document)))
+    (tmp_path / "same.json").write_text(to_json(baseline), encoding="utf-8")
+    baseline["points"][5]["z"] += 0.05
+    baseline["models"][1]["scale_factor"] *= 1 + 1e-5
+    (tmp_path / "other.json").write_text(to_json(baseline), encoding="utf-8")
+    return tmp_path
+
+
+def parsed(text: str) -> ET.Element:
+    """Give the suite of a JUnit file."""
+    return ET.fromstring(text.encode("utf-8"))[0]  # noqa: S314 (we wrote it)
+
+
+def moved() -> str:
+    name: str = case().document["points"][5]["id"]
+    return name
+
+
+@pytest.mark.usefixtures("files")
+def test_what_agrees_ends_with_0(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["compare", "result", "same.json"]) == 0
+    printed = capsys.readouterr()
+    assert "SAME: " in printed.out
+    assert printed.err == ""
+
+
+@pytest.mark.usefixtures("files")
+def test_what_differs_ends_with_1_and_names_the_worst(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["compare", "result/result.json", "other.json"]) == 1
+    out = capsys.readouterr().out
+    assert "DIFFERENT: result/result.json and other.json differ: 2 numbers beyond tolerance." in out
+    height = next(line for line in out.splitlines() if line.startswith("height"))
+    assert re.search(rf"1\s+0\.05  m\s+point {moved()}\s+0\.0002 m", height)
+    assert re.search(r"scale factors .* +(1e-05|9\.\d+e-06)\s+model .*, scale_", out)
+
+
+@pytest.mark.usefixtures("files")
+def test_quiet_prints_the_verdict_alone(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["compare", "result", "other.json", "--quiet"]) == 1
+    assert capsys.readouterr().out.count("\n") == 1
+
+
+def test_a_profile_decides(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    own = "photostrip_tolerances: 1\nextends: survey.yaml\nheight: {absolute: 0.06}\n"
+    (files / "survey.yaml").write_text((PROFILES / "survey.yaml").read_text(encoding="utf-8"), encoding="utf-8")
+    (files / "own.yaml").write_text(own, encoding="utf-8")
+    assert main(["compare", "result", "other.json", "--tol", "survey.yaml"]) == 1
+    assert main(["compare", "result", "other.json", "--tol", "own.yaml"]) == 0
+    assert "0.06 m" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("form", ["text", "json", "md", "junit", "github"])
+@pytest.mark.parametrize(("baseline", "code"), [("same.json", 0), ("other.json", 1), ("none.json", 2)])
+@pytest.mark.usefixtures("files")
+def test_the_exit_code_is_the_same_in_every_form(form: str, baseline: str, code: int) -> None:
+    assert main(["compare", "result", baseline, "--format", form]) == code
+
+
+@pytest.mark.usefixtures("files")
+def test_json_is_the_whole_comparison(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["compare", "result", "other.json", "--format", "json"])
+    found = json.loads(capsys.readouterr().out)
+    assert (found["photostrip_compare"], found["status"]) == (1, "different")
+    assert [(row["kind"], row["id"]) for row in found["differences"]][1] == ("height", moved())
+    assert found["differences"][0]["kind"] == "scale"
+
+
+@pytest.mark.usefixtures("files")
+def test_junit_has_a_case_for_every_kind(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["compare", "result", "other.json", "--format", "junit"])
+    suite = parsed(capsys.readouterr().out)
+    assert (suite.get("tests"), suite.get("failures")) == ("12", "2")
+    failed = {case.get("name"): case[0] for case in suite if len(case)}
+    assert set(failed) == {"height", "scale factors"}
+    assert moved() in (failed["height"].text or "")
+
+
+def test_junit_holds_any_text() -> None:
+    text = to_junit('a "suite" <&>\x00', [Case("one\x1b", "<failed> & 'so'", "]]>\ud800"), Case("two", skipped="x")])
+    suite = parsed(text)
+    assert suite.get("name") == 'a "suite" <&>?'
+    assert suite[0][0].get("message") == "<failed> & 'so'"
+    assert suite[0][0].text == "]]>?"
+    assert suite[1][0].tag == "skipped"
+
+
+def test_annotations_lead_to_the_line_of_the_baseline(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    main(["compare", "result", "other.json", "--format", "github"])
+    out = capsys.readouterr().out
+    found = re.search(rf"::error file=other\.json,line=(\d+),title=photostrip different::point {moved()}, height", out)
+    assert found is not None
+    line = (files / "other.json").read_text(encoding="utf-8").splitlines()[int(found[1]) - 1]
+    assert json.loads(line.rstrip(","))["id"] == moved()
+
+
+def test_every_record_of_a_result_has_its_line() -> None:
+    document = case().document
+    text = to_json(document)
+    find, lines = line_finder(text), text.splitlines()
+    for block in ("photos", "points", "control", "strips"):
+        for row in document[block]:
+            assert json.loads(lines[find(block, row["id"]) - 1].rstrip(","))["id"] == row["id"]
+    model = document["models"][2]
+    assert json.loads(lines[find("models", f"{model['left']} – {model['right']}") - 1].rstrip(",")) == model
+    assert lines[find("summary", "") - 1].startswith('"summary"')
+    assert lines[find("points", "nobody") - 1].startswith('"points"')
+    assert find("nothing", "") == 0
+
+
+def test_many_differences_are_counted(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    document = json.loads((files / "same.json").read_text(encoding="utf-8"))
+    for row in document["points"]:
+        row["x"] += 1.0
+        row["z"] += 1.0
+    (files / "other.json").write_text(to_json(document), encoding="utf-8")
+    assert main(["compare", "result", "other.json"]) == 1
+    assert "more; --verbose prints all" in capsys.readouterr().out
+    main(["compare", "result", "other.json", "--format", "github"])
+    assert (
+        capsys.readouterr().out.splitlines()[-1].endswith("more differences; photostrip compare --verbose lists them")
+    )
+
+
+# ------------------------------------------------------------------------------------------- the baseline anew
+
+
+def test_update_writes_a_baseline_that_agrees(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["compare", "result", "new/baseline.json", "--update"]) == 0
+    assert capsys.readouterr().err == "wrote new/baseline.json\n"
+    assert main(["compare", "result", "new"]) == 0
+    assert (files / "new/baseline.json").read_bytes() == (files / "same.json").read_bytes()
+
+
+def test_update_says_what_changes(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["compare", "result", "other.json", "--update"]) == 0
+    assert "; DIFFERENT: result/result.json and the baseline before differ: 2 numbers" in capsys.readouterr().err
+    assert main(["compare", "result", "other.json"]) == 0
+    (files / "other.json").write_text("{", encoding="utf-8")
+    assert main(["compare", "result", "other.json", "--update"]) == 0
+    assert "could not be compared" in capsys.readouterr().err
+
+
+def test_a_result_is_no_baseline_of_itself(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = (files / "result/result.json").read_bytes()
+    assert main(["compare", "result", "result/result.json", "--update"]) == 2
+    assert "is the result itself" in capsys.readouterr().err
+    assert main(["compare", "result", "result", "--update"]) == 0
+    assert (files / "result/result.json").read_bytes() == before
+    assert (files / "result/baseline.json").read_bytes() == (files / "same.json").read_bytes()
+
+
+def test_a_baseline_that_cannot_be_written_stays_whole(files: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = (files / "other.json").read_bytes()
+
+    def full(*_: object) -> int:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    assert main(["compare", "result", "other.json", "--update"]) == 2
+    monkeypatch.undo()
+    os.chdir(files)
+    assert (files / "other.json").read_bytes() == before
+    assert sorted(path.name for path in files.iterdir()) == ["other.json", "result", "same.json"]
+
+
+# ------------------------------------------------------------------------------------------- what is refused
+
+
+@pytest.mark.usefixtures("files")
+def test_a_missing_baseline_says_how_it_comes_to_be(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["compare", "result", "none.json"]) == 2
+    assert "--update writes it" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("text", "code"),
+    [
+        ("{}", "result-kind"),
+        ('{"photostrip_result": 2}', "result-schema"),
+        ("[", "result-json"),
+        ('{"photostrip_result": 1}', "not-comparable"),
+    ],
+)
+def test_what_is_no_result_is_refused(files: Path, text: str, code: str, capsys: pytest.CaptureFixture[str]) -> None:
+    (files / "other.json").write_text(text, encoding="utf-8")
+    assert main(["compare", "result", "other.json", "--format", "json"]) == 2
+    found = json.loads(capsys.readouterr().out)
+    assert {each["code"] for each in found["findings"]} == {code}
+
+
+def test_a_broken_result_never_becomes_a_baseline(files: Path) -> None:
+    (files / "result/result.json").write_text('{"photostrip_result": 1}', encoding="utf-8")
+    before = (files / "other.json").read_bytes()
+    assert main(["compare", "result", "other.json", "--update"]) == 2
+    assert (files / "other.json").read_bytes() == before
+
+
+# ------------------------------------------------------------------------------------------- profiles
+
+
+def test_the_numerical_profile_is_the_default() -> None:
+    assert load_tolerances(PROFILES / "numerical.yaml")[0] == Tolerances()
+
+
+def test_profiles_grow() -> None:
+    exact, numerical, survey = (
+        load_tolerances(PROFILES / f"{name}.yaml")[0] for name in ("exact", "numerical", "survey")
+    )
+    for kind in ("plan", "height", "rotation", "sigma0", "statistics"):
+        sizes = [profile.of(kind).absolute for profile in (exact, numerical, survey)]
+        assert sizes[0] == 0 < sizes[1] < sizes[2]
+    assert [profile.scale.relative for profile in (exact, numerical, survey)] == [0.0, 1e-8, 2e-5]
+
+
+@pytest.mark.parametrize("profile", sorted(PROFILES.iterdir()), ids=lambda path: path.stem)
+def test_every_line_of_a_profile_says_what_it_is_for(profile: Path) -> None:
+    for line in profile.read_text(encoding="utf-8").splitlines():
+        assert not line or " # " in line or line.startswith("# "), line
+
+
+def test_a_faulty_profile_is_told_by_line(tmp_path: Path) -> None:
+    path = tmp_path / "tol.yaml"
+    path.write_text(
+        "photostrip_tolerances: 2\nplan: {absolut: 1}\nheight: {absolute: -1}\nids: {new: 0.5}\nscale: {relative: x}\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(InputError) as refused:
+        load_tolerances(path)
+    faults = [(fault.line, fault.key, fault.code) for fault in refused.value.faults]
+    assert faults == [
+        (1, "photostrip_tolerances", "schema-number"),
+        (2, "plan.absolut", "unknown-key"),
+        (3, "height.absolute", "range"),
+        (4, "ids.new", "number"),
+        (5, "scale.relative", "number"),
+    ]
+    assert "did you mean `absolute`?" in str(refused.value)

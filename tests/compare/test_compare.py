@@ -1,0 +1,314 @@
+"""Two results beside each other: differences of known size come out with that size, in the right kind and place."""
+
+from __future__ import annotations
+
+import copy
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from photostrip.compare import SetTolerance, Tolerance, Tolerances, baseline_of, compare_results
+from photostrip.compare.ground import plan_and_height
+from photostrip.compare.tolerances import UNITS
+from photostrip.errors import InputError
+from tests.results import case
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    Document = dict[str, Any]
+
+
+def documents(frame: str = "projected") -> tuple[Document, Document]:
+    """Give a result, and a copy of it to be changed."""
+    document = case(frame).document
+    return copy.deepcopy(document), document
+
+
+def kind(found: Document, name: str) -> Document:
+    row: Document = next(each for each in found["kinds"] if each["kind"] == name)
+    return row
+
+
+@pytest.mark.parametrize("frame", ["projected", "north first", "geographic", "geocentric", "local"])
+def test_a_result_agrees_with_itself_and_with_its_short_form(frame: str) -> None:
+    now, before = documents(frame)
+    zero = Tolerances()
+    for name in UNITS:
+        zero = replace(zero, **{name: Tolerance()})  # type: ignore[arg-type]
+    for other in (before, baseline_of(before)):
+        found = compare_results(now, other, zero)
+        assert found["status"] == "same"
+        assert found["differences"] == []
+        assert kind(found, "plan")["compared"] == kind(found, "height")["compared"] > 40
+        assert all(
+            kind(found, name)["compared"] > 0 for name in ("rotation", "sigma0", "scale", "statistics", "counts")
+        )
+
+
+def test_the_short_form_leaves_out_single_measurements_only() -> None:
+    document = case().document
+    assert document.keys() - baseline_of(document).keys() == {"version", "residuals", "parallaxes"}
+
+
+def degree_of_latitude(latitude: float) -> float:
+    """Length of a degree along the meridian in metres: the series of geodetic tables."""
+    b = math.radians(latitude)
+    return 111_132.92 - 559.82 * math.cos(2 * b) + 1.175 * math.cos(4 * b) - 0.0023 * math.cos(6 * b)
+
+
+def degree_of_longitude(latitude: float) -> float:
+    """Length of a degree along the parallel in metres, from the same tables."""
+    b = math.radians(latitude)
+    return 111_412.84 * math.cos(b) - 93.5 * math.cos(3 * b) + 0.118 * math.cos(5 * b)
+
+
+@pytest.mark.parametrize(
+    ("frame", "key", "step", "plan", "height"),
+    [
+        ("projected", "x", 0.003, 0.003, 0.0),
+        ("projected", "z", -0.003, 0.0, 0.003),
+        ("north first", "x", 0.003, 0.003, 0.0),
+        ("local", "y", 0.002, 0.002, 0.0),
+        ("geographic", "x", 1e-7, math.nan, 0.0),
+        ("geographic", "y", 1e-7, math.nan, 0.0),
+    ],
+)
+def test_a_moved_point_is_found_with_its_size(frame: str, key: str, step: float, plan: float, height: float) -> None:
+    now, before = documents(frame)
+    row = now["points"][7]
+    row[key] += step
+    if frame == "geographic":  # east, north
+        plan = step * (degree_of_longitude(row["y"]) if key == "x" else degree_of_latitude(row["y"]))
+    found = compare_results(now, before)
+    assert [(row["kind"], row["id"]) for row in found["differences"]] == [
+        ("plan" if plan else "height", before["points"][7]["id"])
+    ]
+    assert found["differences"][0]["difference"] == pytest.approx(
+        plan or height, rel=2e-4
+    )  # 300 m above the ellipsoid: 5e-5
+    assert found["differences"][0]["unit"] == "m"
+    other = kind(found, "height" if plan else "plan")
+    assert other["worst"] is None
+
+
+def test_up_in_a_geocentric_frame_is_the_normal() -> None:
+    now, before = documents("geocentric")
+    row = now["points"][3]
+    place = np.array([row[axis] for axis in "xyz"])
+    # WGS 84: the normal of the surface x^2/a^2 + y^2/a^2 + z^2/b^2 = 1 is its gradient
+    normal = place / np.array([6378137.0, 6378137.0, 6356752.314245]) ** 2
+    place += 0.01 * normal / np.linalg.norm(normal)
+    row.update(zip("xyz", place.tolist(), strict=True))
+    found = compare_results(now, before)
+    assert [each["kind"] for each in found["differences"]] == ["height"]
+    assert found["differences"][0]["difference"] == pytest.approx(0.01, rel=1e-4)
+
+
+def test_the_short_way_across_the_meridian_of_180_degrees() -> None:
+    frame = {"kind": "geographic", "axes": ["north", "east", "up"], "plan_factor": math.radians(1.0)}
+    frame |= {"height_factor": 1.0, "ellipsoid": [6378137.0, 6378137.0 * (1 - 1 / 298.257223563)]}
+    plan, height = plan_and_height(frame, np.array([[0.0, -179.9999999, 5.0]]), np.array([[0.0, 179.9999999, 4.0]]))
+    assert plan[0] == pytest.approx(2e-7 * 111_319.49, rel=1e-6)
+    assert height[0] == pytest.approx(1.0)
+
+
+def test_feet_are_told_in_metres() -> None:
+    frame = {"kind": "projected", "axes": ["east", "north", "up"], "plan_factor": 0.3048, "height_factor": 0.3048}
+    plan, height = plan_and_height(frame, np.array([[3.0, 4.0, 1.0]]), np.zeros((1, 3)))
+    assert (plan[0], height[0]) == pytest.approx((1.524, 0.3048))
+
+
+@given(
+    angle=st.floats(1e-7, 170.0),
+    axis=st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: math.hypot(*v) > 0.1),
+)
+def test_a_rotation_is_told_by_its_angle(angle: float, axis: tuple[float, float, float]) -> None:
+    now, before = documents()
+    x, y, z = np.array(axis) / math.hypot(*axis)
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    # Rodrigues, with sin and 1 - cos of the angle
+    turn = np.eye(3) + math.sin(math.radians(angle)) * cross
+    turn += 2 * math.sin(math.radians(angle) / 2) ** 2 * cross @ cross
+    photo = now["photos"][2]
+    photo["rotation"] = (turn @ np.reshape(photo["rotation"], (3, 3))).ravel().tolist()
+    found = kind(compare_results(now, before), "rotation")["worst"]
+    assert found["id"] == photo["id"]
+    assert found["difference"] == pytest.approx(angle, rel=1e-4, abs=1e-9)
+
+
+def change(path: str, step: float) -> Callable[[Document], None]:
+    """Give a change of the number at a path."""
+
+    def apply(document: Document) -> None:
+        *way, last = path.split(".")
+        place: Any = document
+        for each in way:
+            place = place[int(each)] if isinstance(place, list) else place[each]
+        place[last] += step
+
+    return apply
+
+
+@pytest.mark.parametrize(
+    ("path", "step", "expected"),
+    [
+        ("summary.sigma0_um", 0.5, ("sigma0", "um", "")),
+        ("models.1.sigma0_um", -0.5, ("sigma0", "um", "P02 – P03")),
+        ("models.2.scale_factor", 1e-6, ("scale", "", "P03 – P04")),
+        ("junctions.0.factor", 1e-6, ("scale", "", "P02")),
+        ("absolute.0.scale", 0.1, ("scale", "", "A")),
+        ("models.0.elements.omega2", 1e-4, ("rotation", "deg", "P01 – P02")),
+        ("summary.check.plan.rms", 0.1, ("statistics", "m", "")),
+        ("summary.image_rms_um", 0.5, ("statistics", "um", "")),
+        ("summary.check_rms_um.z", 5.0, ("statistics", "um", "")),
+        ("summary.check.normalised", 0.2, ("statistics", "", "")),
+        ("junctions.1.spread_ppm", 50.0, ("statistics", "ppm", "P03")),
+        ("counts.image_points_used", 1, ("counts", "", "")),
+        ("points.4.rays", 1, ("counts", "", None)),
+        ("photos.1.z", 0.01, ("height", "m", "P02")),
+        ("control.2.dz", 0.01, ("height", "m", None)),
+    ],
+)
+def test_every_kind_of_number_is_watched(path: str, step: float, expected: tuple[str, str, str | None]) -> None:
+    now, before = documents()
+    for number, photo in enumerate(("P01", "P02", "P03", "P04", "P05")):
+        assert len(before["photos"]) == 5
+        rename(now, before["photos"][number]["id"], photo)
+    names = {row["id"]: f"P0{number}" for number, row in enumerate(before["photos"], 1)}
+    before = renamed(before, names)
+    change(path, step)(now)
+    found = compare_results(now, before)
+    assert found["status"] == "different"
+    name, unit, where = expected
+    assert [(row["kind"], row["unit"]) for row in found["differences"]] == [(name, unit)]
+    assert where is None or found["differences"][0]["id"] == where
+    assert found["differences"][0]["difference"] == pytest.approx(abs(step), rel=1e-3)
+
+
+def rename(document: Document, old: str, new: str) -> None:
+    document.update(renamed(document, {old: new}))
+
+
+def renamed(value: Any, names: dict[str, str]) -> Any:  # noqa: ANN401 (any JSON)
+    """Give photos other names, wherever they stand."""
+    if isinstance(value, dict):
+        return {key: renamed(each, names) for key, each in value.items()}
+    if isinstance(value, list):
+        return [renamed(each, names) for each in value]
+    return names.get(value, value) if isinstance(value, str) else value
+
+
+def test_a_number_that_is_gone_is_a_difference() -> None:
+    now, before = documents()
+    now["models"][0]["sigma0_um"] = None
+    found = compare_results(now, before, Tolerances(sigma0=Tolerance(absolute=1e6)))
+    assert [(row["id"] != "", row["difference"], row["now"]) for row in found["differences"]] == [(True, None, None)]
+
+
+def test_sets_are_told_by_what_is_missing_and_new() -> None:
+    now, before = documents()
+    gone = now["points"].pop(next(n for n, row in enumerate(now["points"]) if row["role"] == "new"))
+    now["photos"][0]["id"] = "another"
+    now["rejected"].append(
+        {"strip": "A", "photo": "1", "other_photo": "2", "point": "P", "stage": "relative", "test": "t"}
+    )
+    now["notes"].append({"severity": "warning", "code": "weak", "strip": "A", "photos": [], "points": ["P"]})
+    now["polynomials"][0]["degree"] += 1
+    sets = {each["kind"]: each for each in compare_results(now, before)["sets"]}
+    assert f"point {gone['id']}" in [row["what"] for row in sets["ids"]["missing"]]
+    assert "photo another" in [row["what"] for row in sets["ids"]["new"]]
+    assert [row["what"] for row in sets["rejected"]["new"]] == ["P on 1 – 2, relative"]
+    assert [row["what"] for row in sets["findings"]["new"]] == ["warning weak: strip A, point P"]
+    assert len(sets["choices"]["missing"]) == len(sets["choices"]["new"]) == 1
+    assert all(each["differs"] for each in sets.values())
+    loose = SetTolerance(missing=0, new=1)
+    again = {each["kind"]: each for each in compare_results(now, before, Tolerances(rejected=loose))["sets"]}
+    assert not again["rejected"]["differs"]
+
+
+def test_what_was_taken_back_is_not_rejected() -> None:
+    now, before = documents()
+    row = {"strip": "A", "photo": "1", "other_photo": None, "point": "P", "stage": "rays", "readmitted": True}
+    now["rejected"].append(row)
+    assert compare_results(now, before)["status"] == "same"
+
+
+@given(step=st.floats(0.0, 1.0), allowed=st.floats(0.0, 1.0), relative=st.floats(0.0, 0.1))
+def test_the_larger_part_of_a_tolerance_counts(step: float, allowed: float, relative: float) -> None:
+    tolerances = Tolerances(sigma0=Tolerance(absolute=allowed, relative=relative))
+    before = 4.0
+    limit = max(allowed, 4.0 * relative)
+    assert tolerances.allowed("sigma0", "um", before) == pytest.approx(limit)
+    now, then = documents()
+    then = {**then, "summary": {**then["summary"], "sigma0_um": before}}
+    now["summary"]["sigma0_um"] = before + step
+    found = [row for row in compare_results(now, then, tolerances)["differences"] if row["block"] == "summary"]
+    if abs(step - limit) > 1e-12:
+        assert bool(found) is (step > limit)
+
+
+def test_an_ignored_kind_never_differs() -> None:
+    now, before = documents()
+    now["summary"]["sigma0_um"] += 3.0
+    now["status"] = "failed"
+    ignoring = Tolerances(sigma0=Tolerance(ignore=True), choices=SetTolerance(ignore=True))
+    found = compare_results(now, before, ignoring)
+    assert found["status"] == "same"
+    assert kind(found, "sigma0")["worst"]["difference"] == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("crs", "EPSG:32634"),
+        ("axes", ["north", "east", "up"]),
+        ("plan_unit", "US survey foot"),
+        ("heights", "orthometric"),
+        ("kind", "local"),
+    ],
+)
+def test_other_frames_are_not_compared(key: str, value: object) -> None:
+    now, before = documents()
+    now["frame"][key] = value
+    with pytest.raises(InputError) as refused:
+        compare_results(now, before, files=("now.json", "before.json"))
+    assert [(fault.code, fault.key, fault.file) for fault in refused.value.faults] == [
+        ("not-comparable", f"frame.{key}", "now.json")
+    ]
+
+
+def test_the_case_of_a_crs_does_not_matter() -> None:
+    now, before = documents()
+    now["frame"]["crs"] = "epsg:32633"
+    assert compare_results(now, before)["status"] == "same"
+
+
+def test_another_strip_is_not_compared() -> None:
+    now, before = documents()
+    for row in now["points"]:
+        row["id"] = f"other {row['id']}"
+    with pytest.raises(InputError, match="no point is in both"):
+        compare_results(now, before)
+
+
+def test_a_document_that_is_not_whole_is_refused() -> None:
+    now, before = documents()
+    del now["models"]
+    with pytest.raises(InputError, match="key 'models' is missing"):
+        compare_results(now, before)
+
+
+def test_worst_comes_first() -> None:
+    now, before = documents()
+    now["points"][1]["z"] += 0.01  # 50 times what is allowed
+    now["points"][2]["x"] += 0.02  # 100 times
+    now["photos"][0]["rotation"] = [-value for value in now["photos"][0]["rotation"]]
+    found = compare_results(now, before)["differences"]
+    assert [row["block"] for row in found] == ["photos", "points", "points"]
+    assert [row["id"] for row in found[1:]] == [before["points"][2]["id"], before["points"][1]["id"]]
