@@ -19,6 +19,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from photostrip.notes import Finding
+
 EXIT_DONE = 0
 EXIT_TOLERANCE = 1
 EXIT_INPUT = 2
@@ -77,6 +79,8 @@ class PhotostripError(Exception):
     """Root of all errors photostrip raises on purpose."""
 
     exit_code = EXIT_INTERNAL
+    findings: tuple[Finding, ...] = ()
+    """What the data say against themselves: mistakes that may be the cause."""
 
 
 class InputError(PhotostripError):

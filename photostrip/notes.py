@@ -1,8 +1,16 @@
-"""What a run has to say beside its numbers: warnings and remarks, each with a stable code."""
+"""What a run has to say beside its numbers: warnings and remarks, each with a stable code.
+
+A :class:`Note` says what was noticed. A :class:`Finding` says that the data themselves seem to be wrong, with the
+numbers that say so.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,3 +57,59 @@ def before(file: str, line: int, column: int) -> str:
     """Give the place that stands before a message: ``file:line:column: ``; empty when there is none."""
     place = file + "".join(f":{number}" for number in (line, column) if file and number)
     return f"{place}: " if place else ""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One mistake that the data seem to have; see :mod:`photostrip.triangulation.plausibility`.
+
+    Parameters
+    ----------
+    code : str
+        Its kind, for example ``"P101"``.
+    title : str
+        What kind of mistake that is, in a few words.
+    severity : str
+        ``"error"``: a result made from such data is wrong as a whole; ``"warning"``: some of it may be.
+    message : str
+        What was found, with ids, numbers and units.
+    fix : str
+        What would put it right.
+    evidence : mapping of str to float, int or str
+        The numbers behind it; names end with the unit.
+    photos, points, strips : tuple of str
+        Ids concerned.
+    key : str
+        Path of the key in the project file that would be changed; empty when the mistake is in a table.
+    accepted : bool
+        Whether the user has accepted it.
+    file : str
+        File in which it would be put right; empty when it is not known.
+    line, column : int
+        Where in it, counted from 1; 0 when unknown.
+    """
+
+    code: str
+    title: str
+    severity: str
+    message: str
+    fix: str
+    evidence: Mapping[str, float | int | str] = field(default_factory=dict)
+    photos: tuple[str, ...] = ()
+    points: tuple[str, ...] = ()
+    strips: tuple[str, ...] = ()
+    key: str = ""
+    accepted: bool = False
+    file: str = ""
+    line: int = 0
+    column: int = 0
+
+    @property
+    def is_error(self) -> bool:
+        """Whether it stands against the whole result and is not accepted."""
+        return self.severity == "error" and not self.accepted
+
+    @property
+    def names(self) -> frozenset[str]:
+        """Ids under which it can be accepted: its photos, points and strips."""
+        return frozenset((*self.photos, *self.points, *self.strips))

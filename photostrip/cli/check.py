@@ -24,7 +24,7 @@ def check(
 
     For each project: every fault of every file, what was passed over and why, the ground frames decoded at one point
     and back, the standard deviation of every control coordinate and where it stands, and what became of every row of
-    every table. The exit code is 2 when any project has a fault.
+    every table; and mistakes that the data themselves show. The exit code is 2 when any project has a fault.
     """
     from photostrip.cli.checking import print_checked
     from photostrip.cli.talking import no_collector
@@ -38,4 +38,4 @@ def check(
             waiting.at(f"checking {project}")
             found.append(check_project(project, assignments or []))
     print_checked(found, form, width, quiet=quiet, verbose=verbose)
-    return EXIT_INPUT if any(each.faults for each in found) else EXIT_DONE
+    return EXIT_INPUT if any(each.wrong for each in found) else EXIT_DONE

@@ -47,12 +47,12 @@ def print_checked(found: Sequence[Checked], form: Format, width: int | None, *, 
                 sys.stdout.write("\n")
             _print_one(each, form, width, quiet=quiet, verbose=verbose)
         if len(found) > 1:
-            faulty = sum(bool(each.faults) for each in found)
+            faulty = sum(bool(each.wrong) for each in found)
             sys.stdout.write(f"\n{len(found)} projects: {len(found) - faulty} OK, {faulty} faulty\n")
 
 
 def findings_of(checked: Checked) -> list[dict[str, Any]]:
-    """Give faults, then notes, as plain values."""
+    """Give faults, findings and notes as plain values."""
     return [messages.finding_of(told) for told in checked.told]
 
 
@@ -61,7 +61,7 @@ def document_of(found: Sequence[Checked]) -> dict[str, Any]:
     projects = [
         {
             "project": each.path,
-            "status": "faulty" if each.faults else "ok",
+            "status": "faulty" if each.wrong else "ok",
             "findings": findings_of(each),
             **each.document,
         }
@@ -73,7 +73,7 @@ def document_of(found: Sequence[Checked]) -> dict[str, Any]:
 def _print_one(checked: Checked, form: Format, width: int | None, *, quiet: bool, verbose: bool) -> None:
     """Print the verdict of one project, its findings line by line, and what was decoded."""
     findings = findings_of(checked)
-    head = verdict(checked.path, len(checked.faults), len(checked.notes))
+    head = verdict(checked.path, checked.wrong, checked.remarks)
     lines = [messages.line_of(each) for each in findings]
     sections = () if quiet or not checked.document else check_sections(checked.document, everything=verbose)
     if form is Format.MD:

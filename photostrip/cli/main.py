@@ -245,6 +245,10 @@ def _exit_code(error: BaseException, *, debug: bool) -> int:
             return EXIT_INTERNAL
     for message in messages:
         _complain(message)
+    if isinstance(error, InputError | GeometryError) and error.findings:
+        from photostrip.report.messages import finding_of, line_of
+
+        sys.stderr.writelines(f"{line_of(finding_of(each))}\n" for each in error.findings)
     return code
 
 

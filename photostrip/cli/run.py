@@ -48,7 +48,7 @@ def run(
         talk.step(f"read {len(loaded.files)} files, {len(loaded.inputs.observations)} image points")
         waiting.at(f"adjusting {sum(len(strip.photos) for strip in loaded.inputs.strips)} photos")
         with loaded.places():
-            result = triangulate(loaded.inputs, loaded.settings, directory=loaded.directory)
+            result = loaded.result(triangulate(loaded.inputs, loaded.settings, directory=loaded.directory))
         talk.step(f"adjusted {len(result.points.number)} points")
         document = document_of(result, loaded.remarks)
         waiting.at("writing the result")

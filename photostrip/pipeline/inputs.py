@@ -164,6 +164,8 @@ class Settings:
         System (``geometry.rotation.SYSTEMS``) and unit (``"deg"``, ``"gon"``, ``"rad"``) of exported angles.
     tolerances : dict of str to float
         Largest allowed values of the summary, metres, by name (``check_rms_xy``, ``check_rms_z``, ...).
+    accept : tuple of str
+        Findings that the user has looked at and accepted: codes, or ``code/id`` for one photo, point or strip.
     """
 
     adjustment: str = "polynomial"
@@ -177,3 +179,4 @@ class Settings:
     angle_system: str = "alpha-omega-kappa"
     angle_unit: str = "deg"
     tolerances: dict[str, float] = field(default_factory=dict)
+    accept: tuple[str, ...] = ()

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     from photostrip.geodesy.crs import GroundFrame
     from photostrip.geodesy.local_frame import IntermediateFrame
-    from photostrip.notes import Note
+    from photostrip.notes import Finding, Note
     from photostrip.pipeline.inputs import Inputs, Settings, Strip
     from photostrip.points import ControlPoints
     from photostrip.triangulation import (
@@ -206,6 +206,8 @@ class Result:
         What the surveyor should know.
     precision : Precision or None
         How precise points and photos are; None when it was not computed.
+    findings : tuple of Finding
+        What the data say against themselves.
     """
 
     inputs: Inputs
@@ -222,6 +224,7 @@ class Result:
     not_determined: dict[str, str]
     notes: tuple[Note, ...]
     precision: Precision | None = None
+    findings: tuple[Finding, ...] = ()
 
     @property
     def roles(self) -> tuple[str, ...]:

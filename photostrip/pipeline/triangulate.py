@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.errors import Fault, InputError
+from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geodesy.crs import tie_frames
 from photostrip.notes import Note
-from photostrip.pipeline import overruling
+from photostrip.pipeline import overruling, plausibility
 from photostrip.pipeline.inputs import ADJUSTMENTS
 from photostrip.pipeline.results import Adjusted, Result, Ties
 from photostrip.pipeline.strip import adjust_strip
@@ -55,7 +55,21 @@ def triangulate(inputs: Inputs, settings: Settings, *, directory: Path | None = 
         When the settings or frames contradict each other or the control is left-handed.
     GeometryError
         When a pair, a joint or the absolute orientation cannot be determined.
+
+    Notes
+    -----
+    Either error carries in ``findings`` what the data say against themselves.
     """
+    try:
+        result = _triangulated(inputs, settings, directory)
+    except (InputError, GeometryError) as error:
+        error.findings = plausibility.of_failure(inputs, settings)
+        raise
+    return replace(result, findings=plausibility.of_result(result))
+
+
+def _triangulated(inputs: Inputs, settings: Settings, directory: Path | None) -> Result:
+    """Walk through the method."""
     _require(settings)
     _require_strips(inputs)
     frames, output = _frames(inputs, settings, directory)
@@ -171,7 +185,7 @@ def _ideal_coordinates(
     wanted = settings.refinement
     if wanted.refraction and (wanted.flying_height is None or wanted.ground_height is None):
         # The heights come from a first run without refraction; metres do not matter to it.
-        first = triangulate(inputs, replace(settings, refinement=replace(wanted, refraction=False)))
+        first = _triangulated(inputs, replace(settings, refinement=replace(wanted, refraction=False)), None)
         flying, ground = _heights(first, frames)
         wanted = replace(wanted, flying_height=flying, ground_height=ground)
     return refinement.refine(observations, _cameras(inputs), wanted)

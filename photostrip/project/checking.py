@@ -16,7 +16,7 @@ import numpy as np
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.findings import Findings
 from photostrip.geodesy.crs import tie_frames
-from photostrip.pipeline import overruling
+from photostrip.pipeline import overruling, plausibility
 from photostrip.pipeline.triangulate import require_whole
 from photostrip.project.document import fault_at, key_path
 from photostrip.project.loading import load_project
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     from photostrip.formats.control import ControlTable
     from photostrip.geodesy.crs import GroundFrame
-    from photostrip.notes import Note
+    from photostrip.notes import Finding, Note
     from photostrip.points import PhotoPoints
     from photostrip.project.loading import Project
 
@@ -52,6 +52,8 @@ class Checked:
         The project file as the user named it.
     faults : tuple of Fault
         What must be put right before the project can be adjusted.
+    findings : tuple of Finding
+        What the data say against themselves.
     notes : tuple of Note
         What the surveyor should know.
     document : dict
@@ -60,13 +62,24 @@ class Checked:
 
     path: str
     faults: tuple[Fault, ...]
+    findings: tuple[Finding, ...]
     notes: tuple[Note, ...]
     document: Document
 
     @property
-    def told(self) -> tuple[Fault | Note, ...]:
-        """Faults, then notes."""
-        return (*self.faults, *self.notes)
+    def told(self) -> tuple[Fault | Finding | Note, ...]:
+        """Faults, then findings, then notes."""
+        return (*self.faults, *self.findings, *self.notes)
+
+    @property
+    def wrong(self) -> int:
+        """How much must be put right: faults, and findings that stand against the whole result."""
+        return len(self.faults) + sum(each.is_error for each in self.findings)
+
+    @property
+    def remarks(self) -> int:
+        """How much else is told."""
+        return len(self.told) - self.wrong
 
 
 def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
@@ -87,7 +100,7 @@ def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
     try:
         project = load_project(path, overrides)
     except InputError as error:
-        return Checked(str(path), error.faults, (), {})
+        return Checked(str(path), error.faults, (), (), {})
     faults = _refused(project, partial(overruling.require, project.settings.relative, project.inputs.observations))
     notes = list(project.hints)
     notes += _image_coordinates(project, faults)
@@ -101,9 +114,17 @@ def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
         "control": list(_control(project)),
         "rows": table_rows(project),
     }
-    findings = Findings()  # of too many faults in one file they only count the rest
-    findings.add(*dict.fromkeys(faults))
-    return Checked(str(path), findings.faults, tuple(notes), document)
+    counted = Findings()  # of too many faults in one file they only count the rest
+    counted.add(*dict.fromkeys(faults))
+    return Checked(str(path), counted.faults, _against_themselves(project), tuple(notes), document)
+
+
+def _against_themselves(project: Project) -> tuple[Finding, ...]:
+    """Let the gate examine the data as far as that needs no adjustment."""
+    try:
+        return project.placed(plausibility.of_inputs(project.inputs, project.settings))
+    except (InputError, GeometryError):
+        return ()  # what is wrong is told as a fault
 
 
 def _refused(project: Project, test: Callable[[], None]) -> list[Fault]:

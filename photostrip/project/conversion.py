@@ -419,4 +419,5 @@ def settings(project: schema.ProjectFile) -> Settings:
         angle_system=project.output.angles.system,
         angle_unit=project.output.angles.unit,
         tolerances=project.tolerances.model_dump(exclude_none=True),
+        accept=tuple(map(str, project.accept)),
     )

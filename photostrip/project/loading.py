@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from photostrip.errors import Fault, InputError
+from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.findings import Findings
 from photostrip.geodesy.crs import tie_frames
 from photostrip.pipeline import Inputs, Settings
@@ -30,6 +30,7 @@ from photostrip.project.conversion import (
     strips,
 )
 from photostrip.project.document import COMMAND_LINE, Node, fault_at
+from photostrip.project.finding_places import placed
 from photostrip.project.hints import hints
 from photostrip.project.merging import override, read_tree, steps
 from photostrip.project.references import check_references
@@ -39,11 +40,12 @@ from photostrip.project.tables import Tables, check_tables, read_tables
 from photostrip.project.validation import valid_section, validate
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from photostrip.camera import Camera
     from photostrip.geodesy.frame_spec import FrameSpec
-    from photostrip.notes import Note
+    from photostrip.notes import Finding, Note
+    from photostrip.pipeline import Result
     from photostrip.pipeline.inputs import CameraPositions, GivenOrientations
     from photostrip.points import PhotoPoints
 
@@ -93,13 +95,27 @@ class Project:
         """The hints with files as seen from the project's folder: the same wherever the project is run from."""
         return tuple(replace(note, file=_seen_from(note.file, self.directory)) for note in self.hints)
 
+    def placed(self, findings: Iterable[Finding]) -> tuple[Finding, ...]:
+        """Give findings the place in the files where they would be put right."""
+        return tuple(placed(findings, self.tree, self.tables, self.inputs.strips))
+
+    def result(self, result: Result) -> Result:
+        """Give a result whose findings say where, with files as seen from the project's folder."""
+        seen = (replace(each, file=_seen_from(each.file, self.directory)) for each in self.placed(result.findings))
+        return replace(result, findings=tuple(seen))
+
     @contextmanager
     def places(self) -> Iterator[None]:
         """Give faults that are found in what was read, not while it was read, their place in the project file."""
         try:
             yield
         except InputError as error:
-            raise InputError(fault if fault.file else _placed(self.tree, fault) for fault in error.faults) from None
+            told = InputError(fault if fault.file else _placed(self.tree, fault) for fault in error.faults)
+            told.findings = self.placed(error.findings)
+            raise told from None
+        except GeometryError as error:
+            error.findings = self.placed(error.findings)
+            raise
 
 
 def load_project(path: Path, overrides: Sequence[str] = ()) -> Project:

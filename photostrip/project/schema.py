@@ -23,6 +23,7 @@ from photostrip.geometry.rotation import SYSTEMS
 from photostrip.pipeline import ADJUSTMENTS, Settings
 from photostrip.triangulation.bundle.settings import CALIBRATION, SCREENINGS, TESTS
 from photostrip.triangulation.formation import SCALE_TRANSFERS
+from photostrip.triangulation.plausibility import KINDS
 from photostrip.triangulation.polynomial import DEGREES
 from photostrip.triangulation.screening import METHODS
 
@@ -553,6 +554,20 @@ class Tolerances(Section):
     sigma0_um: Positive | None = key("Largest sigma0 of the image coordinates", None, unit="um")
 
 
+def _finding(value: object) -> str:
+    """Read the code of a finding, alone or with the one id that it is accepted for."""
+    expected = "a code such as P201, or P201/1003 for one photo, point or strip"
+    word = _word(value, expected)
+    code, _, _ = word.partition("/")
+    if code not in KINDS:
+        message = f"there is no finding `{shown(code)}`"
+        raise wrong(message, code="no-such-finding", expected=expected, fix=suggestion(code, KINDS))
+    return _text(word)
+
+
+Accepted = Annotated[str, *_typed(_finding, {"type": "string", "pattern": "^P[0-9]{3}(/.+)?$"})]
+
+
 class ProjectFile(Section):
     """A project of photostrip: what was measured, what is given, and what is to be done.
 
@@ -575,6 +590,10 @@ class ProjectFile(Section):
     processing: Processing = key("What is computed and how", Processing.model_construct())
     tolerances: Tolerances = key(
         "Largest allowed values; where one is exceeded the exit code is 1", Tolerances.model_construct()
+    )
+    accept: list[Accepted] = key(
+        "Findings that were looked at and are accepted: codes, or `code/id` for one photo, point or strip",
+        [],
     )
 
 

@@ -8,7 +8,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from photostrip.errors import Fault, InputError
-from photostrip.report import decision_sections, ground_sections, precision_sections, strip_sections
+from photostrip.report import (
+    decision_sections,
+    finding_sections,
+    ground_sections,
+    precision_sections,
+    strip_sections,
+)
 from photostrip.report.figures import counted, fixed, metres, micrometres, short, unit
 from photostrip.report.parts import Column, Facts, Part, Section, Table, Words
 
@@ -20,7 +26,7 @@ Document = dict[str, Any]
 HEADLINES = {
     "good": "GOOD: nothing calls for a second look.",
     "look": "LOOK at {number} before you use this:",
-    "failed": "FAILED: {failed} of {tolerances} not kept.",
+    "failed": "FAILED: {failed}.",
 }
 LOOK_SHOWN = 10
 
@@ -43,6 +49,7 @@ def sections_of(document: Document, *, everything: bool = False) -> tuple[Sectio
     several = len(document["strips"]) > 1
     found = [
         verdict_section(document, everything=everything),
+        *finding_sections.findings_sections(document),
         project_section(document),
         decision_sections.decisions_section(document),
         counts_section(document),
@@ -114,8 +121,11 @@ def headline(document: Document) -> str:
     tolerances = document["tolerances"]
     failed = sum(not each["passed"] for each in tolerances)
     number = counted(len(document["verdict"]["look_at"]), "thing")
-    text = HEADLINES[document["status"]]
-    return text.format(number=number, failed=failed, tolerances=counted(len(tolerances), "tolerance"))
+    reasons = [f"{failed} of {counted(len(tolerances), 'tolerance')} not kept"] if failed else []
+    wrong = sum(each["severity"] == "error" and not each["accepted"] for each in document.get("findings", []))
+    if wrong:
+        reasons.append(f"the data contradict themselves, {counted(wrong, 'finding')}")
+    return HEADLINES[document["status"]].format(number=number, failed="; ".join(reasons))
 
 
 def _accuracy(document: Document) -> Words:

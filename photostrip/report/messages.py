@@ -1,4 +1,4 @@
-"""Faults and notes in the three forms in which they are told: lines for people, JSON for programs, annotations.
+"""Faults, findings and notes in the three forms in which they are told: lines, JSON for programs, annotations.
 
 Whatever the form, the same findings come out with the same file, line, column, key and code.
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from photostrip.errors import Fault, GeometryError, InputError
+from photostrip.notes import Finding
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -18,14 +19,15 @@ Document = dict[str, Any]
 
 LEVELS = {"error": "error", "warning": "warning", "note": "notice"}  # ours, and those of GitHub
 SCHEMA = 1
+ACCEPTED = "accepted: "
 
 
-def finding_of(told: Fault | Note) -> Document:
-    """Give a fault or a note as plain values.
+def finding_of(told: Fault | Note | Finding) -> Document:
+    """Give a fault, a note or a finding as plain values.
 
     Parameters
     ----------
-    told : Fault or Note
+    told : Fault, Note or Finding
         What was found.
 
     Returns
@@ -43,17 +45,36 @@ def finding_of(told: Fault | Note) -> Document:
         "key": told.key,
         "message": told.message,
     }
+    if isinstance(told, Finding):
+        return found | _of_finding(told)
     if isinstance(told, Fault):
         return found | {"expected": told.expected, "fix": told.fix, "photos": [], "points": []}
     return found | {"expected": "", "fix": "", "photos": list(told.photos), "points": list(told.points)}
 
 
+def _of_finding(told: Finding) -> Document:
+    """Give what a finding has beside message and place; an accepted one is no error and needs no cure."""
+    return {
+        "severity": "note" if told.accepted else told.severity,
+        "message": f"{ACCEPTED if told.accepted else ''}{told.message}",
+        "expected": "",
+        "fix": "" if told.accepted else told.fix,
+        "photos": list(told.photos),
+        "points": list(told.points),
+        "strips": list(told.strips),
+        "title": told.title,
+        "accepted": told.accepted,
+        "evidence": dict(told.evidence),
+    }
+
+
 def findings_of(error: InputError | GeometryError) -> list[Document]:
-    """Give what an error carries as plain values."""
+    """Give what an error carries as plain values: the failure, then what the data say against themselves."""
+    causes = [finding_of(each) for each in error.findings]
     if isinstance(error, InputError):
-        return [finding_of(fault) for fault in error.faults]
+        return [finding_of(fault) for fault in error.faults] + causes
     found = finding_of(Fault(str(error), error.code))
-    return [found | {"photos": list(error.photos), "points": list(error.points)}]
+    return [found | {"photos": list(error.photos), "points": list(error.points)}, *causes]
 
 
 def result_findings(document: Document) -> list[Document]:
@@ -81,7 +102,18 @@ def result_findings(document: Document) -> list[Document]:
         for each in document["tolerances"]
         if not each["passed"]
     ]
-    return found + [empty | note for note in document["notes"]]
+    return (
+        found
+        + [_told(empty, each) for each in document.get("findings", [])]
+        + [empty | note for note in document["notes"]]
+    )
+
+
+def _told(empty: Document, finding: Document) -> Document:
+    """Give a finding of a result's document in the form of the others."""
+    if not finding["accepted"]:
+        return empty | finding
+    return empty | finding | {"severity": "note", "message": ACCEPTED + finding["message"], "fix": ""}
 
 
 def as_document(findings: Sequence[Document], exit_code: int) -> Document:
@@ -105,8 +137,10 @@ def as_document(findings: Sequence[Document], exit_code: int) -> Document:
 def line_of(finding: Document) -> str:
     """Give a finding on one line: ``error: file:line:column: key: what; expected ...; what would fix it``."""
     names = ("message", "code", "file", "line", "column", "key", "expected", "fix")
-    fault = Fault(**{name: finding[name] for name in names})
-    return f"{finding['severity']}: {fault}"
+    told = {name: finding[name] for name in names}
+    if "evidence" in finding:  # the codes of the gate are for people, too: they can be accepted
+        told["message"] = f"{finding['code']} {finding['message']}"
+    return f"{finding['severity']}: {Fault(**told)}"
 
 
 def annotated(findings: Iterable[Document]) -> str:

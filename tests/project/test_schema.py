@@ -162,4 +162,5 @@ def test_the_model_is_the_contract() -> None:
         "output",
         "processing",
         "tolerances",
+        "accept",
     ]

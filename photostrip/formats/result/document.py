@@ -12,7 +12,7 @@ from photostrip.formats.result.verdict import verdict_of
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from photostrip.notes import Note
+    from photostrip.notes import Finding, Note
     from photostrip.pipeline import Result
 
 SCHEMA = 1
@@ -58,6 +58,7 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         "ties": ground.ties_of(result, rank),
         "rejected": pairs.rejected_of(result),
         "not_determined": ground.not_determined_of(result),
+        "findings": [_finding(each) for each in result.findings],
         "notes": [_note(note) for note in (*notes, *result.notes)],
         "models": pairs.models_of(result),
         "junctions": pairs.junctions_of(result),
@@ -75,6 +76,30 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         "verdict": verdict,
     }
     return head | body
+
+
+def _finding(finding: Finding) -> Document:
+    """Give a finding; the numbers of its evidence have six digits."""
+    return {
+        "code": finding.code,
+        "title": finding.title,
+        "severity": finding.severity,
+        "accepted": finding.accepted,
+        "message": finding.message,
+        "fix": finding.fix,
+        "evidence": {name: _six_digits(value) for name, value in sorted(finding.evidence.items())},
+        "strips": list(finding.strips),
+        "photos": list(finding.photos),
+        "points": list(finding.points),
+        "file": finding.file,
+        "line": finding.line,
+        "column": finding.column,
+        "key": finding.key,
+    }
+
+
+def _six_digits(value: float | str) -> float | str:
+    return float(f"{value:.6g}") if isinstance(value, float) else value
 
 
 def _note(note: Note) -> Document:

@@ -46,9 +46,10 @@ def verdict_of(document: Document) -> Document:
     dict
         ``status``, one of ``good``, ``look`` and ``failed``; ``accuracy``, a sentence; ``look_at``, sentences.
     """
-    failed = list(_tolerances(document))
+    failed = [*_tolerances(document), *_findings(document, "error")]
     look_at = [
         *failed,
+        *_findings(document, "warning"),
         *_control(document),
         *_check(document),
         *_sigma0(document),
@@ -171,6 +172,15 @@ def _rejected(document: Document) -> Iterator[str]:
     gone = sum(model["points_rejected"] for model in document["models"])
     if gone > MANY_REJECTED * (used + gone):
         yield f"{gone} of {used + gone} points in pairs were rejected, {100 * gone / (used + gone):.0f} %"
+
+
+def _findings(document: Document, severity: str) -> Iterator[str]:
+    """Tell what the data say against themselves and nobody has accepted."""
+    open_ones = [each for each in document["findings"] if each["severity"] == severity and not each["accepted"]]
+    for _, group in groupby(open_ones, key=itemgetter("code")):
+        kind = list(group)
+        yield from (f"{each['code']} {each['message']}" for each in kind[:NAMED])
+        yield from _more(len(kind), "findings")
 
 
 def _notes(document: Document) -> Iterator[str]:

@@ -1,0 +1,78 @@
+"""Where in its files a project would be changed to put a finding right."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.project.merging import steps
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from photostrip.notes import Finding
+    from photostrip.pipeline import Strip
+    from photostrip.project.document import Node
+    from photostrip.project.tables import Tables
+
+
+def placed(findings: Iterable[Finding], tree: Node, tables: Tables, strips: Sequence[Strip]) -> Iterator[Finding]:
+    """Give findings with the places of what they name.
+
+    Parameters
+    ----------
+    findings : iterable of Finding
+        What was found.
+    tree : Node
+        The project file they were found in.
+    tables : Tables
+        Its tables.
+    strips : sequence of Strip
+        Its strips.
+
+    Yields
+    ------
+    Finding
+        The same, with file, line and column: those of the key, else of the first point in a control list, else of the
+        first photo in its strip.
+    """
+    for each in findings:
+        if each.key:
+            path, key = steps(each.key), each.key
+        elif each.points and (row := _given(each.points, tables)) is not None:
+            yield replace(each, file=row[0], line=row[1])
+            continue
+        else:
+            path = _listed(each, strips)
+            key = ""
+        if not path or not tree.has(*path[:1]):
+            yield each
+            continue
+        place = tree.place_of(path)
+        yield replace(each, file=place.file, line=place.line, column=place.column, key=key)
+
+
+def _given(points: tuple[str, ...], tables: Tables) -> tuple[str, int] | None:
+    """File and line of the first of some points that a control list gives."""
+    for read in tables.control:
+        if read is None:
+            continue
+        rows = np.flatnonzero(np.isin(np.array(read.ids, str), points))
+        if len(rows):
+            return read.table.file, int(read.table.lines[rows[0]])
+    return None
+
+
+def _listed(finding: Finding, strips: Sequence[Strip]) -> tuple[str | int, ...]:
+    """Path of the first photo, or of the strip, that a finding names."""
+    for number, strip in enumerate(strips):
+        if finding.strips and strip.id not in finding.strips:
+            continue
+        for photo in finding.photos:
+            if photo in strip.photos:
+                return ("strips", number, "photos", strip.photos.index(photo))
+        if finding.strips:
+            return ("strips", number, "id")
+    return ()

@@ -1,0 +1,279 @@
+"""Photos laid out side by side in a plane by their common points, whatever their order in the list.
+
+Two photos that share points are linked by a plane similarity, z_b = m z_a + t with complex image coordinates, and by a
+mirrored one, z_b = m conj(z_a) + t; the one that fits says whether one of them is a mirror image. Relief and tilts
+leave residuals of millimetres, so a link says nothing about accuracy, but much about order, overlap and mistakes.
+Links do not depend on the principal distance, on the unit, on the order of the photos, or on control.
+"""
+
+from __future__ import annotations
+
+import heapq
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.points import PhotoPoints
+
+    Floats = NDArray[np.float64]
+    Complex = NDArray[np.complex128]
+    Numbers = NDArray[np.intp]
+    Flags = NDArray[np.bool_]
+
+LARGEST_LAG = 12  # photos on which a point is followed on; a strip with 90 % end lap has 10
+STEPS = 6  # of the reweighting: a gross error must not turn a link
+LEAST = 2  # common points of a link
+MIRROR_LEAST = 5  # common points that tell a mirror image
+MIRROR_RATIO = 0.25  # of the mirrored to the plain misfit
+MIRROR_ABSOLUTE = 0.12  # of the spread of the points; relief and tilts leave less
+NARROW = 0.15  # breadth over length of the common points: mirror images of a line fit as well
+JUMP = 2.5  # ratio of the scales of two photos that no change of the flying height explains
+SMALL = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Links:
+    """Photos of one strip that share points, two and two.
+
+    Parameters
+    ----------
+    photo : ndarray of int, shape (l, 2)
+        Places of the two photos in the strip's list, the smaller first.
+    count : ndarray of int, shape (l,)
+        Common points.
+    turn, shift : ndarray of complex, shape (l,)
+        Second photo from first: z_b = turn z_a + shift, or with conj(z_a) where `mirrored`.
+    misfit : ndarray, shape (l,)
+        Mean residual, in the unit of the image coordinates.
+    spread : ndarray, shape (l,)
+        Rms distance of the common points from their centre, on the second photo.
+    mirrored : ndarray of bool, shape (l,)
+        Whether one of the two is a mirror image of the other.
+    """
+
+    photo: Numbers
+    count: Numbers
+    turn: Complex
+    shift: Complex
+    misfit: Floats
+    spread: Floats
+    mirrored: Flags
+
+    def __len__(self) -> int:
+        """Give the number of links."""
+        return len(self.count)
+
+    @cached_property
+    def bases(self) -> tuple[Complex, Complex]:
+        """Centre of the second photo as it would lie on the first, and of the first on the second."""
+        back = -self.shift / np.where(np.abs(self.turn) > SMALL, self.turn, np.nan)
+        return np.where(self.mirrored, np.conj(back), back), self.shift
+
+    @cached_property
+    def index(self) -> dict[tuple[int, int], int]:
+        """Row of each link by its two photos."""
+        return {(int(a), int(b)): row for row, (a, b) in enumerate(self.photo)}
+
+    def toward(self, of: int, other: int) -> complex:
+        """Centre of another photo as it would lie on a photo; NaN without a link."""
+        row = self.index.get((min(of, other), max(of, other)))
+        if row is None:
+            return complex("nan")
+        return complex(self.bases[0 if of < other else 1][row])
+
+
+def link(observations: PhotoPoints, photos: Sequence[str]) -> Links:
+    """Link the photos of a strip by their common points.
+
+    Parameters
+    ----------
+    observations : PhotoPoints
+        Image points of the project, in any unit.
+    photos : sequence of str
+        Photos of the strip; a photo that is listed twice counts where it stands first.
+
+    Returns
+    -------
+    Links
+        One for every two photos with at least two common points.
+    """
+    key, z_a, z_b = _common(observations, photos)
+    order = np.argsort(key, kind="stable")
+    key, z_a, z_b = key[order], z_a[order], z_b[order]
+    pairs, starts, count = np.unique(key, return_index=True, return_counts=True)
+    enough = count >= LEAST
+    rows = np.repeat(enough, count)
+    key, z_a, z_b = key[rows], z_a[rows], z_b[rows]
+    pairs, count = pairs[enough], count[enough]
+    if not len(pairs):
+        none, nowhere = np.zeros(0), np.zeros(0, complex)
+        return Links(np.zeros((0, 2), np.intp), np.zeros(0, np.intp), nowhere, nowhere, none, none, np.zeros(0, bool))
+    starts = np.concatenate([[0], np.cumsum(count)[:-1]])
+    plain, mirror = _similar(z_a, z_b, starts, count), _similar(np.conj(z_a), z_b, starts, count)
+    spread, narrow = _shape(z_b, starts, count)
+    turned = (
+        (mirror[2] < MIRROR_RATIO * plain[2])
+        & (mirror[2] < MIRROR_ABSOLUTE * spread)
+        & (count >= MIRROR_LEAST)
+        & ~narrow
+    )
+    turn, shift = np.where(turned, mirror[0], plain[0]), np.where(turned, mirror[1], plain[1])
+    misfit = np.where(turned, mirror[2], plain[2])
+    photo = np.column_stack(np.divmod(pairs, len(photos))).astype(np.intp)
+    return Links(photo, count.astype(np.intp), turn, shift, misfit, spread, turned)
+
+
+def _common(observations: PhotoPoints, photos: Sequence[str]) -> tuple[Numbers, Complex, Complex]:
+    """Rows of two photos that show the same point: number of the pair of photos, coordinates on both."""
+    place: dict[str, int] = {}
+    for number, name in enumerate(photos):
+        place.setdefault(name, number)
+    position = np.array([place.get(name, -1) for name in observations.photo_ids], np.intp)[observations.photo]
+    inside = np.flatnonzero(position >= 0)
+    order = inside[np.lexsort((position[inside], observations.point[inside]))]
+    point, position = observations.point[order], position[order]
+    z = observations.xy[order, 0] + 1j * observations.xy[order, 1]
+    keys, first, second = [], [], []
+    for lag in range(1, LARGEST_LAG + 1):
+        rows = np.flatnonzero((point[lag:] == point[:-lag]) & (position[lag:] > position[:-lag]))
+        if not len(rows):
+            break
+        keys.append(position[rows] * len(photos) + position[rows + lag])
+        first.append(z[rows])
+        second.append(z[rows + lag])
+    if not keys:
+        return np.zeros(0, np.intp), np.zeros(0, complex), np.zeros(0, complex)
+    return np.concatenate(keys), np.concatenate(first), np.concatenate(second)
+
+
+def _similar(z_a: Complex, z_b: Complex, starts: Numbers, count: Numbers) -> tuple[Complex, Complex, Floats]:
+    """Plane similarity of each segment, with weights that fall with the residual: turn, shift, mean residual."""
+    segment = np.repeat(np.arange(len(count)), count)
+    weight = np.ones(len(z_a))
+    turn, shift = np.zeros(len(count), complex), np.zeros(len(count), complex)
+    misfit = np.zeros(len(count))
+    for _ in range(STEPS):
+        total = np.add.reduceat(weight, starts)
+        mean_a, mean_b = (np.add.reduceat(weight * z, starts) / total for z in (z_a, z_b))
+        d_a, d_b = z_a - mean_a[segment], z_b - mean_b[segment]
+        squares = np.add.reduceat(weight * np.abs(d_a) ** 2, starts)
+        turn = np.asarray(np.add.reduceat(weight * np.conj(d_a) * d_b, starts) / np.maximum(squares, SMALL**2), complex)
+        shift = mean_b - turn * mean_a
+        size = np.abs(d_b - turn[segment] * d_a)
+        misfit = np.add.reduceat(weight * size, starts) / total
+        weight = 1.0 / np.maximum(size / np.maximum(misfit, SMALL)[segment], 0.5)
+    return turn, shift, misfit
+
+
+def _shape(z: Complex, starts: Numbers, count: Numbers) -> tuple[Floats, Flags]:
+    """Rms distance from the centre, and whether the points stand nearly on one line."""
+    segment = np.repeat(np.arange(len(count)), count)
+    d = z - (np.add.reduceat(z, starts) / count)[segment]
+    squares = np.add.reduceat(np.abs(d) ** 2, starts)
+    skew = np.abs(np.add.reduceat(d**2, starts))  # length squared minus breadth squared
+    with np.errstate(divide="ignore", invalid="ignore"):
+        breadth = np.sqrt((squares - skew) / (squares + skew))
+    return np.sqrt(squares / count), ~(breadth > NARROW)
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Photos of a strip in one plane.
+
+    Parameters
+    ----------
+    part : ndarray of int, shape (n,)
+        Which connected part each photo belongs to; the largest part is 0.
+    center : ndarray of complex, shape (n,)
+        Centre of each photo in the plane of its part.
+    factor, offset : ndarray of complex, shape (n,)
+        Plane from photo: Z = factor z + offset, with conj(z) for mirrored photos.
+    mirrored : ndarray of bool, shape (n,)
+        Photos that are mirror images of most of the others of their part.
+    size : ndarray, shape (n,)
+        How many times larger the coordinates of a photo are than those of most others; changes of a few ten percent
+        from photo to photo, which are changes of the flying height, do not count.
+    """
+
+    part: Numbers
+    center: Complex
+    factor: Complex
+    offset: Complex
+    mirrored: Flags
+    size: Floats
+
+
+def lay_out(links: Links, photos: int) -> Layout:
+    """Bring the photos of a strip into one plane, along the links with most points.
+
+    Parameters
+    ----------
+    links : Links
+        Links of the strip.
+    photos : int
+        Number of its photos.
+
+    Returns
+    -------
+    Layout
+        Places of all photos.
+    """
+    around: list[list[tuple[int, int]]] = [[] for _ in range(photos)]
+    for row, (a, b) in enumerate(links.photo.tolist()):
+        around[a].append((row, b))
+        around[b].append((row, a))
+    factor, offset = np.ones(photos, complex), np.zeros(photos, complex)
+    part, odd, size = np.full(photos, -1, np.intp), np.zeros(photos, bool), np.ones(photos)
+    for start in range(photos):
+        if part[start] < 0:
+            part[start] = part.max() + 1
+            _grow(start, around, links, (part, factor, offset, odd, size))
+    for number in range(int(part.max(initial=-1)) + 1):
+        inside = part == number
+        if 2 * odd[inside].sum() > inside.sum():  # the majority is taken as not mirrored: turn the plane over
+            factor[inside], offset[inside] = np.conj(factor[inside]), np.conj(offset[inside])
+            odd[inside] = ~odd[inside]
+        size[inside] /= np.median(size[inside])
+    sizes = np.bincount(part, minlength=1)
+    rank = np.empty(len(sizes), np.intp)
+    rank[np.argsort(-sizes, kind="stable")] = np.arange(len(sizes))
+    return Layout(rank[part], offset.copy(), factor, offset, odd, size)
+
+
+def _grow(
+    start: int,
+    around: Sequence[Sequence[tuple[int, int]]],
+    links: Links,
+    plane: tuple[Numbers, Complex, Complex, Flags, Floats],
+) -> None:
+    """Place all photos that hang together with one, strongest links first."""
+    part, factor, offset, odd, size = plane
+    queue = [(-int(links.count[row]), row, start, other) for row, other in around[start]]
+    heapq.heapify(queue)
+    while queue:
+        _, row, known, new = heapq.heappop(queue)
+        if part[new] >= 0:
+            continue
+        part[new] = part[known]
+        turn, shift, mirrored = complex(links.turn[row]), complex(links.shift[row]), bool(links.mirrored[row])
+        if known < new:  # z_new = turn z_known + shift, so z_known = (z_new - shift) / turn
+            turn, shift = (1.0 / turn, -shift / turn) if abs(turn) > SMALL else (0j, 0j)
+            if mirrored:
+                turn, shift = turn.conjugate(), shift.conjugate()
+        # z_known = turn z_new + shift, or of conj(z_new)
+        if odd[known]:  # the plane takes conj(z_known)
+            turn, shift = turn.conjugate(), shift.conjugate()
+        odd[new] = odd[known] ^ mirrored
+        size[new] = size[known] * (1.0 if 1 / JUMP < abs(turn) < JUMP else 1 / max(abs(turn), SMALL))
+        factor[new] = factor[known] * turn
+        offset[new] = factor[known] * shift + offset[known]
+        for link_row, other in around[new]:
+            if part[other] < 0:
+                heapq.heappush(queue, (-int(links.count[link_row]), link_row, new, other))

@@ -1,0 +1,192 @@
+"""The size of image coordinates against the format and the principal distance.
+
+Points of overlapping photos reach far into the format: with 60 % end lap to four fifths of its half, with 90 % to more
+than a tenth across the flight. A reach beyond the format or a tenth of it is not a choice of points but another unit.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from photostrip.triangulation.plausibility.finding import found
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.camera import Camera
+    from photostrip.notes import Finding
+    from photostrip.points import PhotoPoints
+
+    Floats = NDArray[np.float64]
+
+REACH_SHARE = 0.98  # of the image points; the rest may be gross errors
+REACH = (0.12, 1.2)  # of half the format
+LIKELY_REACH = (0.3, 1.1)  # a reading that brings the reach here explains it
+REACH_OF_DISTANCE = (0.02, 8.0)  # of the principal distance, when no format is given
+LIKELY_OF_DISTANCE = (0.1, 2.0)
+MOST_LIKELY = 0.5  # of the upper end of such a range; below it other readings come first
+LIKELY_PIXELS = 2.2  # counted from a corner they reach twice as far
+HALF_DIAGONAL = (0.15, 3.5)  # of the principal distance: fields of 17 to 148 degrees
+USUAL_HALF_DIAGONAL = (0.24, 1.9)  # a 610 mm lens and an 85 mm lens on 23 cm film
+READINGS = (
+    (1e-3, "micrometres read as millimetres"),
+    (1e3, "millimetres read as micrometres"),
+    (0.1, "tenths of a micrometre read as micrometres"),
+    (10.0, "centimetres read as millimetres, or micrometres read as tenths"),
+    (1e-4, "tenths of a micrometre read as millimetres"),
+    (25.4, "inches read as millimetres"),
+    (1e-2, "hundredths of a millimetre read as millimetres"),
+    (1e2, "a decimal point two places off"),
+)
+
+
+class Reading(NamedTuple):
+    """What would bring image coordinates to a likely size.
+
+    Parameters
+    ----------
+    factor : float
+        What they would have to be multiplied by.
+    name : str
+        What may have happened; empty when nothing is known that explains it.
+    """
+
+    factor: float
+    name: str
+
+
+def reading_of(ratio: float, likely: tuple[float, float], pixel_size: float | None = None) -> Reading:
+    """Find the unit that explains a size.
+
+    Parameters
+    ----------
+    ratio : float
+        Size found over size expected.
+    likely : tuple of float
+        Range in which the ratio should lie.
+    pixel_size : float, optional
+        Size of a pixel of the camera in mm.
+
+    Returns
+    -------
+    Reading
+        The first that brings the ratio into the upper half of its range, or into the rest of it, pixels first; factor 1
+        when none does.
+    """
+    pixels = (
+        []
+        if pixel_size is None
+        else [
+            (pixel_size, "pixels read as millimetres"),
+            (pixel_size * 1e3, "pixels read as micrometres"),
+            (1 / pixel_size, "millimetres read as pixels"),
+        ]
+    )
+    fits = [Reading(factor, name) for factor, name in pixels if likely[0] < ratio * factor < LIKELY_PIXELS]
+    for least in (MOST_LIKELY * likely[1], likely[0]):
+        fits += [Reading(factor, name) for factor, name in READINGS if least < ratio * factor < likely[1]]
+    return fits[0] if fits else Reading(1.0, "")
+
+
+def reaches(observations: PhotoPoints, cameras: Mapping[str, Camera]) -> dict[str, tuple[float, bool]]:
+    """Measure how far image points reach, camera by camera.
+
+    Parameters
+    ----------
+    observations : PhotoPoints
+        Image points, mm.
+    cameras : mapping of str to Camera
+        Camera of each photo.
+
+    Returns
+    -------
+    dict of str to (float, bool)
+        By name of the camera: the reach, in units of half the format (or of the principal distance), and whether the
+        format is known.
+    """
+    size_of = {}
+    owner = [cameras[photo].name if photo in cameras else "" for photo in observations.photo_ids]
+    for name, camera in {each.name: each for each in cameras.values()}.items():
+        rows = np.array([each == name for each in owner], bool)[observations.photo]
+        if not rows.any():
+            continue
+        half = camera.principal_distance if camera.format is None else np.array(camera.format) / 2.0
+        size = (np.abs(observations.xy[rows]) / half).max(axis=1)
+        size_of[name] = float(np.quantile(size, REACH_SHARE)), camera.format is not None
+    return size_of
+
+
+def examine(observations: PhotoPoints, cameras: Mapping[str, Camera]) -> tuple[list[Finding], dict[str, float]]:
+    """Look for image coordinates in another unit, and for principal distances that no lens has.
+
+    Parameters
+    ----------
+    observations : PhotoPoints
+        Image points in the system of the photo, mm.
+    cameras : mapping of str to Camera
+        Camera of each photo.
+
+    Returns
+    -------
+    list of Finding
+        P101 and P105.
+    dict of str to float
+        Factor by camera that would bring its image coordinates to a likely size; 1 where nothing is wrong.
+    """
+    told, factors = [], {}
+    by_name = {each.name: each for each in cameras.values()}
+    for name, (reach, known) in reaches(observations, cameras).items():
+        camera = by_name[name]
+        low, high = REACH if known else REACH_OF_DISTANCE
+        factors[name] = 1.0
+        if not low < reach < high:
+            likely = LIKELY_REACH if known else LIKELY_OF_DISTANCE
+            reading = reading_of(reach, likely, camera.pixel_size)
+            factors[name] = reading.factor
+            photos = [photo for photo in observations.photo_ids if photo in cameras and cameras[photo].name == name]
+            told.append(_wrong_unit(camera, reach, reading, photos))
+    for camera in by_name.values():
+        wrong = _unlikely_lens(camera)
+        if wrong is not None:
+            told.append(wrong)
+    return told, factors
+
+
+def _wrong_unit(camera: Camera, reach: float, reading: Reading, photos: Sequence[str]) -> Finding:
+    what = "half the format" if camera.format is not None else "the principal distance"
+    message = f"image coordinates of camera {camera.name} reach to {reach:.3g} times {what}"
+    if reading.name:
+        message += (
+            f"; multiplied by {reading.factor:g} they would reach to {reach * reading.factor:.2f}: {reading.name}"
+        )
+        fix = "correct `observations.unit`, or the columns of the table"
+    else:
+        fix = "check `observations.unit`, `observations.origin` and the format of the camera"
+    evidence = {"reach": reach, "factor": reading.factor, "principal_distance_mm": camera.principal_distance}
+    if camera.format is not None:
+        evidence |= {"format_width_mm": camera.format[0], "format_height_mm": camera.format[1]}
+    return found("P101", message, fix, evidence, photos=photos, key="observations.unit")
+
+
+def _unlikely_lens(camera: Camera) -> Finding | None:
+    if camera.format is None:
+        return None
+    half = float(np.hypot(*camera.format)) / 2.0
+    ratio = half / camera.principal_distance
+    if HALF_DIAGONAL[0] < ratio < HALF_DIAGONAL[1]:
+        return None
+    field = 2.0 * np.degrees(np.arctan(ratio))
+    low, high = USUAL_HALF_DIAGONAL
+    meant = [camera.principal_distance * 10.0**k for k in (-3, -2, -1, 1, 2, 3)]
+    fits = [value for value in meant if low < half / value < high]
+    fix = f"is it {fits[0]:g} mm?" if fits else "take principal distance and format from the certificate"
+    message = (
+        f"camera {camera.name} with a principal distance of {camera.principal_distance:g} mm and a format of "
+        f"{camera.format[0]:g} x {camera.format[1]:g} mm would have a field of {field:.1f} degrees"
+    )
+    evidence = {"principal_distance_mm": camera.principal_distance, "half_diagonal_mm": half, "field_deg": field}
+    return found("P105", message, fix, evidence, key=f"cameras.{camera.name}.principal_distance")
