@@ -1,0 +1,161 @@
+"""Which of several cameras does a survey with the fewest photos: the efficiency coefficient K = f m_p.
+
+A height has the standard deviation m_h = H m_p / b with the flying height H = f m, the photo base b, and the standard
+deviation m_p of an x parallax in the photo. At equal m_h the camera with the smaller K flies higher and covers more.
+
+Source: [004b] eq. 1-8, with the corrections listed in docs/sources.md.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+
+class Camera(NamedTuple):
+    """A camera to compare.
+
+    Parameters
+    ----------
+    name : str
+        Its name.
+    focal : float
+        Principal distance f, mm.
+    sigma : float
+        Standard deviation m_p of an x parallax, mm.
+    base : float
+        Photo base b, mm.
+    width : float
+        Width l of a photo across the flight, mm.
+    """
+
+    name: str
+    focal: float
+    sigma: float
+    base: float
+    width: float
+
+    @property
+    def coefficient(self) -> float:
+        """K in mm², the smaller the better.
+
+        Source: [004b] eq. 4, 7, 8.
+        """
+        return self.focal * self.sigma
+
+    @property
+    def height_ratio(self) -> float:
+        """H / m_h = b / m_p: how many standard deviations of a height the flying height is."""
+        return self.base / self.sigma
+
+
+class Comparison(NamedTuple):
+    """A camera beside another, both flown for the same standard deviation of heights, unless said otherwise.
+
+    Parameters
+    ----------
+    scale : float
+        Ratio of the denominators of photo scale, m1 / m2.
+    height_error : float
+        eta_mh: ratio of the standard deviations of heights, m_h1 / m_h2, where the two cover the same area.
+    printed_area : float
+        eta_S as printed (eq. 2): the scale to the first power.
+    area : float
+        The ratio of the areas that a model covers: the scale squared.
+    photos : float
+        How many times as many photos are needed for an area: the inverse of `area`.
+    """
+
+    scale: float
+    height_error: float
+    printed_area: float
+    area: float
+    photos: float
+
+
+def compare(first: Camera, second: Camera) -> Comparison:
+    """Compare two cameras.
+
+    Parameters
+    ----------
+    first, second : Camera
+        The cameras.
+
+    Returns
+    -------
+    Comparison
+        Ratios, first to second. Formats and bases may differ; with equal ones the printed and the true ratio of areas
+        are the scale ratio and its square.
+
+    Source: [004b] eq. 2, 5, 6.
+    """
+    base, width = first.base / second.base, first.width / second.width
+    coefficient = first.coefficient / second.coefficient
+    scale = base / coefficient  # at equal m_h: m = m_h b / (f m_p)
+    area = base * width * scale**2
+    # at equal area the scales are as 1 / sqrt(b l)
+    height_error = coefficient / base / (base * width) ** 0.5
+    return Comparison(scale, height_error, base * width * scale, area, 1 / area)
+
+
+class PrintedRow(NamedTuple):
+    """A row of the table of the source, as it is printed.
+
+    Parameters
+    ----------
+    focal, sigma : float
+        f and m_p, mm.
+    coefficient : float
+        K, mm².
+    height_ratio : float
+        H / m_h.
+    area : float
+        eta_S.
+    """
+
+    focal: float
+    sigma: float
+    coefficient: float
+    height_ratio: float
+    area: float
+
+
+PRINTED_BASE = 60.0  # mm: the base that the printed H / m_h belong to
+# [004b], the table; the last heading is misprinted
+PRINTED_TABLE = (
+    PrintedRow(70.0, 0.017, 1.2, 3500.0, 1.8),
+    PrintedRow(100.0, 0.015, 1.5, 4000.0, 1.45),
+    PrintedRow(140.0, 0.0125, 1.75, 4800.0, 1.25),
+    PrintedRow(200.0, 0.011, 2.2, 5000.0, 1.0),
+)
+
+
+def source_cameras() -> tuple[Camera, ...]:
+    """Give the four cameras of the source's table.
+
+    Returns
+    -------
+    tuple of Camera
+        All with the base of 60 mm and one format.
+    """
+    return tuple(
+        Camera(f"f {row.focal:g} mm", row.focal, row.sigma, PRINTED_BASE, PRINTED_BASE) for row in PRINTED_TABLE
+    )
+
+
+def by_efficiency(cameras: Sequence[Camera]) -> list[Camera]:
+    """Cameras from the best to the worst.
+
+    Parameters
+    ----------
+    cameras : sequence of Camera
+        The cameras.
+
+    Returns
+    -------
+    list of Camera
+        By the area that a model covers at equal m_h; with equal bases and formats that is by K.
+    """
+    return sorted(cameras, key=lambda camera: -camera.width * camera.base**3 / camera.coefficient**2)

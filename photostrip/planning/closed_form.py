@@ -1,0 +1,127 @@
+"""The same deformation of an oriented model in closed form, for level ground: sums over the control, no operators.
+
+Its only purpose is to check, and to be checked by, the operators of :mod:`photostrip.planning.single_model`; the
+source prints this form.
+
+Source: [000] eq. 9-11 with nine corrections, each listed in docs/sources.md and shown to be necessary by a test.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    Array = NDArray[np.float64]
+
+ORDER = ("dbz", "dkappa", "dalpha", "domega")
+
+
+def control_sums(control: ArrayLike) -> Array:
+    """Sum up c1 to c15 over the control.
+
+    Parameters
+    ----------
+    control : array_like, shape (n, 2)
+        x and y of the control points.
+
+    Returns
+    -------
+    ndarray, shape (15,)
+        m(u, v) = sum of u v less the product of the sums over n.
+    """
+    x, y = np.asarray(control, float).T
+    pairs = (
+        (x, x), (y, y), (x, y), (x * x, x), (y * y, y), (x * x, y), (y * y, x), (x * y, y), (x * y, x),
+        (x**3, x), (x**3, y), (x * x * y, x), (x * y * y, y), (x * x * y, y), (x * y * y, x),
+    )  # fmt: skip
+    return np.array([u @ v - u.sum() * v.sum() / len(x) for u, v in pairs])
+
+
+def coefficients(points: ArrayLike, control: ArrayLike, base: float, depth: float) -> Array:
+    """Errors of points of the oriented model per error of each element.
+
+    Parameters
+    ----------
+    points : array_like, shape (q, 2)
+        x and y from the left nadir.
+    control : array_like, shape (n, 2)
+        The same of the control points, all of them given in plan and height.
+    base, depth : float
+        b and the depth Z of all points.
+
+    Returns
+    -------
+    ndarray, shape (q, 3, 4)
+        Coefficients of x, y, height in the order of `ORDER`; dby drops out.
+    """
+    along, across = _plan(points, control, base, depth)
+    return np.stack([along, across, _height(points, control, base)], axis=1)
+
+
+def _reduced(points: ArrayLike, control: ArrayLike) -> dict[str, Array]:
+    """Give the differences [g] = g of the point less the mean of g over the control."""
+    found = {}
+    (x, y), (u, v) = np.asarray(points, float).T, np.asarray(control, float).T
+    powers = {
+        "x": (1, 0),
+        "y": (0, 1),
+        "xx": (2, 0),
+        "xy": (1, 1),
+        "yy": (0, 2),
+        "xxx": (3, 0),
+        "xxy": (2, 1),
+        "xyy": (1, 2),
+    }
+    for name, (p, q) in powers.items():
+        found[name] = x**p * y**q - (u**p * v**q).mean()
+    return found
+
+
+def _plan(points: ArrayLike, control: ArrayLike, base: float, depth: float) -> tuple[Array, Array]:
+    """Rows of x (eq. 9) and y (eq. 10)."""
+    c1, c2, c3, c4, c5, c6, c7, c8, c9, c10, c11, c12, c13, c14, c15 = control_sums(control)
+    b, z = base, depth
+    p = (
+        b / 2 * c3 - c5 - c9,
+        b * c1 + b / 2 * c2 - c4 - c8,
+        (b**2 + z**2) * c1 + (b**2 / 2 + z**2) * c2 - 2 * b * c4 - 1.5 * b * c8 + c10 + c14,
+        b / 2 * c5 + b * c9 - c12 - c13,
+    )
+    q = (
+        b / 2 * c1 - c7 + c8,
+        b / 2 * c3 - c6 + c9,
+        b**2 / 2 * c3 - 2 * b * c6 + 1.5 * b * c9 + c11 - c12,
+        b / 2 * c7 - b * c8 + c14 - c15,
+    )
+    g = _reduced(points, control)
+    x, y = g["x"] / (c1 + c2), g["y"] / (c1 + c2)  # X / B, Y / B
+    kappa, other = 1 / b, 1 / (b * z)
+    along = (
+        (g["xx"] - b * g["x"] + x * p[1] + y * q[1]) * other,
+        (-g["xy"] - x * p[0] + y * q[0]) * kappa,
+        (g["xxx"] - 2 * b * g["xx"] + (b**2 + z**2) * g["x"] - x * p[2] - y * q[2]) * other,
+        (g["xxy"] - b * g["xy"] + x * p[3] - y * q[3]) * other,
+    )
+    across = (
+        (g["xy"] - b / 2 * g["y"] + y * p[1] - x * q[1]) * other,
+        (b / 2 * g["x"] - g["yy"] - y * p[0] - x * q[0]) * kappa,
+        (g["xxy"] - 1.5 * b * g["xy"] + (b**2 / 2 + z**2) * g["y"] - y * p[2] + x * q[2]) * other,
+        (-b / 2 * g["yy"] + g["xyy"] + y * p[3] + x * q[3]) * other,
+    )
+    return np.stack(along, axis=-1), np.stack(across, axis=-1)
+
+
+def _height(points: ArrayLike, control: ArrayLike, base: float) -> Array:
+    """Rows of the height (eq. 11); dbz and dkappa do not deform heights."""
+    c1, c2, c3, c4, _, c6, _, c8, c9, *_ = control_sums(control)
+    g = _reduced(points, control)
+    area = c1 * c2 - c3**2
+    x, y = g["x"] / area, g["y"] / area
+    bend = -g["xx"] + x * (c2 * c4 - c3 * c6) + y * (c1 * c6 - c3 * c4)
+    twist = -g["xy"] + x * (c2 * c9 - c3 * c8) + y * (c1 * c8 - c3 * c9)
+    zero = np.zeros_like(bend)
+    return np.stack([zero, zero, bend / base, twist / base], axis=-1)

@@ -1,0 +1,353 @@
+"""Simple accuracy formulas of a model, and the surface into which errors of relative orientation bend it.
+
+Photo coordinates x, y count from the left nadir, in millimetres; m is the denominator of the photo scale, b the photo
+base, f the principal distance. Elements are those of the base frame: alpha1', kappa1', alpha2', omega2', kappa2'.
+
+Source: [003] eq. 10.7-10.12, with results of Lobanov and of Skiridov.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from photostrip.errors import GeometryError
+from photostrip.statistics import normal_quantile, t_quantile
+from photostrip.triangulation import gruber
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    Array = NDArray[np.float64]
+
+TERMS = ("E0", "A", "B", "C", "D")
+LEAST_POINTS = 5
+RANK_TOLERANCE = 5e-3  # of the singular values of the scaled columns: below it x² is as good as a multiple of x
+
+
+# ------------------------------------------------------------------------------------------------- differentials
+
+
+def relative_differentials(
+    base: float, parallax: float, image: ArrayLike, errors: ArrayLike, focal: float
+) -> tuple[float, float, float]:
+    """dX/X, dY/Y and dZ/Z of a point in the normal case.
+
+    Parameters
+    ----------
+    base, parallax : float
+        dB/B and dp/p.
+    image : array_like, shape (2,)
+        x and y.
+    errors : array_like, shape (3,)
+        dx, dy and df.
+    focal : float
+        f.
+
+    Returns
+    -------
+    tuple of float
+        The three relative errors.
+
+    Source: [003] eq. 10.7.
+    """
+    (x, y), (dx, dy, df) = np.asarray(image, float), np.asarray(errors, float)
+    common = base - parallax
+    return common + dx / x, common + dy / y, common + df / focal
+
+
+def parallax_error(xy: ArrayLike, elements: ArrayLike, focal: float, base: float, measured: ArrayLike = 0.0) -> Array:
+    """Give the quantity c that all errors of a point go through.
+
+    Parameters
+    ----------
+    xy : array_like, shape (n, 2)
+        x and y.
+    elements : array_like, shape (..., 5)
+        Errors of the elements, radians.
+    focal, base : float
+        f and b, mm.
+    measured : array_like
+        Error dp of the x parallax, mm.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        c in mm. A constant f (dalpha2' - dalpha1') is left out, which is scale and height datum only.
+
+    Source: [003] eq. 10.9, with the sign of kappa that belongs to the angles used here.
+    """
+    x, y = np.moveaxis(np.asarray(xy, float), -1, 0)
+    al1, ka1, al2, om2, ka2 = np.moveaxis(np.asarray(elements, float), -1, 0)
+    right = x - base
+    turned = (right**2 * al2 - x**2 * al1 + right * y * om2) / focal
+    found: Array = turned - y * (ka2 - ka1) - np.asarray(measured, float)
+    return found
+
+
+def ground_errors(
+    xy: ArrayLike, parallax: ArrayLike, scale: float, focal: float, base: float, image: ArrayLike = (0.0, 0.0)
+) -> Array:
+    """Errors of points from c.
+
+    Parameters
+    ----------
+    xy : array_like, shape (n, 2)
+        x and y, mm.
+    parallax : array_like, shape (n,)
+        c, mm.
+    scale : float
+        m, denominator of the photo scale.
+    focal, base : float
+        f and b, mm.
+    image : array_like, shape (2,) or (n, 2)
+        Errors dx, dy of the left image point, mm.
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+        Errors along, across and up, ground mm.
+
+    Source: [003] eq. 10.8.
+    """
+    place, c = np.asarray(xy, float), np.asarray(parallax, float)
+    plan = place / base * c[..., None] + np.asarray(image, float)
+    found: Array = scale * np.concatenate([plan, (-focal / base * c)[..., None]], axis=-1)
+    return found
+
+
+# ----------------------------------------------------------------------------------------------------- constants
+
+
+class Constants(NamedTuple):
+    """Factors of the standard deviation of one y parallax.
+
+    Parameters
+    ----------
+    plan, height : float
+        With m they give ground units: m_D = plan m m_q, m_Z = height m (f/b) m_q.
+    """
+
+    plan: float
+    height: float
+
+
+SIDE, CENTRAL = "side", "central"
+# as printed, rounded to one decimal
+PRINTED = {SIDE: Constants(3.5, 2.3), CENTRAL: Constants(2.1, 1.6)}
+
+
+def source_constants() -> dict[str, Constants]:
+    """Give the printed constants before rounding, under the assumptions of the source.
+
+    Returns
+    -------
+    dict of str to Constants
+        For side points (y = b) and central points (y = 0).
+
+    Notes
+    -----
+    With a = b: alpha counts 1/2, omega 3/4 and the measured parallax 2. The side points take m_kappa = m_q / b for
+    each of the two kappas, which is not what six points give, omega at the left edge and plan at the right edge.
+
+    Source: [003] eq. 10.10, 10.11; the assumptions are found by trying.
+    """
+    found = {}
+    for name, parts, sides in ((SIDE, (0.5, 0.75, 2.0, 2.0), 2), (CENTRAL, (0.5, 2.0), 1)):
+        variance = sum(parts)
+        # plan: x = b; a side point has an error in y as in x, a central point has none from c
+        plan = np.sqrt(2 * (variance + 1)) if sides == 2 else np.sqrt(variance + 2)
+        found[name] = Constants(float(plan), float(np.sqrt(variance)))
+    return found
+
+
+def rigorous_factors(xy: ArrayLike, focal: float, width: float, base: float) -> Array:
+    """Variance of c in units of the variance of a y parallax, with the cofactors of six standard points.
+
+    Parameters
+    ----------
+    xy : array_like, shape (n, 2)
+        x and y, mm.
+    focal, width, base : float
+        f, the distance a of the side points from the middle ones, and b, mm.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        var(c) / m_q², the measured parallax counting 2.
+    """
+    place = np.asarray(xy, float)
+    rows = np.stack([parallax_error(place, unit, focal, base) for unit in np.eye(5)], axis=-1)
+    found: Array = np.einsum("...i,ij,...j->...", rows, gruber.cofactors(focal, width, base), rows) + 2
+    return found
+
+
+def rigorous_constants(xy: ArrayLike, focal: float, width: float, base: float) -> list[Constants]:
+    """Constants for any place in the model.
+
+    Parameters
+    ----------
+    xy, focal, width, base
+        As for :func:`rigorous_factors`.
+
+    Returns
+    -------
+    list of Constants
+        One for each place. dx and dy of the left point count 1 each, as in the source.
+    """
+    place = np.asarray(xy, float)
+    variance = rigorous_factors(place, focal, width, base)
+    plan = np.sqrt((place**2).sum(axis=-1) / base**2 * variance + 2)
+    return [Constants(float(p), float(h)) for p, h in zip(plan, np.sqrt(variance), strict=True)]
+
+
+# ---------------------------------------------------------------------------------------------------- paraboloid
+
+
+def paraboloid(elements: ArrayLike, scale: float, focal: float, base: float) -> Array:
+    """Give the surface into which errors of the elements bend the heights of a model.
+
+    Parameters
+    ----------
+    elements : array_like, shape (5,)
+        Errors of alpha1', kappa1', alpha2', omega2', kappa2', radians.
+    scale, focal, base : float
+        m, f and b (mm).
+
+    Returns
+    -------
+    ndarray, shape (5,)
+        E0, A, B, C, D of dZ = E0 + A x + B y + C x y + D x²; dZ in ground mm for x, y in mm. E0, A and B go into the
+        absolute orientation; C is twist, D is bending along the base.
+
+    Source: [003] eq. 10.12.
+    """
+    al1, ka1, al2, om2, ka2 = np.asarray(elements, float)
+    m, b = scale, base
+    return np.array(
+        [-m * b * al2, 2 * m * al2, m * om2 + m * focal / b * (ka2 - ka1), -m * om2 / b, -m * (al2 - al1) / b]
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Paraboloid:
+    """A deformation paraboloid fitted to height residuals.
+
+    Parameters
+    ----------
+    coefficients : ndarray, shape (5,)
+        E0, A, B, C, D, in the unit of the residuals for x, y in their unit.
+    sigmas : ndarray, shape (5,)
+        Standard deviations: from the residuals when `redundancy` is positive, else from the stated ones.
+    redundancy : int
+        Points minus five.
+    sigma0 : float
+        Standard deviation of unit weight from the residuals; NaN without redundancy.
+    """
+
+    coefficients: Array
+    sigmas: Array
+    redundancy: int
+    sigma0: float
+
+    @property
+    def t_values(self) -> Array:
+        """C and D over their standard deviations, shape (2,)."""
+        return self.coefficients[3:] / self.sigmas[3:]
+
+    def critical(self, alpha: float = 0.05) -> float:
+        """Give what |t| exceeds by chance with probability `alpha`; the normal quantile without redundancy."""
+        if self.redundancy == 0:
+            return normal_quantile(1 - alpha / 2)
+        return t_quantile(1 - alpha / 2, self.redundancy)
+
+    def elements(self, scale: float, base: float) -> tuple[float, float]:
+        """domega2' and dalpha2' - dalpha1', radians, that bend a model so.
+
+        Parameters
+        ----------
+        scale, base : float
+            m and b; residuals in the unit of b.
+
+        Returns
+        -------
+        tuple of float
+            -C b / m and -D b / m.
+        """
+        twist, bend = self.coefficients[3:]
+        return -float(twist) * base / scale, -float(bend) * base / scale
+
+
+def paraboloid_rows(xy: ArrayLike) -> Array:
+    """Rows 1, x, y, x y, x² of the surface, shape (n, 5)."""
+    x, y = np.moveaxis(np.asarray(xy, float), -1, 0)
+    return np.stack([np.ones_like(x), x, y, x * y, x**2], axis=-1)
+
+
+def determines_paraboloid(xy: ArrayLike) -> bool:
+    """Whether points determine the five coefficients: five of them, at three or more distances along the base.
+
+    Parameters
+    ----------
+    xy : array_like, shape (n, 2)
+        x and y.
+
+    Returns
+    -------
+    bool
+        False also for the six standard points, where x² = b x.
+    """
+    place = np.asarray(xy, float)
+    if len(place) < LEAST_POINTS:
+        return False
+    middle = place - place.mean(axis=0)
+    half = np.abs(middle).max(axis=0)
+    if half.min() == 0:
+        return False
+    values = np.linalg.svd(paraboloid_rows(middle / half), compute_uv=False)
+    return bool(values[-1] > RANK_TOLERANCE * values[0])
+
+
+def fit_paraboloid(xy: ArrayLike, residuals: ArrayLike, sigmas: ArrayLike) -> Paraboloid:
+    """Fit the deformation paraboloid to height residuals.
+
+    Parameters
+    ----------
+    xy : array_like, shape (n, 2)
+        x and y, in one unit.
+    residuals : array_like, shape (n,)
+        Heights of the model minus given heights.
+    sigmas : array_like, shape (n,)
+        Standard deviations of the residuals, in their unit.
+
+    Returns
+    -------
+    Paraboloid
+        Coefficients with their precision.
+
+    Raises
+    ------
+    GeometryError
+        When the points do not determine the surface.
+
+    Source: [003], after eq. 10.12.
+    """
+    place, height = np.asarray(xy, float), np.asarray(residuals, float)
+    if not determines_paraboloid(place):
+        raise GeometryError(
+            "the height residuals do not determine twist and bending: five points are needed, at three or more"
+            " distances along the base",
+            code="plan-paraboloid",
+        )
+    stated = np.broadcast_to(np.asarray(sigmas, float), height.shape)
+    rows = paraboloid_rows(place) / stated[:, None]
+    size = np.linalg.norm(rows, axis=0)
+    found, *_ = np.linalg.lstsq(rows / size, height / stated, rcond=None)
+    inverse = np.linalg.inv((rows / size).T @ (rows / size)) / np.outer(size, size)
+    left = height / stated - rows @ (found / size)
+    redundancy = len(height) - len(TERMS)
+    sigma0 = float(np.sqrt(left @ left / redundancy)) if redundancy else float("nan")
+    scale = sigma0 if redundancy else 1.0
+    return Paraboloid(found / size, scale * np.sqrt(np.diag(inverse)), redundancy, sigma0)

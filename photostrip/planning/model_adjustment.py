@@ -1,0 +1,137 @@
+"""Absolute orientation of a model that takes the errors of its relative orientation as unknowns too.
+
+A plain fit of seven parameters leaves the deformation that the elements cause. Here the elements come along as
+unknowns with their a-priori variances: the same as generalised least squares with the whole covariance of the
+misclosures, and prediction of what the elements do at new points.
+
+Source: [000], where the covariance is meant "for the adjustment of coordinates"; derived.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.planning.single_model import PARAMETERS, Control, free_influence, parameter_rows
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    Array = NDArray[np.float64]
+    Rows = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class AdjustedModel:
+    """An oriented model.
+
+    Parameters
+    ----------
+    control : Control
+        Control.
+    base : float
+        b.
+    parameters : ndarray, shape (7,)
+        Absolute orientation, in the order of `PARAMETERS`.
+    elements : ndarray, shape (4,)
+        Estimated errors of the relative orientation: dkappa, dbz, dalpha2, domega.
+    cofactors : ndarray, shape (11, 11)
+        Covariance of both.
+    weights : ndarray, shape (n, 3, 3)
+        Inverse covariances of the misclosures without the elements; zero where a coordinate is not given.
+    """
+
+    control: Control
+    base: float
+    parameters: Array
+    elements: Array
+    cofactors: Array
+    weights: Array
+
+    def correction(self, points: ArrayLike) -> Array:
+        """Give what is to be subtracted from model points.
+
+        Parameters
+        ----------
+        points : array_like, shape (q, 3)
+            x, y, depth.
+
+        Returns
+        -------
+        ndarray, shape (q, 3)
+            Absolute orientation and deformation together.
+        """
+        found: Array = self._rows(points) @ np.concatenate([self.parameters, self.elements])
+        return found
+
+    def covariance(self, points: ArrayLike, measured: ArrayLike, row: Rows | None = None) -> Array:
+        """Covariance of corrected points.
+
+        Parameters
+        ----------
+        points : array_like, shape (q, 3)
+            x, y, depth.
+        measured : array_like, shape (q, 3, 3)
+            Covariance of their measured model coordinates.
+        row : ndarray of int, shape (q,), optional
+            The control point that a point is, -1 for none.
+
+        Returns
+        -------
+        ndarray, shape (q, 3, 3)
+            Covariance of x, y and height.
+        """
+        rows, own = self._rows(points), np.array(measured, float)
+        if row is not None:
+            known = np.flatnonzero(row >= 0)
+            own[known] = self.control.measured[row[known]]
+        found: Array = own + rows @ self.cofactors @ np.swapaxes(rows, 1, 2)
+        if row is not None:
+            # the measurement of a control point is part of the estimate
+            own_part = rows[known] @ self.cofactors @ np.swapaxes(rows[known], 1, 2)
+            shared = own_part @ self.weights[row[known]] @ own[known]
+            found[known] -= shared + np.swapaxes(shared, 1, 2)
+        return found
+
+    def _rows(self, points: ArrayLike) -> Array:
+        return np.concatenate([parameter_rows(points, self.control), free_influence(points, self.base)], axis=2)
+
+
+def adjust_model(control: Control, misclosures: ArrayLike, base: float, elements: ArrayLike) -> AdjustedModel:
+    """Orient a model with the errors of its relative orientation as further unknowns.
+
+    Parameters
+    ----------
+    control : Control
+        Control; coordinates that are not given do not count.
+    misclosures : array_like, shape (n, 3)
+        W: model minus given.
+    base : float
+        b.
+    elements : array_like, shape (4, 4)
+        A-priori covariance of dkappa, dbz, dalpha2, domega.
+
+    Returns
+    -------
+    AdjustedModel
+        Orientation, elements and their covariance.
+    """
+    rows = np.concatenate([parameter_rows(control.points, control), free_influence(control.points, base)], axis=2)
+    counts = np.stack([control.plan, control.plan, control.height], axis=1)
+    noise = control.measured + control.given
+    off = ~counts
+    noise = np.where(off[:, :, None] | off[:, None, :], 0.0, noise)
+    noise[off[:, :, None] & np.eye(3, dtype=bool)] = 1.0
+    weights = np.asarray(np.linalg.inv(noise), np.float64)
+    weights[off[:, :, None] & np.eye(3, dtype=bool)] = 0.0
+    weighted = np.swapaxes(rows, 1, 2) @ weights
+    normal = (weighted @ rows).sum(axis=0)
+    first = len(PARAMETERS)
+    normal[first:, first:] += np.linalg.inv(np.asarray(elements, float))
+    right = np.einsum("nka,na->k", weighted, np.where(counts, np.asarray(misclosures, float), 0.0))
+    size = np.sqrt(np.diag(normal))  # the unknowns differ by many orders of magnitude
+    cofactors = np.linalg.inv(normal / np.outer(size, size)) / np.outer(size, size)
+    solution = cofactors @ right
+    return AdjustedModel(control, base, solution[:first], solution[first:], cofactors, weights)

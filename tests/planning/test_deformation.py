@@ -1,0 +1,182 @@
+"""Simple accuracy formulas and the deformation paraboloid: published numbers, and the exact intersection."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from photostrip.errors import GeometryError
+from photostrip.geometry.rotation import from_alpha_omega_kappa
+from photostrip.planning.deformation import (
+    CENTRAL,
+    PRINTED,
+    SIDE,
+    determines_paraboloid,
+    fit_paraboloid,
+    ground_errors,
+    paraboloid,
+    paraboloid_rows,
+    parallax_error,
+    relative_differentials,
+    rigorous_constants,
+    rigorous_factors,
+    source_constants,
+)
+from tests.vectors import cases
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from tests.vectors import Vector
+
+    Floats = NDArray[np.float64]
+
+SIX = np.array([[x, y] for y in (0.0, 65.0, -65.0) for x in (0.0, 70.0)])
+PLACES = (("lateral", SIDE), ("central", CENTRAL))
+
+
+@pytest.mark.parametrize("vector", cases("model_deformation"))
+def test_numbers_computed_apart(vector: Vector) -> None:
+    given_, want = vector.input, vector.expected
+    rel = vector.tol["rel"]
+    m, f, b = given_["m"], given_["f"], given_["b"]
+    xy, elements, m_q = np.array(given_["points_xy"]), np.array(given_["elements_rad"]), given_["m_q_micrometre"] / 1e6
+    for printed_name, name in PLACES:
+        for group, table in (("printed_constants_m", PRINTED), ("unrounded_m", source_constants())):
+            # m_q in metres: m_D = plan m m_q, m_Z = height m (f / b) m_q
+            assert table[name].plan * m * m_q == pytest.approx(want[group][f"mD_{printed_name}"], rel=rel)
+            assert table[name].height * m * f / b * m_q == pytest.approx(want[group][f"mZ_{printed_name}"], rel=rel)
+    for printed_name, name in PLACES:
+        assert source_constants()[name].plan == pytest.approx(want["unrounded_constants"][f"mD_{printed_name}"])
+        assert source_constants()[name].height == pytest.approx(want["unrounded_constants"][f"mZ_{printed_name}"])
+    factors = rigorous_factors([[0, 0], [0, b], [b, b]], f, b, b)
+    wanted = want["rigorous_c_variance_factors"]
+    assert factors == pytest.approx([wanted["central"], wanted["lateral_left"], wanted["lateral_right"]], rel=1e-9)
+
+    c = parallax_error(xy, elements, f, b)
+    assert c == pytest.approx(want["c_mm"], rel=rel, abs=1e-15)
+    surface = paraboloid(elements, m, f, b)
+    assert surface == pytest.approx([want[name] for name in ("E0", "A", "B", "C", "D")], rel=rel)
+    assert paraboloid_rows(xy) @ surface == pytest.approx(want["dZ_mm"], rel=rel)
+    assert ground_errors(xy, c, m, f, b)[:, 2] == pytest.approx(want["dZ_mm"], rel=1e-9)
+
+
+def test_the_printed_22_micrometres_are_21() -> None:
+    # 10 um, f = b, a central point: the text of the source says 22
+    assert PRINTED[CENTRAL].plan * 10 == pytest.approx(21)
+    assert source_constants()[CENTRAL].plan * 10 == pytest.approx(21.2, abs=0.05)
+
+
+def test_the_assumptions_of_the_printed_constants_are_not_those_of_six_points() -> None:
+    b = 70.0
+    left, right, centre = rigorous_constants([[0, b], [b, b], [b, 0]], b, b, b)
+    assert (left.height, right.height, centre.height) == pytest.approx((1.98, 1.78, 1.58), abs=0.005)
+    assert right.plan == pytest.approx(2.89, abs=0.005)
+    assert centre.plan == pytest.approx(source_constants()[CENTRAL].plan)
+    printed = source_constants()[SIDE]
+    assert printed.height > 1.15 * left.height
+    assert printed.plan > 1.2 * right.plan
+
+
+def heights(xy: Floats, elements: Floats, focal: float, base: float) -> Floats:
+    """Heights of an exact pair at photo scale whose photos have turned by small elements against the base."""
+    al1, ka1, al2, om2, ka2 = elements
+    left = np.column_stack([xy, np.full(len(xy), -focal)])
+    ray1 = left @ from_alpha_omega_kappa(al1, 0.0, ka1).T
+    ray2 = (left - (base, 0.0, 0.0)) @ from_alpha_omega_kappa(al2, om2, ka2).T
+    scale = -base * ray2[:, 2] / (ray1[:, 2] * ray2[:, 0] - ray1[:, 0] * ray2[:, 2])
+    found: Floats = scale * ray1[:, 2]
+    return found
+
+
+small = st.floats(-2e-6, 2e-6)
+
+
+@given(st.tuples(small, small, small, small, small), st.floats(60.0, 300.0))
+def test_the_paraboloid_is_what_the_exact_intersection_does(elements: tuple[float, ...], focal: float) -> None:
+    xy, base = np.vstack([SIX, [[35.0, 10.0], [20.0, -40.0]]]), 70.0
+    found = heights(xy, np.array(elements), focal, base) + focal
+    # eq. 10.9 leaves out a constant, which is scale and height datum only
+    constant = -(focal**2) / base * (elements[2] - elements[0])
+    surface = paraboloid_rows(xy) @ paraboloid(elements, 1.0, focal, base) + constant
+    assert surface == pytest.approx(found, abs=1e-7)  # mm, of up to 3e-3: what is left is of second order
+
+
+def test_rigorous_factors_are_the_scatter_of_exact_orientations() -> None:
+    f, a, b = 100.0, 65.0, 70.0
+    rng = np.random.default_rng(2)
+    x, y = SIX[:, 0], SIX[:, 1]
+    rows = np.column_stack([x * y / f, x, -(x - b) * y / f, -(f + y**2 / f), -(x - b)])
+    elements = -np.linalg.lstsq(rows, rng.normal(size=(6, 20_000)), rcond=None)[0].T
+    where = np.array([[0.0, 0.0], [0.0, 65.0], [70.0, -65.0], [35.0, 30.0]])
+    c = np.array([parallax_error(np.broadcast_to(p, (20_000, 2)), elements, f, b) for p in where])
+    expected = rigorous_factors(where, f, a, b) - 2
+    assert c.var(axis=1) == pytest.approx(expected, rel=0.04)
+
+
+def test_relative_differentials_are_those_of_the_normal_case() -> None:
+    base, p, x, y, f = 500.0, 70.0, 40.0, -25.0, 100.0
+
+    def point(base: float, p: float, x: float, y: float, f: float) -> Floats:
+        return base / p * np.array([x, y, f])
+
+    d = 1e-6
+    step = point(base + d, p + 2 * d, x + 3 * d, y - d, f + d) - point(base, p, x, y, f)
+    found = relative_differentials(d / base, 2 * d / p, (x, y), (3 * d, -d, d), f)
+    assert found == pytest.approx(step / point(base, p, x, y, f), rel=1e-5)
+
+
+# ---------------------------------------------------------------------------------------------------- estimation
+
+
+FIVE = np.array([[0.0, 65.0], [70.0, 65.0], [0.0, -65.0], [70.0, -65.0], [35.0, 0.0]])
+
+
+def test_five_points_give_the_elements_back() -> None:
+    elements = np.array([2e-5, -3e-5, -4e-5, 6e-5, 5e-5])
+    m, f, b = 10_000.0, 100.0, 70.0
+    surface = paraboloid(elements, m, f, b)
+    fitted = fit_paraboloid(FIVE, paraboloid_rows(FIVE) @ surface, 1.0)
+    assert fitted.coefficients == pytest.approx(surface, rel=1e-9)
+    assert fitted.redundancy == 0
+    assert np.isnan(fitted.sigma0)
+    omega, alpha = fitted.elements(m, b)
+    assert (omega, alpha) == pytest.approx((6e-5, -6e-5))
+    assert fitted.critical() == pytest.approx(1.96, abs=0.001)
+
+
+@pytest.mark.parametrize(
+    ("xy", "enough"),
+    [
+        (SIX, False),  # x² = b x
+        (FIVE, True),
+        (FIVE[:4], False),
+        (np.vstack([SIX, [[0.2, 0.0]]]), False),  # hardly another distance
+        (np.vstack([SIX, [[30.0, 0.0]]]), True),
+        (np.array([[x, 2.0] for x in range(6)]), False),
+        (np.array([[3.0, y] for y in range(6)]), False),
+    ],
+)
+def test_which_points_determine_the_surface(xy: Floats, *, enough: bool) -> None:
+    assert determines_paraboloid(xy) is enough
+    assert determines_paraboloid(xy * 250 + 4000) is enough  # whatever the unit and the origin
+    if not enough:
+        with pytest.raises(GeometryError, match="do not determine twist and bending"):
+            fit_paraboloid(xy, np.zeros(len(xy)), 1.0)
+
+
+def test_t_values_are_student_distributed_without_deformation_and_see_a_real_one() -> None:
+    rng = np.random.default_rng(5)
+    xy = np.vstack([SIX, FIVE[4:], [[20.0, 30.0], [55.0, -40.0]]])
+    clean = [fit_paraboloid(xy, rng.normal(size=len(xy)), 1.0) for _ in range(1500)]
+    false = np.mean([np.abs(fit.t_values) > fit.critical() for fit in clean], axis=0)
+    assert false == pytest.approx([0.05, 0.05], abs=0.02)
+    bent = paraboloid_rows(xy) @ [0, 0, 0, 2e-3, 0]
+    found = [fit_paraboloid(xy, bent + rng.normal(size=len(xy)), 1.0) for _ in range(300)]
+    seen = np.mean([np.abs(fit.t_values) > fit.critical() for fit in found], axis=0)
+    assert seen[0] > 0.9
+    assert seen[1] < 0.12

@@ -1,0 +1,157 @@
+"""Eq. 9-11 of the source as they are printed: each misprint alone makes them disagree with the direct adjustment."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from photostrip.planning.closed_form import ORDER, control_sums
+from photostrip.planning.single_model import ELEMENTS, Control, influence, orientation_operator
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+BASE, DEPTH = 70.0, 100.0
+XY = np.array([[2.0, 58.0], [68.0, 61.0], [-3.0, -63.0], [72.0, -55.0], [33.0, 6.0]])
+POINT = np.array([20.0, 30.0])
+ROUNDING = 1e-9
+VISIBLE = 1e-4  # relative to the largest coefficient of its kind
+
+X_PRINTED = ("b2 in x alpha", "sign in x omega", "symbols")
+Y_PRINTED = ("c8 in y kappa", "b2 in y alpha", "squares in y omega", "symbols")
+
+
+def control() -> Control:
+    every, none = np.ones(len(XY), bool), np.zeros((len(XY), 3, 3))
+    return Control(np.column_stack([XY, np.full(len(XY), DEPTH)]), every, every, none, none)
+
+
+def direct() -> Floats:
+    """Coefficients of x, y and height from the direct adjustment, in the order of `ORDER`."""
+    point = np.array([[*POINT, DEPTH]])
+    operator, given = orientation_operator(point, control()), control().points
+    rows = influence(point, BASE) - np.einsum("qanb,nbk->qak", operator, influence(given, BASE))
+    found: Floats = rows[0][:, [ELEMENTS.index(name) for name in ORDER]]
+    return found
+
+
+def as_printed(misprints: tuple[str, ...] = ()) -> Floats:
+    """Eq. 9-10 term by term, after the source, with the misprints that are named; rows x, y in the order of `ORDER`."""
+    b, z, n = BASE, DEPTH, len(XY)
+    x, y = POINT
+    u, v = XY.T
+    X, Y = x - u.mean(), y - v.mean()
+    c = dict(enumerate(control_sums(XY), 1))
+    B = c[1] + c[2]
+
+    def less_mean(at_point: float, at_control: Floats) -> float:
+        return float(at_point - at_control.sum() / n)
+
+    c8 = -c[8] if "c8 in y kappa" in misprints else c[8]
+    b_squared = b if "b2 in x alpha" in misprints else b**2
+    sign = 1 if "sign in x omega" in misprints else -1
+    square = v if "squares in y omega" in misprints else v**2
+    half = (b**2 + z**2) / 2 if "b2 in y alpha" in misprints else b**2 / 2 + z**2
+    p2, q2 = b * c[1] + b / 2 * c[2] - c[4] - c[8], b / 2 * c[3] - c[6] + c[9]
+    p3 = (b**2 + z**2) * c[1] + (b**2 / 2 + z**2) * c[2] - 2 * b * c[4] - 1.5 * b * c[8] + c[10] + c[14]
+    q3 = b**2 / 2 * c[3] - 2 * b * c[6] + 1.5 * b * c[9] + c[11] - c[12]
+    p4, q4 = b / 2 * c[5] + b * c[9] - c[12] - c[13], b / 2 * c[7] - b * c[8] + c[14] - c[15]
+    p1, q1 = b / 2 * c[3] - c[5] - c[9], b / 2 * c[1] - c[7] + c[8]
+
+    along = [
+        less_mean(x**2, u**2) - b * X + X / B * p2 + Y / B * q2,
+        -less_mean(x * y, u * v) - X / B * p1 + Y / B * q1,
+        less_mean(x**3, u**3) - 2 * b * less_mean(x**2, u**2) + (b_squared + z**2) * X - X / B * p3 - Y / B * q3,
+        less_mean(x**2 * y, u**2 * v) - b * less_mean(x * y, u * v) + X / B * p4 + sign * Y / B * q4,
+    ]
+    across = [
+        less_mean(x * y, u * v) - b / 2 * Y + Y / B * p2 - X / B * q2,
+        b / 2 * X - less_mean(y**2, v**2) - Y / B * p1 - X / B * (b / 2 * c[1] - c[7] + c8),
+        less_mean(x**2 * y, u**2 * v) - 1.5 * b * less_mean(x * y, u * v) + half * Y - Y / B * p3 + X / B * q3,
+        -b / 2 * less_mean(y**2, square) + less_mean(x * y**2, u * v**2) + Y / B * p4 + X / B * q4,
+    ]
+    over = np.array([b * z, b, b * z, b * z])
+    found: Floats = np.array([along, across]) / over
+    return found
+
+
+def test_eq_9_and_10_with_all_corrections_are_the_direct_adjustment() -> None:
+    assert as_printed() == pytest.approx(direct()[:2], rel=ROUNDING)
+
+
+@pytest.mark.parametrize(
+    ("misprint", "row", "column"),
+    [
+        ("b2 in x alpha", 0, "dalpha"),
+        ("sign in x omega", 0, "domega"),
+        ("c8 in y kappa", 1, "dkappa"),
+        ("b2 in y alpha", 1, "dalpha"),
+        ("squares in y omega", 1, "domega"),
+    ],
+)
+def test_a_misprint_of_eq_9_or_10_shows(misprint: str, row: int, column: str) -> None:
+    wrong, right = as_printed((misprint,)), direct()[:2]
+    bad = np.abs(wrong - right) > VISIBLE * np.abs(right).max(axis=0)
+    assert [(r, ORDER[k]) for r, k in np.argwhere(bad)] == [(row, column)]
+
+
+def test_the_printed_symbols_of_eq_9_and_10_cannot_be_meant() -> None:
+    # "d Delta x" stands three times: over b, then twice over bZ; only kappa over b and alpha over bZ are left to name
+    rows = direct()[:2]
+    kappa, alpha = ORDER.index("dkappa"), ORDER.index("dalpha")
+    exchanged = rows.copy()
+    exchanged[:, [kappa, alpha]] = rows[:, [alpha, kappa]]
+    assert np.abs(exchanged - as_printed()).max() > 1.0
+
+
+def test_the_printed_kernels_of_the_control_in_eq_10_do_not_give_back_a_known_orientation() -> None:
+    given = control().points
+    X, Y = (XY - XY.mean(axis=0)).T
+    B = (X**2 + Y**2).sum()
+    x, y = POINT - XY.mean(axis=0)
+    shift, scale, turn = (0.3, -0.2), 1e-3, 2e-3
+    wx, wy = shift[0] + X * scale - Y * turn, shift[1] + Y * scale + X * turn
+    wanted = shift[1] + y * scale + x * turn
+    n = len(XY)
+    printed = ((1 / n + (y * X + x * Y) / B) * wy).sum() + ((y * Y - x * X) / B * wx).sum()
+    correct = ((1 / n + (y * Y + x * X) / B) * wy).sum() + ((y * X - x * Y) / B * wx).sum()
+    assert correct == pytest.approx(wanted)
+    assert abs(printed - wanted) > 0.01
+    operator = orientation_operator([[*POINT, DEPTH]], control())
+    assert operator[0, 1, :, 0] @ wx + operator[0, 1, :, 1] @ wy == pytest.approx(wanted)
+    assert len(given) == n
+
+
+def test_the_printed_height_kernel_of_eq_11_does_not_give_back_a_known_tilt() -> None:
+    X, Y = (XY - XY.mean(axis=0)).T
+    c1, c2, c3 = control_sums(XY)[:3]
+    x, y = POINT - XY.mean(axis=0)
+    misclosure = 0.5 + 1e-3 * X - 2e-3 * Y
+    wanted = 0.5 + 1e-3 * x - 2e-3 * y
+    A, n = c1 * c2 - c3**2, len(XY)
+    printed = ((1 / n + (-x * (c2 * X + c3 * Y) - y * (c3 * X - c1 * Y)) / A) * misclosure).sum()
+    correct = ((1 / n + (x * (c2 * X - c3 * Y) - y * (c3 * X - c1 * Y)) / A) * misclosure).sum()
+    assert correct == pytest.approx(wanted)
+    assert abs(printed - wanted) > 0.005
+
+
+def test_eq_11_needs_the_measurement_of_each_control_point_in_the_sum() -> None:
+    # printed: dz of the point itself inside the sum over the control; then a common height error of the control stays
+    operator = orientation_operator([[*POINT, DEPTH]], control())[0, 2, :, 2]
+    at_point, at_control = 0.004, np.full(len(XY), 0.003)
+    correct = at_point - operator @ at_control
+    printed = at_point - operator @ np.full(len(XY), at_point)
+    assert correct == pytest.approx(0.001)  # the common part of the control's error has gone into the point
+    assert printed == pytest.approx(0.0)  # as if the point were free of error
+
+
+def test_dv0_is_dy0() -> None:
+    # eq. 4: the mean of the misclosures in y moves y, and no parameter is called V
+    misclosure = np.zeros((len(XY), 3))
+    misclosure[:, 1] = 0.7
+    moved = np.einsum("qanb,nb->qa", orientation_operator([[*POINT, DEPTH]], control()), misclosure)
+    assert moved[0] == pytest.approx([0.0, 0.7, 0.0])
