@@ -64,6 +64,11 @@ COMMANDS = {
         "Write a synthetic project with known truth, ready to run.",
         "photostrip simulate strip.yaml -o simulated",
     ),
+    "plan": Entry(
+        "photostrip.cli.plan",
+        "Expected accuracy and design, before any photo is taken.",
+        "photostrip plan model --overlap 60 --control corners",
+    ),
     "terrestrial": Entry(
         "photostrip.cli.terrestrial",
         "Directions of a phototheodolite, displacements between epochs.",

@@ -19,15 +19,15 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
 
-def write_text(path: Path, text: str) -> None:
+def write_text(path: Path, text: str | bytes) -> None:
     """Write one file, whole or not at all.
 
     Parameters
     ----------
     path : Path
         The file; missing folders are made. A device or a pipe is written to as it is.
-    text : str
-        Its content, written as UTF-8 with the line ends that it has.
+    text : str or bytes
+        Its content; a text is written as UTF-8 with the line ends that it has.
 
     Raises
     ------
@@ -39,7 +39,7 @@ def write_text(path: Path, text: str) -> None:
     write_files(path.parent, {path.name: text})
 
 
-def write_files(folder: Path, files: Mapping[str, str]) -> None:
+def write_files(folder: Path, files: Mapping[str, str | bytes]) -> None:
     """Write the files of one folder, all of them or none.
 
     All contents are written first and renamed then, in the order given: put the file last that make or another program
@@ -49,7 +49,7 @@ def write_files(folder: Path, files: Mapping[str, str]) -> None:
     ----------
     folder : Path
         The folder; made when it is missing.
-    files : mapping of str to str
+    files : mapping of str to str or bytes
         Content by file name.
 
     Raises
@@ -67,12 +67,13 @@ def write_files(folder: Path, files: Mapping[str, str]) -> None:
     try:
         for name, text in files.items():
             target = folder / name
+            content = text if isinstance(text, bytes) else text.encode()
             if target.exists() and not target.is_file():  # a pipe or a device: renaming would replace it
-                target.write_bytes(text.encode())
+                target.write_bytes(content)
                 continue
             target = Path(os.path.realpath(target))  # through a link, to where the file is
             waiting.append((target.with_name(f".{target.name}.{os.getpid()}.tmp"), target))
-            waiting[-1][0].write_bytes(text.encode())
+            waiting[-1][0].write_bytes(content)
         for temporary, target in waiting:
             temporary.replace(target)
     except BaseException:  # also when the user interrupts

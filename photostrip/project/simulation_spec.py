@@ -327,7 +327,7 @@ def _spec(given: SimulationFile) -> simulate.Spec:
     return simulate.Spec(
         name=str(given.name),
         seed=given.seed,
-        camera=_camera(given.camera),
+        camera=camera_of(given.camera),
         ground=simulate.Ground(**_fields(given.ground) | {"ellipsoid": _semi_axes(given.ground.ellipsoid)}),
         flight=simulate.Flight(**_fields(given.flight)),
         terrain=simulate.Terrain(**_fields(given.terrain)),
@@ -351,8 +351,19 @@ def _semi_axes(given: Ellipsoid | None) -> tuple[float, float] | None:
     return None if given is None else (given.a, given.b)
 
 
-def _camera(given: SimulatedCamera) -> camera.Camera:
-    """Give the preset with what is said beside it."""
+def camera_of(given: SimulatedCamera) -> camera.Camera:
+    """Give the preset with what is said beside it.
+
+    Parameters
+    ----------
+    given : SimulatedCamera
+        The section of a file.
+
+    Returns
+    -------
+    Camera
+        The camera.
+    """
     changed = {name: value for name, value in _fields(given).items() if value is not None and name != "preset"}
     if given.distortion is not None:
         lens = given.distortion

@@ -58,7 +58,7 @@ def _available() -> bool:
 
 
 @contextmanager
-def _style() -> Iterator[None]:
+def styled() -> Iterator[None]:
     """Draw in matplotlib's own style, whatever the user's configuration says, and without random ids."""
     import matplotlib as mpl
 
@@ -81,7 +81,7 @@ def _svg(figure: Figure) -> str:
     return "".join(f"{line.rstrip()}\n" for line in stream.getvalue().splitlines())
 
 
-@_style()
+@styled()
 def accuracy_plot(document: Document, fine: Document) -> str:
     """Draw the required accuracy of directions over the photo.
 
@@ -109,7 +109,7 @@ def accuracy_plot(document: Document, fine: Document) -> str:
     return _svg(figure)
 
 
-@_style()
+@styled()
 def theodolite_plot(document: Document, fine: Document) -> str:
     """Draw the image accuracy that a theodolite supports over the photo.
 
@@ -146,7 +146,7 @@ def _isolines(axes: Axes, points: list[Document], key: str, title: str) -> None:
     axes.set_ylabel("z, mm")
 
 
-@_style()
+@styled()
 def displacement_plot(document: Document) -> str:
     """Draw the displacements in plan and in elevation, and as time series.
 

@@ -1,0 +1,314 @@
+"""Expected errors all over one model: what is asked for, and the answer with the share of each error source."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.planning import deformation
+from photostrip.planning.model_adjustment import adjust_model
+from photostrip.planning.single_model import (
+    FREE,
+    Control,
+    Expected,
+    element_covariance,
+    expected_errors,
+    free_covariance,
+    measured_covariance,
+)
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    Array = NDArray[np.float64]
+
+Place = tuple[float, float]
+LAYOUTS = ("corners", "corners+centre", "six")
+MICROMETRE = 1e-3  # mm
+METRE = 1e3  # mm
+
+
+@dataclass(frozen=True)
+class ControlPoint:
+    """A control point of a model.
+
+    Parameters
+    ----------
+    at : tuple of float
+        x and y from the left nadir at photo scale, mm.
+    use : str
+        ``xyz``, ``xy`` or ``z``.
+    """
+
+    at: Place
+    use: str = "xyz"
+
+
+@dataclass(frozen=True)
+class ModelSpec:
+    """One model.
+
+    Parameters
+    ----------
+    focal : float
+        Principal distance, mm.
+    base : float
+        Photo base b, mm.
+    width : float
+        Distance a of the side points from the flight line, mm.
+    scale : float
+        Denominator of the photo scale.
+    image_sigma : float
+        Standard deviation of an image coordinate, mm.
+    zone_points : int
+        Points in each of the six standard zones that orient the pair; 1: the six standard points.
+    orientation_points : tuple of tuple of float
+        Points that orient the pair, x and y in mm, instead of the standard zones.
+    control : tuple of ControlPoint
+        Control points.
+    control_sigma : tuple of float
+        Standard deviations of given coordinates along, across and in height, metres.
+    grid : tuple of int
+        Points along and across at which errors are computed.
+    """
+
+    focal: float
+    base: float
+    width: float
+    scale: float = 10_000.0
+    image_sigma: float = 0.005
+    zone_points: int = 1
+    orientation_points: tuple[Place, ...] = ()
+    control: tuple[ControlPoint, ...] = ()
+    control_sigma: tuple[float, float, float] = (0.05, 0.05, 0.08)
+    grid: tuple[int, int] = (5, 7)
+
+    @property
+    def parallax_sigma(self) -> float:
+        """Standard deviation of a y parallax, mm."""
+        return float(np.sqrt(2.0)) * self.image_sigma
+
+    @property
+    def ground_unit(self) -> float:
+        """Metres on the ground of a millimetre at photo scale."""
+        return self.scale / METRE
+
+
+def standard_zones(base: float, width: float) -> tuple[Place, ...]:
+    """Give the six standard points.
+
+    Parameters
+    ----------
+    base, width : float
+        b and a.
+
+    Returns
+    -------
+    tuple of tuple of float
+        Points 1 to 6 as everywhere: middle, upper and lower ones, each left and right.
+    """
+    return tuple((x, y) for y in (0.0, width, -width) for x in (0.0, base))
+
+
+def control_layout(name: str, base: float, width: float) -> tuple[ControlPoint, ...]:
+    """Give a named layout of control.
+
+    Parameters
+    ----------
+    name : str
+        One of `LAYOUTS`.
+    base, width : float
+        b and a.
+
+    Returns
+    -------
+    tuple of ControlPoint
+        Points given in full.
+    """
+    six = standard_zones(base, width)
+    places = {"corners": six[2:], "corners+centre": (*six[2:], (base / 2, 0.0)), "six": six}[name]
+    return tuple(ControlPoint(place) for place in places)
+
+
+@dataclass(frozen=True, eq=False)
+class Forecast:
+    """Expected errors of one model.
+
+    Parameters
+    ----------
+    spec : ModelSpec
+        What was asked for.
+    places : ndarray, shape (q, 2)
+        Points of the grid, mm at photo scale, rows across the flight after each other.
+    expected : Expected
+        Their errors after the plain absolute orientation, mm at photo scale.
+    adjusted : ndarray, shape (q, 3, 3)
+        Their covariance when the elements are unknowns of the orientation.
+    at_control : ndarray, shape (n, 3)
+        Standard deviations of the adjusted control points, metres.
+    elements : ndarray, shape (4,)
+        Standard deviations of `FREE`: radians, dbz in mm at photo scale.
+    """
+
+    spec: ModelSpec
+    places: Array
+    expected: Expected
+    adjusted: Array
+    at_control: Array
+    elements: Array
+
+    @property
+    def sigmas(self) -> Array:
+        """Standard deviations along, across and in height, metres, shape (q, 3)."""
+        return self.expected.sigmas * self.spec.ground_unit
+
+    @property
+    def adjusted_sigmas(self) -> Array:
+        """The same with the elements as unknowns of the orientation."""
+        return _sigmas(self.adjusted) * self.spec.ground_unit
+
+    def shares(self) -> dict[str, Array]:
+        """Give the standard deviations that each source alone would cause.
+
+        Returns
+        -------
+        dict of str to ndarray, shape (q, 3)
+            Metres: the measurement of the point, each element, the relative orientation as a whole, control as
+            measured and as given, all together, and all together with the elements as unknowns.
+        """
+        unit, sources = self.spec.ground_unit, self.expected.sources
+        found = {"measuring of the point": _sigmas(sources["measuring"]) * unit}
+        for number, name in enumerate(FREE):
+            found[f"orientation: {name}"] = self.expected.elements[:, :, number] * unit
+        found["orientation, together"] = _sigmas(sources["orientation"]) * unit
+        found["control, measured"] = _sigmas(sources["control measured"]) * unit
+        found["control, given"] = _sigmas(sources["control given"]) * unit
+        return found | {"all": self.sigmas, "all, elements adjusted": self.adjusted_sigmas}
+
+
+@dataclass(frozen=True)
+class SimpleAccuracy:
+    """What the simple formulas say of a place of the model, metres.
+
+    Parameters
+    ----------
+    place : str
+        Which place.
+    at : tuple of float
+        x and y, mm.
+    source, rigorous : Constants
+        Plan (both coordinates together) and height: with the constants as printed, and with the cofactors of six
+        standard points.
+    """
+
+    place: str
+    at: Place
+    source: deformation.Constants
+    rigorous: deformation.Constants
+
+
+def plan_model(spec: ModelSpec) -> Forecast:
+    """Compute the expected errors of a model.
+
+    Parameters
+    ----------
+    spec : ModelSpec
+        The model.
+
+    Returns
+    -------
+    Forecast
+        Errors over the model and at its control.
+
+    Raises
+    ------
+    GeometryError
+        When the points of orientation or the control determine too little.
+    """
+    along = np.linspace(0.0, spec.base, spec.grid[0])
+    across = np.linspace(spec.width, -spec.width, spec.grid[1])
+    places = np.array([(x, y) for y in across for x in along])
+    control = _control(spec)
+    elements = _elements(spec)
+    points = _level(places, spec.focal)
+    own = _measured(points, spec)
+    expected = expected_errors(points, own, control, spec.base, elements)
+    adjusted = adjust_model(control, np.zeros((len(spec.control), 3)), spec.base, elements)
+    number = np.arange(len(spec.control))
+    at_control = expected_errors(control.points, control.measured, control, spec.base, elements, number)
+    return Forecast(
+        spec,
+        places,
+        expected,
+        adjusted.covariance(points, own),
+        at_control.sigmas * spec.ground_unit,
+        np.sqrt(np.diag(elements)),
+    )
+
+
+def simple_accuracy(spec: ModelSpec) -> list[SimpleAccuracy]:
+    """Apply the simple formulas to the corners and the middle of a model.
+
+    Parameters
+    ----------
+    spec : ModelSpec
+        The model; its control does not matter to them.
+
+    Returns
+    -------
+    list of SimpleAccuracy
+        Side points left and right, middle points left and right.
+
+    Source: [003] eq. 10.10, 10.11.
+    """
+    b, a, f = spec.base, spec.width, spec.focal
+    places = {
+        "side, left": (0.0, a),
+        "side, right": (b, a),
+        "middle, left": (0.0, 0.0),
+        "middle, right": (b, 0.0),
+    }
+    rigorous = deformation.rigorous_constants(list(places.values()), f, a, b)
+    unit = spec.ground_unit * spec.parallax_sigma
+    found = []
+    for (name, at), exact in zip(places.items(), rigorous, strict=True):
+        printed = deformation.PRINTED[deformation.SIDE if name.startswith("side") else deformation.CENTRAL]
+        both = [deformation.Constants(c.plan * unit, c.height * f / b * unit) for c in (printed, exact)]
+        found.append(SimpleAccuracy(name, at, *both))
+    return found
+
+
+def _sigmas(covariance: Array) -> Array:
+    return np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+
+
+def _level(places: ArrayLike, focal: float) -> Array:
+    """Give places of level ground their depth."""
+    flat = np.asarray(places, float)
+    return np.column_stack([flat, np.full(len(flat), focal)])
+
+
+def _measured(points: Array, spec: ModelSpec) -> Array:
+    return measured_covariance(points, spec.base, spec.focal, spec.image_sigma)
+
+
+def _control(spec: ModelSpec) -> Control:
+    points = _level([point.at for point in spec.control] or np.zeros((0, 2)), spec.focal)
+    given = np.diag(np.square(np.array(spec.control_sigma) / spec.ground_unit))
+    return Control(
+        points,
+        np.array(["xy" in point.use for point in spec.control], bool),
+        np.array(["z" in point.use for point in spec.control], bool),
+        _measured(points, spec),
+        np.broadcast_to(given, (len(points), 3, 3)),
+    )
+
+
+def _elements(spec: ModelSpec) -> Array:
+    """Covariance of the elements from the standard zones, or from the points that are named."""
+    places = spec.orientation_points or standard_zones(spec.base, spec.width)
+    density = 1 if spec.orientation_points else spec.zone_points
+    covariance = element_covariance(_level(places, spec.focal), spec.base, spec.parallax_sigma)
+    return free_covariance(covariance / density, spec.base)

@@ -1,0 +1,168 @@
+"""``photostrip plan``: files, options, forms and pictures."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from photostrip.cli.main import main
+from photostrip.planning.model_plan import ModelSpec, control_layout, plan_model
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+CAMERAS = """\
+photostrip_plan_cameras: 1
+cameras:
+  wide: {principal_distance: 153, sigma_um: 7, format: [230, 230]}
+  digital: {principal_distance: 100.5, sigma_um: 2, format: [67.86, 103.86]}
+"""
+
+
+def answer(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    assert main(arguments) == 0
+    return capsys.readouterr().out
+
+
+def test_options_and_a_file_say_the_same(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    options = ["--principal-distance", "100", "--photo-format", "180,160", "--overlap", "65", "--flying-height", "800"]
+    options += ["--sigma-um", "3", "--control", "six", "--control-sigma", "0.02,0.03,0.04"]
+    from_options = answer(capsys, "plan", "model", *options, "--format", "json")
+    file = tmp_path / "m.yaml"
+    file.write_text(
+        "photostrip_plan_model: 1\ncamera: {principal_distance: 100, format: [180, 160]}\nend_lap_percent: 65\n"
+        "flying_height: 800\nimage_sigma_um: 3\ncontrol: {layout: six, sigma: [0.02, 0.03, 0.04]}\n"
+    )
+    assert answer(capsys, "plan", "model", str(file), "--format", "json") == from_options
+    found = json.loads(from_options)
+    b, a = 63.0, 64.0
+    spec = ModelSpec(100, b, a, 8000, 0.003, control=control_layout("six", b, a), control_sigma=(0.02, 0.03, 0.04))
+    expected = plan_model(spec)
+    assert [point["sigma_z_m"] for point in found["points"]] == pytest.approx(expected.sigmas[:, 2], abs=1e-4)
+    assert found["worst"]["sigma_z_m"] == pytest.approx(expected.sigmas[:, 2].max(), abs=1e-4)
+
+
+def test_sources_add_up_and_the_table_is_the_document(capsys: pytest.CaptureFixture[str]) -> None:
+    document = json.loads(answer(capsys, "plan", "model", "--format", "json"))
+    share = {row["source"]: row for row in document["sources"]}
+    parts = ("measuring of the point", "orientation, together", "control, measured", "control, given")
+    for name in ("plan_rms_m", "z_rms_m"):
+        assert np.sqrt(sum(share[part][name] ** 2 for part in parts)) == pytest.approx(share["all"][name], abs=3e-4)
+    rows = list(csv.DictReader(io.StringIO(answer(capsys, "plan", "model", "--format", "csv"))))
+    assert [float(row["sigma_z_m"]) for row in rows] == [point["sigma_z_m"] for point in document["points"]]
+    assert share["all, elements adjusted"]["z_max_m"] < share["all"]["z_max_m"]
+
+
+def test_more_points_in_a_zone_lower_what_the_elements_do(capsys: pytest.CaptureFixture[str]) -> None:
+    def sigmas(*more: str) -> list[float]:
+        document = json.loads(answer(capsys, "plan", "model", "--format", "json", *more))
+        return [each["sigma"] for each in document["orientation"]["sigmas"]]
+
+    ratio = np.array(sigmas("--set", "orientation.zone_points=4")) / sigmas()
+    assert ratio == pytest.approx(np.full(4, 0.5), abs=2e-3)
+    six = "[[0,0],[92,0],[0,92],[92,92],[0,-92],[92,-92]]"
+    assert sigmas("--set", f"orientation.points={six}") == sigmas()
+
+
+def test_cameras_from_a_list(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "c.yaml"
+    file.write_text(CAMERAS)
+    document = json.loads(answer(capsys, "plan", "camera", str(file), "--format", "json"))
+    wide, digital = document["cameras"]
+    assert (document["reference"], document["fewest_photos"], document["smallest_coefficient"]) == (
+        "digital",
+        "wide",
+        "digital",
+    )
+    assert wide["base_mm"] == pytest.approx(92.0)
+    assert wide["coefficient_mm2"] == pytest.approx(153 * 0.007)
+    assert digital["eta_area"] == 1
+    text = answer(capsys, "plan", "camera", str(file), "--format", "md")
+    assert "| wide | 153 | 7.0 |" in text
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("photostrip_plan_model: 1\nscael: 3\n", "did you mean `scale`"),
+        ("photostrip_plan_model: 1\nscale: 3000\nflying_height: 400\n", "are both given"),
+        ("photostrip_plan_model: 1\ncontrol: {sigma: [0, 0, 0]}\n", "all zero"),
+        ("photostrip_plan_model: 1\ncontrol: {points: [{at: [1, 2], use: zz}]}\n", "`zz` is not known"),
+        ("photostrip_plan_model: 1\ngrid: {rows: 1}\n", "1 is out of range"),
+        ("photostrip_plan_model: 2\n", "`2` is not known"),
+    ],
+)
+def test_a_wrong_plan_is_refused(text: str, message: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "m.yaml"
+    file.write_text(text)
+    assert main(["plan", "model", str(file)]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert f"{file}:" in error
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("  a: {principal_distance: 153, sigma_um: 7}\n", "nothing says how long the photo base is"),
+        (CAMERAS.partition("cameras:\n")[2] + "  c: {principal_distance: 9, sigma_um: 7, base: 3}\n", "no format"),
+        (CAMERAS.partition("cameras:\n")[2] + "reference: wild\n", "there is no camera `wild`"),
+    ],
+)
+def test_a_wrong_list_of_cameras_is_refused(
+    text: str, message: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    file = tmp_path / "c.yaml"
+    file.write_text(f"photostrip_plan_cameras: 1\ncameras:\n{text}")
+    assert main(["plan", "camera", str(file)]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_weak_control_is_weak_geometry(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", "model", "--set", "control.points=[[0, 0], [40, 40], [80, 80]]"]) == 3
+    assert "on one line" in capsys.readouterr().err
+    assert main(["plan", "model", "--set", "orientation.points=[[0, 0], [40, 40]]"]) == 3
+
+
+def test_one_of_list_and_source_table_is_needed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plan", "camera"]) == 2
+    assert main(["plan", "camera", "x.yaml", "--source-table"]) == 2
+    assert "exclude each other" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("ending", [".json", ".csv", ".md", ".txt"])
+def test_files_are_what_is_printed(ending: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    target = tmp_path / f"plan{ending}"
+    form = "text" if ending == ".txt" else ending[1:]
+    shown = answer(capsys, "plan", "model", "--format", form, "-o", str(target))
+    assert target.read_text(encoding="utf-8") == shown
+    assert answer(capsys, "plan", "model", "-q", "-o", str(target)) == ""
+    assert main(["plan", "model", "-o", str(tmp_path / "plan.docx")]) == 2
+
+
+@pytest.mark.slow
+def test_pictures_are_the_same_every_time(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "c.yaml"
+    file.write_text(CAMERAS)
+    for command in (("model",), ("camera", str(file)), ("camera", "--source-table")):
+        for ending, begin in ((".svg", b"<?xml"), (".png", b"\x89PNG")):
+            found = []
+            for number in range(2):
+                target = tmp_path / f"{number}{ending}"
+                assert answer(capsys, "plan", *command, "-q", "-o", str(target)) == ""
+                found.append(target.read_bytes())
+            assert found[0] == found[1]
+            assert found[0].startswith(begin)
+
+
+def test_a_picture_without_matplotlib_names_the_extra(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "matplotlib", None)
+    assert main(["plan", "model", "-o", str(tmp_path / "p.png")]) == 2
+    assert "pip install photostrip[report]" in capsys.readouterr().err
