@@ -19,6 +19,8 @@ class Distortion:
         Radial coefficients k1, k2, k3 in mm^-2, mm^-4, mm^-6 (Brown).
     p : tuple of float
         Decentering coefficients p1, p2 in mm^-1 (Brown).
+    b : tuple of float
+        Affinity b1 and shear b2 of the image, dimensionless (Brown): D_x gets b1 X + b2 Y.
     radius, distortion : tuple of float
         Radial table in mm: distances from the principal point and distortion there.
     """
@@ -27,6 +29,7 @@ class Distortion:
     direction: str
     k: tuple[float, float, float] = (0.0, 0.0, 0.0)
     p: tuple[float, float] = (0.0, 0.0)
+    b: tuple[float, float] = (0.0, 0.0)
     radius: tuple[float, ...] = ()
     distortion: tuple[float, ...] = ()
 

@@ -214,6 +214,15 @@ def test_the_correction_before_and_after_leaves_a_centimetre(plane_map: tuple[Si
     assert model < height_rms(plane_map, degree("2"))
 
 
+def test_the_correction_in_the_images_does_the_same_photo_by_photo(
+    plane_map: tuple[Simulation, Inputs, Floats],
+) -> None:
+    """The arc between neighbouring photos takes the place of the straight line, up to terms of higher order."""
+    in_images = replace(SIMILARITY, refinement=replace(SIMILARITY.refinement, earth_radius=6_371_000.0))
+    found = height_rms(plane_map, in_images)
+    assert found < height_rms(plane_map, SIMILARITY) / 50
+
+
 def test_the_geocentric_route_needs_no_correction(plane_map: tuple[Simulation, Inputs, Floats]) -> None:
     done, _, _ = plane_map
     result = triangulate(inputs_of(done), SIMILARITY)
@@ -234,6 +243,13 @@ def test_curvature_twice_is_refused(crs: str, axes: tuple[str, str, str]) -> Non
         triangulate(inputs_of(done), PLANE_MAP)
     assert {fault.code for fault in caught.value.faults} == {"curvature-twice"}
     assert caught.value.exit_code == EXIT_INPUT
+
+
+def test_curvature_in_images_and_in_the_frame_is_refused() -> None:
+    done = simulate(Spec())
+    in_images = replace(SIMILARITY, refinement=replace(SIMILARITY.refinement, earth_radius=6_371_000.0))
+    with pytest.raises(InputError, match="counted twice: in the images and in EPSG:32633, which carries it"):
+        triangulate(inputs_of(done), in_images)
 
 
 # ---------------------------------------------------------------------------------------------- points seen once

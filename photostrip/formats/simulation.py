@@ -269,7 +269,7 @@ def _camera(camera: Camera) -> list[str]:
         lines += ["    fiducials:", *(f"      {_flow(mark)}: {_flow(xy)}" for mark, xy in camera.fiducials.items())]
     if camera.distortion is not None:
         shape = asdict(camera.distortion)
-        names = ("k", "p") if camera.distortion.model == "brown" else ("radius", "distortion")
+        names = ("k", "p", "b") if camera.distortion.model == "brown" else ("radius", "distortion")
         lines += ["    distortion:", f"      model: {shape['model']}", f"      direction: {shape['direction']}"]
         lines += [f"      {name}: {_flow(shape[name])}" for name in names]
     return lines

@@ -155,6 +155,7 @@ def require_whole(inputs: Inputs, frames: Sequence[GroundFrame]) -> None:
 def _frames(inputs: Inputs, settings: Settings, directory: Path | None) -> tuple[list[GroundFrame], GroundFrame]:
     """Ground frames tied together; with curvature by eq. 153 all share the control's centre of gravity as origin."""
     radius = settings.absolute.earth_radius if settings.absolute.earth_curvature == "model" else None
+    _refuse_curvature_twice(inputs, settings)
     specs = [replace(spec, curvature_radius=radius) for spec in inputs.frames]
     output = None if inputs.output is None else replace(inputs.output, curvature_radius=radius)
     frames, target = tie_frames(specs, output, directory=directory)
@@ -163,6 +164,20 @@ def _frames(inputs: Inputs, settings: Settings, directory: Path | None) -> tuple
     plan = inputs.control.use[:, 0] & ~inputs.control.check
     origin = inputs.control.enu[plan, :2].mean(axis=0)
     return [frame.with_origin(origin) for frame in frames], target.with_origin(origin)
+
+
+def _refuse_curvature_twice(inputs: Inputs, settings: Settings) -> None:
+    """Refuse curvature in image space where the ground frames carry it."""
+    curved = [spec.name for spec in (*inputs.frames, *filter(None, [inputs.output])) if spec.crs != "local"]
+    if settings.refinement.earth_radius is not None and curved:
+        fault = Fault(
+            f"Earth curvature would be counted twice: in the images and in {curved[0]}, which carries it",
+            code="curvature-twice",
+            key="processing.earth_curvature",
+            expected="auto",
+            fix="drop `earth_curvature: image`, or give plane coordinates of an unknown projection as `crs: local`",
+        )
+        raise InputError(fault)
 
 
 def _photo_coordinates(inputs: Inputs, settings: Settings) -> tuple[PhotoPoints, interior.InteriorOrientation | None]:
@@ -183,9 +198,10 @@ def _ideal_coordinates(
 ) -> refinement.Refined:
     """Image coordinates reduced to the principal point, free of distortion and refraction."""
     wanted = settings.refinement
-    if wanted.refraction and (wanted.flying_height is None or wanted.ground_height is None):
-        # The heights come from a first run without refraction; metres do not matter to it.
-        first = _triangulated(inputs, replace(settings, refinement=replace(wanted, refraction=False)), None)
+    if wanted.needs_heights and (wanted.flying_height is None or wanted.ground_height is None):
+        # The heights come from a first run without these corrections; metres do not matter to them.
+        plain = replace(wanted, refraction=False, earth_radius=None)
+        first = _triangulated(inputs, replace(settings, refinement=plain), None)
         flying, ground = _heights(first, frames)
         wanted = replace(wanted, flying_height=flying, ground_height=ground)
     return refinement.refine(observations, _cameras(inputs), wanted)

@@ -151,8 +151,9 @@ def _image_coordinates(project: Project, faults: list[Fault]) -> list[Note]:
                 oriented = interior.orient(inputs.fiducials, cameras, project.settings.interior)
                 notes = list(oriented.notes)
                 observations = interior.transform(observations, oriented)
-            # refraction needs heights that only a run can find; it refuses nothing in a file
-            refinement.refine(observations, cameras, replace(project.settings.refinement, refraction=False))
+            # refraction and curvature need heights that only a run can find; they refuse nothing in a file
+            wanted = replace(project.settings.refinement, refraction=False, earth_radius=None)
+            refinement.refine(observations, cameras, wanted)
     except InputError as error:
         faults += error.faults
     except GeometryError as error:

@@ -75,7 +75,7 @@ def _camera(name: str, given: schema.Camera) -> camera.Camera:
     if given.distortion is not None:
         lens = given.distortion
         distortion = camera.Distortion(
-            lens.model, lens.direction, lens.k, lens.p, tuple(lens.radius), tuple(lens.distortion)
+            lens.model, lens.direction, lens.k, lens.p, lens.b, tuple(lens.radius), tuple(lens.distortion)
         )
     return camera.Camera(
         name,
@@ -415,6 +415,7 @@ def settings(project: schema.ProjectFile) -> Settings:
             refraction=wanted.refraction,
             flying_height=wanted.flying_height,
             ground_height=wanted.ground_height,
+            earth_radius=wanted.earth_radius if wanted.earth_curvature == "image" else None,
         ),
         angle_system=project.output.angles.system,
         angle_unit=project.output.angles.unit,

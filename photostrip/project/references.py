@@ -158,7 +158,7 @@ def _units_of_sigma(root: Node, findings: Findings) -> None:
 
 def _curvature(root: Node, findings: Findings) -> None:
     """Refuse to count the Earth's curvature twice."""
-    if root.word("processing", "earth_curvature") != "model":
+    if root.word("processing", "earth_curvature") not in {"model", "image"}:
         return
     control = root.find("control")
     systems = [each.word("crs") for each in (control.elements if control is not None else [])]
@@ -191,7 +191,7 @@ def _needs_of_the_strip_method(root: Node, findings: Findings) -> None:
 
 def _camera_positions(root: Node, findings: Findings) -> None:
     """Refuse curvature by eq. 153 for positions that carry it: they must lie in the control's frame."""
-    if root.word("processing", "earth_curvature") != "model":
+    if root.word("processing", "earth_curvature") not in {"model", "image"}:
         return
     for section in ("camera_positions", "orientations"):
         crs = root.word(section, "crs")

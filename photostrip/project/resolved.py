@@ -126,7 +126,7 @@ def text_of(project: ProjectFile) -> str:
 def _plain(value: Any) -> Any:  # noqa: ANN401 (any value of a project)
     """Turn sections into mappings, without keys that say nothing."""
     if isinstance(value, BaseModel):
-        skipped = ("k", "p") if isinstance(value, Distortion) and value.model == "radial-table" else ()
+        skipped = ("k", "p", "b") if isinstance(value, Distortion) and value.model == "radial-table" else ()
         fields = ((name, getattr(value, name)) for name in type(value).model_fields if name not in skipped)
         return {
             name: "auto" if each is None else _plain(each)

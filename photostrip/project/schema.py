@@ -229,13 +229,14 @@ class Distortion(Section):
         "Radial coefficients k1, k2, k3", (0.0, 0.0, 0.0), unit="mm^-2, mm^-4, mm^-6"
     )
     p: Pair = key("Decentring coefficients p1, p2", (0.0, 0.0), unit="mm^-1")
+    b: Pair = key("Affinity b1 and shear b2: D_x gets b1 X + b2 Y", (0.0, 0.0))
     radius: list[Number] = key("Radial table: ascending distances from the principal point", [], unit="mm")
     distortion: list[Number] = key("Radial table: distortion at these distances, outwards positive", [], unit="mm")
 
     @model_validator(mode="after")
     def _one_model(self) -> Self:
         table = self.model == "radial-table"
-        for name in ("k", "p") if table else ("radius", "distortion"):
+        for name in ("k", "p", "b") if table else ("radius", "distortion"):
             if name in self.model_fields_set:
                 raise wrong(f"`{name}` does not belong to model {self.model}", at=name, fix="remove it or change model")
         if not table:
@@ -520,22 +521,22 @@ class Processing(Section):
         "`least_squares`: all common points with their precision; `distances`: the textbook's mean of ratios",
         DEFAULTS.formation.scale_transfer,
     )
-    earth_curvature: Annotated[str, *_choice(("auto", "model", "none"), "image")] = key(
+    earth_curvature: Annotated[str, *_choice(("auto", "model", "image", "none"))] = key(
         "`auto` or `none`: the frames carry it, `local` is truly Cartesian; `model`: D^2/2R, for plane map"
-        " coordinates of an unknown projection given as `local`",
+        " coordinates of an unknown projection given as `local`; `image`: the same, photo by photo in the image",
         DEFAULTS.absolute.earth_curvature,
     )
     earth_radius: Positive = key(
-        "Radius of the Earth for `earth_curvature: model`", DEFAULTS.absolute.earth_radius, unit="m"
+        "Radius of the Earth for `earth_curvature: model` and `image`", DEFAULTS.absolute.earth_radius, unit="m"
     )
     refraction: Flag = key("Correct for atmospheric refraction", DEFAULTS.refinement.refraction)
     flying_height: NumberOrAuto = key(
-        "Mean height of the cameras above sea level, for refraction; `auto`: derived",
+        "Mean height of the cameras above sea level, for refraction and curvature; `auto`: derived",
         DEFAULTS.refinement.flying_height,
         unit="m",
     )
     ground_height: NumberOrAuto = key(
-        "Mean height of the ground above sea level, for refraction; `auto`: derived",
+        "Mean height of the ground above sea level, for refraction and curvature; `auto`: derived",
         DEFAULTS.refinement.ground_height,
         unit="m",
     )

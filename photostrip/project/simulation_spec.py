@@ -368,6 +368,6 @@ def camera_of(given: SimulatedCamera) -> camera.Camera:
     if given.distortion is not None:
         lens = given.distortion
         changed["distortion"] = camera.Distortion(
-            lens.model, lens.direction, lens.k, lens.p, tuple(lens.radius), tuple(lens.distortion)
+            lens.model, lens.direction, lens.k, lens.p, lens.b, tuple(lens.radius), tuple(lens.distortion)
         )
     return replace(simulate.PRESETS[given.preset], **changed)

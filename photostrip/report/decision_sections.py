@@ -74,9 +74,12 @@ def _screening(document: Document, settings: Document) -> Iterator[tuple[str, st
 
 
 def _heights(document: Document, settings: Document) -> Iterator[tuple[str, str]]:
-    if settings["refraction"] and (settings["flying_height"] is None or settings["ground_height"] is None):
+    wanted = [name for name, key in (("refraction", "refraction"), ("curvature", "earth_radius")) if settings.get(key)]
+    if wanted and (settings["flying_height"] is None or settings["ground_height"] is None):
         heights = ", ".join(f"{short(strip['flying_height'])} m" for strip in document["strips"])
-        yield "heights for refraction", f"from a first run without it; flying height above ground {heights}"
+        without = "it" if len(wanted) == 1 else "them"
+        label = f"heights for {' and '.join(wanted)}"
+        yield label, f"from a first run without {without}; flying height above ground {heights}"
 
 
 def weights_section(document: Document, *, everything: bool) -> Section:

@@ -203,6 +203,8 @@ def _corrections(corrections: Document) -> list[tuple[str, str]]:
     image = [f"{name} {_effect(corrections[key])}" for key, name in effects]
     curvature = corrections["earth_curvature"]
     size = f", up to {metres(curvature['largest'])} m in height" if curvature["largest"] else ""
+    if "largest_um" in curvature:
+        size = f", up to {micrometres(curvature['largest_um'])} µm"
     interior = corrections["interior"]
     rows = [("image corrections", ", ".join(image)), ("Earth curvature", f"{curvature['treatment']}{size}")]
     return [*([("fiducial marks", _interior(interior))] if interior else []), *rows]

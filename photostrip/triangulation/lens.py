@@ -114,13 +114,14 @@ def shift(xy: Floats, distortion: Distortion) -> Floats:
 
     Notes
     -----
-    Source: Brown 1966, radial and decentering distortion.
+    Source: Brown 1966, radial and decentering distortion; Fraser 1997, affinity and shear.
     """
     x, y = xy[..., 0], xy[..., 1]
     square = x**2 + y**2
     p1, p2 = distortion.p
+    b1, b2 = distortion.b
     factor = _radial(np.sqrt(square), distortion).factor
-    dx = x * factor + p1 * (square + 2 * x**2) + 2 * p2 * x * y
+    dx = x * factor + p1 * (square + 2 * x**2) + 2 * p2 * x * y + b1 * x + b2 * y
     dy = y * factor + p2 * (square + 2 * y**2) + 2 * p1 * x * y
     return np.stack([dx, dy], -1)
 
@@ -142,11 +143,12 @@ def jacobian(xy: Floats, distortion: Distortion) -> Floats:
     """
     x, y = xy[..., 0], xy[..., 1]
     p1, p2 = distortion.p
+    b1, b2 = distortion.b
     factor, slope = _radial(np.hypot(x, y), distortion)
-    xx = 1 + factor + slope * x**2 + 6 * p1 * x + 2 * p2 * y
+    xx = 1 + factor + slope * x**2 + 6 * p1 * x + 2 * p2 * y + b1
     yy = 1 + factor + slope * y**2 + 6 * p2 * y + 2 * p1 * x
     xy_ = slope * x * y + 2 * p1 * y + 2 * p2 * x
-    return np.stack([np.stack([xx, xy_], -1), np.stack([xy_, yy], -1)], -2)
+    return np.stack([np.stack([xx, xy_ + b2], -1), np.stack([xy_, yy], -1)], -2)
 
 
 def reach(distortion: Distortion) -> tuple[float, float]:
@@ -257,7 +259,7 @@ def _inverse(target: Floats, distortion: Distortion) -> Floats:
     radius = np.hypot(target[..., 0], target[..., 1])
     farthest = 2 * float(radius.max(initial=0.0))
     if farthest == 0:
-        return target.copy() if not np.any(distortion.p) else _newton(target, target, distortion)
+        return target.copy() if not np.any((distortion.p, distortion.b)) else _newton(target, target, distortion)
     radii = np.linspace(0, min(farthest, _last_radius(distortion)), RADII)
     images = np.maximum.accumulate(radii * (1 + _radial(radii, distortion).factor))
     scale = np.interp(radius, images, radii) / np.where(radius > 0, radius, 1.0)

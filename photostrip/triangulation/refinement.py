@@ -4,10 +4,12 @@ The order of the corrections, from the image to the ideal, is that in which ligh
 
 1. principal point: coordinates are reduced to it;
 2. lens distortion, :mod:`photostrip.triangulation.lens`;
-3. atmospheric refraction.
+3. atmospheric refraction;
+4. Earth curvature, only where the ground frame does not carry it and it is asked for in image space.
 
 Film deformation is taken out before, by the interior orientation. Earth curvature is no error of an image: the ground
-frames carry it. :func:`distort` goes the other way and is the exact inverse.
+frames carry it, unless plane map coordinates of an unknown projection are given as Cartesian ones. :func:`distort` goes
+the other way and is the exact inverse.
 """
 
 from __future__ import annotations
@@ -56,11 +58,42 @@ class Settings:
     flying_height, ground_height : float or None
         Mean heights of the perspective centers and of the ground above sea level, in metres; None: derived
         from camera and control.
+    earth_radius : float or None
+        Radius of the Earth in metres for the correction in image space; None: none.
     """
 
     refraction: bool = False
     flying_height: float | None = None
     ground_height: float | None = None
+    earth_radius: float | None = None
+
+    @property
+    def needs_heights(self) -> bool:
+        """Whether a correction depends on the heights of camera and ground."""
+        return self.refraction or self.earth_radius is not None
+
+
+@dataclass(frozen=True)
+class Bending:
+    """How far light and Earth bend away from straight line and plane, over the depth from camera to ground.
+
+    Parameters
+    ----------
+    refraction : float
+        Constant of :func:`refraction_constant`; 0: none.
+    curvature : float
+        Constant of :func:`curvature_constant`; 0: none.
+    """
+
+    refraction: float = 0.0
+    curvature: float = 0.0
+
+    def __bool__(self) -> bool:
+        """Whether there is anything to correct."""
+        return bool(self.refraction or self.curvature)
+
+
+NOTHING_BENT = Bending()
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +106,7 @@ class Refined:
         Ideal image coordinates, reduced to the principal point, mm.
     largest_um : dict of str to float
         Largest shift by each effect that was corrected, micrometres: ``"principal point"``, ``"distortion"``,
-        ``"refraction"``.
+        ``"refraction"``, ``"earth curvature"``.
     """
 
     observations: PhotoPoints
@@ -110,25 +143,25 @@ def refine(
     Raises
     ------
     InputError
-        When a distortion has no inverse over the format, or refraction is asked for without heights, or a point
-        lies beyond the radii of a distortion table: with photo, point and radius.
+        When a distortion has no inverse over the format, or refraction or curvature is asked for without heights, or
+        a point lies beyond the radii of a distortion table: with photo, point and radius.
     """
     cameras = {camera_of_photo[photo].name: camera_of_photo[photo] for photo in observations.photo_ids}
     number = {name: row for row, name in enumerate(cameras)}
     camera_of_row = np.array([number[camera_of_photo[photo].name] for photo in observations.photo_ids], np.intp)[
         observations.photo
     ]
-    constant = _constant(settings, flying_height, ground_height)
+    bending = _bending(settings, flying_height, ground_height)
     rows_of = {name: np.flatnonzero(camera_of_row == row) for name, row in number.items()}
     _refuse_distortion(observations, cameras, rows_of)
     xy = observations.xy
     largest: dict[str, float] = {}
     for name, camera in cameras.items():
-        if not _active(camera, constant):
+        if not _active(camera, bending):
             continue
         if xy is observations.xy:
             xy = xy.copy()
-        xy[rows_of[name]], shifts = _corrected(xy[rows_of[name]], camera, constant)
+        xy[rows_of[name]], shifts = _corrected(xy[rows_of[name]], camera, bending)
         for effect, length in shifts.items():
             largest[effect] = max(largest.get(effect, 0.0), length / MICROMETRE)
     if not largest:
@@ -137,7 +170,7 @@ def refine(
     return Refined(PhotoPoints(o.photo_ids, o.point_ids, o.photo, o.point, xy, o.sigma), largest)
 
 
-def undistort(image_xy: ArrayLike, camera: Camera, refraction: float = 0.0) -> Floats:
+def undistort(image_xy: ArrayLike, camera: Camera, bending: Bending = NOTHING_BENT) -> Floats:
     """Give the ideal points of image points of one camera.
 
     Parameters
@@ -146,18 +179,18 @@ def undistort(image_xy: ArrayLike, camera: Camera, refraction: float = 0.0) -> F
         Photo coordinates, mm.
     camera : Camera
         The camera.
-    refraction : float
-        Constant of :func:`refraction_constant`; 0: none.
+    bending : Bending
+        Refraction and Earth curvature.
 
     Returns
     -------
     ndarray, shape (n, 2)
         Ideal coordinates reduced to the principal point, mm.
     """
-    return _corrected(np.asarray(image_xy, float), camera, refraction)[0]
+    return _corrected(np.asarray(image_xy, float), camera, bending)[0]
 
 
-def distort(ideal_xy: ArrayLike, camera: Camera, refraction: float = 0.0) -> Floats:
+def distort(ideal_xy: ArrayLike, camera: Camera, bending: Bending = NOTHING_BENT) -> Floats:
     """Give the image points of ideal points of one camera; the exact inverse of :func:`undistort`.
 
     Parameters
@@ -166,8 +199,8 @@ def distort(ideal_xy: ArrayLike, camera: Camera, refraction: float = 0.0) -> Flo
         Ideal coordinates reduced to the principal point, mm.
     camera : Camera
         The camera.
-    refraction : float
-        Constant of :func:`refraction_constant`; 0: none.
+    bending : Bending
+        Refraction and Earth curvature.
 
     Returns
     -------
@@ -180,8 +213,11 @@ def distort(ideal_xy: ArrayLike, camera: Camera, refraction: float = 0.0) -> Flo
         When a point lies beyond the radii of a distortion table.
     """
     xy = np.asarray(ideal_xy, float)
-    if refraction:
-        xy = _with_refraction(xy, camera.principal_distance, refraction)
+    f = camera.principal_distance
+    if bending.curvature:
+        xy = _stretched(xy, f, 0.0, bending.curvature)
+    if bending.refraction:
+        xy = _stretched(xy, f, -bending.refraction, -bending.refraction)
     if _distorts(camera.distortion):
         xy = lens.image_from_ideal(xy, camera.distortion)
     return np.asarray(xy + np.array(camera.principal_point), np.float64)
@@ -213,12 +249,8 @@ def refraction_constant(flying_height: float, ground_height: float) -> float:
     in plane layers follows tan(alpha) = tan(theta) (1 - K / cos(theta)^2) for the direction theta at the camera and
     the straight line alpha to the ground.
     """
+    _require_above(flying_height, ground_height, "refraction")
     camera, ground = flying_height / 1000, ground_height / 1000
-    if camera <= ground:
-        message = f"refraction: the flying height {flying_height:g} m is not above the ground, {ground_height:g} m"
-        raise InputError(
-            Fault(message, code="flying-height", key="processing.flying_height", expected="heights in metres")
-        )
     fall = _pressure(ground) - _pressure(camera)
     return REFRACTIVITY * (SCALE_HEIGHT * fall / (camera - ground) - _density(camera))
 
@@ -249,6 +281,43 @@ def refraction_shift(radius: ArrayLike, principal_distance: float, constant: flo
     return np.asarray(constant * r * (1 + (r / principal_distance) ** 2), np.float64)
 
 
+def curvature_constant(flying_height: float, ground_height: float, radius: float) -> float:
+    """Constant C of Earth curvature in image space: height above ground over the diameter of the Earth.
+
+    Parameters
+    ----------
+    flying_height, ground_height : float
+        Heights of the perspective center and of the ground above sea level, metres.
+    radius : float
+        Radius of the Earth, metres.
+
+    Returns
+    -------
+    float
+        C, dimensionless. A point of the plan at distance D lies D^2 / 2R below the plane, so that its image lies too
+        far inside by dr = C r^3 / f^2, which is added to the radius.
+
+    Raises
+    ------
+    InputError
+        When the camera is not above the ground.
+
+    Notes
+    -----
+    Source: Kraus, Photogrammetry, vol. 1, influence of Earth curvature on a near-vertical photo.
+    """
+    _require_above(flying_height, ground_height, "earth_curvature")
+    return (flying_height - ground_height) / (2 * radius)
+
+
+def _require_above(flying_height: float, ground_height: float, what: str) -> None:
+    if flying_height <= ground_height:
+        message = f"{what}: the flying height {flying_height:g} m is not above the ground, {ground_height:g} m"
+        raise InputError(
+            Fault(message, code="flying-height", key="processing.flying_height", expected="heights in metres")
+        )
+
+
 def _pressure(height_km: float) -> float:
     """Pressure of the standard atmosphere over that at sea level; above 20 km little is left to be wrong."""
     if height_km <= TROPOPAUSE:
@@ -261,27 +330,32 @@ def _density(height_km: float) -> float:
     return _pressure(height_km) / (1 - LAPSE * min(height_km, TROPOPAUSE))
 
 
-def _constant(settings: Settings, flying_height: float | None, ground_height: float | None) -> float:
-    if not settings.refraction:
-        return 0.0
+def _bending(settings: Settings, flying_height: float | None, ground_height: float | None) -> Bending:
+    if not settings.needs_heights:
+        return NOTHING_BENT
     flying = flying_height if settings.flying_height is None else settings.flying_height
     ground = ground_height if settings.ground_height is None else settings.ground_height
     if flying is None or ground is None:
-        message = "refraction: flying height and height of the ground are not known"
+        what = "refraction" if settings.refraction else "earth_curvature"
+        message = f"{what}: flying height and height of the ground are not known"
         fix = "give processing.flying_height and processing.ground_height, in metres"
-        raise InputError(Fault(message, code="flying-height", key="processing.refraction", fix=fix))
-    return refraction_constant(flying, ground)
+        raise InputError(Fault(message, code="flying-height", key=f"processing.{what}", fix=fix))
+    radius = settings.earth_radius
+    return Bending(
+        refraction_constant(flying, ground) if settings.refraction else 0.0,
+        curvature_constant(flying, ground, radius) if radius is not None else 0.0,
+    )
 
 
 def _distorts(distortion: Distortion | None) -> TypeGuard[Distortion]:
-    return distortion is not None and any((*distortion.k, *distortion.p, *distortion.distortion))
+    return distortion is not None and any((*distortion.k, *distortion.p, *distortion.b, *distortion.distortion))
 
 
-def _active(camera: Camera, constant: float) -> bool:
-    return any(camera.principal_point) or camera.distortion is not None or constant != 0
+def _active(camera: Camera, bending: Bending) -> bool:
+    return any(camera.principal_point) or camera.distortion is not None or bool(bending)
 
 
-def _corrected(image: Floats, camera: Camera, constant: float) -> tuple[Floats, dict[str, float]]:
+def _corrected(image: Floats, camera: Camera, bending: Bending) -> tuple[Floats, dict[str, float]]:
     """Ideal points, and the largest shift in mm by each effect."""
     shifts = {}
     xy = image
@@ -292,9 +366,13 @@ def _corrected(image: Floats, camera: Camera, constant: float) -> tuple[Floats, 
         ideal = lens.ideal_from_image(xy, camera.distortion) if _distorts(camera.distortion) else xy
         shifts["distortion"] = _longest(ideal - xy)
         xy = ideal
-    if constant:
-        ideal = xy * (1 - constant * (1 + (xy**2).sum(-1, keepdims=True) / camera.principal_distance**2))
+    if bending.refraction:
+        ideal = xy * (1 - bending.refraction * (1 + _slope(xy, camera.principal_distance)))
         shifts["refraction"] = _longest(ideal - xy)
+        xy = ideal
+    if bending.curvature:
+        ideal = xy * (1 + bending.curvature * _slope(xy, camera.principal_distance))
+        shifts["earth curvature"] = _longest(ideal - xy)
         xy = ideal
     return xy, shifts
 
@@ -303,13 +381,18 @@ def _longest(shifts: Floats) -> float:
     return float(np.hypot(shifts[..., 0], shifts[..., 1]).max(initial=0.0))
 
 
-def _with_refraction(ideal: Floats, principal_distance: float, constant: float) -> Floats:
-    """Solve ``s (1 - K (1 + s^2 q)) = 1`` for the stretch s of ideal points, q = r^2 / f^2, by Newton's iteration."""
-    q = (ideal**2).sum(-1, keepdims=True) / principal_distance**2
+def _slope(xy: Floats, principal_distance: float) -> Floats:
+    """Square of the tangent of the angle to the optical axis, shape (..., 1)."""
+    return np.asarray((xy**2).sum(-1, keepdims=True) / principal_distance**2, np.float64)
+
+
+def _stretched(ideal: Floats, principal_distance: float, constant: float, cubic: float) -> Floats:
+    """Solve ``s (1 + a + b s^2 q) = 1`` for the stretch s of ideal points, q = r^2 / f^2, by Newton's iteration."""
+    q = _slope(ideal, principal_distance)
     stretch = np.ones_like(q)
     for _ in range(ITERATIONS):
-        misclosure = stretch * (1 - constant * (1 + stretch**2 * q)) - 1
-        step = misclosure / (1 - constant * (1 + 3 * stretch**2 * q))
+        misclosure = stretch * (1 + constant + cubic * stretch**2 * q) - 1
+        step = misclosure / (1 + constant + 3 * cubic * stretch**2 * q)
         stretch = stretch - step
         if (np.abs(step) <= CONVERGED * stretch).all():
             break

@@ -115,7 +115,7 @@ NOT_YET = [
         "not available yet",
         "polynomial",
     ),
-    (Y, "processing:", "processing:\n  earth_curvature: image", "project.yaml:30:20:", "`image` is not available yet"),
+    (Y, "processing:", "processing:\n  earth_curvature: image", "project.yaml:30:20:", "counted twice", "EPSG:32633"),
 ]
 REFERENCES = [
     (Y, "id: B\n    camera: RC30", "id: B\n    camera: RC3O", "project.yaml:14:13:", "no camera `RC3O`", "mean `RC30`"),

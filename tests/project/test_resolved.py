@@ -27,6 +27,7 @@ cameras:
       direction: image_to_ideal
       k: [1.0e-08, 0.0, 0.0]
       p: [0.0, 0.0]
+      b: [0.0, 0.0]
 strips:
   - id: "A"
     camera: "RC30"

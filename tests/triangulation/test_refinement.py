@@ -17,7 +17,7 @@ from photostrip.camera import Camera, Distortion
 from photostrip.errors import GeometryError, InputError
 from photostrip.points import PhotoPoints
 from photostrip.triangulation import lens, refinement
-from photostrip.triangulation.refinement import Refined, Settings
+from photostrip.triangulation.refinement import Bending, Refined, Settings
 
 Floats = NDArray[np.float64]
 
@@ -42,8 +42,13 @@ def table(direction: str, nodes: tuple[float, ...] = NODES) -> Distortion:
     return Distortion("radial-table", direction, radius=nodes, distortion=tuple(values))
 
 
-def brown(direction: str, k: tuple[float, float, float], p: tuple[float, float] = (0.0, 0.0)) -> Distortion:
-    return Distortion("brown", direction, k=k, p=p)
+def brown(
+    direction: str,
+    k: tuple[float, float, float],
+    p: tuple[float, float] = (0.0, 0.0),
+    b: tuple[float, float] = (0.0, 0.0),
+) -> Distortion:
+    return Distortion("brown", direction, k=k, p=p, b=b)
 
 
 def observed(xy: Floats, photos: tuple[str, ...] = ("1",)) -> PhotoPoints:
@@ -65,8 +70,12 @@ def refine(xy: Floats, camera: Camera, settings: Settings | None = None) -> Refi
 unit = st.floats(-1, 1)
 # up to 7 % of pincushion or barrel in the corner, far more than any camera for photogrammetry has
 browns = st.builds(
-    lambda direction, a, b, c, d, e: brown(direction, (a * 1e-6, b * 3e-11, c * 1e-15), (d * 2e-6, e * 2e-6)),
+    lambda direction, a, b, c, d, e, f, g: brown(
+        direction, (a * 1e-6, b * 3e-11, c * 1e-15), (d * 2e-6, e * 2e-6), (f * 1e-3, g * 1e-3)
+    ),
     st.sampled_from([FORWARD, BACKWARD]),
+    unit,
+    unit,
     unit,
     unit,
     unit,
@@ -95,8 +104,11 @@ image_points = st.lists(st.tuples(st.floats(-115, 115), st.floats(-115, 115)), m
 # ------------------------------------------------------------------------------------------- order and inverse
 
 
-@given(cameras, image_points, st.floats(-4e-4, 4e-4))
-def test_every_correction_has_its_inverse(camera: Camera, image: Floats, constant: float) -> None:
+bendings = st.builds(Bending, st.floats(-4e-4, 4e-4), st.floats(0, 1e-3))
+
+
+@given(cameras, image_points, bendings)
+def test_every_correction_has_its_inverse(camera: Camera, image: Floats, constant: Bending) -> None:
     ideal = refinement.undistort(image, camera, constant)
     assert np.abs(refinement.distort(ideal, camera, constant) - image).max() < PICOMETRE
     again = refinement.undistort(refinement.distort(ideal, camera, constant), camera, constant)
@@ -107,28 +119,32 @@ def test_every_correction_has_its_inverse(camera: Camera, image: Floats, constan
 def test_a_table_of_points_is_refined_as_its_camera_alone(camera: Camera, image: Floats) -> None:
     settings = Settings(refraction=True, flying_height=3000.0, ground_height=200.0)
     found = refine(image, camera, settings).observations
-    constant = refinement.refraction_constant(3000.0, 200.0)
+    constant = Bending(refinement.refraction_constant(3000.0, 200.0))
     assert np.array_equal(found.xy, refinement.undistort(image, camera, constant))
     assert found.photo_ids == ("1",)
 
 
-def test_the_order_is_principal_point_distortion_refraction() -> None:
+def test_the_order_is_principal_point_distortion_refraction_curvature() -> None:
     camera = replace(PLAIN, principal_point=(0.5, -0.3), distortion=brown(FORWARD, (3e-7, 0.0, 0.0)))
     x, y = 100.5, -70.3
     x, y = x - 0.5, y + 0.3
     stretch = 1 + 3e-7 * (x * x + y * y)
     x, y = x * stretch, y * stretch
     shrink = 1 - 5e-5 * (1 + (x * x + y * y) / FOCAL**2)
-    expected = [x * shrink, y * shrink]
-    assert refinement.undistort(np.array([[100.5, -70.3]]), camera, 5e-5)[0] == pytest.approx(expected, abs=1e-12)
+    x, y = x * shrink, y * shrink
+    stretch = 1 + 2e-4 * (x * x + y * y) / FOCAL**2
+    expected = [x * stretch, y * stretch]
+    found = refinement.undistort(np.array([[100.5, -70.3]]), camera, Bending(5e-5, 2e-4))
+    assert found[0] == pytest.approx(expected, abs=1e-12)
 
 
-@given(st.sampled_from([FORWARD, BACKWARD]), st.tuples(*[unit] * 5), st.floats(-100, 100), st.floats(-100, 100))
+@given(st.sampled_from([FORWARD, BACKWARD]), st.tuples(*[unit] * 7), st.floats(-100, 100), st.floats(-100, 100))
 def test_brown_is_the_formula_of_the_project_file(direction: str, c: tuple[float, ...], x: float, y: float) -> None:
     k1, k2, k3, p1, p2 = c[0] * 1e-6, c[1] * 1e-11, c[2] * 1e-16, c[3] * 1e-6, c[4] * 1e-6
-    camera = replace(PLAIN, distortion=brown(direction, (k1, k2, k3), (p1, p2)))
+    b1, b2 = c[5] * 1e-3, c[6] * 1e-3
+    camera = replace(PLAIN, distortion=brown(direction, (k1, k2, k3), (p1, p2), (b1, b2)))
     r2 = x**2 + y**2
-    dx = x * (k1 * r2 + k2 * r2**2 + k3 * r2**3) + p1 * (r2 + 2 * x**2) + 2 * p2 * x * y
+    dx = x * (k1 * r2 + k2 * r2**2 + k3 * r2**3) + p1 * (r2 + 2 * x**2) + 2 * p2 * x * y + b1 * x + b2 * y
     dy = y * (k1 * r2 + k2 * r2**2 + k3 * r2**3) + p2 * (r2 + 2 * y**2) + 2 * p1 * x * y
     given_points, shifted = np.array([[x, y]]), np.array([[x + dx, y + dy]])
     shift = refinement.undistort if direction == FORWARD else refinement.distort
@@ -437,7 +453,7 @@ def test_refraction_shift_is_the_textbook_form(radius: float, flying: float) -> 
     constant = refinement.refraction_constant(flying, 0.0)
     found = refinement.refraction_shift(radius, FOCAL, constant)
     assert found == pytest.approx(constant * (radius + radius**3 / FOCAL**2), rel=1e-12)
-    corrected = refinement.undistort(np.array([[radius, 0.0]]), PLAIN, constant)
+    corrected = refinement.undistort(np.array([[radius, 0.0]]), PLAIN, Bending(constant))
     assert corrected[0, 0] == pytest.approx(radius - found, abs=1e-12)
 
 
@@ -464,6 +480,43 @@ def test_refraction_without_heights_or_below_the_ground_is_refused() -> None:
         refine(image, PLAIN, Settings(refraction=True, flying_height=3000.0))
     with pytest.raises(InputError, match="the flying height 400 m is not above the ground, 900 m"):
         refine(image, PLAIN, Settings(refraction=True, flying_height=400.0, ground_height=900.0))
+
+
+# ------------------------------------------------------------------------------------------- Earth curvature
+
+
+@pytest.mark.parametrize("flying", [1500.0, 5000.0, 9000.0])
+@pytest.mark.parametrize("angle_deg", [15.0, 40.0, 55.0])
+def test_curvature_is_that_of_a_sphere_seen_from_above(flying: float, angle_deg: float) -> None:
+    radius = 6371000.0
+    tangent = np.tan(np.radians(angle_deg))
+    arc = flying * tangent / radius  # as a plane map has it: distances along the sphere
+    below = flying + radius * (1 - np.cos(arc))
+    seen = FOCAL * radius * np.sin(arc) / below
+    bending = Bending(curvature=refinement.curvature_constant(flying, 0.0, radius))
+    found = refinement.undistort(np.array([[0.0, seen]]), PLAIN, bending)
+    missing = FOCAL * tangent - seen
+    assert missing > 0  # the ground falls away from the plane, so its images lie too far inside
+    assert found[0, 0] == 0
+    assert found[0, 1] == pytest.approx(seen + missing, abs=0.01 * missing)
+
+
+def test_the_textbook_size_of_curvature() -> None:
+    # wide angle, 1:30 000, 140 mm from the middle: dr = r^3 H / (2 R f^2)
+    bending = Bending(curvature=refinement.curvature_constant(4590.0, 0.0, 6370000.0))
+    found = refinement.undistort(np.array([[140.0, 0.0]]), PLAIN, bending)
+    assert found[0, 0] - 140.0 == pytest.approx(140.0**3 * 4590.0 / (2 * 6370000.0 * FOCAL**2), rel=1e-9)
+    assert 0.0421 < found[0, 0] - 140.0 < 0.0423
+
+
+def test_curvature_tells_its_largest_shift_and_needs_heights() -> None:
+    image = np.array([[140.0, 0.0], [10.0, 0.0]])
+    settings = Settings(earth_radius=6370000.0, flying_height=4590.0, ground_height=0.0)
+    assert refine(image, PLAIN, settings).largest_um == {"earth curvature": pytest.approx(42.2, abs=0.1)}
+    with pytest.raises(InputError, match="earth_curvature: flying height and height of the ground are not known"):
+        refine(image, PLAIN, Settings(earth_radius=6370000.0))
+    with pytest.raises(InputError, match="earth_curvature: the flying height 4590 m is not above the ground, 5000 m"):
+        refine(image, PLAIN, replace(settings, ground_height=5000.0))
 
 
 # ------------------------------------------------------------------------------------------- tables of photos

@@ -24,6 +24,7 @@ ROTATION = {
     "local": "the axes east, north, up of the local frame",
 }
 EFFECTS = ("principal point", "distortion", "refraction")
+CURVATURE = "earth curvature"  # told with the other ways to treat it
 
 
 def conventions_of(result: Result) -> Document:
@@ -111,6 +112,9 @@ def _interior(result: Result) -> Document | None:
 def _curvature(result: Result) -> Document:
     """Say how the Earth's curvature was treated, and what it makes of the heights at the ends of the strips."""
     wanted, radius = result.settings.absolute.earth_curvature, result.output.spec.curvature_radius
+    if CURVATURE in (shifts := result.refined.largest_um):
+        how = f"image points shifted outwards, R = {result.settings.refinement.earth_radius:.0f} m"
+        return {"asked": wanted, "treatment": how, "largest": 0.0, "largest_um": rounded(shifts[CURVATURE], 2)}
     if radius is not None:
         points = result.points
         size = float(np.abs(points.ground[:, 2] - points.cartesian[:, 2]).max(initial=0.0))
