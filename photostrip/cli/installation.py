@@ -15,15 +15,16 @@ from photostrip.threads import THREAD_VARIABLES
 # What can be read and written, by the command that does it.
 FORMATS = {
     "read": [
-        "project file (YAML): photostrip check, run",
-        "image coordinates, fiducial marks, control (.csv, .csv.gz): photostrip check, run",
+        "project file (YAML): photostrip check, run, batch",
+        "image coordinates, fiducial marks, control (.csv, .csv.gz): photostrip check, run, batch",
         "simulation (YAML): photostrip simulate",
         "result.json, baseline.json: photostrip report, compare",
         "tolerance profile (YAML): photostrip compare",
         "phototheodolite projects and tables (YAML, .csv): photostrip terrestrial",
     ],
     "written": [
-        "result.json, points.csv, photos.csv, residuals.csv, parallaxes.csv, rejected.csv: photostrip run -o",
+        "result.json, points.csv, photos.csv, residuals.csv, parallaxes.csv, rejected.csv: photostrip run -o, batch -o",
+        "summary of a batch (text, CSV, JSON, JUnit, Markdown, annotations): photostrip batch",
         "accuracy report (text, Markdown, JSON, annotations): photostrip run, report",
         "comparison (text, Markdown, JSON, JUnit, annotations), baseline.json: photostrip compare",
         "project with tables and truth.json: photostrip simulate -o",

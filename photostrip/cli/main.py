@@ -49,6 +49,11 @@ COMMANDS = {
         "Adjust the strips of a project and report the accuracy.",
         "photostrip run project.yaml -o result",
     ),
+    "batch": Entry(
+        "photostrip.cli.batch",
+        "Adjust many projects, on all cores or many machines.",
+        "photostrip batch strips/* -o results -j 4",
+    ),
     "report": Entry(
         "photostrip.cli.report",
         "Print the accuracy report of a saved result again.",

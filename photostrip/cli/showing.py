@@ -21,6 +21,17 @@ class Format(StrEnum):
     GITHUB = "github"
 
 
+class BatchFormat(StrEnum):
+    """Forms in which the summary of a batch is printed."""
+
+    TEXT = "text"
+    CSV = "csv"
+    JSON = "json"
+    JUNIT = "junit"
+    MD = "md"
+    GITHUB = "github"
+
+
 ENDINGS = {".txt": Format.TEXT, ".json": Format.JSON, ".md": Format.MD}
 
 

@@ -14,8 +14,10 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from photostrip.errors import Fault, InputError
 from photostrip.formats.findings import suggestion
+from photostrip.formats.source import current
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from io import FileIO
     from typing import NoReturn
 
@@ -64,6 +66,34 @@ def read_bytes(file: str, limit: int) -> bytes:
     InputError
         When it is missing, a folder, unreadable, too big, empty or changed while it was read.
     """
+    source = current()
+    if source is not None and source.given is not None:
+        data = _travelled(file, source.given, limit)
+    else:
+        data = _from_disk(file, limit)
+    if source is not None:
+        source.account(file, data)
+    return data
+
+
+def _travelled(file: str, given: Mapping[str, bytes], limit: int) -> bytes:
+    """Take a file from those that came along with the project."""
+    if file not in given:
+        refuse(file, "file-missing", "does not exist")
+    data = given[file]
+    _fits(file, len(data), limit)
+    if not data:
+        refuse(file, "file-empty", "is empty")
+    return data
+
+
+def _fits(file: str, size: int, limit: int) -> None:
+    if size > limit:
+        message = f"has {size / MEGABYTE:.0f} MB"
+        refuse(file, "file-size", message, expected=f"at most {limit / MEGABYTE:.0f} MB; is it the right file?")
+
+
+def _from_disk(file: str, limit: int) -> bytes:
     try:
         # without O_NONBLOCK a pipe that nobody writes to would wait forever, before it can be seen to be one
         handle = os.open(file, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
@@ -80,9 +110,7 @@ def _content(file: str, stream: BinaryIO | FileIO, limit: int) -> bytes:
         raise IsADirectoryError(errno.EISDIR, "is a directory", file)
     if not stat.S_ISREG(before.st_mode):
         refuse(file, "file-kind", "is a device or a pipe", expected="a file")
-    if before.st_size > limit:
-        size = f"has {before.st_size / MEGABYTE:.0f} MB"
-        refuse(file, "file-size", size, expected=f"at most {limit / MEGABYTE:.0f} MB; is it the right file?")
+    _fits(file, before.st_size, limit)
     data = stream.read(before.st_size + 1)
     after = os.fstat(stream.fileno())
     if (before.st_mtime_ns, before.st_size) != (after.st_mtime_ns, after.st_size) or len(data) != before.st_size:

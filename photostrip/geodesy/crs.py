@@ -40,6 +40,7 @@ __all__ = ["FrameSpec", "GroundFrame", "tie_frames"]
 
 _EARTH_RADIUS = 6378137.0  # m; a body whose radius is within half a percent of it is the Earth
 _BODY_TOLERANCE = 0.005
+_GRIDS = re.compile(r"(\b(?:geoid|nad)grids=)(\S+)")
 _SAME_AXIS = 1e-10  # relative: two semi-axes are the same within 0.6 mm on the Earth
 
 
@@ -288,7 +289,24 @@ def _with_grids(text: str, directory: Path | None) -> str:
             names = [str((directory / name).resolve()) if (directory / name).is_file() else name for name in names]
         return match[1] + ",".join(names)
 
-    return re.sub(r"(\b(?:geoid|nad)grids=)(\S+)", named, text)
+    return _GRIDS.sub(named, text)
+
+
+def grid_names(crs: str) -> tuple[str, ...]:
+    """Give the names of the grid files that a PROJ string asks for.
+
+    Parameters
+    ----------
+    crs : str
+        A CRS as the user names it.
+
+    Returns
+    -------
+    tuple of str
+        Names as they stand there, without the mark of optional grids; none for an authority code.
+    """
+    names = [name.removeprefix("@") for match in _GRIDS.finditer(crs) for name in match[2].split(",")]
+    return tuple(dict.fromkeys(name for name in names if name and name != "null"))
 
 
 def _vertical_name(spec: FrameSpec, vertical: CRS) -> str:

@@ -5,7 +5,6 @@ Everything that is wrong with any of the files is told in one go; see :class:`ph
 
 from __future__ import annotations
 
-import os
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,7 +12,8 @@ from typing import TYPE_CHECKING
 
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.findings import Findings
-from photostrip.geodesy.crs import tie_frames
+from photostrip.formats.source import current, seen_from
+from photostrip.geodesy.crs import grid_names, tie_frames
 from photostrip.pipeline import Inputs, Settings
 from photostrip.project import schema
 from photostrip.project.conversion import (
@@ -65,7 +65,7 @@ class Project:
     path : Path
         The project file.
     files : tuple of Path
-        Every file that was read, the project file first.
+        Every file that was read, the project file first, grid files beside it last.
     resolved : str
         The project as YAML with all defaults filled in, without absolute paths.
     hints : tuple of Note
@@ -74,6 +74,11 @@ class Project:
         The project file with everything merged into it: it knows where each value stands.
     tables : Tables
         Its tables as they were read.
+    grids : tuple of str
+        Names of the grid files that the ground frames ask for. Those that stand beside the project file are used; for
+        the others PROJ looks elsewhere.
+    grid_folder : Path
+        Where they were looked for.
     """
 
     inputs: Inputs
@@ -84,6 +89,8 @@ class Project:
     hints: tuple[Note, ...]
     tree: Node
     tables: Tables
+    grids: tuple[str, ...]
+    grid_folder: Path
 
     @property
     def directory(self) -> Path:
@@ -147,15 +154,24 @@ def load_project(path: Path, overrides: Sequence[str] = ()) -> Project:
     check_references(root, findings)
     tables = read_tables(root, name, findings, files)
     check_tables(root, tables, findings)
-    _check_frames(root, Path(name).parent, findings)
+    source = current()
+    grid_folder = source.grids if source is not None and source.grids is not None else Path(name).parent
+    _check_frames(root, grid_folder, findings)
     findings.stop()
     if project is None:  # cannot be: validate() had a reason, and stop() told it
         raise InputError(f"{name} is not a valid project")
     project = completed(project, root, name)
     inputs, notes = _inputs(project, tables, root)
-    read = tuple(map(Path, files))
+    grids = _grids(inputs)
+    read = (*map(Path, files), *(path.parent / grid for grid in grids if (grid_folder / grid).is_file()))
     told = (*findings.notes, *notes)
-    return Project(inputs, settings(project), path, read, text_of(project), told, root, tables)
+    return Project(inputs, settings(project), path, read, text_of(project), told, root, tables, grids, grid_folder)
+
+
+def _grids(inputs: Inputs) -> tuple[str, ...]:
+    """Names of the grid files that the ground frames ask for."""
+    specs = (*inputs.frames, *(() if inputs.output is None else (inputs.output,)))
+    return tuple(dict.fromkeys(grid for spec in specs for grid in grid_names(spec.crs)))
 
 
 def _seen_from(file: str, folder: Path) -> str:
@@ -163,7 +179,7 @@ def _seen_from(file: str, folder: Path) -> str:
     if not file or file == COMMAND_LINE:
         return file
     try:
-        return os.path.relpath(file, folder).replace(os.sep, "/")
+        return seen_from(file, folder)
     except ValueError:  # another drive
         return file
 

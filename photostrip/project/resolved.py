@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel
 
+from photostrip.formats.source import seen_from
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES
 from photostrip.project.conversion import first_frame, output_spec
 from photostrip.project.merging import path_of
@@ -100,10 +100,9 @@ def _relative(root: Node, project: str, *owner: str | int) -> Text:
     node = root.find(*owner, "file")
     path = path_of(node, project) if node is not None else ""
     try:
-        path = os.path.relpath(path, Path(project).parent)
+        return Text(seen_from(path, Path(project).parent))
     except ValueError:  # another drive
-        path = str(Path(path).resolve())
-    return Text(path.replace(os.sep, "/"))
+        return Text(Path(path).resolve().as_posix())
 
 
 def text_of(project: ProjectFile) -> str:

@@ -25,12 +25,15 @@ class Case(NamedTuple):
         More lines about the failure.
     skipped : str
         Why it was not tested; empty when it was.
+    error : str
+        Why it could not be tested, in one line; empty when it could.
     """
 
     name: str
     failure: str = ""
     details: str = ""
     skipped: str = ""
+    error: str = ""
 
 
 def to_junit(suite: str, cases: Iterable[Case]) -> str:
@@ -51,7 +54,8 @@ def to_junit(suite: str, cases: Iterable[Case]) -> str:
     given = list(cases)
     failed = sum(bool(case.failure) for case in given)
     skipped = sum(bool(case.skipped) for case in given)
-    counts = f'tests="{len(given)}" failures="{failed}" errors="0" skipped="{skipped}"'
+    errors = sum(bool(case.error) for case in given)
+    counts = f'tests="{len(given)}" failures="{failed}" errors="{errors}" skipped="{skipped}"'
     body = "".join(_case(suite, case) for case in given)
     return (
         '<?xml version="1.0" encoding="UTF-8"?>\n'
@@ -62,9 +66,10 @@ def to_junit(suite: str, cases: Iterable[Case]) -> str:
 
 def _case(suite: str, case: Case) -> str:
     head = f"    <testcase classname={_quoted(suite)} name={_quoted(case.name)}"
-    if case.failure:
-        details = escape(_clean(case.details or case.failure))
-        return f"{head}>\n      <failure message={_quoted(case.failure)}>{details}</failure>\n    </testcase>\n"
+    kind, message = ("error", case.error) if case.error else ("failure", case.failure)
+    if message:
+        details = escape(_clean(case.details or message))
+        return f"{head}>\n      <{kind} message={_quoted(message)}>{details}</{kind}>\n    </testcase>\n"
     if case.skipped:
         return f"{head}>\n      <skipped message={_quoted(case.skipped)}/>\n    </testcase>\n"
     return f"{head}/>\n"

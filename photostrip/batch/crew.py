@@ -1,0 +1,219 @@
+"""The crew: some workers on this machine, one project each at a time, and what is done when one of them fails.
+
+A worker that dies takes only its own project along. That project is tried once more, because the worker may have been
+killed by somebody else; if it kills the second worker, too, it is told as the cause.
+"""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections import deque
+from multiprocessing.connection import wait
+from typing import TYPE_CHECKING, Protocol
+
+from photostrip.batch.tasks import BROKEN, TIMEOUT, Answer, Limits, failure
+from photostrip.batch.work import out_of_memory
+from photostrip.batch.worker import NO_MEMORY, READY, WORK, Worker, share_of_memory
+from photostrip.errors import Fault, PhotostripError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from typing import Self
+
+    from photostrip.batch.tasks import Task
+
+TICK = 0.1  # seconds between two looks at what else may have happened
+TRIES = 2
+RECYCLED_AFTER = 1000  # projects
+RECYCLED_ABOVE = 0.5  # of the memory that a worker may have
+FALSE_STARTS = 3
+
+
+class Executor(Protocol):
+    """Who computes: a crew on this machine, or a cluster."""
+
+    def answers(self, tasks: Iterator[Task | None], stopped: Callable[[], bool]) -> Iterator[Answer]:
+        """Compute tasks.
+
+        Parameters
+        ----------
+        tasks : iterator of Task or None
+            What is to be done, taken as it is needed; None: nothing yet, look again.
+        stopped : callable
+            Whether to stop.
+
+        Yields
+        ------
+        Answer
+            In the order in which they come.
+        """
+        ...
+
+
+def ignored(_: Task) -> None:
+    """Take no notice of a task that begins."""
+
+
+class Crew:
+    """Workers on this machine.
+
+    Parameters
+    ----------
+    jobs : int
+        How many.
+    limits : Limits
+        What a project may use.
+    work : str
+        What a worker does with a task, as ``module:function``.
+    begun : callable
+        Is told every task that begins.
+    """
+
+    def __init__(
+        self,
+        jobs: int = 1,
+        limits: Limits | None = None,
+        work: str = WORK,
+        begun: Callable[[Task], None] = ignored,
+    ) -> None:
+        self.jobs, self.limits, self.work, self.begun = jobs, limits or Limits(), work, begun
+        self.megabytes = self.limits.megabytes or share_of_memory(jobs)
+        self.workers: list[Worker] = []
+        self._again: deque[Task] = deque()
+        self._tries: dict[int, int] = {}
+        self._false_starts = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """End all workers at once; they hold nothing that could be lost."""
+        while self.workers:
+            self.workers.pop().end()
+
+    def answers(self, tasks: Iterator[Task | None], stopped: Callable[[], bool]) -> Iterator[Answer]:
+        """Compute tasks; see :class:`Executor`."""
+        queue: deque[Task] = deque()
+        heard: deque[Answer] = deque()
+        more = True
+        while not stopped():
+            looking = more and len(queue) < self.jobs - self._busy()
+            if looking:
+                try:
+                    task = next(tasks)
+                except StopIteration:
+                    more = looking = False
+                else:
+                    queue.extend([task] if task is not None else [])
+            self._hand_out(queue)
+            if heard:  # only now: while an answer is written, its worker has the next task already
+                yield heard.popleft()
+            elif not more and not queue and not self._busy():
+                return
+            heard.extend(self._heard(0.0 if looking or heard else TICK))
+            while self._again:
+                queue.appendleft(self._again.pop())
+        yield from heard
+
+    def _busy(self) -> int:
+        return sum(worker.task is not None for worker in self.workers)
+
+    def _hand_out(self, queue: deque[Task]) -> None:
+        """Give tasks to idle workers, and start workers for the others."""
+        for worker in [each for each in self.workers if each.ready and each.task is None][: len(queue)]:
+            task = queue.popleft()
+            self._tries[task.number] = self._tries.get(task.number, 0) + 1
+            worker.give(task)
+            self.begun(task)
+        starting = sum(not worker.ready for worker in self.workers)
+        for _ in range(min(len(queue) - starting, self.jobs - len(self.workers))):
+            self.workers.append(Worker(self.megabytes, self.work))
+
+    def _heard(self, patience: float) -> Iterator[Answer]:
+        """Take what the workers have sent, and end those that take too long."""
+        by_connection = {worker.connection: worker for worker in self.workers}
+        for connection in wait(list(by_connection), patience):
+            worker = by_connection[connection]  # type: ignore[index]
+            try:
+                said = worker.hear()
+            except (EOFError, OSError):
+                yield from self._buried(worker)
+                continue
+            if said == READY:
+                worker.ready, self._false_starts = True, 0
+                continue
+            yield from self._taken(worker, said)
+        yield from self._overdue()
+
+    def _taken(self, worker: Worker, answer: Answer) -> Iterator[Answer]:
+        """Take an answer; a worker that has grown is replaced."""
+        worker.task = None
+        worker.number_done += 1
+        self._tries.pop(answer.number, None)
+        grown = answer.megabytes > RECYCLED_ABOVE * self.megabytes or answer.outcome["status"] == "memory"
+        if grown or worker.number_done >= RECYCLED_AFTER:
+            self._dismiss(worker)
+        yield answer
+
+    def _overdue(self) -> Iterator[Answer]:
+        limit = self.limits.seconds
+        if limit is None:
+            return
+        now = time.monotonic()
+        for worker in [each for each in self.workers if each.task is not None and now - each.begin > limit]:
+            task = worker.task
+            self._dismiss(worker)
+            if task is not None:
+                fault = Fault(f"took longer than {limit:g} s", "timeout", fix="give it more time with --timeout")
+                yield self._gave_up(task, TIMEOUT, fault, limit)
+
+    def _buried(self, worker: Worker) -> Iterator[Answer]:
+        """Say what a worker died of, or let its project be tried once more."""
+        code, task = worker.fate(), worker.task
+        self.workers.remove(worker)
+        if not worker.ready:
+            self._false_starts += 1
+            if self._false_starts >= FALSE_STARTS:
+                raise PhotostripError(f"no worker process starts: {worker.last_words or cause_of(code)}")
+        elif task is not None and code == NO_MEMORY:
+            yield Answer(task.number, out_of_memory())
+        elif task is not None and self._tries[task.number] < TRIES:
+            self._again.append(task)
+        elif task is not None:
+            message = f"the process that computed it died, {TRIES} times in a row: {cause_of(code)}"
+            fault = Fault(message, "worker-died", fix="`photostrip run PROJECT` shows whether it does so alone")
+            yield self._gave_up(task, BROKEN, fault, trace=worker.last_words)
+
+    def _gave_up(self, task: Task, status: str, fault: Fault, seconds: float = 0.0, trace: str = "") -> Answer:
+        self._tries.pop(task.number, None)
+        return Answer(task.number, failure(status, fault), seconds=seconds, trace=trace)
+
+    def _dismiss(self, worker: Worker) -> None:
+        worker.end()
+        self.workers.remove(worker)
+
+
+def cause_of(code: int) -> str:
+    """Say how a process ended.
+
+    Parameters
+    ----------
+    code : int
+        Its exit code; negative after a signal.
+
+    Returns
+    -------
+    str
+        For example ``killed by SIGSEGV``.
+    """
+    if code >= 0:
+        return f"it ended with exit code {code}"
+    try:
+        name = signal.Signals(-code).name
+    except ValueError:
+        name = f"signal {-code}"
+    return f"killed by {name}" + (", by somebody or for want of memory" if name == "SIGKILL" else "")

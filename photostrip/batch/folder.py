@@ -1,0 +1,246 @@
+"""The folder that a batch writes into: one batch at a time, whole results, and what can be trusted of earlier ones.
+
+A result is trusted when its record says that it was made by this very program with these settings from files with this
+content, and when every file of the result has the content that the record gives. The record is written after all the
+others; so a result that was interrupted, mixed with an older one, edited or damaged is computed again.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from contextlib import contextmanager, suppress
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from photostrip import __version__
+from photostrip.errors import Fault, InputError
+from photostrip.formats.batch import SCHEMA, parsed_record, record_text
+from photostrip.formats.source import digest
+from photostrip.formats.writing import write_files
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from photostrip.batch.selection import Chosen
+    from photostrip.batch.tasks import Answer
+
+    Document = dict[str, Any]
+
+LOCK = ".batch.lock"
+RECORD = "batch.json"
+SUMMARIES = ("summary.txt", "summary.csv", "summary.json", "junit.xml")
+LIBRARIES = ("numpy", "scipy", "pyproj")  # whose version can change a number
+_TEMPORARY = re.compile(r"\..+\.\d+\.tmp")
+
+
+@cache
+def program() -> dict[str, str]:
+    """Give what computes: the version, the digest of the program's own files, the versions of the libraries below it.
+
+    Returns
+    -------
+    dict of str to str
+        Two programs for which it is the same give the same results.
+    """
+    from importlib.metadata import version
+
+    package = Path(__file__).parents[1]
+    files = sorted(file for ending in ("*.py", "*.yaml") for file in package.rglob(ending))
+    account = "\n".join(f"{file.relative_to(package).as_posix()} {digest(file.read_bytes())}" for file in files)
+    own = {"photostrip": __version__, "source": digest(account.encode())}
+    return own | {name: version(name) for name in LIBRARIES}
+
+
+class Folder:
+    """The folder of a batch; make it with :func:`opened`.
+
+    Parameters
+    ----------
+    path : Path
+        Where it is.
+    overrides : sequence of str
+        Assignments that hold for all projects.
+    """
+
+    def __init__(self, path: Path, overrides: Sequence[str] = ()) -> None:
+        self.path, self.overrides = path, list(overrides)
+
+    def unchanged(self, chosen: Chosen) -> Document | None:
+        """Give the line of the summary of a result that can be trusted.
+
+        Parameters
+        ----------
+        chosen : Chosen
+            The project.
+
+        Returns
+        -------
+        dict or None
+            The line; None when the project must be computed.
+        """
+        place = self.path / chosen.output
+        _sweep(place)
+        record = self._record(place)
+        if record is None or record["program"] != program() or record["set"] != self.overrides:
+            return None
+        folder = os.path.split(chosen.project)[0]
+        inputs = {_back(name, folder): content for name, content in record["inputs"].items()}
+        if chosen.project not in inputs or not all(_is(Path(name), content) for name, content in inputs.items()):
+            return None
+        outputs = record["outputs"]
+        if "result.json" not in outputs or not all(_is(place / name, content) for name, content in outputs.items()):
+            return None
+        outcome: Document = record["outcome"]
+        return outcome
+
+    def files_of(self, chosen: Chosen) -> list[str]:
+        """Give the files that the result of a project was made from; none when there is no result."""
+        record = self._record(self.path / chosen.output)
+        if record is None or record["project"] != self._name(chosen):
+            return []
+        folder = os.path.split(chosen.project)[0]
+        return [_back(name, folder) for name, content in record["inputs"].items() if content is not None]
+
+    def refused(self, chosen: Chosen) -> Fault | None:
+        """Say whether a project must not be written where it would go: the result of another one stands there.
+
+        Parameters
+        ----------
+        chosen : Chosen
+            The project.
+
+        Returns
+        -------
+        Fault or None
+            What stands there. A project that was moved, but not changed, is no other one.
+        """
+        record = self._record(self.path / chosen.output)
+        if record is None or record["project"] == self._name(chosen):
+            return None
+        content = record["inputs"].get(os.path.split(chosen.project)[1])
+        if content is not None and _is(Path(chosen.project), content):
+            return None
+        there = self.path / chosen.output
+        message = f"its result would replace that of another project, {record['project']} as seen from there"
+        return Fault(message, "output-taken", str(there), fix="choose another folder with -o, or use --force")
+
+    def write(self, chosen: Chosen, answer: Answer) -> None:
+        """Write a result, the record last.
+
+        Parameters
+        ----------
+        chosen : Chosen
+            The project.
+        answer : Answer
+            Its result.
+
+        Raises
+        ------
+        InputError, OSError
+            When it cannot be written; what was there before is as it was.
+        """
+        folder = os.path.split(chosen.project)[0]
+        place = self.path / chosen.output
+        inputs = {_short(name, folder): content for name, content in answer.inputs.items()}
+        record: Document = {
+            "photostrip_batch_record": SCHEMA,
+            "program": program(),
+            "project": self._name(chosen),
+            "set": self.overrides,
+            "inputs": dict(sorted(inputs.items())),
+            "outputs": {name: digest(text.encode()) for name, text in sorted(answer.files.items())},
+            "outcome": answer.outcome,
+        }
+        _sweep(place)
+        write_files(place, {**answer.files, RECORD: record_text(record)})
+
+    def write_summaries(self, texts: dict[str, str]) -> None:
+        """Write the files of the summary."""
+        write_files(self.path, texts)
+
+    def forget_summaries(self) -> None:
+        """Remove the summary of an earlier batch, which would not be true while this one runs, or if it is killed."""
+        _sweep(self.path)
+        for name in SUMMARIES:
+            (self.path / name).unlink(missing_ok=True)
+
+    def _name(self, chosen: Chosen) -> str:
+        """Path of a project as seen from its result."""
+        return os.path.relpath(chosen.project, self.path / chosen.output).replace(os.sep, "/")
+
+    @staticmethod
+    def _record(place: Path) -> Document | None:
+        try:
+            return parsed_record((place / RECORD).read_bytes())
+        except OSError:
+            return None
+
+
+@contextmanager
+def opened(path: Path, overrides: Sequence[str] = ()) -> Iterator[Folder]:
+    """Take a folder for one batch.
+
+    The lock is the system's: it is gone with the process that holds it, however that ends.
+
+    Parameters
+    ----------
+    path : Path
+        The folder; made when it is missing.
+    overrides : sequence of str
+        Assignments that hold for all projects.
+
+    Yields
+    ------
+    Folder
+        The folder, without the summary of an earlier batch.
+
+    Raises
+    ------
+    InputError
+        When another batch is writing into it.
+    OSError
+        When nothing can be written there.
+    """
+    import fcntl
+
+    write_files(path, {})  # makes it, or says what is in its way
+    with (path / LOCK).open("w") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            message = "another batch is writing into this folder"
+            fix = "wait for its end, or choose another folder with -o"
+            raise InputError(Fault(message, "batch-running", str(path), fix=fix)) from None
+        folder = Folder(path, overrides)
+        folder.forget_summaries()
+        yield folder
+
+
+def _sweep(folder: Path) -> None:
+    """Remove temporary files that a batch left behind when it was killed."""
+    with suppress(FileNotFoundError, NotADirectoryError), os.scandir(folder) as entries:
+        for entry in entries:
+            if _TEMPORARY.fullmatch(entry.name):
+                with suppress(FileNotFoundError):
+                    Path(entry.path).unlink()
+
+
+def _is(file: Path, content: str | None) -> bool:
+    """Whether a file has the content with a digest; None: whether it is not there."""
+    try:
+        return digest(file.read_bytes()) == content
+    except FileNotFoundError:
+        return content is None
+    except OSError:
+        return False
+
+
+def _short(name: str, folder: str) -> str:
+    """Path of a file that a project names, without the folder of the project."""
+    return name.removeprefix(f"{folder}{os.sep}") if folder else name
+
+
+def _back(name: str, folder: str) -> str:
+    return os.path.join(folder, name)  # noqa: PTH118 (`..` and `.` stay as they were)

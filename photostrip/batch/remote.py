@@ -1,0 +1,63 @@
+"""What runs inside a worker of a cluster: a crew of one for each thread, with the limits and habits of a local batch.
+
+The cluster's own process never computes. A project that crashes, hangs or eats memory ends a process below it, and the
+cluster keeps its worker.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from typing import TYPE_CHECKING
+
+from photostrip.batch.crew import Crew
+from photostrip.batch.folder import program
+from photostrip.batch.tasks import Limits
+from photostrip.batch.worker import WORK, share_of_memory
+from photostrip.errors import PhotostripError
+
+if TYPE_CHECKING:
+    from photostrip.batch.tasks import Answer, Task
+
+_idle: dict[tuple[Limits, str], list[Crew]] = {}
+_lock = threading.Lock()
+
+
+def compute(task: Task, limits: Limits, work: str = WORK) -> tuple[Answer, dict[str, str]]:
+    """Compute a project in a process below this one.
+
+    Parameters
+    ----------
+    task : Task
+        The project, with its files.
+    limits : Limits
+        What it may use; without a limit of memory, this machine's memory shared among its cores.
+    work : str
+        What a worker does with a task, as ``module:function``.
+
+    Returns
+    -------
+    answer : Answer
+        What became of it.
+    program : dict of str to str
+        What computed it, as :func:`photostrip.batch.folder.program` gives it.
+    """
+    key = limits, work
+    with _lock:
+        waiting = _idle.setdefault(key, [])
+        crew = waiting.pop() if waiting else _new(limits, work)
+    try:
+        answers = list(crew.answers(iter([task]), lambda: False))
+    except BaseException:
+        crew.close()
+        raise
+    with _lock:
+        waiting.append(crew)
+    if len(answers) != 1:  # cannot be: a crew answers every task once
+        raise PhotostripError(f"{len(answers)} answers to one task")
+    return answers[0], program()
+
+
+def _new(limits: Limits, work: str) -> Crew:
+    megabytes = limits.megabytes or share_of_memory(os.cpu_count() or 1)
+    return Crew(1, Limits(limits.seconds, megabytes), work)

@@ -1,0 +1,228 @@
+"""A whole batch: what is unchanged, what is computed by whom, what is written, and how it ends."""
+
+from __future__ import annotations
+
+import signal
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Protocol
+
+from photostrip.batch.tasks import FAULTY, UNWRITTEN, Answer, Task, failure, not_run
+from photostrip.errors import Fault, InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+    from types import FrameType
+
+    from photostrip.batch.crew import Executor
+    from photostrip.batch.folder import Folder
+    from photostrip.batch.selection import Chosen
+
+    Document = dict[str, Any]
+
+LAST_REFUSALS = 3  # results in a row that cannot be written before the batch gives up
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class Watch(Protocol):
+    """Who is told what happens."""
+
+    def finished(self, outcome: Document, answer: Answer | None) -> None:
+        """Take notice of a project that is done; without an answer, its result was there already."""
+        ...
+
+
+@dataclass
+class Stop:
+    """Why a batch is to end early.
+
+    Parameters
+    ----------
+    signal : int
+        Number of the signal that asked for it; 0: none did.
+    refusals : int
+        Results in a row that could not be written.
+    """
+
+    signal: int = 0
+    refusals: int = 0
+
+    def __call__(self) -> bool:
+        """Whether to stop."""
+        return bool(self.signal) or self.refusals >= LAST_REFUSALS
+
+
+@contextmanager
+def on_signals(stop: Stop) -> Iterator[Stop]:
+    """Let Ctrl-C and SIGTERM end a batch in good order; a second one ends it at once.
+
+    Parameters
+    ----------
+    stop : Stop
+        Learns of the signal.
+
+    Yields
+    ------
+    Stop
+        The same.
+    """
+    before: dict[int, Any] = {}
+
+    def noticed(number: int, _: FrameType | None) -> None:
+        stop.signal = number
+        for each in SIGNALS:
+            signal.signal(each, before[each])
+
+    for each in SIGNALS:
+        before[each] = signal.signal(each, noticed)
+    try:
+        yield stop
+    finally:
+        for each in SIGNALS:
+            signal.signal(each, before[each])
+
+
+@dataclass
+class Batch:
+    """What became of a batch.
+
+    Parameters
+    ----------
+    outcomes : list of dict
+        The line of the summary of each project, in the order in which the user named them.
+    unchanged : int
+        Projects whose result was there already.
+    seconds : float
+        What the others took together.
+    """
+
+    outcomes: list[Document] = field(default_factory=list)
+    unchanged: int = 0
+    seconds: float = 0.0
+
+    @property
+    def exit_code(self) -> int:
+        """That of the worst project: the highest."""
+        return max((each["exit_code"] for each in self.outcomes), default=0)
+
+
+class Run:
+    """One batch on its way.
+
+    Parameters
+    ----------
+    projects : sequence of Chosen
+        What is to be computed.
+    overrides : sequence of str
+        Assignments that hold for all of them.
+    folder : Folder, optional
+        Where results go; None: nowhere.
+    force : bool
+        Whether to compute what is unchanged, too, and to replace results of other projects.
+    """
+
+    def __init__(
+        self, projects: Sequence[Chosen], overrides: Sequence[str] = (), folder: Folder | None = None, *, force: bool
+    ) -> None:
+        self.projects, self.overrides, self.folder, self.force = projects, tuple(overrides), folder, force
+        self.batch = Batch([named(not_run(), chosen, written=folder is not None) for chosen in projects])
+
+    def go(self, executor: Executor, watch: Watch, stop: Stop) -> Batch:
+        """Compute what must be computed.
+
+        Parameters
+        ----------
+        executor : Executor
+            Who computes.
+        watch : Watch
+            Is told what happens.
+        stop : Stop
+            Says when to end early.
+
+        Returns
+        -------
+        Batch
+            One line for every project, whatever happened.
+        """
+        for answer in executor.answers(self._tasks(watch, stop), stop):
+            self._take(answer, watch, stop)
+        return self.batch
+
+    def files_read(self) -> list[str]:
+        """Give every file that the results were made from, and the project files of those without a result."""
+        files: dict[str, None] = {}
+        for chosen in self.projects:
+            read = self.folder.files_of(chosen) if self.folder is not None else []
+            files.update(dict.fromkeys(read or [chosen.project]))
+        return list(files)
+
+    def _tasks(self, watch: Watch, stop: Callable[[], bool]) -> Iterator[Task | None]:
+        """Give what must be computed, None in between for what need not."""
+        for chosen in self.projects:
+            if stop():
+                return
+            settled = self._settled(chosen)
+            if settled is None:
+                yield Task(chosen.number, chosen.project, self.overrides)
+            else:
+                self._note(chosen, settled, None, watch)
+                yield None
+
+    def _settled(self, chosen: Chosen) -> Document | None:
+        """Give the line of the summary of a project that need not, or must not, be computed."""
+        if self.folder is None or self.force:
+            return None
+        outcome = self.folder.unchanged(chosen)
+        if outcome is not None:
+            self.batch.unchanged += 1
+            return outcome
+        refused = self.folder.refused(chosen)
+        return None if refused is None else failure(FAULTY, refused)
+
+    def _take(self, answer: Answer, watch: Watch, stop: Stop) -> None:
+        """Write a result and its line of the summary."""
+        chosen = self.projects[answer.number]
+        outcome = answer.outcome
+        self.batch.seconds += answer.seconds
+        if answer.files and self.folder is not None:
+            try:
+                self.folder.write(chosen, answer)
+                stop.refusals = 0
+            except (InputError, OSError) as error:
+                stop.refusals += 1
+                place = str(self.folder.path / chosen.output)
+                outcome = failure(UNWRITTEN, unwritten(error, place) if isinstance(error, OSError) else error)
+        self._note(chosen, outcome, answer, watch)
+
+    def _note(self, chosen: Chosen, outcome: Document, answer: Answer | None, watch: Watch) -> None:
+        line = named(outcome, chosen, written=self.folder is not None)
+        self.batch.outcomes[chosen.number] = line
+        watch.finished(line, answer)
+
+
+def named(outcome: Document, chosen: Chosen, *, written: bool) -> Document:
+    """Put the names of a project before its line of the summary.
+
+    Parameters
+    ----------
+    outcome : dict
+        The line.
+    chosen : Chosen
+        The project.
+    written : bool
+        Whether the batch has a folder to write into.
+
+    Returns
+    -------
+    dict
+        The line with ``project`` and ``output`` first; ``output`` is None where there is no result.
+    """
+    there = written and outcome["status"] in {"good", "look", "failed"}
+    return {"project": chosen.project, "output": chosen.output if there else None, **outcome}
+
+
+def unwritten(error: OSError, place: str) -> Fault:
+    """Say why a result could not be written; not where exactly, which differs from run to run."""
+    reason = (error.strerror or str(error)).lower()
+    fix = "make room, or choose another place with -o"
+    return Fault(f"the result cannot be written: {reason}", "system", place, fix=fix)

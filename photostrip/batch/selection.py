@@ -1,0 +1,168 @@
+"""Which projects a batch has, and where the result of each goes."""
+
+from __future__ import annotations
+
+import glob
+import os
+import sys
+from collections import defaultdict
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from photostrip.errors import Fault, InputError
+from photostrip.formats.files import MEGABYTE, decode, read_bytes
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+PROJECT = "project.yaml"
+ENDINGS = {".yaml", ".yml"}
+LIST = "@"
+LARGEST_LIST = 100 * MEGABYTE
+
+
+@dataclass(frozen=True, slots=True)
+class Chosen:
+    """A project of the batch.
+
+    Parameters
+    ----------
+    number : int
+        Its place among all.
+    project : str
+        Path of the project file as the user knows it.
+    output : str
+        Folder of its result below that of the batch, with slashes.
+    """
+
+    number: int
+    project: str
+    output: str
+
+
+def choose(arguments: Sequence[str]) -> list[Chosen]:
+    """Find the projects that the user names.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        Each a project file; a folder (its ``project.yaml``, or all of them below it); a pattern with ``*``, ``?`` or
+        ``**``; or ``@FILE``, a list of such arguments, one a line, with paths relative to FILE (``@-``: from stdin).
+
+    Returns
+    -------
+    list of Chosen
+        Every project once, in the order of the arguments.
+
+    Raises
+    ------
+    InputError
+        With a fault for each argument that leads to no project.
+    """
+    faults: list[Fault] = []
+    found: dict[str, str] = {}
+    for argument in _listed(arguments, faults):
+        for project in _projects(argument, faults):
+            found.setdefault(os.path.realpath(project), project)
+    if not found and not faults:
+        faults.append(Fault("no project is named", "no-project", expected="project files, folders, or @FILE"))
+    if faults:
+        raise InputError(faults)
+    projects = list(found.values())
+    return [Chosen(n, *pair) for n, pair in enumerate(zip(projects, output_names(projects), strict=True))]
+
+
+def _listed(arguments: Iterable[str], faults: list[Fault]) -> Iterator[str]:
+    """Replace lists by their lines."""
+    for argument in arguments:
+        if not argument.startswith(LIST):
+            yield argument
+            continue
+        file = argument.removeprefix(LIST)
+        try:
+            data = sys.stdin.buffer.read() if file == "-" else read_bytes(file, LARGEST_LIST)
+            text, _ = decode(file, data)
+        except InputError as error:
+            faults += error.faults
+            continue
+        folder = Path() if file == "-" else Path(file).parent
+        lines = [line.strip() for line in text.splitlines()]
+        yield from (str(folder / line) for line in lines if line and not line.startswith("#"))
+
+
+def _projects(argument: str, faults: list[Fault]) -> list[str]:
+    """Give the project files that one argument means."""
+    path = Path(argument)
+    if path.is_dir():
+        found = _below(path)
+        if not found:
+            message = f"there is no {PROJECT} in this folder or below it"
+            faults.append(Fault(message, "no-project", argument, fix="name the project files themselves"))
+        return found
+    if glob.has_magic(argument) and not path.exists():
+        matches = [Path(each) for each in sorted(glob.glob(argument, recursive=True))]  # noqa: PTH207 (takes any path)
+        found = [name for each in matches for name in (_below(each) if each.is_dir() else _project(each))]
+        if not found:
+            faults.append(Fault("no project fits this pattern", "no-project", argument))
+        return found
+    return [str(path)]  # a file that is not there is told as the fault of that project, among the others
+
+
+def _project(path: Path) -> list[str]:
+    return [str(path)] if path.suffix in ENDINGS else []
+
+
+def _below(folder: Path) -> list[str]:
+    """Give the project of a folder, or those of all folders below it except hidden ones."""
+    if (folder / PROJECT).is_file():
+        return [str(folder / PROJECT)]
+    found = []
+    for place, inner, files in os.walk(folder, followlinks=True):
+        inner[:] = sorted(name for name in inner if not name.startswith("."))
+        if PROJECT in files:
+            found.append(str(Path(place) / PROJECT))
+            inner.clear()
+    return sorted(found)
+
+
+def output_names(projects: Sequence[str]) -> list[str]:
+    """Give every project the name of its result's folder.
+
+    Parameters
+    ----------
+    projects : sequence of str
+        Paths of different project files.
+
+    Returns
+    -------
+    list of str
+        The folder of a ``project.yaml``, the name of any other file without its ending; where that is not enough, with
+        as many folders above it as tell one from the other (``north/s1``, ``south/s1``).
+    """
+    parts = [_parts(project) for project in projects]
+    names = [list(each[-1:]) for each in parts]
+    clashing = list(range(len(projects)))
+    depth = 1
+    while clashing:
+        groups = defaultdict(list)
+        for number in clashing:
+            groups["/".join(names[number]).casefold()].append(number)  # some file systems know no case
+        clashing = [number for group in groups.values() if len(group) > 1 for number in group]
+        depth += 1
+        for number in list(clashing):
+            if depth > len(parts[number]):
+                names[number] = [*parts[number], str(number + 1)]
+                clashing.remove(number)
+            else:
+                names[number] = list(parts[number][-depth:])
+    return ["/".join(name) for name in names]
+
+
+def _parts(project: str) -> tuple[str, ...]:
+    """Give the folders above a result and its name."""
+    path = Path(os.path.abspath(project))  # noqa: PTH100 (links stay: the user named them)
+    folders = path.parent.parts[1:]
+    if path.stem == "project" and folders:
+        return folders
+    return (*folders, path.stem)

@@ -1,0 +1,176 @@
+"""What goes to a worker and what comes back: plain values that travel between processes and machines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from photostrip.errors import EXIT_GEOMETRY, EXIT_INPUT, EXIT_INTERNAL, EXIT_TOLERANCE, Fault, InputError
+from photostrip.report.messages import findings_of, line_of
+
+if TYPE_CHECKING:
+    from photostrip.errors import GeometryError
+    from photostrip.project.packing import Parcel
+
+Document = dict[str, Any]
+
+# How a project can end beside the verdicts of a result (good, look, failed), and the exit code of each.
+FAULTY, WEAK, BROKEN, TIMEOUT, MEMORY, UNWRITTEN, NOT_RUN = (
+    "faulty",
+    "weak",
+    "crashed",
+    "timeout",
+    "memory",
+    "unwritten",
+    "not run",
+)
+EXIT_CODES = {
+    "good": 0,
+    "look": 0,
+    "failed": EXIT_TOLERANCE,
+    FAULTY: EXIT_INPUT,
+    UNWRITTEN: EXIT_INPUT,
+    WEAK: EXIT_GEOMETRY,
+    BROKEN: EXIT_INTERNAL,
+    TIMEOUT: EXIT_INTERNAL,
+    MEMORY: EXIT_INTERNAL,
+    NOT_RUN: 0,
+}
+
+
+@dataclass(frozen=True)
+class Task:
+    """One project to be computed.
+
+    Parameters
+    ----------
+    number : int
+        Its place among the projects of the batch.
+    project : str
+        Path of the project file as the user knows it.
+    overrides : tuple of str
+        Assignments that replace values of the file.
+    parcel : Parcel, optional
+        Its files, when it goes to another machine; None: they are read from the disk.
+    """
+
+    number: int
+    project: str
+    overrides: tuple[str, ...] = ()
+    parcel: Parcel | None = None
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What became of a project.
+
+    Parameters
+    ----------
+    number : int
+        That of the task.
+    outcome : dict
+        Its line in the summary, see :func:`outcome_of` and :func:`failure`.
+    files : dict of str to str
+        Content of its result files by name; none after a failure.
+    inputs : dict of str to str or None
+        SHA-256 of every file read, by path; None for a file that would have been read if it were there.
+    seconds : float
+        Time it took.
+    megabytes : float
+        Memory of the worker afterwards.
+    trace : str
+        Where an internal error happened.
+    """
+
+    number: int
+    outcome: Document
+    files: dict[str, str] = field(default_factory=dict)
+    inputs: dict[str, str | None] = field(default_factory=dict)
+    seconds: float = 0.0
+    megabytes: float = 0.0
+    trace: str = ""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What one project may use.
+
+    Parameters
+    ----------
+    seconds : float, optional
+        Time; None: any.
+    megabytes : float, optional
+        Address space of the worker that computes it; None: an even share of the machine's memory.
+    """
+
+    seconds: float | None = None
+    megabytes: float | None = None
+
+
+def outcome_of(document: Document, findings: list[Document]) -> Document:
+    """Give the line of the summary for a result.
+
+    Parameters
+    ----------
+    document : dict
+        The document of the result.
+    findings : list of dict
+        Its verdict and notes as :func:`photostrip.report.messages.result_findings` gives them.
+
+    Returns
+    -------
+    dict
+        ``status``, ``exit_code``, counts, ``sigma0_um``, the rms at check points (at control points where there are
+        none; ``rms_at`` says which) in metres, ``messages`` (sentences, worst first) and ``findings``.
+    """
+    summary, status = document["summary"], document["status"]
+    role = "check" if any(summary["check"][part]["count"] for part in ("plan", "height")) else "control"
+    return {
+        "status": status,
+        "exit_code": EXIT_CODES[status],
+        "adjustment": document["adjustment"],
+        "strips": len(document["strips"]),
+        "photos": len(document["photos"]),
+        "points": len(document["points"]),
+        "rejected": len(document["rejected"]),
+        "sigma0_um": summary["sigma0_um"],
+        "rms_at": role,
+        "rms_plan_m": summary[role]["plan"]["rms"],
+        "rms_height_m": summary[role]["height"]["rms"],
+        "messages": document["verdict"]["look_at"],
+        "findings": [each for each in findings if each["severity"] == "error"],
+    }
+
+
+def failure(status: str, error: InputError | GeometryError | Fault) -> Document:
+    """Give the line of the summary for a project without a result.
+
+    Parameters
+    ----------
+    status : str
+        How it ended.
+    error : InputError, GeometryError or Fault
+        Why.
+
+    Returns
+    -------
+    dict
+        The same keys as those of a result, without numbers.
+    """
+    findings = findings_of(InputError(error) if isinstance(error, Fault) else error)
+    nothing = dict.fromkeys(
+        ("strips", "photos", "points", "rejected", "sigma0_um", "rms_at", "rms_plan_m", "rms_height_m")
+    )
+    return {
+        "status": status,
+        "exit_code": EXIT_CODES[status],
+        "adjustment": None,
+        **nothing,
+        "messages": [line_of(each).removeprefix("error: ") for each in findings],
+        "findings": findings,
+    }
+
+
+def not_run() -> Document:
+    """Give the line of the summary for a project that was not reached."""
+    return failure(NOT_RUN, InputError(()))

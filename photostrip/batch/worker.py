@@ -1,0 +1,208 @@
+"""A worker: a process that loads the libraries once, then computes one project after the other.
+
+It is a fresh interpreter, not a copy of its parent: nothing of the parent's threads, locks or open files is in it. Its
+only tie is one end of a socket. When the other end closes, whatever the reason, it ends itself at once, so that no
+worker outlives a batch that was killed.
+"""
+
+from __future__ import annotations
+
+import os
+import queue
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from contextlib import suppress
+from importlib import import_module
+from multiprocessing.connection import Connection, Pipe
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from photostrip.threads import THREAD_VARIABLES
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from photostrip.batch.tasks import Answer, Task
+
+WORK = "photostrip.batch.work:evaluate"  # what a worker does with a task
+READY = "ready"
+MEGABYTE = 1_000_000
+NO_MEMORY = 71  # exit code of a worker that has too little memory left even to say so
+# The interpreter of a worker finds the same modules as that of its parent, wherever the parent has them from.
+START = (
+    "import sys; sys.path[:] = sys.argv[1].split('\\n'); "
+    "from photostrip.batch.worker import serve; serve(int(sys.argv[2]), float(sys.argv[3]), sys.argv[4])"
+)
+
+
+# --------------------------------------------------------------------------------------- on the parent's side
+
+
+class Worker:
+    """A worker as its parent sees it.
+
+    Parameters
+    ----------
+    megabytes : float
+        Address space that it may have.
+    work : str
+        What it does with a task, as ``module:function``.
+    """
+
+    def __init__(self, megabytes: float, work: str = WORK) -> None:
+        self.task: Task | None = None
+        self.ready = False
+        self.number_done = 0
+        self.begin = time.monotonic()
+        self.last_words = ""  # the last line that it wrote on stderr, once it is dead
+        self._said = tempfile.TemporaryFile()  # noqa: SIM115 (as long as the worker lives)
+        self.connection, theirs = Pipe()
+        handle = theirs.fileno()
+        command = [sys.executable, "-c", START, "\n".join(sys.path), str(handle), str(megabytes), work]
+        self._process = subprocess.Popen(  # noqa: S603 (our own interpreter and our own module)
+            command,
+            pass_fds=(handle,),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=self._said,
+            env={**os.environ, **dict.fromkeys(THREAD_VARIABLES, "1")},
+        )
+        theirs.close()
+
+    @property
+    def pid(self) -> int:
+        """Number of its process."""
+        return self._process.pid
+
+    def give(self, task: Task) -> None:
+        """Hand it a task; it counts as begun now."""
+        self.task, self.begin = task, time.monotonic()
+        with suppress(OSError):  # it is dead: the next look at the connection shows it
+            self.connection.send(task)
+
+    def hear(self) -> Any:  # noqa: ANN401 (an Answer or READY)
+        """Take what it has sent.
+
+        Raises
+        ------
+        EOFError, OSError
+            When it is dead.
+        """
+        return self.connection.recv()
+
+    def end(self) -> int:
+        """End it, if it still lives, and give its exit code; negative after a signal."""
+        self.connection.close()
+        self._process.kill()
+        code = self._process.wait()
+        with self._said:
+            self._said.seek(0)
+            lines = self._said.read().decode(errors="replace").split("\n")
+        self.last_words = next((line.strip() for line in reversed(lines) if line.strip()), "")
+        return code
+
+    def fate(self) -> int:
+        """Give the exit code of a worker whose connection broke: it is dead, or about to be."""
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(timeout=1.0)
+        return self.end()
+
+
+def share_of_memory(workers: int) -> float:
+    """Give an even share of the machine's memory, megabytes.
+
+    Parameters
+    ----------
+    workers : int
+        Number of workers that share it.
+
+    Returns
+    -------
+    float
+        The share; of the container's memory where it is limited.
+    """
+    total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    for file in ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"):
+        with suppress(OSError, ValueError):
+            total = min(total, int(Path(file).read_text(encoding="ascii")))
+    return total / MEGABYTE / workers
+
+
+# --------------------------------------------------------------------------------------- on the worker's side
+
+
+def serve(handle: int, megabytes: float, work: str) -> None:
+    """Compute what comes through a connection until it closes.
+
+    Parameters
+    ----------
+    handle : int
+        File descriptor of the connection.
+    megabytes : float
+        Address space that this process may have.
+    work : str
+        What to do with a task, as ``module:function``.
+    """
+    import gc
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches every process of the terminal; the parent decides
+    connection: Connection[Any, Any] = Connection(handle)
+    module, _, name = work.partition(":")
+    evaluate: Callable[[Task], Answer] = getattr(import_module(module), name)
+    _limit_memory(megabytes)
+    gc.disable()  # as in every command: a project makes many small objects and hardly a cycle
+    gc.freeze()
+    tasks: queue.SimpleQueue[Task] = queue.SimpleQueue()
+    threading.Thread(target=_receive, args=(connection, tasks), daemon=True).start()
+    connection.send(READY)
+    while True:
+        try:
+            _send(connection, evaluate(tasks.get()))
+        except MemoryError:
+            os._exit(NO_MEMORY)
+        gc.collect()
+
+
+def _receive(connection: Connection[Any, Any], tasks: queue.SimpleQueue[Task]) -> None:
+    """Take in tasks beside the work, so that the end of the parent is noticed in the middle of it."""
+    try:
+        while True:
+            tasks.put(connection.recv())
+    except MemoryError:
+        os._exit(NO_MEMORY)
+    except (EOFError, OSError):
+        os._exit(0)
+
+
+def _send(connection: Connection[Any, Any], answer: Answer) -> None:
+    from dataclasses import replace
+
+    with suppress(OSError):  # the parent is gone; the other thread ends this process
+        connection.send(replace(answer, megabytes=_resident()))
+
+
+def _limit_memory(megabytes: float) -> None:
+    import resource
+
+    _, hard = resource.getrlimit(resource.RLIMIT_AS)
+    wanted = int(megabytes * MEGABYTE)
+    if hard != resource.RLIM_INFINITY:
+        wanted = min(wanted, hard)
+    with suppress(OSError, ValueError):  # not every system has this limit
+        resource.setrlimit(resource.RLIMIT_AS, (wanted, hard))
+
+
+def _resident() -> float:
+    """Memory that this process has now, megabytes; its peak where the system does not tell."""
+    import resource
+
+    try:
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    except OSError:
+        scale = 1 if sys.platform == "darwin" else 1024
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * scale / MEGABYTE
+    return pages * os.sysconf("SC_PAGE_SIZE") / MEGABYTE

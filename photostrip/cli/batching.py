@@ -1,0 +1,206 @@
+"""How ``photostrip batch`` puts its parts together, and what it says meanwhile and in the end."""
+
+from __future__ import annotations
+
+import os
+import sys
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from photostrip.batch.crew import Crew
+from photostrip.batch.folder import opened
+from photostrip.batch.run import Run, Stop, on_signals
+from photostrip.batch.selection import choose
+from photostrip.cli.showing import BatchFormat
+from photostrip.cli.talking import as_fault
+from photostrip.errors import InputError
+from photostrip.formats import batch as formats
+from photostrip.formats.writing import make_rule, write_text
+from photostrip.report import console, layout, messages, text
+from photostrip.report.batch import batch_junit, batch_sections, outcome_line
+from photostrip.report.figures import counted
+from photostrip.report.progress import batch_table
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from photostrip.batch.crew import Executor
+    from photostrip.batch.folder import Folder
+    from photostrip.batch.run import Batch
+    from photostrip.batch.tasks import Answer, Limits, Task
+    from photostrip.report.progress import BatchTable
+
+    Document = dict[str, Any]
+
+EXIT_SIGNAL = 128  # plus its number, as a shell reports it
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What the user asked for; see the options of the command."""
+
+    projects: list[str]
+    output: Path | None
+    jobs: int | None
+    executor: str
+    overrides: tuple[str, ...]
+    limits: Limits
+    force: bool
+    depfile: Path | None
+
+
+def cores() -> int:
+    """Give the number of cores that this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # not on every system
+        return os.cpu_count() or 1
+
+
+def run_asked(asked: Asked, form: BatchFormat, width: int | None, *, quiet: bool, verbose: bool) -> int:
+    """Run a batch and print its summary.
+
+    Parameters
+    ----------
+    asked : Asked
+        What the user asked for.
+    form : BatchFormat
+        How the summary is printed.
+    width : int, optional
+        Width of the text in characters.
+    quiet, verbose : bool
+        Whether to say less, or more.
+
+    Returns
+    -------
+    int
+        The exit code.
+    """
+    projects = choose(asked.projects)
+    stop = Stop()
+    with ExitStack() as stack:
+        stack.enter_context(on_signals(stop))
+        folder = None
+        if asked.output is not None:
+            folder = stack.enter_context(opened(asked.output, asked.overrides))
+        table = stack.enter_context(batch_table(sys.stderr, len(projects), quiet=quiet))
+        run = Run(projects, asked.overrides, folder, force=asked.force)
+        trouble: list[InputError] = []
+        try:
+            with executor_of(asked, len(projects), table) as executor:
+                run.go(executor, Talking(table, len(projects), quiet=quiet, verbose=verbose), stop)
+        except InputError as error:  # the cluster is gone, or was never there
+            trouble.append(error)
+        finally:
+            table.stop()
+            code = max((run.batch.exit_code, *(each.exit_code for each in trouble)))
+            code = EXIT_SIGNAL + stop.signal if stop.signal else code
+            if folder is not None:
+                trouble += summed_up(run.batch, code, folder)
+    show(run.batch.outcomes, code, form, width, quiet=quiet, verbose=verbose)
+    if asked.depfile is not None and asked.output is not None:
+        write_text(asked.depfile, make_rule(asked.output / "summary.json", run.files_read()))
+    _close(run.batch, stop, quiet=quiet)
+    if trouble:
+        raise InputError(fault for each in trouble for fault in each.faults)
+    return code
+
+
+@contextmanager
+def executor_of(asked: Asked, number: int, table: BatchTable) -> Iterator[Executor]:
+    """Give the executor that the user asked for."""
+    jobs = min(asked.jobs or cores(), number)
+
+    def begun(task: Task) -> None:
+        table.begun(task.project)
+
+    if asked.executor == "local":
+        with Crew(jobs, asked.limits, begun=begun) as crew:
+            yield crew
+        return
+    from photostrip.batch.cluster import cluster
+
+    with cluster(asked.executor.removeprefix("dask:"), jobs, asked.limits, begun) as found:
+        yield found
+
+
+class Talking:
+    """What is said on stderr while a batch runs: a line for each project, or on a terminal for each failure.
+
+    Parameters
+    ----------
+    table : BatchTable
+        The table on a terminal.
+    total : int
+        Number of projects.
+    quiet, verbose : bool
+        Whether to say nothing, or also where internal errors happened.
+    """
+
+    def __init__(self, table: BatchTable, total: int, *, quiet: bool, verbose: bool) -> None:
+        self.table, self.total, self.quiet, self.verbose, self.done = table, total, quiet, verbose, 0
+
+    def finished(self, outcome: Document, answer: Answer | None) -> None:
+        """Say what became of a project."""
+        self.done += 1
+        self.table.finished(outcome["project"], failed=bool(outcome["exit_code"]), unchanged=answer is None)
+        if self.quiet or (self.table.live and not outcome["exit_code"]):
+            return
+        how = ", unchanged" if answer is None and not outcome["exit_code"] else ""
+        trace = answer.trace if answer is not None and self.verbose else ""
+        count = f"{self.done:>{len(str(self.total))}} of {self.total}"
+        self.table.say(f"{count}  {outcome_line(outcome)}{how}\n{trace}".rstrip("\n"))
+
+
+def summed_up(batch: Batch, code: int, folder: Folder) -> list[InputError]:
+    """Write the files of the summary; give what went wrong, which must not hide what became of the projects."""
+    try:
+        folder.write_summaries(
+            {
+                "summary.txt": text.to_text("", batch_sections(batch.outcomes, everything=True)),
+                "summary.csv": formats.summary_csv(batch.outcomes),
+                "junit.xml": batch_junit(batch.outcomes),
+                "summary.json": formats.summary_json(batch.outcomes, code),
+            }
+        )
+    except InputError as error:
+        return [error]
+    except OSError as error:
+        return [as_fault(error)]
+    return []
+
+
+def show(
+    outcomes: list[Document], code: int, form: BatchFormat, width: int | None, *, quiet: bool, verbose: bool
+) -> None:
+    """Print the summary on stdout."""
+    ascii_only = not console.speaks_unicode(sys.stdout)
+    sections = batch_sections(outcomes, quiet=quiet, everything=verbose)
+    match form:
+        case BatchFormat.TEXT:
+            console.print_report("", sections, sys.stdout, width)
+        case BatchFormat.CSV:
+            sys.stdout.write(formats.summary_csv(outcomes))
+        case BatchFormat.JSON:
+            sys.stdout.write(formats.summary_json(outcomes, code, ascii_only=ascii_only))
+        case BatchFormat.JUNIT:
+            sys.stdout.write(batch_junit(outcomes))
+        case BatchFormat.GITHUB:
+            sys.stdout.write(messages.annotated(finding for each in outcomes for finding in each["findings"]))
+        case BatchFormat.MD:
+            page = text.to_markdown("Summary of the batch", sections)
+            sys.stdout.write(layout.plain_ascii(page) if ascii_only else page)
+
+
+def _close(batch: Batch, stop: Stop, *, quiet: bool) -> None:
+    """Say on stderr what was computed, and why the batch ended before its end."""
+    waiting = sum(each["status"] == "not run" for each in batch.outcomes)
+    if stop.signal:
+        sys.stderr.write(f"interrupted: {counted(waiting, 'project')} not run; the same command goes on from here\n")
+    elif stop():
+        sys.stderr.write(f"error: {stop.refusals} results in a row could not be written; {waiting} not run\n")
+    elif not quiet and batch.unchanged:
+        computed = len(batch.outcomes) - batch.unchanged
+        sys.stderr.write(f"{computed} computed, {batch.unchanged} unchanged since the last time\n")

@@ -1,0 +1,104 @@
+"""Where the bytes of files come from, and an account of what was read.
+
+Usually files come from the disk. Where a project travels to another machine, its files travel along as bytes, and
+every reader takes them from there instead. Either way the account says which bytes a result was made from.
+"""
+
+from __future__ import annotations
+
+import os
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+    from pathlib import Path
+
+
+@dataclass
+class Source:
+    """Where files come from while one project is read.
+
+    Parameters
+    ----------
+    given : mapping of str to bytes, optional
+        Content by path as the user typed it; None: the files are read from the disk.
+    folder : str
+        Working folder to which relative paths refer; empty: that of the process.
+    grids : Path, optional
+        Folder that stands in for the project's folder where grid files are looked for.
+    digests : dict of str to str
+        SHA-256 of every file read so far, by its path.
+    """
+
+    given: Mapping[str, bytes] | None = None
+    folder: str = ""
+    grids: Path | None = None
+    digests: dict[str, str] = field(default_factory=dict)
+
+    def account(self, file: str, data: bytes) -> None:
+        """Remember what was read."""
+        self.digests[file] = digest(data)
+
+
+_current: ContextVar[Source | None] = ContextVar("source", default=None)
+
+
+def digest(data: bytes) -> str:
+    """Give the SHA-256 of some bytes as 64 hexadecimal digits."""
+    import hashlib
+
+    return hashlib.sha256(data).hexdigest()
+
+
+@contextmanager
+def reading_from(source: Source) -> Iterator[Source]:
+    """Let all readers take their files from a source, and keep its account.
+
+    Parameters
+    ----------
+    source : Source
+        The source.
+
+    Yields
+    ------
+    Source
+        The same.
+    """
+    token = _current.set(source)
+    try:
+        yield source
+    finally:
+        _current.reset(token)
+
+
+def current() -> Source | None:
+    """Give the source that readers take their files from; None: the disk, without an account."""
+    return _current.get()
+
+
+def seen_from(file: str, folder: str | Path) -> str:
+    """Give a path relative to a folder, with slashes on every system.
+
+    Parameters
+    ----------
+    file : str
+        A path.
+    folder : str or Path
+        The folder.
+
+    Returns
+    -------
+    str
+        The relative path, as the working folder of the current source lets it be.
+
+    Raises
+    ------
+    ValueError
+        When there is no way, because they stand on different drives.
+    """
+    source = current()
+    base = source.folder if source is not None else ""
+    return os.path.relpath(os.path.join(base, file), os.path.join(base, folder)).replace(os.sep, "/")  # noqa: PTH118

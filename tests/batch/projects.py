@@ -1,0 +1,96 @@
+"""Small projects for batches, and commands that run on them."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from functools import cache
+from typing import TYPE_CHECKING
+
+from photostrip.batch.work import evaluate
+from photostrip.formats.simulation import project_files
+from photostrip.formats.writing import write_files
+from photostrip.simulate.simulation import simulate
+from photostrip.simulate.spec import Flight, Points, Spec
+from tests.source_tree import ROOT
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+    from typing import Self
+
+    from photostrip.batch.tasks import Answer, Limits, Task
+
+PHOTOS = 4
+NOT_RESULTS = {".batch.lock"}
+
+
+@cache
+def _files() -> dict[str, str]:
+    spec = Spec(name="small", flight=Flight(photos=PHOTOS), points=Points(rows=3, extra_per_model=2))
+    return project_files(simulate(spec))
+
+
+def write_projects(folder: Path, number: int) -> list[str]:
+    """Write projects s1, s2, ... that differ in their control only; give their project files."""
+    found = []
+    for n in range(1, number + 1):
+        files = dict(_files())
+        head, *rows = files["control.csv"].splitlines()
+        files["control.csv"] = "\n".join([head, *(_raised(row, n) for row in rows)]) + "\n"
+        write_files(folder / f"s{n}", files)
+        found.append(str(folder / f"s{n}" / "project.yaml"))
+    return found
+
+
+def _raised(row: str, metres: int) -> str:
+    """Move a point of a control list up by whole metres: no two projects have the same result."""
+    point, x, y, z, *rest = row.split(",")
+    return ",".join([point, x, y, str(float(z) + metres), *rest])
+
+
+def command(*arguments: str) -> list[str]:
+    return [sys.executable, "-m", "photostrip", "batch", *arguments]
+
+
+def environment() -> dict[str, str]:
+    return {**os.environ, "PYTHONPATH": str(ROOT), "NO_COLOR": "1", "COLUMNS": "100"}
+
+
+def run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run ``photostrip batch`` as a process of its own."""
+    return subprocess.run(
+        command(*arguments), cwd=folder, env=environment(), capture_output=True, text=True, check=False
+    )
+
+
+def tree(folder: Path) -> dict[str, bytes]:
+    """Give the content of every file below a folder, except the lock, which has none."""
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and path.name not in NOT_RESULTS
+    }
+
+
+class Alone:
+    """Stands in for the crew: does the same work in this process, where a test need not wait for others to start."""
+
+    def __init__(self, jobs: int, limits: Limits, begun: Callable[[Task], None]) -> None:
+        assert jobs > 0
+        assert limits.seconds is None
+        self.begun = begun
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None: ...
+
+    def answers(self, tasks: Iterator[Task | None], stopped: Callable[[], bool]) -> Iterator[Answer]:
+        for task in tasks:
+            if stopped():
+                return
+            if task is not None:
+                self.begun(task)
+                yield evaluate(task)
