@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 TERMS = ("E0", "A", "B", "C", "D")
 LEAST_POINTS = 5
+LEAST_REDUNDANCY = 3  # below it a standard deviation from the residuals is mostly luck
 RANK_TOLERANCE = 5e-3  # of the singular values of the scaled columns: below it x² is as good as a multiple of x
 
 
@@ -240,7 +241,7 @@ class Paraboloid:
     coefficients : ndarray, shape (5,)
         E0, A, B, C, D, in the unit of the residuals for x, y in their unit.
     sigmas : ndarray, shape (5,)
-        Standard deviations: from the residuals when `redundancy` is positive, else from the stated ones.
+        Standard deviations: from the residuals with a `redundancy` of three or more, else from the stated ones.
     redundancy : int
         Points minus five.
     sigma0 : float
@@ -258,8 +259,8 @@ class Paraboloid:
         return self.coefficients[3:] / self.sigmas[3:]
 
     def critical(self, alpha: float = 0.05) -> float:
-        """Give what |t| exceeds by chance with probability `alpha`; the normal quantile without redundancy."""
-        if self.redundancy == 0:
+        """Give what |t| exceeds by chance with probability `alpha`; the normal quantile with stated sigmas."""
+        if self.redundancy < LEAST_REDUNDANCY:
             return normal_quantile(1 - alpha / 2)
         return t_quantile(1 - alpha / 2, self.redundancy)
 
@@ -349,5 +350,5 @@ def fit_paraboloid(xy: ArrayLike, residuals: ArrayLike, sigmas: ArrayLike) -> Pa
     left = height / stated - rows @ (found / size)
     redundancy = len(height) - len(TERMS)
     sigma0 = float(np.sqrt(left @ left / redundancy)) if redundancy else float("nan")
-    scale = sigma0 if redundancy else 1.0
+    scale = sigma0 if redundancy >= LEAST_REDUNDANCY else 1.0
     return Paraboloid(found / size, scale * np.sqrt(np.diag(inverse)), redundancy, sigma0)

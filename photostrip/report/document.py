@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from photostrip.errors import Fault, InputError
 from photostrip.report import (
     decision_sections,
+    deformation_sections,
     finding_sections,
     ground_sections,
     precision_sections,
@@ -59,6 +60,7 @@ def sections_of(document: Document, *, everything: bool = False) -> tuple[Sectio
         *([strip_sections.polynomial_section(document, everything=everything)] if document.get("polynomials") else []),
         decision_sections.weights_section(document, everything=everything),
         *([precision_sections.precision_section(document, everything=everything)] if "precision" in document else []),
+        *([deformation_sections.deformation_section(document)] if document.get("deformations") else []),
         ground_sections.control_section(document, everything=everything),
         ground_sections.check_section(document, everything=everything),
         *([ground_sections.ties_section(document, everything=everything)] if several else []),

@@ -149,6 +149,17 @@ def test_five_points_give_the_elements_back() -> None:
     assert fitted.critical() == pytest.approx(1.96, abs=0.001)
 
 
+def test_few_redundant_points_do_not_overrule_the_stated_precision() -> None:
+    seven = np.vstack([SIX, FIVE[4:]])
+    one_left = np.array([1.0, -1.0, -0.5, 0.5, -0.5, 0.5, 0.0])  # what six points leave
+    lucky = fit_paraboloid(seven, 1e-6 * one_left, 0.1)
+    assert lucky.redundancy == 2
+    assert lucky.sigma0 < 1e-4
+    assert np.all(lucky.sigmas[3:] > 1e-6)
+    assert lucky.critical() == pytest.approx(1.96, abs=0.001)
+    assert np.abs(lucky.t_values).max() < 1e-3
+
+
 @pytest.mark.parametrize(
     ("xy", "enough"),
     [

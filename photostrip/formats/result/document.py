@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from photostrip import __version__
-from photostrip.formats.result import conventions, ground, pairs, photos, precision, strips, summary
+from photostrip.formats.result import conventions, deformation, ground, pairs, photos, precision, strips, summary
 from photostrip.formats.result.numbers import Document, natural_rank
 from photostrip.formats.result.verdict import verdict_of
 
@@ -61,6 +61,7 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         "findings": [_finding(each) for each in result.findings],
         "notes": [_note(note) for note in (*notes, *result.notes)],
         "models": pairs.models_of(result),
+        **deformation.deformations_of(result),
         "junctions": pairs.junctions_of(result),
         "photos": photos.photos_of(result, images),
         "points": ground.points_of(result, photos.point_rms(result, images), rank),

@@ -1,0 +1,88 @@
+"""Twist and bending of the models of a run: seen where they are, and only there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from photostrip.formats.result.document import document_of
+from photostrip.formats.simulation import inputs_of, settings_of
+from photostrip.pipeline import triangulate
+from photostrip.pipeline.deformation import model_deformations
+from photostrip.report.document import sections_of
+from photostrip.simulate import Control, Flight, Points, Spec, Terrain, simulate
+
+if TYPE_CHECKING:
+    from photostrip.pipeline import Result
+
+FOCAL = 153.0
+
+
+def spec(seed: int = 1, count: int = 60, photos: int = 4) -> Spec:
+    return Spec(
+        seed=seed,
+        flight=Flight(photos=photos),
+        terrain=Terrain(relief=30.0),
+        points=Points(rows=5, extra_per_model=20),
+        control=Control(layout="random", count=count, check=10, sigma=(0.02, 0.02, 0.02)),
+    )
+
+
+def run(seed: int = 1, *, twist_arcsec: float = 0.0, **more: int) -> Result:
+    """Adjust a strip; the right photo of the middle model may get an x error x y domega / f."""
+    simulation = simulate(spec(seed, **more))
+    inputs, settings = inputs_of(simulation), settings_of(simulation)
+    observations = inputs.observations
+    if twist_arcsec:
+        xy = observations.xy.copy()
+        # an x error that leaves no y parallax and bends heights as a turn domega would
+        here = observations.photo == observations.photo_ids.index("1003")
+        x, y = xy[here].T
+        xy[here, 0] = x + np.radians(twist_arcsec / 3600) * x * y / FOCAL
+        inputs = replace(inputs, observations=replace(observations, xy=xy))
+    # gross errors would be searched for in what is put in here
+    relative = replace(settings.relative, screening="none")
+    return triangulate(inputs, replace(settings, adjustment="similarity", relative=relative))
+
+
+def documents(result: Result) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = document_of(result).get("deformations", [])
+    return found
+
+
+def test_models_without_deformation_rarely_seem_deformed() -> None:
+    t = np.array([model.surface.t_values for seed in range(30) for model in _deformations(run(seed))])
+    assert len(t) > 80
+    # student t with twenty and more redundant points: mean square hardly more than 1
+    assert 0.7 < (t**2).mean() < 1.6
+    assert np.mean(np.abs(t) > 2.0) < 0.12
+
+
+def _deformations(result: Result) -> list[Any]:
+    return [model for strip in result.strips for model in model_deformations(strip, result.frames)]
+
+
+def test_a_twisted_photo_shows_in_its_models() -> None:
+    rows = documents(run(twist_arcsec=400.0))
+    assert [row["left"] for row in rows] == ["1001", "1002", "1003"]
+    middle, last = rows[1], rows[2]
+    assert middle["significant"]
+    assert last["significant"]
+    assert not rows[0]["significant"]
+    assert abs(middle["twist"]["t"]) > middle["t_limit"]
+    # eq. 10.9: -dp of the right photo is what omega2' does there; as a left photo it does the opposite
+    assert abs(middle["omega2_arcsec"] - 400.0) < 60
+    assert abs(last["omega2_arcsec"] + 400.0) < 60
+    text = sections_of(document_of(run(twist_arcsec=400.0)))
+    assert any("2 of them deformed" in part.text for s in text for part in s.parts if hasattr(part, "text"))
+
+
+def test_check_points_take_no_part_and_thin_control_gives_none() -> None:
+    result = run()
+    used = {name for row in documents(result) for name in row["points"]}
+    control = result.inputs.control
+    assert not used & {name for name, check in zip(control.ids, control.check, strict=True) if check}
+    assert documents(run(count=4)) == []
+    assert "deformations" not in document_of(run(count=4))
