@@ -7,7 +7,7 @@ SOURCES := photostrip tests $(wildcard benchmarks)
 DEMO_PROJECTS ?= $(wildcard sample_data/*/project.yaml)
 WORKERS ?= 2
 
-.PHONY: demo test check lint types lowest bench docs golden clean
+.PHONY: demo test check lint types lowest bench docs golden regress clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/photostrip.installed ## run the main job on every sample project and print its accuracy report
@@ -44,7 +44,10 @@ bench: $(VENV)/dev.installed ## tables of seconds, memory and accuracy
 docs: $(VENV)/dev.installed ## rewrite the printed output in README.md and docs/ by running the commands there
 	$(BIN)/python -m tests.renew_docs
 
-golden: $(VENV)/dev.installed ## compute the results of sample_data that the tests compare with anew
+regress: $(VENV)/photostrip.installed ## adjust the sample projects that changed and compare them with their baselines
+	$(MAKE) --no-print-directory -f configs/Makefile.example STRIPS=sample_data OUT=build/regress PHOTOSTRIP=$(BIN)/photostrip check
+
+golden: $(VENV)/dev.installed ## compute the baselines of sample_data, which regress and the tests compare with, anew
 	$(BIN)/python -m tests.renew_golden
 
 clean: ## remove everything that make has made

@@ -52,11 +52,11 @@ def run(
         talk.step(f"adjusted {len(result.points.number)} points")
         document = document_of(result, loaded.remarks)
         waiting.at("writing the result")
+        if depfile is not None and output is not None:  # before the result: it must not be the newer of the two
+            write_text(depfile, make_rule(output / "result.json", loaded.files_read(result)))
         if output is not None:
             files = result_files(document, loaded.resolved)
             write_files(output, files)
             talk.say(f"wrote {len(files)} files to {output}")
-        if depfile is not None and output is not None:
-            write_text(depfile, make_rule(output / "result.json", loaded.files))
     show(document, form, width, quiet=quiet, verbose=verbose)
     return EXIT_TOLERANCE if document["status"] == "failed" else EXIT_DONE

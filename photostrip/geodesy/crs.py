@@ -17,6 +17,7 @@ import re
 import warnings
 from dataclasses import dataclass
 from functools import cache, cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,7 +28,6 @@ from photostrip.geodesy.ground_frame import WGS84, DatumShift, GroundFrame
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
     from numpy.typing import NDArray
     from pyproj import CRS, Transformer
@@ -98,6 +98,16 @@ class _Operation:
         """Accuracy that PROJ states, metres; None when it states none, or has not chosen yet."""
         stated = float(self.transformer.accuracy)
         return stated if stated >= 0.0 else None
+
+    @property
+    def grids(self) -> tuple[str, ...]:
+        """Paths of the grid files that the operation reads."""
+        steps = self.transformer.operations or ()
+        named = re.findall(r"\bgrids=(\S+)", self.transformer.definition)
+        paths = [name for names in named for name in names.split(",") if Path(name).is_file()]
+        return tuple(
+            dict.fromkeys([*paths, *(grid.full_name for step in steps for grid in step.grids if grid.available)])
+        )
 
     def __str__(self) -> str:
         if not self.idle and self._decided_by is None:

@@ -56,6 +56,10 @@ class Operation(Protocol):
     def accuracy(self) -> float | None:
         """Stated accuracy, metres; None when it is not known."""
 
+    @property
+    def grids(self) -> tuple[str, ...]:
+        """Paths of the grid files that are read."""
+
     def apply(self, columns: Array, *, inverse: bool = False) -> Array:
         """Transform rows of coordinates; what lies outside the domain becomes infinite."""
 
@@ -414,6 +418,13 @@ class GroundFrame:
     def datum_accuracy(self) -> float | None:
         """Accuracy that is stated for the datum shift, metres: 0 without one, None when it is not known."""
         return 0.0 if self._shift is None else self._shift.operation.accuracy
+
+    @property
+    def grids(self) -> tuple[str, ...]:
+        """Paths of the grid files that are read for the heights and the datum shift; known after the first use."""
+        shift = None if self._shift is None else self._shift.operation
+        operations = [each for each in (self._plane, self._vertical, shift) if each is not None]
+        return tuple(dict.fromkeys(grid for operation in operations for grid in operation.grids))
 
     def describe(self) -> str:
         """Say in one line what the frame is, for the report.

@@ -111,6 +111,24 @@ class Project:
         seen = (replace(each, file=_seen_from(each.file, self.directory)) for each in self.placed(result.findings))
         return replace(result, findings=tuple(seen))
 
+    def files_read(self, result: Result) -> tuple[Path, ...]:
+        """Give every file that a run read, grids of geoids and datum shifts included.
+
+        Parameters
+        ----------
+        result : Result
+            What the run found.
+
+        Returns
+        -------
+        tuple of Path
+            The project file first; grids beside it as the other files are named.
+        """
+        grids = [Path(grid) for frame in (*result.frames, result.output) for grid in frame.grids]
+        here = self.directory.resolve()
+        near = [self.directory / grid.relative_to(here) if grid.is_relative_to(here) else grid for grid in grids]
+        return tuple(dict.fromkeys([*self.files, *near]))
+
     @contextmanager
     def places(self) -> Iterator[None]:
         """Give faults that are found in what was read, not while it was read, their place in the project file."""

@@ -1,0 +1,108 @@
+"""The shell script and the workflow for CI do what docs/ci.md says."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree as ET
+
+import pytest
+import yaml
+
+from tests.pages import Scratch, blocks
+from tests.results import spec, write_project
+from tests.source_tree import ROOT
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+WORKFLOW = ROOT / "configs/ci/github-workflow.yaml"
+
+
+def workflow() -> Any:  # noqa: ANN401 (any YAML)
+    return yaml.safe_load(WORKFLOW.read_text(encoding="utf-8"))
+
+
+def test_the_page_shows_the_workflow_that_is_shipped() -> None:
+    shown = next(block for block in blocks(ROOT / "docs/ci.md") if block.kind == "yaml")
+    assert "\n".join(shown.lines) == WORKFLOW.read_text(encoding="utf-8").partition("\n")[2].rstrip("\n")
+
+
+def test_the_workflow_installs_this_version() -> None:
+    import photostrip
+
+    steps = workflow()["jobs"]["regress"]["steps"]
+    assert f"photostrip=={photostrip.__version__}" in next(
+        step["run"] for step in steps if "pip" in step.get("run", "")
+    )
+
+
+@pytest.mark.slow
+def test_the_steps_of_the_workflow_run_and_annotate(tmp_path: Path) -> None:
+    scratch = Scratch(tmp_path)
+    shutil.copy(ROOT / "configs/ci/regress.sh", scratch.folder)
+    for name in ("line-07", "line-08"):
+        write_project(scratch.folder / "strips" / name, spec())
+    update = "for n in 07 08; do photostrip compare r strips/line-$n/baseline.json --update; done"
+    outcome = scratch.shell(f"photostrip run strips/line-07/project.yaml -o r -q && {update}")
+    assert outcome.code == 0, outcome.err
+    commands = [step["run"] for step in workflow()["jobs"]["regress"]["steps"] if "run" in step]
+    assert len(commands) == 3
+    check, regress = (command.partition("#")[0] for command in commands[1:])
+    assert scratch.shell(check).code == 0
+    assert scratch.shell(regress).code == 0
+    spoil(scratch.folder / "strips/line-08/baseline.json")
+    failed = scratch.shell(regress)
+    assert failed.code == 1
+    found = [line for line in failed.out if line.startswith("::error")]
+    assert len(found) == 1
+    assert found[0].startswith("::error file=strips/line-08/baseline.json,line=")
+    line = int(found[0].split("line=")[1].split(",")[0])
+    text = (scratch.folder / "strips/line-08/baseline.json").read_text(encoding="utf-8").splitlines()[line - 1]
+    assert '"id": "1002-3"' in text
+    for name, failures in (("line-07", "0"), ("line-08", "1")):
+        suite = ET.parse(scratch.folder / f"build/{name}/compare.xml").getroot()  # noqa: S314 (we wrote it)
+        assert suite.get("failures") == failures
+
+
+def spoil(baseline: Path) -> None:
+    """Move one point by a metre."""
+    lines = baseline.read_text(encoding="utf-8").splitlines()
+    number = next(n for n, line in enumerate(lines) if line.startswith('{"id": "1002-3"'))
+    row = json.loads(lines[number].rstrip(","))
+    row["z"] += 1.0
+    lines[number] = json.dumps(row) + ","
+    baseline.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def run_script(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    environment = os.environ | {"PHOTOSTRIP": f"{sys.executable} -m photostrip", "PYTHONPATH": str(ROOT)}
+    script = str(ROOT / "configs/ci/regress.sh")
+    return subprocess.run(
+        ["bash", script, *arguments], cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+
+
+@pytest.mark.slow
+def test_the_script_goes_on_after_a_failure_and_ends_with_the_worst_code(tmp_path: Path) -> None:
+    for name in ("a", "b", "c"):
+        write_project(tmp_path / name, spec())
+    (tmp_path / "a/observations.csv").unlink()
+    with (tmp_path / "b/project.yaml").open("a", encoding="utf-8") as opened:
+        opened.write("tolerances: {check_rms_xy: 0.0001}\n")
+    done = run_script(tmp_path)
+    assert done.returncode == 2
+    assert [line for line in done.stdout.splitlines() if line.startswith("==")] == ["== a", "== b", "== c"]
+    assert "a/observations.csv does not exist" in done.stderr
+    assert {path.parent.name for path in tmp_path.glob("build/*/result.json")} == {"b", "c"}
+    shutil.rmtree(tmp_path / "a")
+    assert run_script(tmp_path).returncode == 1
+
+
+def test_the_script_refuses_an_empty_folder(tmp_path: Path) -> None:
+    done = run_script(tmp_path)
+    assert (done.returncode, done.stderr) == (2, "no ./*/project.yaml\n")

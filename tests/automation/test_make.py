@@ -1,0 +1,285 @@
+"""configs/Makefile.example with the make of this machine, and --depfile: what it lists is what is read."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from photostrip.cli.main import main
+from tests.geodesy.frames import write_gtx
+from tests.pages import blocks
+from tests.results import spec, write_project
+from tests.source_tree import ROOT
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+COMMON = "photostrip: 1\nextends: deeper.yaml\nprocessing: {refraction: false}\n"
+DEEPER = "photostrip: 1\nprocessing: {scale_transfer: least_squares}\n"
+GEOID = '"+proj=utm +zone=33 +datum=WGS84 +geoidgrids=own.gtx"'
+# Prints what the command opens below a folder.
+SPY = """
+import os, sys
+seen = set()
+def spy(event, arguments):
+    if event == "open" and isinstance(arguments[0], str):
+        path = os.path.realpath(arguments[0])
+        if path.startswith(os.path.realpath(".") + os.sep):
+            seen.add(os.path.relpath(path))
+sys.addaudithook(spy)
+from photostrip.cli.main import main
+code = main(sys.argv[1:])
+sys.stderr.write("\\n".join(sorted(seen)))
+sys.exit(code)
+"""
+
+
+def two_strips(folder: Path) -> None:
+    """Write two strips that extend one file, which extends another; the heights of the second stand above a geoid."""
+    (folder / "common.yaml").write_text(COMMON, encoding="utf-8")
+    (folder / "deeper.yaml").write_text(DEEPER, encoding="utf-8")
+    for name in ("a", "b"):
+        write_project(folder / name, spec(), "extends: ../common.yaml\n")
+    project = folder / "b/project.yaml"
+    text = project.read_text(encoding="utf-8").replace('"EPSG:32633"', f"{GEOID}\n    height: orthometric")
+    project.write_text(text, encoding="utf-8")
+    write_gtx(folder / "b/own.gtx", np.full((41, 41), 45.0), south=30.0, west=0.0, step=1.0)
+
+
+def listed(depfile: Path) -> set[str]:
+    """Give the files of a rule for make."""
+    rule = depfile.read_text(encoding="utf-8").splitlines()[0].split(": ", 1)[1]
+    return {os.path.normpath(re.sub(r"\\(.)", r"\1", name)) for name in re.split(r"(?<!\\) ", rule)}
+
+
+@pytest.mark.parametrize(
+    ("strip", "more"), [("a", set()), ("b", {"b/own.gtx"})], ids=["tables and presets", "a geoid grid"]
+)
+def test_the_depfile_lists_every_file_that_is_read(tmp_path: Path, strip: str, more: set[str]) -> None:
+    two_strips(tmp_path)
+    done = subprocess.run(
+        [sys.executable, "-c", SPY, "run", f"{strip}/project.yaml", "-o", "out", "--depfile", "out/d.mk", "--quiet"],
+        cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    opened = {name for name in done.stderr.splitlines() if not name.startswith("out")}
+    names = {f"{strip}/{name}" for name in ("project.yaml", "observations.csv", "control.csv")}
+    names |= {"common.yaml", "deeper.yaml"}
+    assert opened == names  # the library of the grids opens them by itself, unseen from here
+    assert listed(tmp_path / "out/d.mk") == names | more
+    assert done.returncode == 0
+
+
+def test_a_grid_that_is_far_away_is_listed_by_its_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    two_strips(tmp_path)
+    grid = (tmp_path / "b/own.gtx").rename(tmp_path / "far.gtx")
+    project = tmp_path / "b/project.yaml"
+    project.write_text(project.read_text(encoding="utf-8").replace("own.gtx", str(grid)), encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "b/project.yaml", "-o", "out", "--depfile", "d.mk", "--quiet"]) == 0
+    assert str(grid) in (tmp_path / "d.mk").read_text(encoding="utf-8")
+
+
+# ------------------------------------------------------------------------------------------------------- make
+
+
+class Folder:
+    """A folder of strips with the example Makefile."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        shutil.copy(ROOT / "configs/Makefile.example", path / "Makefile")
+
+    def make(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        """Run make, as a user would type it."""
+        flags = dict.fromkeys(("MAKEFLAGS", "MFLAGS", "MAKELEVEL"), "")
+        environment = os.environ | flags | {"PYTHONPATH": str(ROOT)}
+        command = f"PHOTOSTRIP={sys.executable} -m photostrip"
+        return subprocess.run(
+            ["make", command, *arguments], cwd=self.path, env=environment, capture_output=True, text=True, check=False
+        )
+
+    def times(self) -> dict[str, int]:
+        """Give the time of each result."""
+        return {path.parent.name: path.stat().st_mtime_ns for path in self.path.glob("build/*/result.json")}
+
+    def renewed(self, *arguments: str) -> set[str]:
+        """Give the strips that make adjusted."""
+        before = self.times()
+        done = self.make(*arguments)
+        assert done.returncode == 0, done.stderr
+        return {name for name, when in self.times().items() if when != before.get(name)}
+
+    def touch(self, name: str) -> None:
+        """Give a file a time after everything else."""
+        now = time.time_ns()
+        os.utime(self.path / name, ns=(now, now))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
+def test_make_adjusts_what_changed_and_nothing_else(tmp_path: Path) -> None:
+    two_strips(tmp_path)
+    folder = Folder(tmp_path)
+    assert folder.renewed("-j2") == {"a", "b"}
+    assert folder.renewed("-j2") == set()
+    for touched, expected in (
+        ("a/control.csv", {"a"}),
+        ("b/own.gtx", {"b"}),
+        ("deeper.yaml", {"a", "b"}),
+    ):
+        folder.touch(touched)
+        assert folder.renewed("-j2") == expected, touched
+    assert folder.renewed("RUN_FLAGS=--set processing.polynomial.degree=1") == {"a", "b"}
+    assert folder.renewed() == {"a", "b"}
+    (tmp_path / "build/a/depends.mk").unlink()
+    assert folder.renewed() == {"a"}
+    assert folder.renewed() == set()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
+def test_make_names_a_table_that_is_gone_and_keeps_the_result(tmp_path: Path) -> None:
+    two_strips(tmp_path)
+    folder = Folder(tmp_path)
+    assert folder.make("-j2").returncode == 0
+    before = (tmp_path / "build/a/result.json").read_bytes()
+    (tmp_path / "a/control.csv").unlink()
+    folder.touch("b/control.csv")
+    times = folder.times()
+    done = folder.make("-k", "-j2")
+    assert done.returncode == 2
+    assert re.search(
+        r"error: a/project\.yaml:\d+:\d+: control\[0\]\.file: .*a/control\.csv does not exist", done.stderr
+    )
+    assert (tmp_path / "build/a/result.json").read_bytes() == before
+    assert folder.times()["b"] > times["b"]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
+def test_make_check_compares_and_watches_tolerances(tmp_path: Path) -> None:
+    two_strips(tmp_path)
+    folder = Folder(tmp_path)
+    first = folder.make("-j2", "check")
+    assert first.returncode == 0
+    assert first.stdout.count("no baseline.json") == 2
+    assert folder.make("baselines").returncode == 0
+    again = folder.make("-j2", "check")
+    assert (again.returncode, again.stdout.count("SAME:")) == (0, 2)
+    baseline = json.loads((tmp_path / "a/baseline.json").read_text(encoding="utf-8"))
+    baseline["points"][0]["z"] += 1.0
+    (tmp_path / "a/baseline.json").write_text(json.dumps(baseline), encoding="utf-8")
+    with (tmp_path / "b/project.yaml").open("a", encoding="utf-8") as opened:
+        opened.write("tolerances: {check_rms_xy: 0.0001}\n")
+    for _ in range(2):  # a tolerance that failed is told again, though nothing is adjusted again
+        failed = folder.make("-k", "-j2", "check")
+        assert failed.returncode == 2
+        assert "DIFFERENT: " in failed.stdout
+        assert "FAILED: 1 of 1 tolerance not kept." in failed.stdout
+    assert folder.renewed() == set()
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
+def test_make_in_an_empty_folder_says_so(tmp_path: Path) -> None:
+    done = Folder(tmp_path).make()
+    assert done.returncode == 2
+    assert "no ./*/project.yaml" in done.stderr
+
+
+def test_make_regress_is_the_example_on_the_samples() -> None:
+    text = (ROOT / "Makefile").read_text(encoding="utf-8")
+    assert re.search(r"(?m)^regress: .*\n\t.*-f configs/Makefile\.example STRIPS=sample_data .* check$", text)
+    assert {path.parent for path in (ROOT / "sample_data").glob("*/baseline.json")} == {
+        path.parent for path in (ROOT / "sample_data").glob("*/project.yaml")
+    }
+
+
+# -------------------------------------------------------------------------------------------------- Snakemake
+
+
+def snakefile() -> str:
+    """Give the Snakefile of the docs."""
+    found = [block for block in blocks(ROOT / "docs/make.md") if block.option("file") == "Snakefile"]
+    return "\n".join(found[0].lines) + "\n"
+
+
+def test_the_snakefile_reads_what_the_depfile_holds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The one function of ours in it, without Snakemake: blanks in names, and the first run."""
+    from photostrip.formats.writing import make_rule
+
+    monkeypatch.chdir(tmp_path)
+    text = snakefile()
+    room: dict[str, object] = {}
+    exec(compile(text[: text.index("rule all")], "Snakefile", "exec"), room)  # noqa: S102
+
+    class Wildcards:
+        strip = "a"
+
+    sources = room["sources"]
+    assert callable(sources)
+    (tmp_path / "strips/a").mkdir(parents=True)
+    (tmp_path / "strips/a/project.yaml").touch()
+    assert sources(Wildcards) == "strips/a/project.yaml"
+    names = ["strips/a/project.yaml", "strips/a/my points.csv", "common.yaml"]
+    (tmp_path / "build/a").mkdir(parents=True)
+    (tmp_path / "build/a/depends.mk").write_text(make_rule("build/a/result.json", names), encoding="utf-8")
+    for name in names[1:]:
+        with pytest.raises(FileNotFoundError, match=name):
+            sources(Wildcards)
+        (tmp_path / name).touch()
+    assert sources(Wildcards) == names
+    later = time.time_ns() + 10**9
+    os.utime(tmp_path / "strips/a/project.yaml", ns=(later, later))
+    assert sources(Wildcards) == names[0]
+
+
+@pytest.mark.slow
+def test_snakemake_runs_the_snakefile(tmp_path: Path) -> None:
+    command = os.environ.get("SNAKEMAKE", shutil.which("snakemake") or "")
+    if not command:
+        pytest.skip("needs snakemake")
+    (tmp_path / "strips").mkdir()
+    two_strips(tmp_path / "strips")
+    (tmp_path / "Snakefile").write_text(snakefile(), encoding="utf-8")
+    stand_in = tmp_path / "bin/photostrip"
+    stand_in.parent.mkdir()
+    script = f'#!/bin/sh\nPYTHONPATH="{ROOT}" exec "{sys.executable}" -m photostrip "$@"\n'
+    stand_in.write_text(script, encoding="utf-8")
+    stand_in.chmod(0o755)
+    environment = os.environ | {"PATH": f"{stand_in.parent}{os.pathsep}{os.environ['PATH']}"}
+    environment.pop("PYTHONPATH", None)
+
+    def run(*targets: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [command, *targets, "--cores", "2", "--rerun-triggers", "mtime"], cwd=tmp_path, env=environment,
+            capture_output=True, text=True, check=False,
+        )  # fmt: skip
+
+    def times() -> dict[str, int]:
+        return {path.parent.name: path.stat().st_mtime_ns for path in tmp_path.glob("build/*/result.json")}
+
+    first = run()
+    assert first.returncode == 0, first.stderr
+    before = times()
+    assert set(before) == {"a", "b"}
+    now = time.time_ns()
+    os.utime(tmp_path / "strips/b/own.gtx", ns=(now, now))
+    assert run().returncode == 0
+    assert times()["a"] == before["a"]
+    assert times()["b"] > before["b"]
+    (tmp_path / "strips/a/baseline.json").write_bytes((tmp_path / "build/a/result.json").read_bytes())
+    assert run("build/a/compare.txt").returncode == 0
+    assert "SAME: " in (tmp_path / "build/a/compare.txt").read_text(encoding="utf-8")
+    (tmp_path / "strips/a/control.csv").unlink()
+    gone = run()
+    assert gone.returncode != 0
+    assert "strips/a/control.csv, which strip a was made from, is gone" in gone.stderr
