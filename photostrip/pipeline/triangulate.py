@@ -10,7 +10,7 @@ import numpy as np
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geodesy.crs import tie_frames
 from photostrip.notes import Note
-from photostrip.pipeline import overruling, plausibility
+from photostrip.pipeline import overruling, plausibility, precision
 from photostrip.pipeline.inputs import ADJUSTMENTS
 from photostrip.pipeline.results import Adjusted, Result, Ties
 from photostrip.pipeline.strip import adjust_strip
@@ -83,6 +83,7 @@ def _triangulated(inputs: Inputs, settings: Settings, directory: Path | None) ->
     rows, differences = _at_given_points(inputs, frames, points, refined.observations)
     missing = _not_determined(refined.observations, points, inputs, strips)
     notes = _notes(inputs, settings, strips, fiducial)
+    precise = [precision.of_strip(strip, refined.observations, frames) for strip in strips]
     return Result(
         inputs,
         settings,
@@ -97,6 +98,7 @@ def _triangulated(inputs: Inputs, settings: Settings, directory: Path | None) ->
         ties,
         missing,
         notes,
+        precision.joined(precise, strips, points),
     )
 
 

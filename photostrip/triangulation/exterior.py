@@ -122,6 +122,36 @@ def resect(xy: Floats, points: Floats, photo: Numbers, focal: Floats, start: tup
     return Resection(centers, rotations, residuals, rms, solved)
 
 
+def partials(arm: Floats, rotations: Floats, focal: Floats, distance: Floats) -> tuple[Floats, Floats, Floats]:
+    """Image coordinates of points, and their derivatives by the orientation of the photo along its own axes.
+
+    Parameters
+    ----------
+    arm : ndarray, shape (m, 3)
+        Points from the perspective centre of their photo.
+    rotations : ndarray, shape (m, 3, 3)
+        Photo to the frame of the points.
+    focal : ndarray, shape (m,)
+        Principal distances in mm.
+    distance : ndarray, shape (m,)
+        Unit in which the centre moves.
+
+    Returns
+    -------
+    by_x, by_y : ndarray, shape (6, m)
+        Derivatives of x and y by a shift of the centre and a small rotation, both along the axes of the photo.
+    xy : ndarray, shape (2, m)
+        Image coordinates in mm.
+    """
+    u, v, w = np.einsum("mi,mij->jm", arm, rotations)
+    x, y = -focal * u / w, -focal * v / w
+    unit = focal * distance / w  # image shift by moving the centre one distance, at this depth
+    zero = np.zeros_like(x)
+    by_x = np.stack([unit, zero, unit * x / focal, -x * y / focal, focal + x * x / focal, y])
+    by_y = np.stack([zero, unit, unit * y / focal, -(focal + y * y / focal), x * y / focal, -x])
+    return by_x, by_y, np.stack([x, y])
+
+
 def _steps(
     xy: Floats,
     points: Floats,
@@ -137,13 +167,7 @@ def _steps(
     """
     centers, rotations = orientation
     present, starts = segments
-    u, v, w = np.einsum("mi,mij->jm", points - centers[photo], rotations[photo])
-    f = focal[photo]
-    x, y = -f * u / w, -f * v / w
-    unit = f * distance[photo] / w  # image shift by moving the centre one distance, at this depth
-    zero = np.zeros_like(x)
-    by_x = np.stack([unit, zero, unit * x / f, -x * y / f, f + x * x / f, y])
-    by_y = np.stack([zero, unit, unit * y / f, -(f + y * y / f), x * y / f, -x])
+    by_x, by_y, (x, y) = partials(points - centers[photo], rotations[photo], focal[photo], distance[photo])
     misfit_x, misfit_y = xy[:, 0] - x, xy[:, 1] - y
     products = np.concatenate(
         [by_x[UPPER[0]] * by_x[UPPER[1]] + by_y[UPPER[0]] * by_y[UPPER[1]], by_x * misfit_x + by_y * misfit_y]

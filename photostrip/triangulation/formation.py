@@ -71,6 +71,8 @@ class Junctions:
         Ratio of the scales of the models, after over before.
     spread : ndarray, shape (j,)
         Relative standard deviation of a single ratio; NaN with one point.
+    weight : ndarray, shape (t,)
+        Weight of each ratio in the factor; 0 where it was not used.
     """
 
     joint: Numbers
@@ -82,6 +84,7 @@ class Junctions:
     limit: Floats
     factor: Floats
     spread: Floats
+    weight: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,7 +241,7 @@ def transfer_scale(
     spreads = scale_screening.spreads(orientation, vectors, (joint, before, after), sigma)
     used, limit = scale_screening.screen(ratio, weight, spreads, joint, joints)
     factor, spread = _factors(ratio, weight * used, joint, joints, settings)
-    return Junctions(joint, before, after, orientation.point[before], ratio, used, limit, factor, spread)
+    return Junctions(joint, before, after, orientation.point[before], ratio, used, limit, factor, spread, weight * used)
 
 
 def _require_joints(joint: Numbers, joints: int, photos: Sequence[str]) -> None:

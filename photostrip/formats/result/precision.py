@@ -152,13 +152,14 @@ def photo_columns(result: Result, number: int, place: Floats, rotations: Floats)
 
 def _rates(rotations: Floats, system: str) -> Floats:
     """Give changes of the angles by small rotations about the output's axes; NaN where they cannot be separated."""
-    rates = np.full((len(rotations), 3, 3), np.nan)
-    for row, rotation in enumerate(rotations):
-        try:
-            rates[row] = np.linalg.inv(angle_rates(angles(rotation, system), system))
-        except GeometryError:
-            continue
-    return rates
+    try:
+        return np.asarray(np.linalg.inv(angle_rates(angles(rotations, system), system)), float)
+    except GeometryError:  # some photo is the exception
+        single = [
+            _rates(rotation[None], system) if len(rotations) > 1 else np.full((1, 3, 3), np.nan)
+            for rotation in rotations
+        ]
+        return np.concatenate(single)
 
 
 # --------------------------------------------------------------------------------------------------------- block

@@ -1,0 +1,256 @@
+"""How precise points and photos of a result are: every strip by itself, then all together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.pipeline.results import Precision
+from photostrip.statistics import chi2_quantile
+from photostrip.triangulation import absolute, control_errors, photo_errors, precision, strip_errors
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.geodesy.crs import GroundFrame
+    from photostrip.pipeline.results import Adjusted, StripResult
+    from photostrip.points import PhotoPoints
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+A_PRIORI, A_POSTERIORI = "a-priori", "a-posteriori"
+LEVEL = 0.01  # of the test that keeps the stated standard deviation of the image coordinates
+
+
+@dataclass(frozen=True, eq=False)
+class StripPrecision:
+    """Covariances of one strip in the axes of the Cartesian frame.
+
+    Parameters
+    ----------
+    points : ndarray, shape (q, 3, 3)
+        Of the points of the strip, metres^2.
+    photos : ndarray, shape (m, 6, 6)
+        Of centre and small rotation of its photos; NaN where a photo could not be oriented.
+    influence : ndarray, shape (q, 3, t)
+        Points by the parameters fitted to the control.
+    operator : ndarray, shape (t, w)
+        Those parameters by errors of the control coordinates that count.
+    control : ndarray of int, shape (w, 2)
+        These coordinates: the control point's number among the image points' ids, and its ground axis.
+    variance : ndarray, shape (w,)
+        Their variances, metres^2.
+    sigma : float
+        Standard deviation of an image coordinate of weight one, mm.
+    basis : str
+        Where that comes from.
+    """
+
+    points: Floats
+    photos: Floats
+    influence: Floats
+    operator: Floats
+    control: Numbers
+    variance: Floats
+    sigma: float
+    basis: str
+
+
+def image_variance(strip: StripResult, sigma: float) -> tuple[float, str]:
+    """Variance factor of the image coordinates: 1 unless the y parallaxes contradict what is stated.
+
+    Parameters
+    ----------
+    strip : StripResult
+        The strip.
+    sigma : float
+        Stated standard deviation of an image coordinate of weight one, mm.
+
+    Returns
+    -------
+    factor : float
+        Variance found over variance stated, or 1.
+    basis : str
+        ``"a-posteriori"`` or ``"a-priori"``.
+    """
+    pairs = strip.orientation.pairs
+    redundancy = int((strip.orientation.points_used - 5).sum())
+    squares = float((pairs.weight * strip.orientation.parallax**2)[strip.orientation.used].sum()) / (2 * sigma**2)
+    if redundancy < 1:
+        return 1.0, A_PRIORI
+    low, high = (chi2_quantile(p, redundancy) for p in (LEVEL / 2, 1 - LEVEL / 2))
+    return (1.0, A_PRIORI) if low <= squares <= high else (squares / redundancy, A_POSTERIORI)
+
+
+@dataclass(frozen=True, eq=False)
+class Propagation:
+    """Rows of derivatives of one strip in its intermediate frame, and what the fit to the control takes away.
+
+    Parameters
+    ----------
+    errors : strip_errors.StripErrors
+        The formed strip.
+    control : control_errors.Misclosures
+        Control coordinates that count.
+    fit : control_errors.Correction
+        Similarity and polynomials.
+    influence : ndarray, shape (q, 3, t)
+        Points by the parameters of the fit.
+    photos : strip_errors.Rows
+        Photos that could be oriented.
+    photo_influence : ndarray, shape (k, 6, t)
+        The same of them.
+    oriented : ndarray of int, shape (k,)
+        Their places in the strip.
+    """
+
+    errors: strip_errors.StripErrors
+    control: control_errors.Misclosures
+    fit: control_errors.Correction
+    influence: Floats
+    photos: strip_errors.Rows
+    photo_influence: Floats
+    oriented: Numbers
+
+
+def propagation(strip: StripResult, observations: PhotoPoints, frames: Sequence[GroundFrame]) -> Propagation:
+    """Differentiate the strip method for one strip.
+
+    Parameters
+    ----------
+    strip : StripResult
+        The strip with all its stages.
+    observations : PhotoPoints
+        Ideal image coordinates of the project.
+    frames : sequence of GroundFrame
+        Ground frames of the control.
+
+    Returns
+    -------
+    Propagation
+        Everything that covariances are made of.
+    """
+    position = places(strip, observations)
+    similarity = strip.absolute.similarity
+    errors = strip_errors.strip_errors(strip.orientation, strip.formed, similarity, position, observations.sigma)
+    xyz = similarity(strip.formed.xyz)
+    found, fit = _fit_to_control(strip, errors, xyz, frames)
+    influence = fit.influence(xyz)
+    rows = photo_errors.photo_rows(errors, sightings(strip, observations), strip.resection, influence)
+    return Propagation(errors, found, fit, influence, *rows)
+
+
+def places(strip: StripResult, observations: PhotoPoints) -> Numbers:
+    """Place in a strip of the photo of every image point; -1 for photos of other strips."""
+    place = {photo: number for number, photo in enumerate(strip.strip.photos)}
+    return np.array([place.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo]
+
+
+def sightings(strip: StripResult, observations: PhotoPoints) -> photo_errors.Sightings:
+    """Collect the image points on which the photos of a strip were oriented."""
+    point = np.searchsorted(strip.formed.point, observations.point[strip.rows])
+    focal = strip.strip.camera.principal_distance
+    photo = places(strip, observations)[strip.rows]
+    return photo_errors.Sightings(photo, point, strip.rows, strip.xyz[point], focal)
+
+
+def of_strip(strip: StripResult, observations: PhotoPoints, frames: Sequence[GroundFrame]) -> StripPrecision:
+    """Covariances of one strip by similarity or polynomial.
+
+    Parameters
+    ----------
+    strip : StripResult
+        The strip with all its stages.
+    observations : PhotoPoints
+        Ideal image coordinates of the project.
+    frames : sequence of GroundFrame
+        Ground frames of the control.
+
+    Returns
+    -------
+    StripPrecision
+        Covariances of points and photos.
+    """
+    found = propagation(strip, observations, frames)
+    errors, operator = found.errors, found.fit.operator
+    stated = float(np.median(observations.sigma[places(strip, observations) >= 0]))
+    factor, basis = image_variance(strip, stated)
+    parameters = precision.fitted(errors, found.control, operator, factor)
+    points = precision.covariances(errors, errors.points, parameters, found.influence) * factor
+    photos = np.full((len(strip.strip.photos), 6, 6), np.nan)
+    photos[found.oriented] = precision.covariances(errors, found.photos, parameters, found.photo_influence) * factor
+    axes, both = strip.intermediate.axes, np.zeros((6, 6))
+    both[:3, :3] = both[3:, 3:] = axes
+    numbers = strip.formed.point[strip.control_rows][found.control.point]
+    return StripPrecision(
+        axes @ points @ axes.T,
+        both @ photos @ both.T,
+        axes @ found.influence,
+        operator,
+        np.column_stack([numbers, found.control.axis]),
+        found.control.variance,
+        stated * float(np.sqrt(factor)),
+        basis,
+    )
+
+
+def _fit_to_control(
+    strip: StripResult, errors: strip_errors.StripErrors, xyz: Floats, frames: Sequence[GroundFrame]
+) -> tuple[control_errors.Misclosures, control_errors.Correction]:
+    """Misclosures at the control and the operator of the fit, with the weights that were in force."""
+    targets = absolute.Targets(strip.control, frames, strip.intermediate)
+    at_control = xyz[strip.control_rows]
+    control = targets.turned(at_control)
+    found = control_errors.misclosures(errors.points, control, strip.control_rows, targets.axes(at_control))
+    terms = [axis.terms for axis in strip.polynomial.axes] if strip.polynomial else [(), (), ()]
+    weight = absolute.weights(control, strip.precision)
+    return found, control_errors.correction(found, weight, at_control, terms, errors.origin)
+
+
+def joined(strips: Sequence[StripPrecision], results: Sequence[StripResult], points: Adjusted) -> Precision:
+    """Precision of all strips together; a point of several strips is their mean.
+
+    Parameters
+    ----------
+    strips : sequence of StripPrecision
+        Precision of each strip.
+    results : sequence of StripResult
+        The strips.
+    points : Adjusted
+        Points of all strips.
+
+    Returns
+    -------
+    Precision
+        Covariances of points and photos. Strips have no image coordinate in common; what their points share are the
+        errors of common control.
+    """
+    rows = [np.searchsorted(points.number, result.formed.point) for result in results]
+    count = np.bincount(np.concatenate(rows), minlength=len(points.number))
+    total = np.zeros((len(points.number), 3, 3))
+    for row, strip in zip(rows, strips, strict=True):
+        total[row] += strip.points
+    for (row_a, a), (row_b, b) in combinations(zip(rows, strips, strict=True), 2):
+        shared, in_a, in_b = np.intersect1d(row_a, row_b, return_indices=True)
+        _, of_a, of_b = np.intersect1d(_keys(a), _keys(b), return_indices=True)
+        if len(shared) and len(of_a):
+            seen_a, seen_b = a.influence[in_a] @ a.operator[:, of_a], b.influence[in_b] @ b.operator[:, of_b]
+            mixed = (seen_a * a.variance[of_a]) @ seen_b.transpose(0, 2, 1)
+            total[shared] += mixed + mixed.transpose(0, 2, 1)
+    return Precision(
+        total / (count**2)[:, None, None],
+        tuple(strip.photos for strip in strips),
+        tuple(strip.sigma for strip in strips),
+        tuple(strip.basis for strip in strips),
+    )
+
+
+def _keys(strip: StripPrecision) -> Numbers:
+    """One number for each control coordinate."""
+    return np.asarray(strip.control[:, 0] * 3 + strip.control[:, 1], np.intp)

@@ -1,0 +1,125 @@
+"""The sparse rows of the precision written out in full, for strips small enough for that."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.formats.simulation import inputs_of
+from photostrip.pipeline import Settings, triangulate
+from photostrip.pipeline import precision as pipeline_precision
+from photostrip.simulate.simulation import simulate
+from photostrip.simulate.spec import Control, Flight, Image, Points, Spec
+from photostrip.triangulation import relative
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.geodesy.local_frame import IntermediateFrame
+    from photostrip.pipeline import Inputs, Result
+    from photostrip.triangulation.strip_errors import Rows, StripErrors
+
+    Floats = NDArray[np.float64]
+
+UNSCREENED = relative.Settings(screening="none")
+SIGMA = 0.005  # mm
+
+
+def spec(photos: int, lap: float = 62.0, *, rows: int = 4, use: dict[str, float] | None = None, bands: int = 4) -> Spec:
+    """Give a small strip over a flat world with hills."""
+    return Spec(
+        flight=Flight(photos=photos, end_lap_percent=lap, heading_deg=70.0),
+        points=Points(rows=rows, extra_per_model=2),
+        control=Control(per_band=3, bands=bands, check=4, sigma=(0.05, 0.06, 0.08), use=use or {"xyz": 1.0}),
+        image=Image(SIGMA * 1000),
+    )
+
+
+def without_noise(wanted: Spec) -> Inputs:
+    """Give the inputs of a strip with true coordinates, and the standard deviations it would have."""
+    control = replace(wanted.control, noise=(0.0, 0.0, 0.0))
+    inputs = inputs_of(simulate(replace(wanted, image=Image(0.0), control=control)))
+    sigma = np.full((len(inputs.observations), 2), wanted.image.sigma_um / 1000)
+    return replace(inputs, observations=replace(inputs.observations, sigma=sigma))
+
+
+def errors_of(result: Result, number: int = 0) -> pipeline_precision.Propagation:
+    """Rows and operators of a strip of a result."""
+    return pipeline_precision.propagation(result.strips[number], result.refined.observations, result.frames)
+
+
+def written_out(rows: Rows, errors: StripErrors) -> Floats:
+    """Derivatives of things by all image coordinates in units of their sigmas, shape (n, d, images * 2)."""
+    images, models = errors.images, errors.models
+    count = len(images.row)
+    units = np.zeros((models + 3, 6, count, 2))
+    for image in range(count):
+        for slot in range(3):
+            model = images.photo[image] - 2 + slot
+            if 0 <= model < models:
+                units[model, :, image] = images.units[image, slot]
+    flat = units.reshape(models + 3, 6, -1)
+    steps = np.einsum("kab,kbc->kac", errors.steps, flat[:models])
+    frames = np.concatenate([np.zeros((1, 7, count * 2)), np.cumsum(steps, axis=0)])
+    result = np.einsum("nda,nac->ndc", rows.frame, frames[rows.first])
+    for slot in range(rows.core.shape[1]):
+        result += np.einsum("nda,nac->ndc", rows.core[:, slot], flat[np.minimum(rows.first + slot, models)])
+    split: Floats = result.reshape(*result.shape[:2], count, 2)
+    for item, image, own in zip(rows.item, rows.image, rows.own, strict=True):
+        split[item, :, image] += own
+    return split.reshape(*split.shape[:2], -1)
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """Points and photos of a result in the axes of one intermediate frame."""
+
+    points: Floats
+    centers: Floats
+    rotations: Floats
+
+    @classmethod
+    def of(cls, result: Result, frame: IntermediateFrame) -> Placed:
+        """Bring a result into a frame."""
+        strip = result.strips[0]
+        there = strip.intermediate
+        centers = there.cartesian_from_intermediate(strip.resection.centers)
+        return cls(
+            frame.intermediate_from_cartesian(strip.cartesian),
+            frame.intermediate_from_cartesian(centers),
+            frame.intermediate_rotations(there.cartesian_rotations(strip.resection.rotations)),
+        )
+
+    def minus(self, other: Placed) -> tuple[Floats, Floats]:
+        """Differences of points (q, 3) and of photos (m, 6): centres and small rotations."""
+        turn = self.rotations @ other.rotations.transpose(0, 2, 1)
+        skew = (turn - turn.transpose(0, 2, 1)) / 2
+        vector = np.column_stack([skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0]])
+        return self.points - other.points, np.column_stack([self.centers - other.centers, vector])
+
+
+def differenced(inputs: Inputs, settings: Settings, image: tuple[int, int], step: float) -> tuple[Floats, Floats]:
+    """Central difference of the whole run by one image coordinate, per mm."""
+    frame = triangulate(inputs, settings).strips[0].intermediate
+    placed = []
+    for sign in (1, -1):
+        xy = inputs.observations.xy.copy()
+        xy[image] += sign * step
+        moved = replace(inputs, observations=replace(inputs.observations, xy=xy))
+        placed.append(Placed.of(triangulate(moved, settings), frame))
+    points, photos = placed[0].minus(placed[1])
+    return points / (2 * step), photos / (2 * step)
+
+
+def differenced_by_control(inputs: Inputs, settings: Settings, row: int, axis: int, step: float) -> Floats:
+    """Central difference of the points of the whole run by one given coordinate."""
+    frame = triangulate(inputs, settings).strips[0].intermediate
+    placed = []
+    for sign in (1, -1):
+        enu = inputs.control.enu.copy()
+        enu[row, axis] += sign * step
+        moved = replace(inputs, control=replace(inputs.control, enu=enu))
+        placed.append(Placed.of(triangulate(moved, settings), frame))
+    return placed[0].minus(placed[1])[0] / (2 * step)
