@@ -281,3 +281,28 @@ def angle_between(first: ArrayLike, second: ArrayLike) -> NDArray[np.float64]:
     chord = np.linalg.norm(a - b, axis=(-2, -1)) / np.sqrt(8.0)
     angle: NDArray[np.float64] = 2 * np.arcsin(np.clip(chord, 0, 1))
     return angle
+
+
+def to_vector(matrix: ArrayLike) -> NDArray[np.float64]:
+    """Vector of a rotation; the inverse of :func:`from_vector`.
+
+    Parameters
+    ----------
+    matrix : array_like, shape (..., 3, 3)
+        Rotation matrices by less than 180 degrees.
+
+    Returns
+    -------
+    ndarray, shape (..., 3)
+        Rotation vectors in radians.
+    """
+    a = np.asarray(matrix, float)
+    sine = 0.5 * np.stack(
+        [a[..., 2, 1] - a[..., 1, 2], a[..., 0, 2] - a[..., 2, 0], a[..., 1, 0] - a[..., 0, 1]], axis=-1
+    )
+    length = np.linalg.norm(sine, axis=-1)
+    angle = np.arctan2(length, 0.5 * (np.trace(a, axis1=-2, axis2=-1) - 1.0))
+    small = length < 1e-9  # noqa: PLR2004  there the vector and its sines are the same
+    factor = np.where(small, 1.0, angle / np.where(small, 1.0, length))
+    vector: NDArray[np.float64] = sine * factor[..., None]
+    return vector

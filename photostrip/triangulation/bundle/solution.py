@@ -9,6 +9,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from photostrip.triangulation.bundle.model import Model
+
     Floats = NDArray[np.float64]
 
 
@@ -65,6 +67,8 @@ class Solution:
         True when the datum came from inner constraints on the points: no control, no positions.
     steps : tuple of Step
         The way from the start, one entry for each step that was taken or refused.
+    model : Model
+        The problem as it was laid out; spares the precision that work.
     """
 
     centers: Floats
@@ -79,6 +83,7 @@ class Solution:
     redundancy: int
     free: bool
     steps: tuple[Step, ...]
+    model: Model
 
     @property
     def sigma0(self) -> float:

@@ -1,0 +1,104 @@
+"""Cholesky factor of normal equations in a band, solutions with it, and the elements of the inverse within the band.
+
+The band is stored as LAPACK wants it: column by column, the diagonal first. Element (i, j) of the matrix then stands
+at place ``i + j * width`` of the flat array (width: elements below the diagonal), so that any block within the band can
+be looked at as a plain matrix without copying; what such a view shows beyond the band is another column's.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.lib.stride_tricks import as_strided
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+STEP = 48  # columns of the inverse that are found at a time
+
+
+class Band:
+    """A symmetric positive definite matrix with a band, and its Cholesky factor.
+
+    Parameters
+    ----------
+    size : int
+        Rows of the matrix.
+    width : int
+        Elements below the diagonal that may differ from zero.
+    """
+
+    def __init__(self, size: int, width: int) -> None:
+        self.size, self.width = size, min(width, size - 1)
+        # The last few rows of views reach beyond the end.
+        self.flat = np.zeros((size + self.width + STEP) * (self.width + 1))
+
+    @property
+    def columns(self) -> Floats:
+        """The storage as LAPACK sees it, shape (width + 1, size), by columns."""
+        return self.flat[: self.size * (self.width + 1)].reshape(self.size, self.width + 1).T
+
+    def place(self, row: Numbers, column: Numbers) -> Numbers:
+        """Places of elements (row >= column) in the flat storage."""
+        return row + column * self.width
+
+    def look(self, row: int, column: int, rows: int, columns: int) -> Floats:
+        """Look at a block; only what lies in the band's lower half belongs to the matrix."""
+        stride = self.flat.itemsize
+        return as_strided(self.flat[row + column * self.width :], (rows, columns), (stride, stride * self.width))
+
+    def factor(self) -> bool:
+        """Replace the matrix by its factor; False when it is not positive definite."""
+        from scipy.linalg.lapack import dpbtrf
+
+        factor, info = dpbtrf(self.columns, lower=1, overwrite_ab=1)
+        if factor.base is not self.flat and not np.shares_memory(factor, self.flat):
+            self.columns[...] = factor
+        return bool(info == 0)
+
+    def solve(self, right: Floats) -> Floats:
+        """Solve for columns (size, c) with the factor."""
+        from scipy.linalg.lapack import dpbtrs
+
+        solution, _ = dpbtrs(self.columns, right, lower=1)
+        found: Floats = solution
+        return found
+
+    def inverse_in_band(self) -> Band:
+        """Give the elements of the inverse within the band.
+
+        Returns
+        -------
+        Band
+            The inverse, lower half; what stands outside the band is not defined.
+
+        Notes
+        -----
+        With columns i and the rows J below them, and L the factor: Z_Ji = -Z_JJ L_Ji L_ii^-1 and
+        Z_ii = (L_ii L_ii')^-1 - (L_Ji L_ii^-1)' Z_Ji, from the last columns to the first.
+        Source: [Takahashi 1973].
+        """
+        from scipy.linalg.lapack import dtrtri
+
+        inverse = Band(self.size, self.width)
+        window = np.zeros((self.width, self.width))
+        for first in range((self.size - 1) // STEP * STEP, -1, -STEP):
+            count = min(STEP, self.size - first)
+            below = min(self.width, self.size - first - count)
+            own, _ = dtrtri(np.tril(np.triu(self.look(first, first, count, count), -self.width)), lower=1)
+            # Below the diagonal blocks, what is within the band: first + count + row - (first + column) <= width.
+            coupling = np.triu(self.look(first + count, first, below, count), count - self.width) @ own
+            under = -window[:below, :below] @ coupling
+            joint = np.zeros((count + self.width, count + self.width))
+            joint[:count, :count] = own.T @ own - coupling.T @ under
+            joint[count : count + below, :count], joint[:count, count : count + below] = under, under.T
+            joint[count:, count:] = window[: self.width, : self.width]
+            row, column = joint.strides
+            sheared = as_strided(joint, (count, self.width + 1), (row + column, row))
+            inverse.columns.T[first : first + count] = sheared
+            window = joint[: self.width, : self.width]
+        return inverse

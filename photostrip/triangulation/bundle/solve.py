@@ -1,0 +1,238 @@
+"""From a problem to its least-squares solution: Gauss-Newton with step control.
+
+Source: [Granshaw 1980] for the reduced normal equations; step control after [Marquardt 1963].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import GeometryError
+from photostrip.geometry.rotation import from_vector
+from photostrip.triangulation.bundle import datum, defects
+from photostrip.triangulation.bundle.linearise import PHOTO, SIGNS, backward
+from photostrip.triangulation.bundle.model import Move, State, model_of, state_of
+from photostrip.triangulation.bundle.reduced import (
+    control_residuals,
+    control_squares,
+    factored,
+    given_at,
+    points_of,
+    reduce,
+)
+from photostrip.triangulation.bundle.solution import Solution, Step
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.triangulation.bundle.layout import Batch
+    from photostrip.triangulation.bundle.linearise import Eliminated
+    from photostrip.triangulation.bundle.model import Model
+    from photostrip.triangulation.bundle.problem import Problem
+    from photostrip.triangulation.bundle.reduced import Reduced
+
+    Floats = NDArray[np.float64]
+
+FIRST_DAMPING = 1e-4
+MORE, LESS = 10.0, 0.1  # factors of the damping after a refused and after a taken step
+LARGEST_DAMPING = 1e8
+ROUNDING = 1e-9  # part of the sum of squares by which it may seem to grow at the minimum
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How the adjustment is driven.
+
+    Parameters
+    ----------
+    iterations : int
+        Steps after which it is given up.
+    converged : float
+        What the steps after the last one may still move, in standard deviations over all parameters together,
+        judged by how much shorter the last step was than the one before it.
+    """
+
+    iterations: int = 30
+    converged: float = 1e-5
+
+
+def solve(problem: Problem, settings: Settings | None = None) -> Solution:
+    """Adjust a bundle of rays.
+
+    Parameters
+    ----------
+    problem : Problem
+        Observations and start values.
+    settings : Settings or None
+        How the adjustment is driven.
+
+    Returns
+    -------
+    Solution
+        Estimate and residuals. Without control and positions the datum comes from inner constraints on the
+        points: the adjusted points have no shift, rotation and change of scale against their start.
+
+    Raises
+    ------
+    GeometryError
+        When points, photos or the datum cannot be determined, by name (``bundle-rays``, ``bundle-rank``), or when
+        the steps do not come to an end (``bundle-diverged``).
+    """
+    settings = settings or Settings()
+    defects.refuse_repeated(problem)
+    model = model_of(problem)
+    free = datum.is_free(problem)
+    state, steps = _iterate(model, settings, free=free)
+    return _solution(model, state, steps, free=free)
+
+
+def _iterate(model: Model, settings: Settings, *, free: bool) -> tuple[State, tuple[Step, ...]]:
+    """Step until a step is short."""
+    start = model.problem.start
+    state = state_of(model, start.centers, start.rotations, start.points, np.zeros(len(model.prior)))
+    damping, steps = 0.0, []
+    if not free:
+        defects.refuse_loose(model, state)
+    best = reduce(model, state)
+    defects.refuse_weak_points(model, best)
+    for _ in range(settings.iterations):
+        move = _move(model, state, best, damping, free=free)
+        steps.append(_told(best, move, damping))
+        moved = _moved(model, state, move)
+        if damping == 0.0 and _still_to_come(steps) < settings.converged:
+            return moved, tuple(steps)
+        found = reduce(model, moved)
+        if found.chi_square <= best.chi_square * (1.0 + ROUNDING):
+            state, best = moved, found
+            damping = 0.0 if damping <= FIRST_DAMPING else damping * LESS
+            continue
+        damping = max(damping * MORE, FIRST_DAMPING)
+        if damping > LARGEST_DAMPING:
+            break
+        best = reduce(model, state, damping)
+    raise GeometryError(f"the bundle adjustment did not come to an end in {len(steps)} steps", code="bundle-diverged")
+
+
+def _still_to_come(steps: list[Step]) -> float:
+    """Foretell the length of the next step from the last two."""
+    last = steps[-1].length
+    before = steps[-2].length if len(steps) > 1 else 1.0
+    return last * min(last / before, 1.0) if before > 0.0 else last
+
+
+def _move(model: Model, state: State, reduced: Reduced, damping: float, *, free: bool) -> Move:
+    """Find the step of all parameters."""
+    own = reduced.blocks[model.structure.own]
+    anchor = datum.anchor(model, state, own) if free else None
+    add = anchor
+    if damping:
+        add = np.eye(PHOTO) * (damping * own) + (0.0 if anchor is None else anchor)
+    band = factored(model, reduced, add)
+    if band is None:
+        defects.refuse_weak_points(model, reduced)
+        defects.refuse_singular(model, reduced, anchor)
+    p = len(state.common)
+    border = reduced.border.reshape(-1, p + 1)
+    solved = band.solve(border)
+    rest = reduced.corner[:p] - border[:, :p].T @ solved
+    defects.refuse_common(model, reduced.corner[:p, :p], rest[:, :p])
+    common = np.asarray(np.linalg.solve(rest[:, :p] + damping * np.diag(np.diag(rest)), rest[:, p]), float)
+    flat = solved[:, p] - solved[:, :p] @ common
+    photos = flat.reshape(-1, PHOTO)
+    eliminated_length = sum(float(np.einsum("cs,cs->", each.rows[-1], each.rows[-1])) for each in reduced.points)
+    square = eliminated_length + float(border[:, p] @ flat) + float(reduced.corner[:p, p] @ common)
+    points = tuple(
+        _shift(batch, eliminated, photos, common[: len(model.calibrated)])
+        for batch, eliminated in zip(model.structure.batches, reduced.points, strict=True)
+    )
+    move = Move(photos, common, points, float(np.sqrt(max(square, 0.0))))
+    return datum.centred(model, state, move) if free else move
+
+
+def _shift(batch: Batch, eliminated: Eliminated, photos: Floats, common: Floats) -> Floats:
+    """Give steps of the points of a batch, (3, S), once those of the photos are known."""
+    k, n = len(batch.photo), PHOTO * len(batch.photo)
+    rows = eliminated.rows
+    shift = np.empty(rows.shape[1:])
+    of_sets, done = photos[batch.sets].reshape(-1, 1, n), 0
+    for first, last, count, size in batch.runs:
+        joint = rows[:n, :, first:last].reshape(n, 3, count, size).transpose(1, 2, 0, 3)
+        shift[:, first:last] = (of_sets[done : done + count] @ joint).reshape(3, -1)
+        done += count
+    if len(common):
+        shift += np.einsum("pcs,p->cs", rows[PHOTO * k : -1], common)
+    np.subtract(rows[-1], shift, out=shift)
+    backward(eliminated.root, shift)
+    return shift
+
+
+def _moved(model: Model, state: State, move: Move) -> State:
+    """Apply a step."""
+    own = (move.photos * SIGNS)[model.structure.rank]
+    return State(
+        state.centers + np.einsum("nij,nj->ni", state.rotations, own[:, :3]),
+        state.rotations @ from_vector(own[:, 3:]),
+        tuple(xyz + shift for xyz, shift in zip(state.xyz, move.points, strict=True)),
+        state.common + move.common,
+    )
+
+
+def _told(reduced: Reduced, move: Move, damping: float) -> Step:
+    """Put a step on record."""
+    shift = max(float(np.abs(part).max(initial=0.0)) for part in (move.photos[:, :3], *move.points))
+    turn = float(np.abs(move.photos[:, 3:]).max(initial=0.0))
+    return Step(reduced.chi_square, move.length, damping, shift, turn)
+
+
+def _solution(model: Model, state: State, steps: tuple[Step, ...], *, free: bool) -> Solution:
+    """Collect estimate and residuals."""
+    problem, structure = model.problem, model.structure
+    residuals = np.zeros((len(problem.images), 2))
+    table, chi_square = model.table(state), 0.0
+    for batch, xyz in zip(structure.batches, state.xyz, strict=True):
+        misfit = model.rays(batch, xyz, table, state.common)[0].misfit
+        chi_square += float(np.einsum("akr,akr->", misfit, misfit))
+        real = batch.real
+        residuals[batch.row[:, real].ravel()] = np.moveaxis(misfit[:, :, real], 0, 2).reshape(-1, 2)
+    residuals *= problem.images.sigma
+    positions, attitudes = given_at(model, state)
+    for linear in (positions, attitudes):
+        chi_square += float(((linear.residual * linear.weight) ** 2).sum())
+    chi_square += control_squares(model, state) + float(((state.common / model.prior) ** 2).sum())
+    return Solution(
+        centers=state.centers,
+        rotations=state.rotations,
+        points=points_of(model, state),
+        common=state.common,
+        image_residuals=residuals,
+        control_residuals=control_residuals(model, state),
+        position_residuals=positions.residual,
+        attitude_residuals=attitudes.residual,
+        chi_square=chi_square,
+        redundancy=_redundancy(model, free=free),
+        free=free,
+        steps=steps,
+        model=model,
+    )
+
+
+def _redundancy(model: Model, *, free: bool) -> int:
+    """Observations minus parameters."""
+    problem = model.problem
+    observed = np.zeros(problem.points, bool)
+    observed[problem.images.point] = True
+    observations = sum(
+        int(np.isfinite(sigma).sum())
+        for sigma in (
+            problem.images.sigma,
+            problem.control.sigma[observed[problem.control.point]],
+            problem.positions.sigma,
+            problem.attitudes.sigma,
+            model.prior,
+        )
+    )
+    unknowns = PHOTO * problem.photos + 3 * int(observed.sum()) + len(model.prior)
+    return observations - unknowns + (datum.DEFECT if free else 0)

@@ -1,0 +1,160 @@
+"""Estimates, cofactors and redundancy numbers against a dense adjustment that was written apart."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from photostrip.geometry.rotation import from_vector
+from photostrip.simulate import Control as SimulatedControl
+from photostrip.simulate import Flight, Points, Spec, simulate
+from photostrip.simulate.bundle import problem_of, truth_of
+from photostrip.triangulation.bundle.precision import precision
+from photostrip.triangulation.bundle.problem import Attitudes, Control, Positions, Problem
+from photostrip.triangulation.bundle.solve import solve
+from tests.bundles import dense
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+SAME = 1e-8  # of the standard deviations
+NO_STEP = 1e-5  # standard deviations: what a further step would still move
+
+LENS = np.zeros((1, 10))
+LENS[0, [0, 1, 2, 6, 7, 8, 9]] = np.inf
+LENS[0, [3, 4]] = 1e-8, 1e-12
+
+
+@cache
+def strip(photos: int = 6, strips: int = 1) -> Problem:
+    """Make a small strip or block on the real Earth, with noise."""
+    spec = Spec(
+        flight=Flight(photos=photos, strips=strips),
+        points=Points(rows=3, extra_per_model=2),
+        control=SimulatedControl(bands=2),
+    )
+    return problem_of(simulate(spec))
+
+
+def with_everything() -> Problem:
+    """Give the strip camera positions with offset and drift, attitudes and a camera to be calibrated."""
+    problem = strip()
+    random = np.random.default_rng(1)
+    m = problem.photos
+    spec = Spec(flight=Flight(photos=6), points=Points(rows=3, extra_per_model=2), control=SimulatedControl(bands=2))
+    truth = truth_of(simulate(spec))
+    lever = np.tile([0.1, 0.2, 1.0], (m, 1))
+    antenna = truth.centers + np.einsum("nij,nj->ni", truth.rotations, lever)
+    positions = Positions(
+        photo=np.arange(m),
+        xyz=antenna + random.normal(0.0, 0.1, (m, 3)) + [1.0, 2.0, 3.0],
+        axes=np.tile(problem.control.axes[0], (m, 1, 1)),
+        sigma=np.full((m, 3), 0.1),
+        lever=lever,
+        group=np.array([0, 0, 0, 1, 1, -1]),
+        time=np.arange(m, dtype=float) - 2.5,
+        offset_sigma=np.array([np.inf, np.inf]),
+        drift_sigma=np.array([0.0, 1.0]),
+    )
+    attitudes = Attitudes(
+        np.arange(1, m),
+        (truth.rotations @ from_vector(random.normal(0.0, 1e-4, (m, 3))))[1:],
+        np.tile([1e-4, 2e-4, np.inf], (m - 1, 1)),
+    )
+    return replace(problem, positions=positions, attitudes=attitudes, cameras=replace(problem.cameras, sigma=LENS))
+
+
+def with_height_only() -> Problem:
+    """Let half of the control count in height only, the rest in plan only, one in all."""
+    problem = strip()
+    sigma = problem.control.sigma.copy()
+    sigma[1::2, :2] = np.inf
+    sigma[2::2, 2] = np.inf
+    return replace(problem, control=replace(problem.control, sigma=sigma))
+
+
+PROBLEMS: dict[str, Callable[[], Problem]] = {
+    "control": strip,
+    "block": lambda: strip(4, 2),
+    "plan and height apart": with_height_only,
+    "free": lambda: replace(strip(), control=Control()),
+    "free block, calibrated": lambda: replace(
+        strip(4, 2), control=Control(), cameras=replace(strip(4, 2).cameras, sigma=LENS)
+    ),
+    "calibrated": lambda: replace(strip(), cameras=replace(strip().cameras, sigma=LENS)),
+    "everything": with_everything,
+}
+
+
+def against(found: Floats, expected: Floats) -> float:
+    """Largest difference of covariances in units of the standard deviations."""
+    deviation = np.sqrt(np.einsum("nii->ni", expected))
+    return float(np.abs((found - expected) / (deviation[:, :, None] * deviation[:, None, :])).max())
+
+
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_estimate_and_cofactors_are_those_of_a_dense_adjustment(name: str) -> None:
+    problem = PROBLEMS[name]()
+    solution = solve(problem)
+    found, expected = precision(solution), dense(problem, solution)
+    m, q, n, p = problem.photos, problem.points, len(problem.images), len(solution.common)
+    cofactors = expected.cofactors
+    deviations = np.sqrt(np.diag(cofactors))
+
+    further = cofactors @ (expected.derivatives.T @ expected.misfit)
+    assert np.abs(further / deviations).max() < NO_STEP
+    assert solution.chi_square == pytest.approx(float(expected.misfit @ expected.misfit), rel=1e-9)
+    images = solution.image_residuals / problem.images.sigma
+    np.testing.assert_allclose(images.ravel(), expected.misfit[: 2 * n], atol=1e-9)
+
+    own = cofactors[: 6 * m, : 6 * m].reshape(m, 6, m, 6)[range(m), :, range(m)]
+    assert against(found.photos, own) < SAME
+    of_points = cofactors[6 * m : 6 * m + 3 * q, 6 * m : 6 * m + 3 * q].reshape(q, 3, q, 3)
+    assert against(found.points, of_points[range(q), :, range(q)]) < SAME
+    if p:
+        assert against(found.common[None], cofactors[None, -p:, -p:]) < SAME
+        mixed = cofactors[: 6 * m, -p:] / np.outer(deviations[: 6 * m], deviations[-p:])
+        scaled = found.photo_common.reshape(6 * m, p) / np.outer(deviations[: 6 * m], deviations[-p:])
+        np.testing.assert_allclose(scaled, mixed, atol=SAME)
+
+
+@pytest.mark.parametrize("name", PROBLEMS)
+def test_redundancy_numbers_are_those_of_a_dense_adjustment(name: str) -> None:
+    problem = PROBLEMS[name]()
+    solution = solve(problem)
+    found, expected = precision(solution), dense(problem, solution).of_misfits()
+    done = 0
+    for cofactors, sigma in (
+        (found.image_residuals, problem.images.sigma),
+        (found.control_residuals, problem.control.sigma),
+        (found.position_residuals, problem.positions.sigma),
+        (found.attitude_residuals, problem.attitudes.sigma),
+    ):
+        rows, size = sigma.shape
+        block = expected[done : done + rows * size, done : done + rows * size].reshape(rows, size, rows, size)
+        scaled = cofactors / (sigma[:, :, None] * sigma[:, None, :])
+        given = np.isfinite(sigma)
+        both = given[:, :, None] & given[:, None, :]
+        np.testing.assert_allclose(scaled[both], block[range(rows), :, range(rows)][both], atol=SAME)
+        done += rows * size
+    weighted = np.isfinite(solution.model.prior)
+    parts = found.common_residuals[weighted] / solution.model.prior[weighted] ** 2
+    np.testing.assert_allclose(parts, np.diag(expected)[done:][weighted], atol=SAME)
+    every = [
+        np.where(np.isfinite(sigma), np.einsum("nii->ni", cofactors) / sigma**2, 0.0).sum()
+        for cofactors, sigma in (
+            (found.image_residuals, problem.images.sigma),
+            (found.control_residuals, problem.control.sigma),
+            (found.position_residuals, problem.positions.sigma),
+            (found.attitude_residuals, problem.attitudes.sigma),
+        )
+    ]
+    assert sum(every) + parts.sum() == pytest.approx(solution.redundancy, abs=1e-5)
