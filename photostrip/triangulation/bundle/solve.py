@@ -56,7 +56,7 @@ class Settings:
     """
 
     iterations: int = 30
-    converged: float = 1e-5
+    converged: float = 1e-6
 
 
 def solve(problem: Problem, settings: Settings | None = None) -> Solution:
