@@ -11,7 +11,7 @@ import numpy as np
 from photostrip.formats.tables import Column, Table, read_table
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -66,7 +66,9 @@ class ControlTable:
         return np.asarray(self.use.any(axis=1), bool)
 
 
-def read_control(file: str, up: int, findings: Findings, *, default_sigma: bool = True) -> ControlTable | None:
+def read_control(
+    file: str, up: int, findings: Findings, *, default_sigma: bool = True, columns: Mapping[str, str] | None = None
+) -> ControlTable | None:
     """Read a table of given ground coordinates.
 
     Parameters
@@ -79,13 +81,15 @@ def read_control(file: str, up: int, findings: Findings, *, default_sigma: bool 
         Where faults and notes go.
     default_sigma : bool
         Whether the project file has standard deviations for rows without them.
+    columns : mapping of str to str, optional
+        Names in the header of columns that are called otherwise than here.
 
     Returns
     -------
     ControlTable or None
         What could be read; None when the header is wrong.
     """
-    table = read_table(file, CONTROL, findings)
+    table = read_table(file, CONTROL, findings, columns=columns)
     if table is None:
         return None
     n = len(table)

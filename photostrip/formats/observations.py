@@ -1,17 +1,23 @@
-"""Points measured on photos: tables ``photo,point,x,y[,sx,sy]`` and, for fiducial marks, ``photo,mark,x,y[,sx,sy]``."""
+"""Points measured on photos: tables ``photo,point,x,y[,sx,sy]`` and, for fiducial marks, ``photo,mark,x,y[,sx,sy]``.
+
+Lists of a stereocomparator, a row for each point of a pair, are read as well: see :mod:`photostrip.formats.pairs`.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.formats import pairs, repeated
 from photostrip.formats.findings import counted
 from photostrip.formats.tables import Column, Table, read_table
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
     from photostrip.formats.findings import Findings
@@ -48,6 +54,8 @@ class Measurements:
         Coordinates in the unit of the table.
     sigma : ndarray, shape (n, 2)
         Standard deviations in the unit of the table; NaN where the row has none.
+    times : ndarray of int, shape (n,)
+        Number of measurements of which each row is the mean.
     """
 
     table: Table
@@ -57,6 +65,7 @@ class Measurements:
     target: Numbers
     xy: Floats
     sigma: Floats
+    times: Numbers
 
     @cached_property
     def photos_measured(self) -> frozenset[str]:
@@ -64,31 +73,61 @@ class Measurements:
         return frozenset(self.photo_ids)
 
 
-def read_measurements(
-    file: str, findings: Findings, *, marks: bool = False, default_sigma: bool = True
-) -> Measurements | None:
+@dataclass(frozen=True)
+class Manner:
+    """How a table of image coordinates is to be read.
+
+    Parameters
+    ----------
+    marks : bool
+        Whether fiducial marks are measured; otherwise points.
+    has_sigma : bool
+        Whether the project has a standard deviation for rows without one.
+    sigma : float or None
+        That standard deviation, in the unit of the table; None when it is none, or stands in another unit.
+    repeated : str
+        ``refuse`` or ``average`` several measurements of one point on a photo; empty: averaged in lists of pairs.
+    columns : mapping of str to str
+        Names in the header of columns that are called otherwise than here.
+    photos : frozenset of str
+        Photos of the strips, by which the names of pairs are understood.
+    """
+
+    marks: bool = False
+    has_sigma: bool = True
+    sigma: float | None = None
+    repeated: str = ""
+    columns: Mapping[str, str] = field(default_factory=dict)
+    photos: frozenset[str] = frozenset()
+
+
+def read_measurements(file: str, findings: Findings, manner: Manner | None = None) -> Measurements | None:
     """Read a table of measured image coordinates.
 
     Parameters
     ----------
     file : str
-        Path of a ``.csv`` or ``.csv.gz`` file.
+        Path of a ``.csv`` or ``.csv.gz`` file: points of photos or of pairs, or marks.
     findings : Findings
         Where faults and notes go.
-    marks : bool
-        Whether fiducial marks are measured; otherwise points.
-    default_sigma : bool
-        Whether the project file has a standard deviation for rows without one.
+    manner : Manner, optional
+        How it is to be read.
 
     Returns
     -------
     Measurements or None
-        What could be read; None when the header is wrong.
+        What could be read, one row for each point of a photo; None when the header is wrong or pairs are none.
     """
-    table = read_table(file, FIDUCIALS if marks else OBSERVATIONS, findings)
+    manner = manner or Manner()
+    layout, others = (FIDUCIALS, ()) if manner.marks else (OBSERVATIONS, pairs.LAYOUTS)
+    table = read_table(file, layout, findings, others=others, columns=manner.columns)
     if table is None:
         return None
-    target = "mark" if marks else "point"
+    in_pairs = pairs.is_pair_list(table)
+    table = pairs.photos_of_pairs(table, manner.photos, findings) if in_pairs else table
+    if table is None:
+        return None
+    target = "mark" if manner.marks else "point"
     read = Measurements(
         table,
         table.ids["photo"],
@@ -97,30 +136,15 @@ def read_measurements(
         table.codes[target],
         np.column_stack([table.column("x"), table.column("y")]),
         np.column_stack([table.column("sx"), table.column("sy")]),
+        np.ones(len(table), np.intp),
     )
-    _refuse_repeated(read, target, findings)
-    if not default_sigma:
-        key = "fiducial_measurements.sigma or observations.sigma" if marks else "observations.sigma"
+    if not manner.has_sigma:
+        key = "fiducial_measurements.sigma or observations.sigma" if manner.marks else "observations.sigma"
         _refuse_without_sigma(table, read.sigma, key, findings)
+    if manner.repeated == "average" or (in_pairs and not manner.repeated):
+        return repeated.averaged(read, target, manner.sigma, findings)
+    repeated.refuse(read, target, findings)
     return read
-
-
-def _refuse_repeated(read: Measurements, target: str, findings: Findings) -> None:
-    """Refuse a second measurement of the same point on the same photo."""
-    key = read.photo * len(read.target_ids) + read.target
-    order = np.argsort(key, kind="stable")
-    again = np.flatnonzero(key[order][1:] == key[order][:-1]) + 1
-    first: dict[int, int] = {}
-    for place in again:
-        row = int(order[place])
-        number = first.setdefault(int(key[row]), int(order[place - 1]))
-        if findings.full(read.table.file):
-            findings.count(read.table.file, 1)
-            continue
-        name, photo = read.target_ids[read.target[row]], read.photo_ids[read.photo[row]]
-        message = f"{target} {name} is measured on photo {photo} already, in line {read.table.lines[number]}"
-        fix = "keep one of the two, or give one another id"
-        findings.add(read.table.fault(row, target, message, "measured-twice", fix=fix))
 
 
 def _refuse_without_sigma(table: Table, sigma: Floats, key: str, findings: Findings) -> None:

@@ -40,7 +40,7 @@ GROUND_STEP, GROUND_STEP_FREE = 1e-4, 1e-7  # metres, likewise
 TRUE_STEP = 1e-7  # metres to which the truth is rounded
 ANGLE_DECIMALS = 10  # degrees: 2e-12 rad
 ANGLE_SYSTEM = "alpha-omega-kappa"
-MM_PER = {"mm": 1.0, "um": 1e-3}
+MM_PER = {"mm": 1.0, "um": 1e-3, "0.1um": 1e-4}
 
 
 # ------------------------------------------------------------------------------------------------ in memory

@@ -44,6 +44,24 @@ class TableText:
     def _lines(self) -> list[str]:
         return self.stream().readlines()
 
+    def placed_as(self, column: str, where: str) -> TableText:
+        """Give the text with a column placed where another one stands.
+
+        Parameters
+        ----------
+        column, where : str
+            Name of the column, and of the one in its place.
+
+        Returns
+        -------
+        TableText
+            The same text.
+        """
+        places, header = dict(self.where), dict(self.header)
+        if where in places:
+            places[column], header[column] = places[where], header[where]
+        return TableText(self.file, self.data, places, header)
+
     def fault(self, line: int, column: str, message: str, code: str, *, expected: str = "", fix: str = "") -> Fault:
         """Make a fault with the place of a cell.
 

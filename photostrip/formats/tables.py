@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import csv
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from operator import itemgetter
 from typing import TYPE_CHECKING
@@ -23,7 +23,7 @@ from photostrip.formats.table_text import TableText, content
 from photostrip.notes import Note
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -57,6 +57,8 @@ class Column:
         The only values allowed, the first being that of an empty cell.
     aliases : tuple of str
         Other names for it.
+    header : str
+        The only name for it in this table, in lower case; empty: its name and its aliases.
     """
 
     name: str
@@ -66,6 +68,12 @@ class Column:
     positive: bool = False
     words: tuple[str, ...] = ()
     aliases: tuple[str, ...] = ()
+    header: str = ""
+
+    @property
+    def accepted(self) -> tuple[str, ...]:
+        """Names in the header that mean this column, in lower case."""
+        return (self.header,) if self.header else (self.name, *self.aliases)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +114,38 @@ class Table:
         ids = self.ids[name]
         return [ids[code] for code in self.codes[name]]
 
+    def take(self, rows: Numbers) -> Table:
+        """Give the table of some rows.
+
+        Parameters
+        ----------
+        rows : ndarray of int
+            Numbers of the rows to keep, in their order.
+
+        Returns
+        -------
+        Table
+            With the same ids.
+        """
+        numbers = {name: each[rows] for name, each in self.numbers.items()}
+        codes = {name: each[rows] for name, each in self.codes.items()}
+        return replace(self, lines=self.lines[rows], numbers=numbers, codes=codes)
+
+    def placed_as(self, column: str, where: str) -> Table:
+        """Give the table with the faults of a column that it does not have placed at one that it has.
+
+        Parameters
+        ----------
+        column, where : str
+            Name of the column, and of the one in its place.
+
+        Returns
+        -------
+        Table
+            The same rows.
+        """
+        return replace(self, _source=self._source.placed_as(column, where))
+
     def fault(self, row: int, column: str, message: str, code: str, *, expected: str = "", fix: str = "") -> Fault:
         """Make a fault with the place of a cell.
 
@@ -126,7 +166,14 @@ class Table:
         return self._source.fault(int(self.lines[row]), column, message, code, expected=expected, fix=fix)
 
 
-def read_table(file: str, layout: Sequence[Column], findings: Findings) -> Table | None:
+def read_table(
+    file: str,
+    layout: Sequence[Column],
+    findings: Findings,
+    *,
+    others: Sequence[Sequence[Column]] = (),
+    columns: Mapping[str, str] | None = None,
+) -> Table | None:
     """Read a table.
 
     Parameters
@@ -137,6 +184,10 @@ def read_table(file: str, layout: Sequence[Column], findings: Findings) -> Table
         Columns the format knows.
     findings : Findings
         Where faults and notes go.
+    others : sequence of sequence of Column
+        Other layouts of the same kind of table; that of which the header has most is taken, the first when in doubt.
+    columns : mapping of str to str, optional
+        Names in the header of columns that the user calls otherwise.
 
     Returns
     -------
@@ -151,7 +202,18 @@ def read_table(file: str, layout: Sequence[Column], findings: Findings) -> Table
         return None
     if marked:
         findings.notes.append(Note("byte-order-mark", BYTE_ORDER_MARK, "note", file=file, line=1))
-    return _Reader(TableText(file, data), layout, findings).read()
+    layouts = [_renamed(each, columns or {}) for each in (layout, *others)]
+    return _Reader(TableText(file, data), layouts, findings).read()
+
+
+def _renamed(layout: Sequence[Column], columns: Mapping[str, str]) -> tuple[Column, ...]:
+    """Give a layout the names that the user has for its columns; nothing else is read for those."""
+    return tuple(
+        replace(column, header=columns[column.name].strip().casefold(), required=True)
+        if column.name in columns
+        else column
+        for column in layout
+    )
 
 
 class _Codes(dict[str, int]):
@@ -165,8 +227,9 @@ class _Codes(dict[str, int]):
 class _Reader:
     """One pass over one table."""
 
-    def __init__(self, source: TableText, layout: Sequence[Column], findings: Findings) -> None:
-        self.source, self.layout, self.findings = source, layout, findings
+    def __init__(self, source: TableText, layouts: Sequence[Sequence[Column]], findings: Findings) -> None:
+        self.source, self.layouts, self.findings = source, layouts, findings
+        self.layout = layouts[0]
         self.rows = csv.reader(source.stream(), strict=True, skipinitialspace=True)
         self.width = 0
         self.columns: list[Column] = []
@@ -213,9 +276,19 @@ class _Reader:
             names.pop()
         self.width = len(names)
         before = self.findings.number(self.source.file)
+        self.layout = self._fitting({name.casefold() for name in names})
         if self._looks_like_a_header(names, line):
             self._assign(names, line)
         return self.findings.number(self.source.file) == before
+
+    def _fitting(self, names: set[str]) -> Sequence[Column]:
+        """Layout that misses the fewest of its columns, of those the one that has most; the first when in doubt."""
+
+        def unlike(layout: Sequence[Column]) -> tuple[int, int]:
+            found = [bool(names & set(column.accepted)) for column in layout if column.required]
+            return len(found) - sum(found), -sum(found)
+
+        return min(self.layouts, key=unlike)
 
     def _looks_like_a_header(self, names: list[str], line: int) -> bool:
         """Refuse a first line that is not a header, and say what it is instead."""
@@ -229,7 +302,7 @@ class _Reader:
             fix = "save as CSV with commas between the fields and points in the numbers"
             self._add(line, "", message, "separator", expected="commas", fix=fix)
             return False
-        known = {alias for column in self.layout for alias in (column.name, *column.aliases)}
+        known = {alias for column in self.layout for alias in column.accepted}
         if not {name.casefold() for name in names} & known:
             message = f"the first line `{shown(','.join(names))}` is not a header"
             self._add(line, "", message, "no-header", expected=f"column names such as `{wanted}`")
@@ -240,8 +313,7 @@ class _Reader:
         """Find the columns of the format among the names of the header."""
         unused = dict(enumerate(names))
         for column in self.layout:
-            accepted = (column.name, *column.aliases)
-            places = [place for place, name in unused.items() if name.casefold() in accepted]
+            places = [place for place, name in unused.items() if name.casefold() in column.accepted]
             if places:
                 self.columns.append(column)
                 self.source.where[column.name] = places[0]
@@ -263,7 +335,7 @@ class _Reader:
         for column in self.layout:
             if column.required and column not in self.columns:
                 expected = ",".join(each.name for each in self.layout if each.required)
-                message = f"there is no column `{column.name}`"
+                message = f"there is no column `{column.header or column.name}`"
                 near = suggestion(column.name, unused.values()) if len(column.name) > 1 else ""
                 fix = near or f"found: {', '.join(shown(name) or '(no name)' for name in self._names(unused))}"
                 self._add(line, column.name, message, "missing-column", expected=f"a header `{expected}`", fix=fix)

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-MICROMETRES = 1000.0  # in a millimetre
+PER_MILLIMETRE = {"mm": 1.0, "um": 1e3, "0.1um": 1e4}
 RADIANS = {"deg": np.pi / 180, "gon": np.pi / 200, "rad": 1.0}  # in a unit of angles
 
 
@@ -39,7 +39,7 @@ class ImageSystem:
     Parameters
     ----------
     unit : str
-        ``mm``, ``um`` or ``px``.
+        ``mm``, ``um``, ``0.1um`` or ``px``.
     y_axis : str
         ``up`` or ``down``.
     origin : str
@@ -156,7 +156,7 @@ def _millimetres(unit: str, owner: camera.Camera | None) -> tuple[float, float]:
     """Factor and divisor that make millimetres of a unit; a division keeps 12345 um exactly 12.345 mm."""
     if unit == "px":
         return (owner.pixel_size or np.nan) if owner is not None else np.nan, 1.0
-    return 1.0, MICROMETRES if unit == "um" else 1.0
+    return 1.0, PER_MILLIMETRE[unit]
 
 
 def _corner(owner: camera.Camera | None, *, half_pixel: bool) -> tuple[float, float]:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     Numbers = NDArray[np.intp]
     Document = dict[str, Any]
+    Reason = tuple[str, NDArray[np.bool_], NDArray[np.object_]]
 
 IN_NO_STRIP = "its photo belongs to no strip"
 ONCE = "the point is measured on one photo only"
@@ -122,13 +123,13 @@ def _measured(read: Measurements, photos: set[str], gaps: set[str]) -> Document:
         (ONCE, ~stranger & once, names),
         (NO_NEIGHBOUR, ~stranger & ~once & apart, names),
     ]
-    return _block(read.table.file, read.table.lines, reasons)
+    return _block(read.table.file, read.table.lines, reasons, read.times)
 
 
 def _marks(read: Measurements, photos: set[str]) -> Document:
     stranger = np.array([name not in photos for name in read.photo_ids], bool)[read.photo]
     owners = np.array(read.photo_ids, object)[read.photo]
-    return _block(read.table.file, read.table.lines, [(IN_NO_STRIP, stranger, owners)])
+    return _block(read.table.file, read.table.lines, [(IN_NO_STRIP, stranger, owners)], read.times)
 
 
 def _given(read: ControlTable, count: dict[str, int], gaps: set[str]) -> Document:
@@ -144,19 +145,17 @@ def _given(read: ControlTable, count: dict[str, int], gaps: set[str]) -> Documen
     return _block(read.table.file, read.table.lines, reasons)
 
 
-def _block(file: str, lines: Numbers, reasons: list[tuple[str, NDArray[np.bool_], NDArray[np.object_]]]) -> Document:
-    unused = list(_unused(lines, reasons))
-    return {
-        "file": file,
-        "rows": len(lines),
-        "used": len(lines) - sum(each["rows"] for each in unused),
-        "unused": unused,
-    }
+def _block(file: str, lines: Numbers, reasons: list[Reason], times: Numbers | None = None) -> Document:
+    """Count the rows of a table; `times` says of how many rows of the file each of them is made."""
+    times = np.ones(len(lines), np.intp) if times is None else times
+    unused = list(_unused(lines, reasons, times))
+    rows = int(times.sum())
+    return {"file": file, "rows": rows, "used": rows - sum(each["rows"] for each in unused), "unused": unused}
 
 
-def _unused(lines: Numbers, reasons: list[tuple[str, NDArray[np.bool_], NDArray[np.object_]]]) -> Iterator[Document]:
+def _unused(lines: Numbers, reasons: list[Reason], times: Numbers) -> Iterator[Document]:
     for why, which, names in reasons:
         rows = np.flatnonzero(which)
         if len(rows):
             ids = list(dict.fromkeys(names[rows].tolist()))
-            yield {"why": why, "rows": len(rows), "ids": ids, "first_line": int(lines[rows[0]])}
+            yield {"why": why, "rows": int(times[rows].sum()), "ids": ids, "first_line": int(lines[rows[0]])}

@@ -11,12 +11,16 @@ from copy import deepcopy
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PlainValidator, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, PlainValidator, model_validator
 from pydantic_core import PydanticCustomError
 
+from photostrip.formats.control import CONTROL
 from photostrip.formats.findings import suggestion
 from photostrip.formats.numbers import SMALLEST, NotANumber, shown
 from photostrip.formats.numbers import number as read_number
+from photostrip.formats.observations import FIDUCIALS, OBSERVATIONS
+from photostrip.formats.pairs import LAYOUTS
+from photostrip.formats.repeated import POLICIES as REPEATED
 from photostrip.formats.tables import CONTROL_CHARACTER
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.geometry.rotation import SYSTEMS
@@ -28,7 +32,9 @@ from photostrip.triangulation.polynomial import DEGREES
 from photostrip.triangulation.screening import METHODS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
+
+    from photostrip.formats.tables import Column
 
 DEFAULTS = Settings()
 SCHEMA_NUMBER = 1
@@ -145,6 +151,21 @@ def _axes(value: object) -> tuple[str, str, str]:
     return first, second, third
 
 
+def _columns(*layouts: Iterable[Column]) -> AfterValidator:
+    """Check of the names that a table has for the columns of some layouts."""
+    known = tuple(dict.fromkeys(column.name for layout in layouts for column in layout))
+
+    def require(value: dict[str, str]) -> dict[str, str]:
+        for name in value:
+            if name not in known:
+                message = f"`{shown(name)}` is no column of this table"
+                fix = suggestion(name, known)
+                raise wrong(message, code="word", at=name, expected=f"one of {', '.join(known)}", fix=fix)
+        return value
+
+    return AfterValidator(require)
+
+
 def _if_empty(value: object) -> object:
     """Read a key whose entries are all commented out as an empty mapping."""
     return {} if value == "" else value
@@ -171,7 +192,12 @@ Flag = Annotated[bool, *_typed(_flag, {"type": "boolean"})]
 SchemaNumber = Annotated[int, *_typed(_schema_number, {"const": SCHEMA_NUMBER})]
 Pair = tuple[Number, Number]
 Axes = Annotated[tuple[str, str, str], *_typed(_axes, _AXES)]
-Unit = Annotated[str, *_choice(("mm", "um", "px"))]
+Unit = Annotated[str, *_choice(("mm", "um", "0.1um", "px"))]
+Repeated = Annotated[str, *_choice(REPEATED)]
+Columns = Annotated[dict[str, Words], BeforeValidator(_if_empty)]
+PointColumns = Annotated[Columns, _columns(OBSERVATIONS, *LAYOUTS)]
+MarkColumns = Annotated[Columns, _columns(FIDUCIALS)]
+ControlColumns = Annotated[Columns, _columns(CONTROL)]
 YAxis = Annotated[str, *_choice(("up", "down"))]
 Height = Annotated[str, *_choice(("ellipsoidal", "orthometric"))]
 Parameter = Annotated[str, *_choice(CALIBRATION)]
@@ -277,11 +303,14 @@ class Strip(Section):
     )
 
 
+COLUMNS = "Names in the header of columns that are called otherwise: `{point: Punkt, x: xs}`"
+
+
 class Observations(Section):
     """Points measured on photos."""
 
-    file: Words = key("Table `photo,point,x,y[,sx,sy]`, .csv or .csv.gz")
-    unit: Unit = key("Unit of the table: `mm`, `um` or `px`")
+    file: Words = key("Table `photo,point,x,y[,sx,sy]`, or of pairs, `pair,point,x,y,p,q`, .csv or .csv.gz")
+    unit: Unit = key("Unit of the table: `mm`, `um`, `0.1um` or `px`")
     y_axis: YAxis | None = key(
         "Direction of y, `up` or `down`; x grows to the right. Default: `up`; required for px", None
     )
@@ -290,6 +319,10 @@ class Observations(Section):
         " Default: `center`; for px `top-left`. Meaningless with measured fiducial marks",
         None,
     )
+    repeated: Repeated | None = key(
+        "A point measured again on the same photo: `refuse` or `average`. Default: `refuse`; for pairs `average`", None
+    )
+    columns: PointColumns = key(COLUMNS, {})
     sigma: Positive | None = key("Standard deviation of rows without sx, sy", None, unit="the table's unit")
 
 
@@ -299,6 +332,8 @@ class FiducialMeasurements(Section):
     file: Words = key("Table `photo,mark,x,y[,sx,sy]`, .csv or .csv.gz")
     unit: Unit | None = key("Unit of the table; default: that of `observations`", None)
     y_axis: YAxis | None = key("Direction of y; default: that of `observations`", None)
+    repeated: Repeated = key("A mark measured again on the same photo: `refuse` or `average`", "refuse")
+    columns: MarkColumns = key(COLUMNS, {})
     sigma: Positive | None = key(
         "Standard deviation of rows without sx, sy; default: that of `observations`", None, unit="the table's unit"
     )
@@ -335,6 +370,7 @@ class Control(Section):
         "Height of the geoid above the ellipsoid, for orthometric heights", None, unit="m"
     )
     ellipsoid: Ellipsoid | None = key("Ellipsoid of geocentric coordinates; default: WGS 84", None)
+    columns: ControlColumns = key(COLUMNS, {})
     sigma: tuple[Positive, Positive, Positive] | None = key(
         "Standard deviations of rows without sx, sy, sz, in the order of `axes`", None, unit="m"
     )

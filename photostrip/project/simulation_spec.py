@@ -182,7 +182,7 @@ class Image(Section):
     sigma_um: Number = key(
         "Standard deviation of an image coordinate; 0 is free of errors", USUAL.image.sigma_um, unit="um"
     )
-    unit: Unit = key("Unit in the tables: `mm`, `um` or `px`", USUAL.image.unit)
+    unit: Unit = key("Unit in the tables: `mm`, `um`, `0.1um` or `px`", USUAL.image.unit)
     y_axis: YAxis = key("Direction of y in the tables, `up` or `down`", USUAL.image.y_axis)
 
 

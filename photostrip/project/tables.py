@@ -13,7 +13,9 @@ import numpy as np
 from photostrip.formats.control import ControlTable, read_control, refuse_repeated
 from photostrip.formats.exterior import OrientationTable, PositionTable, read_orientations, read_positions
 from photostrip.formats.findings import Findings, listed, suggestion
-from photostrip.formats.observations import Measurements, read_measurements
+from photostrip.formats.numbers import NotANumber
+from photostrip.formats.numbers import number as read_number
+from photostrip.formats.observations import Manner, Measurements, read_measurements
 from photostrip.geometry.rotation import SYSTEMS
 from photostrip.project.document import fault_at
 from photostrip.project.merging import path_of, told_where_named
@@ -75,20 +77,19 @@ def read_tables(root: Node, project: str, findings: Findings, files: list[str]) 
     Tables
         What could be read.
     """
-    sigma = root.has("observations", "sigma")
-    same_unit = root.word("fiducial_measurements", "unit") in {"", root.word("observations", "unit")}
-    mark_sigma = root.has("fiducial_measurements", "sigma") or (sigma and same_unit)
+    photos = frozenset(photo.id for photo in listed_photos(root))
     observations = fiducials = None
     for path, inner in _named(root, ("observations",), project, findings, files):
-        observations = read_measurements(path, inner, default_sigma=sigma)
+        observations = read_measurements(path, inner, _manner(root, "observations", photos))
     for path, inner in _named(root, ("fiducial_measurements",), project, findings, files):
-        fiducials = read_measurements(path, inner, marks=True, default_sigma=mark_sigma)
+        fiducials = read_measurements(path, inner, _manner(root, "fiducial_measurements", photos))
     control: list[ControlTable | None] = []
     lists = root.find("control")
     for number, node in enumerate(lists.elements if lists is not None else []):
         control.append(None)
         for path, inner in _named(root, ("control", number), project, findings, files):
-            control[-1] = read_control(path, _height_column(node), inner, default_sigma=node.has("sigma"))
+            up, columns = _height_column(node), _columns(node)
+            control[-1] = read_control(path, up, inner, default_sigma=node.has("sigma"), columns=columns)
     refuse_repeated(control, findings)
     positions = orientations = None
     for path, inner in _named(root, ("camera_positions",), project, findings, files):
@@ -97,6 +98,25 @@ def read_tables(root: Node, project: str, findings: Findings, files: list[str]) 
     for path, inner in _named(root, ("orientations",), project, findings, files):
         orientations = _orientations(path, root.entries["orientations"], inner)
     return Tables(observations, fiducials, control, positions, orientations)
+
+
+def _manner(root: Node, section: str, photos: frozenset[str]) -> Manner:
+    """How a table of image coordinates is to be read, as far as the project says it."""
+    marks, node = section == "fiducial_measurements", root.entries[section]
+    own = node.find("sigma")
+    same_unit = node.word("unit") in {"", root.word("observations", "unit")}
+    source = own if own is not None or not (marks and same_unit) else root.find("observations", "sigma")
+    try:
+        sigma = None if source is None else read_number(source.text)
+    except NotANumber:  # which the schema has told
+        sigma = None
+    return Manner(marks, source is not None, sigma, node.word("repeated"), _columns(node), photos)
+
+
+def _columns(node: Node) -> dict[str, str]:
+    """Names that a table has for its columns."""
+    declared = node.find("columns")
+    return {name: each.text for name, each in declared.entries.items() if each.text} if declared is not None else {}
 
 
 def _orientations(path: str, node: Node, findings: Findings) -> OrientationTable | None:

@@ -154,8 +154,8 @@ def _boundary(spec: Spec) -> Iterator[Fault]:
 def _image(spec: Spec) -> Iterator[Fault]:
     image = spec.image
     yield from _range("image.sigma_um", image.sigma_um, 0.0, 10_000.0, "um")
-    if image.unit not in {"mm", "um", "px"}:
-        yield _fault("image.unit", f"the unit {image.unit!r} is not known", "mm | um | px")
+    if image.unit not in {"mm", "um", "0.1um", "px"}:
+        yield _fault("image.unit", f"the unit {image.unit!r} is not known", "mm | um | 0.1um | px")
     if image.unit == "px" and spec.camera.pixel_size is None:
         yield _fault("image.unit", "pixels need a size", fix="add camera.pixel_size")
     if image.y_axis not in {"up", "down"}:

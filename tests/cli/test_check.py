@@ -264,7 +264,7 @@ def test_findings_as_annotations(tmp_path: Path, command: str, capsys: pytest.Ca
     assert code == 2
     assert out == (
         f"::error file={tmp_path}/project.yaml,line=18,col=9,title=photostrip word"
-        "::observations.unit: `100%25,cm` is not known; expected one of mm, um, px\n"
+        "::observations.unit: `100%25,cm` is not known; expected one of mm, um, 0.1um, px\n"
     )
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from photostrip.formats.control import read_control
 from photostrip.formats.findings import Findings
-from photostrip.formats.observations import read_measurements
+from photostrip.formats.observations import Manner, read_measurements
 from photostrip.project.document import parse
 from photostrip.project.schema import ProjectFile
 from photostrip.project.validation import checked
@@ -47,7 +47,7 @@ def test_the_example_of_a_table_is_right(tmp_path: Path, page: str, rows: int) -
         assert control is not None
         assert len(control.table) == rows
     else:
-        read = read_measurements(str(path), findings, marks=page == "fiducials.md")
+        read = read_measurements(str(path), findings, Manner(marks=page == "fiducials.md"))
         assert read is not None
         assert len(read.table) == rows
     assert (findings.faults, findings.notes) == ((), [])
