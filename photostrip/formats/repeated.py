@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.formats.findings import Findings
-    from photostrip.formats.observations import Measurements
+    from photostrip.formats.measurements import Measurements
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from photostrip.formats.control import ControlTable
     from photostrip.formats.exterior import OrientationTable, PositionTable
-    from photostrip.formats.observations import Measurements
+    from photostrip.formats.measurements import Measurements
     from photostrip.project import schema
     from photostrip.project.document import Node
     from photostrip.project.tables import Tables

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.formats.control import ControlTable
-    from photostrip.formats.observations import Measurements
+    from photostrip.formats.measurements import Measurements
     from photostrip.pipeline import Inputs
     from photostrip.project.loading import Project
 

@@ -13,9 +13,10 @@ import numpy as np
 from photostrip.formats.control import ControlTable, read_control, refuse_repeated
 from photostrip.formats.exterior import OrientationTable, PositionTable, read_orientations, read_positions
 from photostrip.formats.findings import Findings, listed, suggestion
+from photostrip.formats.measurements import Measurements
 from photostrip.formats.numbers import NotANumber
 from photostrip.formats.numbers import number as read_number
-from photostrip.formats.observations import Manner, Measurements, read_measurements
+from photostrip.formats.observations import Manner, read_measurements
 from photostrip.geometry.rotation import SYSTEMS
 from photostrip.project.document import fault_at
 from photostrip.project.merging import path_of, told_where_named
