@@ -13,7 +13,6 @@ import numpy as np
 from photostrip.formats.control import ControlTable, read_control, refuse_repeated
 from photostrip.formats.exterior import OrientationTable, PositionTable, read_orientations, read_positions
 from photostrip.formats.findings import Findings, listed, suggestion
-from photostrip.formats.measurements import Measurements
 from photostrip.formats.numbers import NotANumber
 from photostrip.formats.numbers import number as read_number
 from photostrip.formats.observations import Manner, read_measurements
@@ -25,6 +24,7 @@ from photostrip.project.references import listed_photos
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
+    from photostrip.formats.measurements import Measurements
     from photostrip.project.document import Node
     from photostrip.project.references import ListedPhoto
 
