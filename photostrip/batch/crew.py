@@ -12,10 +12,9 @@ from collections import deque
 from multiprocessing.connection import wait
 from typing import TYPE_CHECKING, Protocol
 
-from photostrip.batch.tasks import BROKEN, TIMEOUT, Answer, Limits, failure
-from photostrip.batch.work import out_of_memory
+from photostrip.batch.tasks import BROKEN, TIMEOUT, Answer, Limits, failure, out_of_memory
 from photostrip.batch.worker import NO_MEMORY, READY, WORK, Worker, share_of_memory
-from photostrip.errors import Fault, PhotostripError
+from photostrip.errors import Fault, InputError, PhotostripError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -175,6 +174,9 @@ class Crew:
         """Say what a worker died of, or let its project be tried once more."""
         code, task = worker.fate(), worker.task
         self.workers.remove(worker)
+        if not worker.ready and code == NO_MEMORY:
+            message = f"no process of the batch starts with {self.megabytes:.0f} MB"
+            raise InputError(Fault(message, "memory", "--memory", fix="give more, or use fewer processes (-j)"))
         if not worker.ready:
             self._false_starts += 1
             if self._false_starts >= FALSE_STARTS:

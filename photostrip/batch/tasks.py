@@ -174,3 +174,9 @@ def failure(status: str, error: InputError | GeometryError | Fault) -> Document:
 def not_run() -> Document:
     """Give the line of the summary for a project that was not reached."""
     return failure(NOT_RUN, InputError(()))
+
+
+def out_of_memory() -> Document:
+    """Give the line of the summary for a project that needs more memory than it may have."""
+    fix = "give more with --memory, with fewer processes (-j) if need be"
+    return failure(MEMORY, Fault("needs more memory than a worker may have", "memory", fix=fix))

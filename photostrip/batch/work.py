@@ -8,7 +8,7 @@ import traceback
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from photostrip.batch.tasks import BROKEN, FAULTY, MEMORY, WEAK, Answer, failure, outcome_of
+from photostrip.batch.tasks import BROKEN, FAULTY, WEAK, Answer, failure, out_of_memory, outcome_of
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.result.document import document_of
 from photostrip.formats.result.files import result_files
@@ -52,12 +52,6 @@ def evaluate(task: Task) -> Answer:
         fault = Fault(message, "internal", fix="`photostrip run PROJECT --debug` shows where")
         outcome, files, inputs = failure(BROKEN, fault), {}, {}
     return Answer(task.number, outcome, files, inputs, time.perf_counter() - start, trace=trace)
-
-
-def out_of_memory() -> Document:
-    """Give the line of the summary for a project that needs more memory than it may have."""
-    fix = "give more with --memory, with fewer processes (-j) if need be"
-    return failure(MEMORY, Fault("needs more memory than a worker may have", "memory", fix=fix))
 
 
 def _from_parcel(task: Task) -> tuple[Document, dict[str, str], dict[str, str | None]]:

@@ -32,6 +32,8 @@ WORK = "photostrip.batch.work:evaluate"  # what a worker does with a task
 READY = "ready"
 MEGABYTE = 1_000_000
 NO_MEMORY = 71  # exit code of a worker that has too little memory left even to say so
+# What libraries in other languages say before they end the process: Rust, C++, OpenBLAS.
+NO_MEMORY_WORDS = ("memory allocation of ", "bad_alloc", "Memory allocation still failed", "MemoryError")
 # The interpreter of a worker finds the same modules as that of its parent, wherever the parent has them from.
 START = (
     "import sys; sys.path[:] = sys.argv[1].split('\\n'); "
@@ -95,15 +97,15 @@ class Worker:
         return self.connection.recv()
 
     def end(self) -> int:
-        """End it, if it still lives, and give its exit code; negative after a signal."""
+        """End it, if it still lives, and give its exit code; negative after a signal, NO_MEMORY for want of memory."""
         self.connection.close()
         self._process.kill()
         code = self._process.wait()
         with self._said:
             self._said.seek(0)
-            lines = self._said.read().decode(errors="replace").split("\n")
-        self.last_words = next((line.strip() for line in reversed(lines) if line.strip()), "")
-        return code
+            said = self._said.read().decode(errors="replace")
+        self.last_words = next((line.strip() for line in reversed(said.split("\n")) if line.strip()), "")
+        return NO_MEMORY if code and any(words in said for words in NO_MEMORY_WORDS) else code
 
     def fate(self) -> int:
         """Give the exit code of a worker whose connection broke: it is dead, or about to be."""
@@ -147,23 +149,26 @@ def serve(handle: int, megabytes: float, work: str) -> None:
     work : str
         What to do with a task, as ``module:function``.
     """
+    try:
+        _serve(Connection(handle), megabytes, work)
+    except MemoryError:
+        os._exit(NO_MEMORY)
+
+
+def _serve(connection: Connection[Any, Any], megabytes: float, work: str) -> None:
     import gc
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches every process of the terminal; the parent decides
-    connection: Connection[Any, Any] = Connection(handle)
+    tasks: queue.SimpleQueue[Task] = queue.SimpleQueue()
+    threading.Thread(target=_receive, args=(connection, tasks), daemon=True).start()
     module, _, name = work.partition(":")
     evaluate: Callable[[Task], Answer] = getattr(import_module(module), name)
     _limit_memory(megabytes)
     gc.disable()  # as in every command: a project makes many small objects and hardly a cycle
     gc.freeze()
-    tasks: queue.SimpleQueue[Task] = queue.SimpleQueue()
-    threading.Thread(target=_receive, args=(connection, tasks), daemon=True).start()
     connection.send(READY)
     while True:
-        try:
-            _send(connection, evaluate(tasks.get()))
-        except MemoryError:
-            os._exit(NO_MEMORY)
+        _send(connection, evaluate(tasks.get()))
         gc.collect()
 
 
