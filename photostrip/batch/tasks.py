@@ -100,7 +100,7 @@ class Limits:
     seconds : float, optional
         Time; None: any.
     megabytes : float, optional
-        Address space of the worker that computes it; None: an even share of the machine's memory.
+        Memory of the worker that computes it; None: an even share of the machine's memory.
     """
 
     seconds: float | None = None

@@ -50,7 +50,7 @@ class Worker:
     Parameters
     ----------
     megabytes : float
-        Address space that it may have.
+        Memory that it may have.
     work : str
         What it does with a task, as ``module:function``.
     """
@@ -145,7 +145,7 @@ def serve(handle: int, megabytes: float, work: str) -> None:
     handle : int
         File descriptor of the connection.
     megabytes : float
-        Address space that this process may have.
+        Memory that this process may have.
     work : str
         What to do with a task, as ``module:function``.
     """
@@ -191,14 +191,17 @@ def _send(connection: Connection[Any, Any], answer: Answer) -> None:
 
 
 def _limit_memory(megabytes: float) -> None:
+    """Let the system refuse more memory than this; a library that asks for it fails, and nobody else does."""
     import resource
 
-    _, hard = resource.getrlimit(resource.RLIMIT_AS)
+    # Linux counts here what can be written to; the address space holds much that is reserved and never used.
+    kind = resource.RLIMIT_DATA if sys.platform == "linux" else resource.RLIMIT_AS
+    _, hard = resource.getrlimit(kind)
     wanted = int(megabytes * MEGABYTE)
     if hard != resource.RLIM_INFINITY:
         wanted = min(wanted, hard)
     with suppress(OSError, ValueError):  # not every system has this limit
-        resource.setrlimit(resource.RLIMIT_AS, (wanted, hard))
+        resource.setrlimit(kind, (wanted, hard))
 
 
 def _resident() -> float:

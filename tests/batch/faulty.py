@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 from photostrip.batch import work
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from photostrip.batch.tasks import Answer, Task
 
 WORK = "tests.batch.faulty:evaluate"
@@ -28,7 +30,7 @@ def _eat() -> None:
         hoard.append(bytearray(10_000_000))
 
 
-FAULTS = {
+FAULTS: dict[str, Callable[[], object]] = {
     "segfault": lambda: os.kill(os.getpid(), signal.SIGSEGV),
     "exit": lambda: os._exit(5),
     "raise": lambda: sys.exit(0),
