@@ -1,0 +1,238 @@
+"""A batch that is killed, at any moment, leaves whole results only, loses none, and goes on where it was."""
+
+from __future__ import annotations
+
+import os
+import random
+import shutil
+import signal
+import subprocess
+import time
+from contextlib import redirect_stderr, redirect_stdout, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from photostrip.cli import batching
+from photostrip.cli.main import main
+from photostrip.formats.batch import parsed_record
+from photostrip.formats.source import digest
+from tests.batch.projects import Alone, command, environment, run, tree, write_projects
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+PROJECTS = 4
+RUNS = int(os.environ.get("PHOTOSTRIP_KILLS", "50"))  # killed inside this process's children
+WHOLE_RUNS = 6  # killed as whole commands with their workers
+SUMMARIES = {"summary.txt", "summary.csv", "summary.json", "junit.xml"}
+BATCH = ["batch", "strips", "-o", "out", "-j", "2"]
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    write_projects(tmp_path / "strips", PROJECTS)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(batching, "Crew", Alone)
+    return tmp_path
+
+
+def in_a_child(act: Callable[[], object], seconds: float | None = None) -> int:
+    """Run something in a copy of this process, kill that after some seconds, and give how it ended."""
+    child = os.fork()
+    if not child:
+        with (
+            suppress(BaseException),
+            Path(os.devnull).open("w") as nowhere,
+            redirect_stdout(nowhere),
+            redirect_stderr(nowhere),
+        ):
+            act()
+            os._exit(0)
+        os._exit(99)
+    if seconds is not None:
+        time.sleep(seconds)
+        os.kill(child, signal.SIGKILL)
+    _, status = os.waitpid(child, 0)
+    return os.waitstatus_to_exitcode(status)
+
+
+def trusted(out: Path) -> set[str]:
+    """Give the projects whose result is whole, judged without the program: by the digests of the record."""
+    found = set()
+    for folder in out.iterdir() if out.exists() else ():
+        record = parsed_record((folder / "batch.json").read_bytes()) if (folder / "batch.json").exists() else None
+        if record is not None:
+            assert all(digest((folder / name).read_bytes()) == given for name, given in record["outputs"].items())
+            found.add(folder.name)
+    return found
+
+
+def check_nothing_half(out: Path, whole: dict[str, bytes]) -> None:
+    """Every file that has its name has all of its content; of a summary there is all or nothing."""
+    for name, content in tree(out).items() if out.exists() else ():
+        assert name.endswith(".tmp") or content == whole[name], name
+
+
+@pytest.mark.slow
+def test_killed_at_random_moments_and_resumed(here: Path) -> None:
+    assert main([*BATCH[:3], "whole", "--quiet"]) == 0
+    whole = tree(here / "whole")
+    begin = time.perf_counter()
+    assert in_a_child(lambda: main(BATCH)) == 0
+    duration = time.perf_counter() - begin
+    assert tree(here / "out") == whole
+    draw, killed, partial = random.Random(8), 0, 0
+    for number in range(RUNS):
+        if trusted(here / "out") == {f"s{n}" for n in range(1, PROJECTS + 1)}:
+            shutil.rmtree(here / "out")  # all is done: from the beginning
+        before = trusted(here / "out")
+        force = ["--force"] if number % 5 == 4 else []  # now and then over results that are there
+        killed += in_a_child(lambda more=force: main([*BATCH, *more]), draw.uniform(0.0, duration)) == -signal.SIGKILL  # type: ignore[misc]
+        check_nothing_half(here / "out", whole)
+        assert before <= trusted(here / "out")  # nothing lost
+        partial += 0 < len(trusted(here / "out")) < PROJECTS
+    assert killed > RUNS / 2
+    assert partial > RUNS / 10  # the moments were spread over the work
+    assert in_a_child(lambda: main(BATCH)) == 0
+    assert tree(here / "out") == whole
+
+
+@pytest.mark.slow
+def test_killed_at_every_single_step_of_writing(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Die before the first, second, ... file that is written or renamed; then go on."""
+    shutil.rmtree(here / "strips")
+    write_projects(here / "strips", 1)
+    assert main([*BATCH[:3], "whole", "--quiet"]) == 0
+    whole = tree(here / "whole")
+    steps = 0
+
+    def dying(act: Callable[..., object], last: int) -> Callable[..., object]:
+        def step(*arguments: object) -> object:
+            nonlocal steps
+            steps += 1
+            if steps > last:
+                if act is write and isinstance(arguments[0], Path) and isinstance(arguments[1], bytes):
+                    write(arguments[0], arguments[1][: len(arguments[1]) // 2])  # a half file
+                os.kill(os.getpid(), signal.SIGKILL)
+            return act(*arguments)
+
+        return step
+
+    write, rename = Path.write_bytes, Path.replace
+    last, code = 0, -signal.SIGKILL
+    while code:
+        shutil.rmtree(here / "out", ignore_errors=True)
+        with monkeypatch.context() as patch:
+            patch.setattr(Path, "write_bytes", dying(write, last))
+            patch.setattr(Path, "replace", dying(rename, last))
+            code = in_a_child(lambda: main(BATCH))
+        check_nothing_half(here / "out", whole)
+        assert main([*BATCH, "--quiet"]) == 0
+        assert tree(here / "out") == whole  # temporary files gone, too
+        last += 1
+    assert last > 2 * (len(whole) - 1)  # each file is written, then renamed
+
+
+@pytest.mark.slow
+def test_whole_commands_killed_with_their_workers(tmp_path: Path) -> None:
+    write_projects(tmp_path / "strips", PROJECTS)
+    begin = time.perf_counter()
+    assert run(tmp_path, "strips", "-o", "whole", "-j", "2").returncode == 0
+    duration = time.perf_counter() - begin
+    whole, draw = tree(tmp_path / "whole"), random.Random(9)
+    mark = f"PHOTOSTRIP_TEST_{os.getpid()}"
+    for _ in range(WHOLE_RUNS):
+        before = trusted(tmp_path / "out")
+        with subprocess.Popen(
+            command("strips", "-o", "out", "-j", "2", "--force"),
+            cwd=tmp_path,
+            env={**environment(), mark: "1"},
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        ) as process:
+            time.sleep(draw.uniform(0.3 * duration, duration))
+            process.kill()
+        check_nothing_half(tmp_path / "out", whole)
+        assert before <= trusted(tmp_path / "out")
+    assert gone(mark)
+    assert run(tmp_path, "strips", "-o", "out", "-j", "2").returncode == 0
+    assert tree(tmp_path / "out") == whole
+
+
+def marked(mark: str) -> list[str]:
+    """Give the living processes that have a variable in their environment."""
+    found = []
+    for place in Path("/proc").glob("[0-9]*/environ"):
+        with suppress(OSError):
+            if f"{mark}=".encode() in place.read_bytes():
+                found.append(place.parent.name)
+    return found
+
+
+def gone(mark: str) -> bool:
+    """Wait until no such process is left."""
+    for _ in range(100):
+        if not marked(mark):
+            return True
+        time.sleep(0.1)
+    return False
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_interrupted_in_good_order(tmp_path: Path, number: signal.Signals) -> None:
+    """As a terminal does on Ctrl-C: every process of the group gets the signal."""
+    import json
+
+    write_projects(tmp_path / "strips", 40)
+    mark = f"PHOTOSTRIP_TEST_{os.getpid()}"
+    with subprocess.Popen(
+        command("strips", "-o", "out", "-j", "2"),
+        cwd=tmp_path,
+        env={**environment(), mark: "1"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as process:
+        assert process.stderr is not None
+        for _ in range(3):
+            process.stderr.readline()
+        assert len(marked(mark)) >= 2
+        os.killpg(process.pid, number)
+        out, err = process.communicate(timeout=20.0)
+    assert process.returncode == 128 + number
+    assert "Traceback" not in err
+    assert "the same command goes on from here" in err
+    assert gone(mark)
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    done = {each["output"] for each in summary["projects"] if each["status"] == "good"}
+    assert done == trusted(tmp_path / "out")
+    assert 3 <= len(done) < 40
+    assert summary["counts"] == {"good": len(done), "not run": 40 - len(done)}
+    assert not summary["finished"]
+    assert f"40 projects: {40 - len(done)} not run, {len(done)} good" in out
+
+
+@pytest.mark.slow
+def test_a_worker_killed_from_outside_costs_nothing(tmp_path: Path) -> None:
+    write_projects(tmp_path / "strips", 20)
+    mark = f"PHOTOSTRIP_TEST_{os.getpid()}"
+    with subprocess.Popen(
+        command("strips", "-o", "out", "-j", "2"),
+        cwd=tmp_path,
+        env={**environment(), mark: "1"},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stderr is not None
+        process.stderr.readline()
+        worker = next(each for each in marked(mark) if int(each) != process.pid)
+        os.kill(int(worker), signal.SIGKILL)
+        out, _ = process.communicate()
+    assert process.returncode == 0
+    assert "20 projects: 20 good" in out
+    assert trusted(tmp_path / "out") == {f"s{n}" for n in range(1, 21)}

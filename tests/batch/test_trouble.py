@@ -1,0 +1,190 @@
+"""The world around a batch: full disks, places that may not be written to or read from, other batches."""
+
+from __future__ import annotations
+
+import ctypes
+import errno
+import json
+import resource
+import subprocess
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from photostrip.batch.folder import opened
+from photostrip.cli import batching
+from photostrip.cli.main import main
+from photostrip.errors import InputError
+from tests.batch.projects import Alone, command, environment, tree, write_projects
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH = 24, 1, 2
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    write_projects(tmp_path / "strips", 5)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(batching, "Crew", Alone)
+    return tmp_path
+
+
+def as_anybody() -> None:
+    """Give up the right of the superuser to read and write everything."""
+    library = ctypes.CDLL(None)
+    for right in (CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH):
+        library.prctl(PR_CAPBSET_DROP, right, 0, 0, 0)
+
+
+def batch(folder: Path, *arguments: str, before: Callable[[], None] = as_anybody) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        command(*arguments),
+        cwd=folder,
+        env=environment(),
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=before,
+    )
+
+
+def full(monkeypatch: pytest.MonkeyPatch, full_for: str) -> None:
+    """Let the disk be full whenever something is written below a folder."""
+    write = Path.write_bytes
+
+    def refused(path: Path, data: bytes) -> int:
+        if full_for in str(path):
+            write(path, data[: len(data) // 2])
+            raise OSError(errno.ENOSPC, "No space left on device", str(path))
+        return write(path, data)
+
+    monkeypatch.setattr(Path, "write_bytes", refused)
+
+
+def test_a_disk_that_is_full_for_a_while_costs_those_projects_only(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with monkeypatch.context() as patch:
+        full(patch, "out/s2/")
+        assert main(["batch", "strips", "-o", "out"]) == 2
+    out = capsys.readouterr().out
+    assert "5 projects: 1 unwritten, 4 good" in out
+    assert "out/s2: the result cannot be written: no space left on device" in out
+    assert list((here / "out" / "s2").iterdir()) == []
+    assert main(["batch", "strips", "-o", "out", "-q"]) == 0
+    assert main(["batch", "strips", "-o", "whole", "-q"]) == 0
+    assert tree(here / "out") == tree(here / "whole")
+
+
+def test_a_disk_that_stays_full_ends_the_batch(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    full(monkeypatch, "out/")
+    assert main(["batch", "strips", "-o", "out"]) == 2
+    captured = capsys.readouterr()
+    assert "5 projects: 3 unwritten, 2 not run" in captured.out  # the summary is told even where it cannot be written
+    assert "error: 3 results in a row could not be written; 2 not run" in captured.err
+    assert "no space left on device" in captured.err
+    assert [path for path in (here / "out").rglob("*") if path.is_file()] == [here / "out" / ".batch.lock"]
+
+
+def test_an_earlier_result_survives_a_full_disk(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert main(["batch", "strips", "-o", "out", "-q"]) == 0
+    before = {name: content for name, content in tree(here / "out").items() if "/" in name}
+    full(monkeypatch, "out/")
+    assert main(["batch", "strips", "-o", "out", "-q", "--force"]) == 2
+    assert tree(here / "out") == before
+
+
+@pytest.mark.slow
+def test_files_that_the_system_cuts_off(here: Path) -> None:
+    """A limit of the system on the size of files, as a quota is: a real write fails in the middle of result.json."""
+
+    def small_files() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
+
+    done = batch(here, "strips", "-o", "out", "-j", "1", before=small_files)
+    assert done.returncode == 2
+    assert "the result cannot be written: file too large" in done.stdout
+    assert "5 projects: 3 unwritten, 2 not run" in done.stdout
+    left = {path.name for path in (here / "out").rglob("*") if path.is_file()}
+    assert left <= {".batch.lock", "summary.txt", "summary.csv", "summary.json", "junit.xml"}
+
+
+def test_an_output_that_must_not_be_written_to_is_refused_at_once(here: Path) -> None:
+    (here / "out").mkdir(mode=0o555)
+    done = batch(here, "strips", "-o", "out")
+    assert done.returncode == 2
+    assert done.stderr == "error: out/.batch.lock: Permission denied\n"
+    assert done.stdout == ""
+
+
+@pytest.mark.slow
+def test_inputs_that_may_not_be_read_in_the_middle(here: Path) -> None:
+    (here / "strips" / "s2" / "observations.csv").chmod(0)
+    (here / "strips" / "s3" / "project.yaml").chmod(0)
+    (here / "strips" / "s4" / "control.csv").write_bytes(b"\xff\xfe\x00")
+    done = batch(here, "strips", "-o", "out", "-j", "1", "--format", "json")
+    assert done.returncode == 2
+    summary = json.loads(done.stdout)
+    assert [each["status"] for each in summary["projects"]] == ["good", "faulty", "faulty", "faulty", "good"]
+    codes = [each["findings"][0]["code"] for each in summary["projects"] if each["findings"]]
+    assert codes == ["file-unreadable", "file-unreadable", "encoding"]
+    assert {path.name for path in (here / "out").iterdir() if path.is_dir()} == {"s1", "s5"}
+
+
+# ------------------------------------------------------------------------------------------------ two at once
+
+
+def test_a_second_batch_on_the_same_folder_is_refused(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["batch", "strips", "-o", "out", "-q"]) == 0
+    before = tree(here / "out")
+    capsys.readouterr()
+    with opened(Path("elsewhere")):
+        assert main(["batch", "strips", "-o", "out", "-q"]) == 0
+    with opened(Path("out")) as folder:
+        folder.write_summaries({name: content.decode() for name, content in before.items() if "/" not in name})
+        assert main(["batch", "strips", "-o", "out"]) == 2
+        assert tree(here / "out") == before  # nothing touched, the summary of the first one neither
+    assert "error: out: another batch is writing into this folder" in capsys.readouterr().err
+    assert main(["batch", "strips", "-o", "out", "-q"]) == 0
+
+
+def test_the_lock_dies_with_its_process(here: Path) -> None:
+    code = "import os, pathlib\nfrom photostrip.batch.folder import opened\n"
+    code += "with opened(pathlib.Path('out')): os.kill(os.getpid(), 9)"
+    with subprocess.Popen([command()[0], "-c", code], cwd=here, env=environment()) as process:
+        assert process.wait() == -9
+    with opened(here / "out"):
+        pass
+
+
+@pytest.mark.slow
+def test_of_two_batches_started_together_one_works(here: Path) -> None:
+    started = [
+        subprocess.Popen(
+            command("strips", "-o", "out", "-j", "1"),
+            cwd=here,
+            env=environment(),
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        for _ in range(2)
+    ]
+    told = [process.communicate()[1] for process in started]
+    codes = [process.returncode for process in started]
+    assert sorted(codes) == [0, 2]
+    assert "another batch is writing into this folder" in told[codes.index(2)]
+    assert json.loads((here / "out" / "summary.json").read_text(encoding="utf-8"))["counts"] == {"good": 5}
+
+
+def test_a_summary_that_would_not_be_true_is_removed(here: Path) -> None:
+    assert main(["batch", "strips", "-o", "out", "-q"]) == 0
+    with opened(here / "out"):
+        assert not list((here / "out").glob("summary.*"))
+    with pytest.raises(InputError), opened(here / "strips" / "s1" / "project.yaml"):
+        pass
