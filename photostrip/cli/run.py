@@ -9,10 +9,10 @@ from typing import Annotated
 import typer
 
 from photostrip.cli.options import Assignments, Quiet, Shape, Verbose, Width
-from photostrip.cli.showing import Format, show
+from photostrip.cli.showing import Format, form_of, show, traced
 
 
-def run(
+def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
     project: Annotated[Path, typer.Argument(metavar="PROJECT", help="Project file (YAML).")],
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="DIR", help="Folder to write the result into.")
@@ -21,6 +21,12 @@ def run(
     form: Shape = Format.TEXT,
     width: Width = None,
     depfile: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a rule for make.")] = None,
+    trace: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Write every iteration with the symbols of the formulas: .txt, .md or .json."
+        ),
+    ] = None,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> int:
@@ -41,6 +47,8 @@ def run(
 
     if depfile is not None and output is None:
         raise typer.BadParameter("a rule for make needs a target: give --output as well", param_hint="--depfile")
+    if trace is not None:
+        form_of(trace, "--trace")  # before anything is computed
     talk = Talk(quiet=quiet, verbose=verbose)
     with failures_as(form), no_collector(), progress(sys.stderr, quiet=quiet) as waiting:
         waiting.at(f"reading {project}")
@@ -54,6 +62,8 @@ def run(
         waiting.at("writing the result")
         if depfile is not None and output is not None:  # before the result: it must not be the newer of the two
             write_text(depfile, make_rule(output / "result.json", loaded.files_read(result)))
+        if trace is not None:
+            write_text(trace, traced(result, form_of(trace, "--trace")))
         if output is not None:
             files = result_files(document, loaded.resolved)
             write_files(output, files)

@@ -11,6 +11,8 @@ import typer
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from photostrip.pipeline import Result
+
 
 class Format(StrEnum):
     """Forms in which a report is printed."""
@@ -104,13 +106,45 @@ def rendered(
     return text.to_text(title, sections, width or layout.USUAL, ascii_only=ascii_only)
 
 
-def form_of(path: Path) -> Format:
+def traced(result: Result, form: Format) -> str:
+    """Give the trace of a run: every stage and iteration.
+
+    Parameters
+    ----------
+    result : Result
+        What the run found.
+    form : Format
+        Text, Markdown or JSON.
+
+    Returns
+    -------
+    str
+        The trace.
+    """
+    from photostrip.formats.trace import trace_of
+    from photostrip.report import layout, text
+    from photostrip.report.trace_sections import trace_sections, trace_title
+
+    document = trace_of(result)
+    if form is Format.JSON:
+        from photostrip.formats.result.files import to_json
+
+        return to_json(document)
+    title, sections = trace_title(document), trace_sections(document)
+    if form is Format.MD:
+        return text.to_markdown(title, sections)
+    return text.to_text(title, sections, layout.WIDEST)
+
+
+def form_of(path: Path, option: str = "--output") -> Format:
     """Give the format that the ending of a file name asks for.
 
     Parameters
     ----------
     path : Path
         The file.
+    option : str
+        The option that names it.
 
     Returns
     -------
@@ -125,5 +159,5 @@ def form_of(path: Path) -> Format:
     if path.suffix.lower() not in {*ENDINGS, ""}:
         known = ", ".join(ENDINGS)
         message = f"no report is written as '{path.suffix}': the name may end in {known}, or give --format"
-        raise typer.BadParameter(message, param_hint="--output")
+        raise typer.BadParameter(message, param_hint=option)
     return ENDINGS.get(path.suffix.lower(), Format.TEXT)

@@ -213,7 +213,13 @@ def weights(control: ControlPoints, precision: tuple[float, float]) -> Floats:
     return np.where(control.use, 1 / (control.sigma**2 + point**2), 0.0)
 
 
-def orient(strip: Floats, targets: Targets, weight: Floats, reach: Floats | None = None) -> AbsoluteOrientation:
+def orient(
+    strip: Floats,
+    targets: Targets,
+    weight: Floats,
+    reach: Floats | None = None,
+    watch: Callable[[Similarity, Floats], None] | None = None,
+) -> AbsoluteOrientation:
     """Similarity of the strip on its control.
 
     Parameters
@@ -227,6 +233,9 @@ def orient(strip: Floats, targets: Targets, weight: Floats, reach: Floats | None
     reach : ndarray, shape (q, 3), optional
         All points of the strip, strip coordinates. What the control must determine is their position: control far along
         a narrow strip is enough when it spans the strip's width. Without them a square of the control's length counts.
+    watch : callable, optional
+        Told of every step: the similarity before it, and shifts, rotations and scale of the step, metres at the end of
+        the strip.
 
     Returns
     -------
@@ -257,6 +266,8 @@ def orient(strip: Floats, targets: Targets, weight: Floats, reach: Floats | None
         _refuse_deficient(plain, root, xyz, targets, half)  # weights do not decide what is free
         share = np.sqrt(weight[targets.control.use])
         step = np.asarray(np.linalg.lstsq(plain * share[:, None], free * share, rcond=None)[0], float)
+        if watch is not None:
+            watch(similarity, step)
         similarity = _corrected(similarity, step, xyz.mean(axis=0), half)
         if np.abs(step).max() < CONVERGED * half:
             break

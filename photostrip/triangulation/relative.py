@@ -18,7 +18,7 @@ from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -260,7 +260,9 @@ def start_values(pairs: Pairs) -> Floats:
     return start
 
 
-def iterate(elements: Floats, pairs: Pairs) -> tuple[Floats, NDArray[np.bool_], Numbers]:
+def iterate(
+    elements: Floats, pairs: Pairs, watch: Callable[[Numbers, Floats, Floats, Floats], None] | None = None
+) -> tuple[Floats, NDArray[np.bool_], Numbers]:
     """Gauss-Newton iteration of all pairs from given elements; converged pairs leave the batch.
 
     Parameters
@@ -269,6 +271,9 @@ def iterate(elements: Floats, pairs: Pairs) -> tuple[Floats, NDArray[np.bool_], 
         Start values in radians.
     pairs : Pairs
         Measurements.
+    watch : callable, optional
+        Told of every step: the numbers of the pairs that take part, their elements before it, their sums of weighted
+        squares of the y parallaxes in mm^2, and what is added to the elements.
 
     Returns
     -------
@@ -299,6 +304,8 @@ def iterate(elements: Floats, pairs: Pairs) -> tuple[Floats, NDArray[np.bool_], 
             step = -np.linalg.solve(normal, right[:, :, None])[:, :, 0] * scale
             largest = np.abs(step).max(axis=1)
             step *= np.minimum(1.0, LARGEST_STEP / np.maximum(largest, LARGEST_STEP))[:, None]
+        if watch is not None:
+            watch(todo, result[todo], part.sums(part.weight * q**2), step)
         result[todo] += step
         steps[todo] += 1
         done = (largest < CONVERGED) & sound

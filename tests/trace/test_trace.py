@@ -1,0 +1,214 @@
+"""The trace: what its numbers claim is so, and it ends where the run ended."""
+
+from __future__ import annotations
+
+import json
+import math
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from photostrip.cli.main import main
+from photostrip.formats.trace import SYMBOLS, trace_of
+from photostrip.report.text import to_text
+from photostrip.report.trace_sections import trace_sections, trace_title
+from photostrip.simulate.spec import GrossError
+from tests.results import case, spec, write_project
+from tests.source_tree import ROOT
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from tests.results import Case
+
+    Document = dict[str, Any]
+
+ELEMENTS = ("alpha1", "kappa1", "alpha2", "omega2", "kappa2")
+CASES = ("projected", "two strips", "geocentric", "gross error")
+
+
+@cache
+def solved(name: str) -> Case:
+    if name == "two strips":
+        return case("north first", 2)
+    if name == "gross error":
+        return case("projected", 1, 5.0, GrossError("image", size_um=500.0, axis="y"))
+    return case(name)
+
+
+@cache
+def trace(name: str) -> Document:
+    found: Document = json.loads(json.dumps(trace_of(solved(name).result)))
+    return found
+
+
+def rotation(alpha: float, omega: float, kappa: float) -> Rotation:
+    """Rotation of eq. 127 from three elementary ones of another library, degrees."""
+    return Rotation.from_euler("YXZ", [-alpha, omega, kappa], degrees=True)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_pairs_end_where_the_run_ended(name: str) -> None:
+    models = solved(name).document["models"]
+    pairs = [pair for strip in trace(name)["strips"] for pair in strip["pairs"]]
+    assert [(pair["left"], pair["right"]) for pair in pairs] == [(model["left"], model["right"]) for model in models]
+    for pair, model in zip(pairs, models, strict=True):
+        end = pair["rounds"][-1]["end"]
+        assert [end[e] for e in ELEMENTS] == pytest.approx([pair["elements"][e] for e in ELEMENTS], abs=1e-8)
+        assert [end[e] for e in ELEMENTS] == pytest.approx([model["elements"][e] for e in ELEMENTS], abs=2e-6)
+        assert pair["rounds"][-1]["points"] == model["points_used"]
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_each_step_leads_to_the_next(name: str) -> None:
+    for strip in trace(name)["strips"]:
+        for pair in strip["pairs"]:
+            for each in pair["rounds"]:
+                states = [step["elements"] for step in each["steps"]] + [each["end"]]
+                for step, after in zip(each["steps"], states[1:], strict=True):
+                    for e in ELEMENTS:
+                        change = (after[e] - step["elements"][e] + 180) % 360 - 180
+                        assert change == pytest.approx(step["d"][e], rel=1e-5, abs=3e-9)
+                assert max(abs(value) for value in each["steps"][-1]["d"].values()) < math.degrees(1e-10)
+                sums = [step["[wqq]"] for step in each["steps"]]
+                assert sums[-1] <= sums[0]
+
+
+def test_the_sum_of_squares_gives_sigma0() -> None:
+    for pair in trace("projected")["strips"][0]["pairs"]:
+        each = pair["rounds"][-1]
+        # a y parallax is the difference of two coordinates; n points determine five elements
+        sigma0 = math.sqrt(each["steps"][-1]["[wqq]"] / 2 / (each["points"] - 5))
+        assert pair["sigma0_um"] == pytest.approx(1000 * sigma0, rel=1e-3)
+        used = [point["q"] for point in pair["points"] if point["used"]]
+        assert sum(q * q for q in used) == pytest.approx(each["steps"][-1]["[wqq]"], rel=0.02)
+
+
+def test_rejected_points_make_a_second_round() -> None:
+    found = solved("gross error")
+    wrong = found.document["rejected"]
+    assert wrong
+    by_pair = {(pair["left"], pair["right"]): pair for pair in trace("gross error")["strips"][0]["pairs"]}
+    for row in wrong:
+        pair = by_pair[row["photo"], row["other_photo"]]
+        assert row["point"] in [each["point"] for each in pair["rejected"]]
+        assert [each["points"] for each in pair["rounds"]] == [len(pair["points"]), len(pair["points"]) - 1]
+        first, second = (each["steps"][-1]["[wqq]"] for each in pair["rounds"])
+        assert second < first / 4
+    assert all(len(pair["rounds"]) == 1 for key, pair in by_pair.items() if key not in
+               {(row["photo"], row["other_photo"]) for row in wrong})  # fmt: skip
+
+
+def test_the_chain_follows_the_formulas() -> None:
+    strip = trace("projected")["strips"][0]
+    previous = None
+    for row, pair in zip(strip["chain"], [None, *strip["pairs"]], strict=True):
+        a = rotation(row["alpha"], row["omega"], row["kappa"])
+        assert np.array(row["A"]).reshape(3, 3) == pytest.approx(a.as_matrix(), abs=1e-9)
+        if pair is not None and previous is not None:
+            e = pair["elements"]
+            base_frame = previous[0] * rotation(e["alpha1"], 0.0, e["kappa1"]).inv()  # A_taunu, eq. 126
+            assert (base_frame * rotation(e["alpha2"], e["omega2"], e["kappa2"])).as_matrix() == pytest.approx(
+                a.as_matrix(), abs=1e-9
+            )
+            b = np.array(row["B"])
+            tau, nu = math.radians(row["tau"]), math.radians(row["nu"])
+            length = float(np.linalg.norm(b))
+            expected = [math.cos(nu) * math.cos(tau), math.cos(nu) * math.sin(tau), math.sin(nu)]  # eq. 135
+            assert b / length == pytest.approx(expected, abs=1e-8)
+            assert b / length == pytest.approx(base_frame.as_matrix()[:, 0], abs=1e-8)
+            assert length == pytest.approx(row["k"], abs=1e-8)
+            assert row["S"] == pytest.approx(previous[1] + b, abs=1e-8)
+        previous = a, np.array(row["S"])
+
+
+def test_points_lie_on_their_rays() -> None:
+    found = solved("projected")
+    f = found.inputs.strips[0].camera.principal_distance
+    strip = trace("projected")["strips"][0]
+    for pair, left in zip(strip["pairs"], strip["chain"], strict=False):
+        for point in pair["points"]:
+            ray = np.array(left["A"]).reshape(3, 3) @ [point["x1"], point["y1"], -f]
+            arm = np.array([point[axis] for axis in "XYZ"]) - left["S"]
+            sine = np.linalg.norm(np.cross(ray, arm)) / np.linalg.norm(ray) / np.linalg.norm(arm)
+            assert sine < 1e-4  # half of a y parallax of 20 micrometres over 153 mm
+
+
+def test_ratios_of_distances_are_the_scale_factors() -> None:
+    strip = trace("projected")["strips"][0]
+    scales = {row["photo"]: row.get("k") for row in strip["chain"]}
+    photos = list(scales)
+    for joint in strip["scale_transfer"]:
+        for point in joint["points"]:
+            assert point["k_t"] == pytest.approx(point["D"] / point["D'"], rel=1e-6)
+        used = [point["k_t"] for point in joint["points"] if point["used"]]
+        assert min(used) < joint["k"] < max(used)
+        assert joint["k"] == pytest.approx(scales[photos[photos.index(joint["photo"]) + 1]], abs=1e-8)
+
+
+@pytest.mark.parametrize("name", ["projected", "geocentric"])
+def test_the_similarity_brings_the_strip_to_the_control(name: str) -> None:
+    found, strip = trace(name)["strips"][0]["absolute"], solved(name).result.strips[0]
+    turn = rotation(found["xi"], found["eta"], found["theta"]).as_matrix()
+    for row in found["control"]:
+        moved = found["s"] * turn @ np.array(row["strip"]) + found["shift"]
+        assert row["oriented"] == pytest.approx(moved, abs=2e-3)
+    redundancy = strip.absolute.redundancy
+    assert math.sqrt(found["steps"][-1]["[wvv]"] / redundancy) == pytest.approx(strip.absolute.sigma0, rel=1e-3)
+    assert found["steps"][-1]["s"] == pytest.approx(found["s"], rel=1e-9)
+    m = np.array(found["M"]).reshape(3, 3)
+    assert m @ m.T == pytest.approx(np.eye(3), abs=1e-9)
+
+
+def test_polynomials_take_out_the_free_terms() -> None:
+    found = trace("projected")["strips"][0]["polynomial"]
+    assert found["degree"] > 0
+    powers = {"1": (0, 0), "X": (1, 0), "Y": (0, 1), "XY": (1, 1), "X^2": (2, 0), "X^3": (3, 0)}
+    for row in found["control"]:
+        for number, axis in enumerate("XYZ"):
+            fit = found["axes"][axis]
+            value = sum(
+                coefficient * row["X"] ** powers[term][0] * row["Y"] ** powers[term][1]
+                for term, coefficient in zip(fit["terms"], fit["coefficients"], strict=True)
+            )
+            assert row["v"][number] == pytest.approx(value - row["l"][number], abs=3e-4)  # eq. 151
+
+
+def test_a_trace_is_the_same_every_time() -> None:
+    assert trace_of(solved("projected").result) == trace_of(solved("projected").result)
+
+
+def test_every_symbol_is_explained() -> None:
+    page = to_text(trace_title(trace("gross error")), trace_sections(trace("gross error")), 200)
+    for symbol in ("[wqq]", "[wvv]", "A0", "k_t", "α1′", "τ"):
+        assert symbol in page
+    assert {"q", "N", "k", "[wqq]", "[wvv]"} <= {name.split(",")[0] for name in SYMBOLS}
+
+
+@pytest.mark.parametrize("ending", ["txt", "md", "json"])
+def test_the_preset_for_teaching_gives_a_trace_in_gon(tmp_path: Path, ending: str) -> None:
+    project = write_project(tmp_path, spec(), f"extends: {ROOT / 'configs/teaching.yaml'}\n")
+    file = tmp_path / f"trace.{ending}"
+    assert main(["run", str(project), "--quiet", "--trace", str(file)]) == 0
+    text = file.read_text(encoding="utf-8")
+    if ending == "json":
+        document = json.loads(text)
+        assert document["angles"] == "gon"
+        joint = document["strips"][0]["scale_transfer"][0]
+        used = [point["k_t"] for point in joint["points"] if point["used"]]
+        assert joint["k"] == pytest.approx(sum(used) / len(used), abs=1e-8)  # the textbook's mean
+    else:
+        assert "Relative orientation of 1001 – 1002" in text
+        assert "gon" in text
+
+
+def test_an_ending_that_is_not_known_is_refused_before_the_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    project = write_project(tmp_path, spec())
+    assert main(["run", str(project), "-o", str(tmp_path / "out"), "--trace", str(tmp_path / "t.pdf")]) == 2
+    assert "--trace" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
