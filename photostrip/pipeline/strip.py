@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -66,6 +67,59 @@ def adjust_strip(
     GeometryError, InputError
         When a pair, a joint or the absolute orientation cannot be determined; the strip is named.
     """
+    return adjust_formed(form_strip(strip, observations, settings), observations, control, frames, settings)
+
+
+@dataclass(frozen=True, eq=False)
+class Formed:
+    """A strip before it meets its control.
+
+    Parameters
+    ----------
+    strip : Strip
+        The strip.
+    sigma : float
+        Median standard deviation of its image coordinates, mm.
+    screened : screening.Screened
+        The search for gross errors in its pairs.
+    oriented : relative.Orientation
+        Relative orientation of the pairs, as the strip was formed.
+    formed : formation.FormedStrip
+        The formed strip.
+    contradictions : rays.Contradictions
+        Points whose rays contradict each other from model to model.
+    """
+
+    strip: Strip
+    sigma: float
+    screened: screening.Screened
+    oriented: relative.Orientation
+    formed: formation.FormedStrip
+    contradictions: rays.Contradictions
+
+
+def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> Formed:
+    """Orient the pairs of a strip and form it, without any control.
+
+    Parameters
+    ----------
+    strip : Strip
+        Photos in flight order and their camera.
+    observations : PhotoPoints
+        Ideal image coordinates of the whole project.
+    settings : Settings
+        What is to be done.
+
+    Returns
+    -------
+    Formed
+        The strip in the frame and scale of its first model.
+
+    Raises
+    ------
+    GeometryError, InputError
+        When a pair or a joint cannot be determined; the strip is named.
+    """
     sigma = _sigma(strip, observations)
     pairs, point, pair_rows = relative.collect_pairs(observations, strip.photos, strip.camera.principal_distance)
     dropped = overruling.touched(settings.relative.drop, observations, pair_rows)
@@ -74,10 +128,35 @@ def adjust_strip(
     screened = screening.examine(first, settings.relative, sigma, converged)
     kept = overruling.touched(settings.relative.keep, observations, pair_rows)
     screened = overruling.restored(screened, pairs.weight, kept)
-    oriented, rejections = screened.orientation, screened.rejections
-    relative.require(oriented, screened.converged, strip.photos)
+    relative.require(screened.orientation, screened.converged, strip.photos)
     oriented, formed, contradictions = _form(strip, observations, screened, settings, kept)
+    return Formed(strip, sigma, screened, oriented, formed, contradictions)
 
+
+def adjust_formed(
+    stage: Formed, observations: PhotoPoints, control: ControlPoints, frames: Sequence[GroundFrame], settings: Settings
+) -> StripResult:
+    """Take a formed strip to the ground.
+
+    Parameters
+    ----------
+    stage : Formed
+        The formed strip.
+    observations, control, frames, settings
+        As for :func:`adjust_strip`.
+
+    Returns
+    -------
+    StripResult
+        Every stage.
+
+    Raises
+    ------
+    GeometryError
+        When the absolute orientation cannot be determined; the strip is named.
+    """
+    strip, sigma, screened = stage.strip, stage.sigma, stage.screened
+    oriented, formed, contradictions = stage.oriented, stage.formed, stage.contradictions
     here, rows = _control_of(formed, control, observations)
     intermediate, orientation, precision = _to_ground(strip, formed, here, rows, frames, oriented, sigma)
     wrong: tuple[control_screening.ControlRejection, ...] = ()
@@ -99,7 +178,7 @@ def adjust_strip(
     return StripResult(
         strip,
         oriented,
-        rejections,
+        screened.rejections,
         formed,
         precision,
         intermediate,
