@@ -264,7 +264,7 @@ def _to_ground(
         msg = f"strip {strip.id}: none of its points is a control point"
         raise GeometryError(msg, photos=strip.photos, code="no-control")
     try:
-        provisional_frame = _intermediate(control, frames)
+        provisional_frame = middle_frame(control, frames)
         provisional = absolute.orient(
             formed.xyz[rows],
             absolute.Targets(control, frames, provisional_frame),
@@ -284,10 +284,25 @@ def _to_ground(
     return intermediate, final, precision
 
 
-def _intermediate(control: ControlPoints, frames: Sequence[GroundFrame]) -> IntermediateFrame:
-    """Frame at the control's centre of gravity, X to the north.
+def middle_frame(control: ControlPoints, frames: Sequence[GroundFrame]) -> IntermediateFrame:
+    """Give the frame at the control's centre of gravity, X to the north.
 
-    Points without plan position do not count; a missing height is taken from the others.
+    Parameters
+    ----------
+    control : ControlPoints
+        Control; points without plan position do not count, a missing height is taken from the others.
+    frames : sequence of GroundFrame
+        Their ground frames.
+
+    Returns
+    -------
+    IntermediateFrame
+        The frame.
+
+    Raises
+    ------
+    GeometryError
+        When no point gives a plan position.
     """
     known = ~np.isnan(control.enu[:, :2]).any(axis=1) & control.use[:, 0]
     chosen = control.take(known)
