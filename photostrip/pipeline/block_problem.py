@@ -65,7 +65,8 @@ def build(
     BlockProblem
         The problem, and what its rows stand for.
     """
-    origin = np.round(np.nanmean(start.points, axis=0), -1)  # whole numbers: nothing is lost when it is added back
+    # whole numbers: nothing is lost when the origin is added back
+    origin: Floats = np.round(np.nanmean(start.points, axis=0, dtype=np.float64), -1)
     place = {photo: number for number, photo in enumerate(start.photos)}
     photo = np.array([place[name] for name in observations.photo_ids], np.intp)
     rows = np.flatnonzero(~_dropped(settings, observations))
@@ -89,7 +90,7 @@ def build(
     )
     level = {
         "control": tuple(frames[0][number].kind != "geocentric" for number in control.frame[control_rows].tolist()),
-        "position": _level_positions(inputs, frames[1], frames[2], start),
+        "position": _level_positions(inputs, frames[1], frames[2]),
     }
     begin = _begin(problem, rows, control, control_rows, start)
     kept = _named(settings.relative.keep, observations)[rows]
@@ -217,7 +218,7 @@ def _measured(
 
 
 def _level_positions(
-    inputs: Inputs, frame: GroundFrame | None, of_orientations: GroundFrame | None, start: BlockStart
+    inputs: Inputs, frame: GroundFrame | None, of_orientations: GroundFrame | None
 ) -> tuple[bool, ...]:
     """Whether the axes of each row of the positions are plan and height."""
     level: list[bool] = []
@@ -290,7 +291,7 @@ def refilled(
 def _begin(
     problem: Problem, rows: Numbers, control: ControlPoints, control_rows: Numbers, start: BlockStart
 ) -> Selection:
-    """What takes part at first: what the strip method used, and what else fits its result."""
+    """Choose what takes part at first: what the strip method used, and what else fits its result."""
     images = problem.images
     used = np.zeros(int(rows.max(initial=-1)) + 1, bool)
     paired = np.zeros(len(used), bool)

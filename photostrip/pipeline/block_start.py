@@ -1,9 +1,9 @@
 """Where the bundle adjustment starts: every strip and every photo of the block in the project's Cartesian frame.
 
 Each strip is formed by the strip method. Strips with enough control of their own go to the ground with it; others are
-tied to them by common points; what is still apart is joined to a block of its own, and the block goes to the ground with
-its control, with camera positions or with given orientations, whatever there is. With nothing at all the first strip
-gives frame and scale. Single photos are resected on what is known by then.
+tied to them by common points; what is still apart is joined to a block of its own, and the block goes to the ground
+with its control, with camera positions or with given orientations, whatever there is. With nothing at all the first
+strip gives frame and scale. Single photos are resected on what is known by then.
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ def known_of(
     lever = np.zeros(3)
     positions, orientations = inputs.positions, inputs.orientations
     if positions is not None and cameras[0] is not None:
-        whole = positions.use.all(axis=1)
+        whole = np.asarray(positions.use.all(axis=1), bool)
         names = [photo for photo, yes in zip(positions.photos, whole, strict=True) if yes]
         found = cameras[0].cartesian_from_ground(positions.enu[whole], ids=[f"of photo {name}" for name in names])
         centers = dict(zip(names, found, strict=True))
@@ -321,7 +321,8 @@ def _by_control(xyz: Floats, every: Floats, control: ControlPoints, known: Known
 
 def _oriented(stages: Sequence[Formed], group: _Group) -> tuple[tuple[str, ...], Floats, Floats]:
     """Photos of a block with their orientations in its frame."""
-    names, centers, rotations = [], [], []
+    names: list[str] = []
+    centers, rotations = [], []
     for number in group.members:
         names += stages[number].strip.photos
         centers.append(group.joined[number](stages[number].formed.centers))
@@ -340,7 +341,7 @@ def _by_cameras(
     rows = np.array([row for row, name in enumerate(names) if name in known.centers], np.intp)
     source, target = centers[rows], np.array([known.centers[names[row]] for row in rows])
     control, numbers = given
-    full = control.use.all(axis=1)
+    full = np.asarray(control.use.all(axis=1), bool)
     source = np.concatenate([source, group.points[numbers[full]]])
     target = np.concatenate([target, _cartesian_of(control.take(full), known)])
     weight = np.ones(len(source))
@@ -440,7 +441,7 @@ def _with_control(points: Floats, observations: PhotoPoints, known: Known) -> Fl
     """Put full control in where a point has no coordinates."""
     found = points.copy()
     number = {name: n for n, name in enumerate(observations.point_ids)}
-    full = known.control.take(known.control.use.all(axis=1))
+    full = known.control.take(np.asarray(known.control.use.all(axis=1), bool))
     rows = np.array([number[name] for name in full.ids], np.intp)
     missing = np.isnan(found[rows, 0]) if len(rows) else np.zeros(0, bool)
     if missing.any():

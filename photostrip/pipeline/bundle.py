@@ -217,7 +217,7 @@ def _block(inputs: Inputs, observations: PhotoPoints, output: GroundFrame, bundl
     photos = tuple(bundle.photo_covariances[begin : begin + count[n]] for n, begin in places)
     basis = "a-priori" if bundle.unit == 1.0 else "a-posteriori"
     precision = Precision(covariances, photos, (sigma,) * len(strips), (basis,) * len(strips))
-    notes = (*_strip_notes(start), *_notes(inputs, bundle))
+    notes = (*_strip_notes(start), *_notes(bundle))
     return Block(strips, points, precision, calibrated, bundle, notes)
 
 
@@ -274,11 +274,11 @@ def _strip(
 
 
 def _strip_notes(start: BlockStart) -> tuple[Note, ...]:
-    """Notes of the strips that still mean something."""
+    """Give the notes of the strips that still mean something."""
     return tuple(note for strip in start.strips for note in strip.notes if note.code not in OF_THE_STRIP_METHOD)
 
 
-def _notes(inputs: Inputs, bundle: Bundle) -> list[Note]:
+def _notes(bundle: Bundle) -> list[Note]:
     """Say what the surveyor should know of the adjustment."""
     notes = []
     solution = bundle.screened.solution
@@ -291,16 +291,17 @@ def _notes(inputs: Inputs, bundle: Bundle) -> list[Note]:
     test = bundle.sigma0
     if np.isfinite(test.lower) and not test.passed:
         text = (
-            f"sigma0 is {test.sigma0:.3f}; with the stated standard deviations it would lie between {test.lower:.3f} and "
-            f"{test.upper:.3f}: they are too {'small' if test.sigma0 > 1 else 'large'}"
+            f"sigma0 is {test.sigma0:.3f}; with the stated standard deviations it would lie between {test.lower:.3f} "
+            f"and {test.upper:.3f}: they are too {'small' if test.sigma0 > 1 else 'large'}"
         )
-        notes.append(Note("sigma0-test", text, severity="note"))
-    notes += _given_notes(inputs, bundle)
+        notes.append(Note("unit-weight", text, severity="note"))
+    notes += _given_notes(bundle)
     for parameter in bundle.parameters:
         if not parameter.significant:
             text = (
-                f"camera {parameter.camera}: {parameter.name} is {parameter.value:.3g} {parameter.unit} with a standard "
-                f"deviation of {parameter.sigma:.3g}: it does not differ from zero; leave it out of self_calibration"
+                f"camera {parameter.camera}: {parameter.name} is {parameter.value:.3g} {parameter.unit} with a "
+                f"standard deviation of {parameter.sigma:.3g}: it does not differ from "
+                "zero; leave it out of self_calibration"
             )
             notes.append(Note("calibration-insignificant", text))
     for correlation in bundle.correlations:
@@ -309,7 +310,7 @@ def _notes(inputs: Inputs, bundle: Bundle) -> list[Note]:
     return notes
 
 
-def _given_notes(inputs: Inputs, bundle: Bundle) -> list[Note]:
+def _given_notes(bundle: Bundle) -> list[Note]:
     """Name control and camera positions that were taken out."""
     notes = []
     problem = bundle.block.problem
@@ -330,9 +331,9 @@ def _given_notes(inputs: Inputs, bundle: Bundle) -> list[Note]:
         part = problem.positions if each.kind == reliability.POSITION else problem.attitudes
         photo = problem.photo_name(int(part.photo[each.row]))
         if each.kind == reliability.POSITION:
-            text = f"the given position of photo {photo} does not fit: {axis} by about {each.size:+.2f} m ({reached}); not used"
+            text = f"the given position of photo {photo} does not fit: {axis} by about {each.size:+.2f} m"
         else:
             turn = f"{np.degrees(each.size):+.3f} deg"
-            text = f"the given angles of photo {photo} do not fit: about axis {each.axis + 1} by {turn} ({reached}); not used"
-        notes.append(Note("position-rejected", text, photos=(photo,)))
+            text = f"the given angles of photo {photo} do not fit: about image axis {each.axis + 1} by {turn}"
+        notes.append(Note("position-rejected", f"{text} ({reached}); not used", photos=(photo,)))
     return notes

@@ -76,7 +76,7 @@ def _triangulated(inputs: Inputs, settings: Settings, directory: Path | None) ->
     """Walk through the method."""
     _require(settings)
     _require_strips(inputs)
-    frames, output, *cameras = _frames(inputs, settings, directory)
+    frames, output, of_positions, of_orientations = _frames(inputs, settings, directory)
     require_whole(inputs, frames)
     observations, fiducial = _photo_coordinates(inputs, settings)
     overruling.require(settings.relative, observations)
@@ -86,7 +86,8 @@ def _triangulated(inputs: Inputs, settings: Settings, directory: Path | None) ->
     if settings.adjustment == "bundle":
         from photostrip.pipeline.bundle import adjust_block  # a strip needs none of its libraries
 
-        block = adjust_block(inputs, settings, refined.observations, control, (frames, output, *cameras))
+        tied = (frames, output, of_positions, of_orientations)
+        block = adjust_block(inputs, settings, refined.observations, control, tied)
         refined = replace(refined, observations=block.observations)
         strips, points, ties = block.strips, block.points, Ties.none()
     else:

@@ -185,7 +185,7 @@ def approximate(xy: Floats, points: Floats, focal: float) -> tuple[Floats, Float
 
 
 def _triples(xy: Floats) -> list[Numbers]:
-    """Sets of three points that span large triangles in the photo, the largest first."""
+    """Choose sets of three points that span large triangles in the photo, the largest first."""
     order = np.argsort(-np.hypot(*(xy - xy.mean(axis=0)).T), kind="stable")[:9]
     sets = [np.array(each, np.intp) for each in combinations(order.tolist(), 3)]
     area = [abs(float(np.linalg.det(np.column_stack([xy[each], np.ones(3)])))) for each in sets]
@@ -228,7 +228,7 @@ def _three_points(rays: Floats, points: Floats) -> Iterator[tuple[Floats, Floats
 def derivatives(
     points: Floats, centers: Floats, rotations: Floats, photo: Numbers, focal: Floats
 ) -> tuple[Floats, Floats]:
-    """Derivatives of image coordinates.
+    """Differentiate image coordinates.
 
     Parameters
     ----------
@@ -320,7 +320,7 @@ def _summed(values: Floats, point: Numbers, count: int) -> Floats:
     """Sum rows by point."""
     flat = values.reshape(len(values), -1)
     sums = np.column_stack([np.bincount(point, column, count) for column in flat.T])
-    return sums.reshape(count, *values.shape[1:])
+    return np.asarray(sums.reshape(count, *values.shape[1:]), np.float64)
 
 
 def _solved(normal: Floats, right: Floats) -> tuple[Floats, NDArray[np.bool_]]:

@@ -1,4 +1,4 @@
-"""The bundle adjustment in a result: convergence, sigma0, reliability, variance components, calibration, correlations."""
+"""The bundle adjustment in a result: convergence, sigma0, reliability, variance components, calibration."""
 
 from __future__ import annotations
 
@@ -191,7 +191,9 @@ def _named(result: Result, found: Bundle, what: str) -> list[Document]:
     shift = reliability.noncentrality(result.settings.bundle.alpha, result.settings.bundle.power)
     chosen = []
     for number, group in enumerate(found.groups):
-        value = np.where(np.isfinite(group.sigma), -group.redundancy if what == "weakest" else np.abs(group.standardised), np.nan)
+        value = np.where(
+            np.isfinite(group.sigma), -group.redundancy if what == "weakest" else np.abs(group.standardised), np.nan
+        )
         flat = np.where(np.isfinite(value), value, -np.inf).ravel()
         best = np.argsort(-flat, kind="stable")[:SHOWN]
         chosen += [(-float(flat[at]), number, int(at)) for at in best.tolist() if np.isfinite(flat[at])]
@@ -265,7 +267,9 @@ def _corrections(found: Bundle) -> Iterator[Document]:
     """Give offsets and drifts of the camera positions of the strips."""
     problem, solution, precision = found.screened.problem, found.screened.solution, found.screened.precision
     names = problem.common_names()
-    first = len(names) - sum(3 * int((s > 0).sum()) for s in (problem.positions.offset_sigma, problem.positions.drift_sigma))
+    first = len(names) - sum(
+        3 * int((s > 0).sum()) for s in (problem.positions.offset_sigma, problem.positions.drift_sigma)
+    )
     for number in range(first, len(names)):
         sigma = float(np.sqrt(precision.common[number, number])) * found.unit
         yield {"name": names[number], "value": significant(solution.common[number], 6), "sigma": significant(sigma)}
@@ -303,7 +307,11 @@ def _rejection(found: Bundle, each: Rejection) -> Document:
         photo = problem.photo_name(int(part.photo[each.row]))
     axis = AXES[each.kind][each.axis]
     size = rounded(each.size * factor, decimals)
-    reason = "does not fit the other observations" if size is None else f"{axis} is wrong by about {size:+g} {unit.replace('um', 'µm')}"
+    reason = (
+        "does not fit the other observations"
+        if size is None
+        else f"{axis} is wrong by about {size:+g} {unit.replace('um', 'µm')}"
+    )
     if each.readmitted:
         reason = "taken back: it fits after the others went"
     strip = next((s.strip.id for s in found.start.strips if photo in s.strip.photos), "") if photo else ""
@@ -348,4 +356,3 @@ def image_fit(result: Result) -> tuple[float, float, int]:
     stated = float(np.sqrt(np.mean(sigma**2)))
     rms = float(np.sqrt(np.mean(solution.image_residuals**2)))
     return solution.sigma0 * stated, rms, solution.redundancy
-

@@ -50,7 +50,7 @@ class Group:
 
     @property
     def standardised(self) -> Floats:
-        """Errors over their standard deviations, shape (n, k); NaN where the redundancy is too small to say anything."""
+        """Errors over their standard deviations, shape (n, k); NaN where the redundancy is too small to tell."""
         with np.errstate(invalid="ignore", divide="ignore"):
             value = self.error / (self.sigma * np.sqrt(self.redundancy))
         return np.where(self.redundancy >= UNCONTROLLED, value, np.nan)

@@ -93,16 +93,17 @@ def selected(problem: Problem, selection: Selection) -> Problem:
     """
     images, rows = problem.images, selection.images
     chosen = Images(images.photo[rows], images.point[rows], images.xy[rows], images.sigma[rows])
-    parts = {
-        name: replace(part, sigma=np.where(getattr(selection, name), part.sigma, np.inf))
-        for name, part in (
-            ("control", problem.control),
-            ("positions", problem.positions),
-            ("attitudes", problem.attitudes),
-        )
-    }
-    start = replace(problem.start, points=np.nan_to_num(problem.start.points))
-    return replace(problem, images=chosen, start=start, **parts)
+    given = (problem.control.sigma, problem.positions.sigma, problem.attitudes.sigma)
+    flags = (selection.control, selection.positions, selection.attitudes)
+    sigma = [np.where(yes, each, np.inf) for each, yes in zip(given, flags, strict=True)]
+    return replace(
+        problem,
+        images=chosen,
+        start=replace(problem.start, points=np.nan_to_num(problem.start.points)),
+        control=replace(problem.control, sigma=sigma[0]),
+        positions=replace(problem.positions, sigma=sigma[1]),
+        attitudes=replace(problem.attitudes, sigma=sigma[2]),
+    )
 
 
 def restarted(problem: Problem, solution: Solution) -> Problem:
@@ -120,6 +121,6 @@ def restarted(problem: Problem, solution: Solution) -> Problem:
     Problem
         The same problem; a point that took no part keeps its start.
     """
-    known = np.isfinite(problem.start.points).all(axis=1)
+    known = np.asarray(np.isfinite(problem.start.points).all(axis=1), bool)
     points = np.where(known[:, None], solution.points, problem.start.points)
     return replace(problem, start=Start(solution.centers, solution.rotations, points))

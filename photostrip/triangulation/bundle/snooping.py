@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.triangulation.bundle import reliability, robust
-from photostrip.triangulation.bundle.self_calibration import image_shift
 from photostrip.triangulation.bundle.precision import precision as precision_of
 from photostrip.triangulation.bundle.selection import Selection, restarted, selected, supported
+from photostrip.triangulation.bundle.self_calibration import image_shift
 from photostrip.triangulation.bundle.solve import solve
 from photostrip.triangulation.exterior import project
 from photostrip.triangulation.single import derivatives, intersect_points
@@ -150,12 +150,13 @@ class _Adjusted:
         """Rows of the whole problem that the observations of a kind have."""
         if kind == reliability.IMAGE:
             return np.flatnonzero(self.selection.images)
-        parts = {
-            "control": self.problem.control,
-            "position": self.problem.positions,
-            "attitude": self.problem.attitudes,
+        problem = self.problem
+        sizes = {
+            reliability.CONTROL: len(problem.control),
+            reliability.POSITION: len(problem.positions),
+            reliability.ATTITUDE: len(problem.attitudes),
         }
-        return np.arange(len(parts[kind]))
+        return np.arange(sizes[kind])
 
 
 class _Search:

@@ -14,7 +14,7 @@ import numpy as np
 from photostrip.triangulation.bundle import reliability
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -84,7 +84,7 @@ def labels(kind: str, rows: int, level: Sequence[bool]) -> list[tuple[str, slice
 
 
 def components(
-    problem: Problem, solution: Solution, precision: Precision, level: dict[str, Sequence[bool]]
+    problem: Problem, solution: Solution, precision: Precision, level: Mapping[str, Sequence[bool]]
 ) -> tuple[Component, ...]:
     """Compare each group's residuals with its standard deviations, once.
 
@@ -96,7 +96,7 @@ def components(
         Its solution.
     precision : Precision
         Cofactors.
-    level : dict of str to sequence of bool
+    level : mapping of str to sequence of bool
         For ``control`` and ``position``: whether the axes of each row are plan and height.
 
     Returns
@@ -128,7 +128,7 @@ def _component(name: str, group: reliability.Group, given: NDArray[np.bool_]) ->
     return Component(name, int(given.sum()), redundancy, factor, sigma, estimated)
 
 
-def scaled(problem: Problem, found: Sequence[Component], level: dict[str, Sequence[bool]]) -> Problem:
+def scaled(problem: Problem, found: Sequence[Component], level: Mapping[str, Sequence[bool]]) -> Problem:
     """Multiply the standard deviations of a problem with the factors of their groups.
 
     Parameters
@@ -137,7 +137,7 @@ def scaled(problem: Problem, found: Sequence[Component], level: dict[str, Sequen
         The problem.
     found : sequence of Component
         The factors.
-    level : dict of str to sequence of bool
+    level : mapping of str to sequence of bool
         As for :func:`components`.
 
     Returns
