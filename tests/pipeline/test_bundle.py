@@ -93,7 +93,7 @@ def test_offset_and_drift_are_found_as_they_are() -> None:
     document = document_of(adjusted(simulation, inputs))
     found = {each["name"]: each["value"] for each in document["bundle"]["corrections"]}
     for axis in (1, 2, 3):
-        # what is added to the given positions, the offset in the middle of the strip; metres of the ground, not of the grid
+        # what is added to the given positions, the offset in mid-strip; metres of the ground, not of the grid
         assert found[f"positions A: drift {axis}"] == pytest.approx(-step[axis - 1], rel=1e-3)
         assert found[f"positions A: offset {axis}"] == pytest.approx(-(axis + 2.5 * step[axis - 1]), rel=1e-3)
         assert abs(found[f"positions B: offset {axis}"]) < 1e-4
