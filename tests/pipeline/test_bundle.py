@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -14,6 +15,12 @@ from photostrip.pipeline import Strip
 from photostrip.points import PhotoPoints
 from photostrip.simulate import Control, Flight, Ground, Image, Spec, Terrain
 from tests.pipeline.blocks import adjusted, corners, errors, exact, orientations, positions, simulate, with_control
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from photostrip.pipeline import Inputs
+    from photostrip.simulate import Simulation
 
 MICROMETRE = 1e-6  # metres
 BLOCK = exact(flight=Flight(photos=6, strips=3))
@@ -55,7 +62,7 @@ def test_without_noise_the_truth_comes_back(title: str) -> None:
     assert np.abs(centers - simulation.truth.centers).max() < MICROMETRE
 
 
-TIED = {
+TIED: dict[str, Callable[[Simulation], Inputs]] = {
     "corners only": lambda s: with_control(s, corners(s)),
     "positions only": lambda s: replace(with_control(s, []), positions=positions(s)),
     "positions and one point": lambda s: replace(with_control(s, corners(s)[:1]), positions=positions(s)),
@@ -141,7 +148,7 @@ def test_single_photos_join_a_strip() -> None:
     assert document["counts"]["photos"] == 12
 
 
-UNDETERMINED = {
+UNDETERMINED: dict[str, tuple[Spec, Callable[[Simulation], Inputs]]] = {
     "roll about the flight line": (
         exact(flight=Flight(photos=6, position_sigma=(0, 0, 0))),
         lambda s: replace(with_control(s, []), positions=positions(s)),
