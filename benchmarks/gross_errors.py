@@ -104,7 +104,9 @@ def adjusted(simulation: Simulation, settings: Settings, wrong_rows: set[tuple[s
     bad = np.array([key in injected for key in zip(photo, point, strict=True)])
     used = np.zeros(len(bad), bool)
     for strip in result.strips:
+        oriented = strip.orientation
         used[strip.rows] = True
+        used[oriented.rows[oriented.used].ravel()] = True
     own = np.array([name in spoiled for name in names])[new]
     wrong_control = [error.point for error in simulation.truth.errors if error.kind == "control"]
     named = None

@@ -49,10 +49,10 @@ from photostrip.triangulation import (  # noqa: E402
     exterior,
     formation,
     polynomial,
-    rays,
     refinement,
     relative,
     screening,
+    strip_screening,
 )
 
 if TYPE_CHECKING:
@@ -183,7 +183,7 @@ STAGES = (
     ("relative orientation", relative, "attempt"),
     ("screening of pairs", screening, "examine"),
     ("strip formation", formation, "form"),
-    ("screening of rays", rays, "examine"),
+    ("screening of the strip", strip_screening, "examine"),
     ("absolute orientation", absolute, "orient"),
     ("polynomial", polynomial, "fit"),
     ("resection", exterior, "resect"),

@@ -41,7 +41,7 @@ def require(settings: relative.Settings, observations: PhotoPoints) -> None:
     """
     faults = []
     for key in ("keep", "drop"):
-        found = rows_of(getattr(settings, key), observations)
+        found = _rows(getattr(settings, key), observations)
         faults += [
             Fault(
                 f"`{entry}` names no measurement",
@@ -61,8 +61,21 @@ def require(settings: relative.Settings, observations: PhotoPoints) -> None:
         raise InputError(faults)
 
 
-def rows_of(entries: Sequence[str], observations: PhotoPoints) -> dict[str, int]:
-    """Find the rows of the measurements of a list.
+def _rows(entries: Sequence[str], observations: PhotoPoints) -> dict[str, int]:
+    """Row of each measurement named photo/point; -1 for none."""
+    if not entries:
+        return {}
+    wanted = dict.fromkeys(entries, -1)
+    photos, points = observations.photo_ids, observations.point_ids
+    for row, (photo, point) in enumerate(zip(observations.photo, observations.point, strict=True)):
+        name = f"{photos[photo]}/{points[point]}"
+        if name in wanted:
+            wanted[name] = row
+    return wanted
+
+
+def rows(entries: Sequence[str], observations: PhotoPoints) -> Numbers:
+    """Give the rows of the measurements of a list.
 
     Parameters
     ----------
@@ -73,18 +86,10 @@ def rows_of(entries: Sequence[str], observations: PhotoPoints) -> dict[str, int]
 
     Returns
     -------
-    dict of str to int
-        Row of each; -1 for none.
+    ndarray of int
+        Their rows, ascending.
     """
-    if not entries:
-        return {}
-    wanted = dict.fromkeys(entries, -1)
-    photos, points = observations.photo_ids, observations.point_ids
-    for row, (photo, point) in enumerate(zip(observations.photo, observations.point, strict=True)):
-        name = f"{photos[photo]}/{points[point]}"
-        if name in wanted:
-            wanted[name] = row
-    return wanted
+    return np.array(sorted(_rows(entries, observations).values()), np.intp)
 
 
 def touched(entries: Sequence[str], observations: PhotoPoints, rows: Numbers) -> Flags:
@@ -104,7 +109,7 @@ def touched(entries: Sequence[str], observations: PhotoPoints, rows: Numbers) ->
     ndarray of bool, shape (m,)
         True for those.
     """
-    hits = np.isin(rows, list(rows_of(entries, observations).values()))
+    hits = np.isin(rows, list(_rows(entries, observations).values()))
     found: Flags = hits[:, 0] | hits[:, 1]
     return found
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,9 +18,10 @@ from photostrip.triangulation import (
     exterior,
     formation,
     polynomial,
-    rays,
     relative,
     screening,
+    settling,
+    strip_screening,
 )
 
 if TYPE_CHECKING:
@@ -67,59 +68,6 @@ def adjust_strip(
     GeometryError, InputError
         When a pair, a joint or the absolute orientation cannot be determined; the strip is named.
     """
-    return adjust_formed(form_strip(strip, observations, settings), observations, control, frames, settings)
-
-
-@dataclass(frozen=True, eq=False)
-class Formed:
-    """A strip before it meets its control.
-
-    Parameters
-    ----------
-    strip : Strip
-        The strip.
-    sigma : float
-        Median standard deviation of its image coordinates, mm.
-    screened : screening.Screened
-        The search for gross errors in its pairs.
-    oriented : relative.Orientation
-        Relative orientation of the pairs, as the strip was formed.
-    formed : formation.FormedStrip
-        The formed strip.
-    contradictions : rays.Contradictions
-        Points whose rays contradict each other from model to model.
-    """
-
-    strip: Strip
-    sigma: float
-    screened: screening.Screened
-    oriented: relative.Orientation
-    formed: formation.FormedStrip
-    contradictions: rays.Contradictions
-
-
-def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> Formed:
-    """Orient the pairs of a strip and form it, without any control.
-
-    Parameters
-    ----------
-    strip : Strip
-        Photos in flight order and their camera.
-    observations : PhotoPoints
-        Ideal image coordinates of the whole project.
-    settings : Settings
-        What is to be done.
-
-    Returns
-    -------
-    Formed
-        The strip in the frame and scale of its first model.
-
-    Raises
-    ------
-    GeometryError, InputError
-        When a pair or a joint cannot be determined; the strip is named.
-    """
     sigma = _sigma(strip, observations)
     pairs, point, pair_rows = relative.collect_pairs(observations, strip.photos, strip.camera.principal_distance)
     dropped = overruling.touched(settings.relative.drop, observations, pair_rows)
@@ -129,34 +77,9 @@ def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> F
     kept = overruling.touched(settings.relative.keep, observations, pair_rows)
     screened = overruling.restored(screened, pairs.weight, kept)
     relative.require(screened.orientation, screened.converged, strip.photos)
-    oriented, formed, contradictions = _form(strip, observations, screened, settings, kept)
-    return Formed(strip, sigma, screened, oriented, formed, contradictions)
+    screened, formed, contradictions = _form(strip, observations, screened, settings, pairs.weight)
+    oriented = screened.orientation
 
-
-def adjust_formed(
-    stage: Formed, observations: PhotoPoints, control: ControlPoints, frames: Sequence[GroundFrame], settings: Settings
-) -> StripResult:
-    """Take a formed strip to the ground.
-
-    Parameters
-    ----------
-    stage : Formed
-        The formed strip.
-    observations, control, frames, settings
-        As for :func:`adjust_strip`.
-
-    Returns
-    -------
-    StripResult
-        Every stage.
-
-    Raises
-    ------
-    GeometryError
-        When the absolute orientation cannot be determined; the strip is named.
-    """
-    strip, sigma, screened = stage.strip, stage.sigma, stage.screened
-    oriented, formed, contradictions = stage.oriented, stage.formed, stage.contradictions
     here, rows = _control_of(formed, control, observations)
     intermediate, orientation, precision = _to_ground(strip, formed, here, rows, frames, oriented, sigma)
     wrong: tuple[control_screening.ControlRejection, ...] = ()
@@ -211,21 +134,18 @@ def _extent(formed: formation.FormedStrip, orientation: absolute.AbsoluteOrienta
 
 
 def _form(
-    strip: Strip, observations: PhotoPoints, screened: screening.Screened, settings: Settings, kept: Flags
-) -> tuple[relative.Orientation, formation.FormedStrip, rays.Contradictions]:
-    """Form the strip, find the points whose rays contradict each other, and form it again without them."""
+    strip: Strip, observations: PhotoPoints, screened: screening.Screened, settings: Settings, weight: Floats
+) -> tuple[screening.Screened, formation.FormedStrip, strip_screening.Verdict]:
+    """Form the strip, and let it decide what its pairs could not."""
     oriented, scatter = screened.orientation, screened.scatter.by_pair
-    formed = formation.form(oriented, settings.formation, strip.photos, scatter)
     if settings.relative.screening == "none":
-        return oriented, formed, rays.Contradictions.none(oriented)
-    sigma = float(np.median(scatter)) / np.sqrt(2.0)
-    found = rays.examine(oriented, formed, observations, strip.photos, sigma, kept)
-    unfit = screening.spared(oriented, found.unfit)
-    if unfit.any():
-        weight = np.where(unfit, 0.0, oriented.pairs.weight)
-        oriented = relative.refine(oriented, weight, np.unique(oriented.pairs.pair[unfit]))
-        formed = formation.form(oriented, settings.formation, strip.photos, scatter)
-    return oriented, formation.without(formed, oriented, found.left_out), found
+        return screened, formation.form(oriented, settings.formation, strip.photos, scatter), strip_screening.Verdict()
+    kept = overruling.rows(settings.relative.keep, observations)
+    measured = settling.Measured(observations, strip.photos, weight, scatter, _sigma(strip, observations), kept)
+    readmit = settings.relative.screening in screening.SEARCHES
+    oriented, formed, verdict = settling.settle(oriented, measured, settings.formation, readmit=readmit)
+    rejections = settling.taken_back(screened.rejections, oriented.used)
+    return replace(screened, orientation=oriented, rejections=rejections), formed, verdict
 
 
 def _sigma(strip: Strip, observations: PhotoPoints) -> float:
@@ -264,7 +184,7 @@ def _to_ground(
         msg = f"strip {strip.id}: none of its points is a control point"
         raise GeometryError(msg, photos=strip.photos, code="no-control")
     try:
-        provisional_frame = middle_frame(control, frames)
+        provisional_frame = _intermediate(control, frames)
         provisional = absolute.orient(
             formed.xyz[rows],
             absolute.Targets(control, frames, provisional_frame),
@@ -284,25 +204,10 @@ def _to_ground(
     return intermediate, final, precision
 
 
-def middle_frame(control: ControlPoints, frames: Sequence[GroundFrame]) -> IntermediateFrame:
-    """Give the frame at the control's centre of gravity, X to the north.
+def _intermediate(control: ControlPoints, frames: Sequence[GroundFrame]) -> IntermediateFrame:
+    """Frame at the control's centre of gravity, X to the north.
 
-    Parameters
-    ----------
-    control : ControlPoints
-        Control; points without plan position do not count, a missing height is taken from the others.
-    frames : sequence of GroundFrame
-        Their ground frames.
-
-    Returns
-    -------
-    IntermediateFrame
-        The frame.
-
-    Raises
-    ------
-    GeometryError
-        When no point gives a plan position.
+    Points without plan position do not count; a missing height is taken from the others.
     """
     known = ~np.isnan(control.enu[:, :2]).any(axis=1) & control.use[:, 0]
     chosen = control.take(known)
@@ -351,7 +256,8 @@ def _orient_photos(
     orientation: absolute.AbsoluteOrientation,
 ) -> tuple[exterior.Resection, Numbers]:
     """Orient every photo on its adjusted points, so that orientations and points belong together."""
-    used = np.unique(oriented.rows[oriented.used & np.isfinite(formed.model_xyz).all(axis=1)])
+    in_models = oriented.rows[oriented.used & np.isfinite(formed.model_xyz).all(axis=1)]
+    used = np.union1d(in_models, formed.bridging)
     place = {photo: n for n, photo in enumerate(strip.photos)}
     position = np.array([place.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo[used]]
     order = np.argsort(position, kind="stable")

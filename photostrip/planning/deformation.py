@@ -256,8 +256,7 @@ class Paraboloid:
     @property
     def t_values(self) -> Array:
         """C and D over their standard deviations, shape (2,)."""
-        with np.errstate(divide="ignore", invalid="ignore"):  # parallaxes without any error
-            return np.asarray(self.coefficients[3:] / self.sigmas[3:], float)
+        return self.coefficients[3:] / self.sigmas[3:]
 
     def critical(self, alpha: float = 0.05) -> float:
         """Give what |t| exceeds by chance with probability `alpha`; the normal quantile with stated sigmas."""

@@ -10,7 +10,7 @@ Source: [001] eq. 125-141.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -113,6 +113,8 @@ class FormedStrip:
         Number of those models.
     junctions : Junctions
         Scale transfer.
+    bridging : ndarray of int, shape (b,)
+        Rows of the observations that place points without a model: of photos that are not neighbours.
     """
 
     centers: Floats
@@ -126,6 +128,7 @@ class FormedStrip:
     xyz: Floats
     models: Numbers
     junctions: Junctions
+    bridging: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))
 
 
 def hand_on(rotations: Floats) -> Floats:
@@ -179,7 +182,9 @@ def model_points(orientation: Orientation) -> tuple[Floats, Floats, Flags]:
     return vectors, found.gap / found.ray_factor, found.sound
 
 
-def _junction_rows(orientation: Orientation, sound: Flags) -> tuple[Numbers, Numbers, Numbers]:
+def _junction_rows(
+    orientation: Orientation, sound: Flags, aside: Flags | None = None
+) -> tuple[Numbers, Numbers, Numbers]:
     """Rows of points that stand in two neighbouring models: joint, row before, row after."""
     usable = np.flatnonzero(orientation.used & sound)
     pair, point = orientation.pairs.pair[usable], orientation.point[usable]
@@ -187,6 +192,11 @@ def _junction_rows(orientation: Orientation, sound: Flags) -> tuple[Numbers, Num
     usable, pair, point = usable[order], pair[order], point[order]
     both = np.flatnonzero((point[1:] == point[:-1]) & (pair[1:] == pair[:-1] + 1))
     before, after, joint = usable[both], usable[both + 1], pair[both]
+    if aside is not None:
+        good = ~(aside[before] | aside[after])
+        # a joint with nothing better keeps what it has
+        good |= (np.bincount(joint, good, orientation.pairs.size) == 0)[joint]
+        before, after, joint = before[good], after[good], joint[good]
     order = np.argsort(joint, kind="stable")
     return joint[order], before[order], after[order]
 
@@ -198,6 +208,7 @@ def transfer_scale(
     settings: Settings,
     photos: Sequence[str],
     sigma: Floats | None = None,
+    aside: Flags | None = None,
 ) -> Junctions:
     """Scale of every model from the one before it, through the pass points at their common photo.
 
@@ -215,6 +226,8 @@ def transfer_scale(
         Photos of the strip, to name a broken joint.
     sigma : ndarray, shape (p,), optional
         Standard deviation of a y parallax of weight one in each pair, mm; by default from the pairs' own residuals.
+    aside : ndarray of bool, shape (m,), optional
+        Rows that must not join models, unless a joint has no other.
 
     Returns
     -------
@@ -230,7 +243,7 @@ def transfer_scale(
     -----
     Source: [001] eq. 139-141.
     """
-    joint, before, after = _junction_rows(orientation, sound)
+    joint, before, after = _junction_rows(orientation, sound, aside)
     joints = orientation.pairs.size - 1
     _require_joints(joint, joints, photos)
     base, _ = orientation.relative
@@ -284,7 +297,11 @@ def _factors(ratio: Floats, weight: Floats, joint: Numbers, joints: int, setting
 
 
 def form(
-    orientation: Orientation, settings: Settings, photos: Sequence[str], sigma: Floats | None = None
+    orientation: Orientation,
+    settings: Settings,
+    photos: Sequence[str],
+    sigma: Floats | None = None,
+    aside: Flags | None = None,
 ) -> FormedStrip:
     """Form the strip from its oriented pairs.
 
@@ -298,6 +315,8 @@ def form(
         Photos of the strip in flight order.
     sigma : ndarray, shape (p,), optional
         Standard deviation of a y parallax of weight one in each pair, mm; by default from the pairs' own residuals.
+    aside : ndarray of bool, shape (m,), optional
+        Rows whose points are in doubt: they join models only where a joint has no other.
 
     Returns
     -------
@@ -311,7 +330,7 @@ def form(
     """
     vectors, gap, sound = model_points(orientation)
     base, rotation = orientation.relative
-    junctions = transfer_scale(orientation, vectors, sound, settings, photos, sigma)
+    junctions = transfer_scale(orientation, vectors, sound, settings, photos, sigma, aside)
     rotations = hand_on(rotation)
     scale = np.concatenate([[1.0], np.cumprod(junctions.factor)])
     bases = scale[:, None] * np.einsum("pij,pj->pi", rotations[:-1], base)

@@ -19,6 +19,7 @@ from photostrip.formats.result.numbers import (
 )
 from photostrip.triangulation.control_screening import AXES
 from photostrip.triangulation.relative import ELEMENTS, MINIMUM_POINTS
+from photostrip.triangulation.strip_screening import BOTH, SEVERAL, TOLD
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,11 +33,15 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
+    Flags = NDArray[np.bool_]
 
 PPM = 1e6
 RATIO_DECIMALS = 1  # of parts per million
-MEET = "the other rays of the point meet without it"
-CONTRADICT = "the rays of the point contradict each other, and which is wrong cannot be told: none is used"
+REASONS = {
+    TOLD: "the other rays of the point meet without it",
+    BOTH: "the two rays of the point contradict each other: neither is used",
+    SEVERAL: "the rays of the point contradict each other, and which is wrong cannot be told: none is used",
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,14 +238,14 @@ def rejected_of(result: Result) -> list[Document]:
     for strip in result.strips:
         oriented = strip.orientation
         gone = sorted(strip.rejections, key=lambda rejection: int(oriented.pairs.pair[rejection.row]))
-        found += [_from_pair(strip, rejection, ids) for rejection in gone]
+        found += [_from_pair(strip, rejection, result.refined.observations) for rejection in gone]
         found += [_from_joint(strip, int(row), ids) for row in np.flatnonzero(~strip.formed.junctions.used)]
         found += _from_rays(strip, result.refined.observations)
         found += [_from_control(strip, wrong) for wrong in strip.wrong_control]
     return found
 
 
-def _from_pair(strip: StripResult, rejection: Rejection, ids: Sequence[str]) -> Document:
+def _from_pair(strip: StripResult, rejection: Rejection, observations: PhotoPoints) -> Document:
     pair = int(strip.orientation.pairs.pair[rejection.row])
     left, right = strip.strip.photos[pair : pair + 2]
     size = rejection.size * 1000
@@ -251,12 +256,16 @@ def _from_pair(strip: StripResult, rejection: Rejection, ids: Sequence[str]) -> 
     elif rejection.test == "parallax":
         unit, value, limit = "um", value * 1000, limit * 1000
     if rejection.readmitted:
-        reason = "taken back: the pair oriented on the other points predicts it, or the user keeps it"
+        reason = "taken back: the pair or the strip oriented on the other points predicts it, or the user keeps it"
+    told = [row for row in _told(strip) if row in strip.orientation.rows[rejection.row]]
+    if told and not rejection.readmitted:
+        wrong = ", ".join(observations.photo_ids[observations.photo[row]] for row in told)
+        reason += f"; the wrong ray is that of photo {wrong}: the others of the point meet without it"
     return {
         "strip": strip.strip.id,
         "photo": left,
         "other_photo": right,
-        "point": ids[strip.orientation.point[rejection.row]],
+        "point": observations.point_ids[strip.orientation.point[rejection.row]],
         "stage": "relative",
         "test": rejection.test,
         "value": rounded(value, 2),
@@ -269,6 +278,12 @@ def _from_pair(strip: StripResult, rejection: Rejection, ids: Sequence[str]) -> 
         "readmitted": rejection.readmitted,
         "reason": reason,
     }
+
+
+def _told(strip: StripResult) -> list[int]:
+    """Rows of the observations that are known to be wrong, of their points' rays."""
+    found = strip.contradictions
+    return [int(row) for row, kind in zip(found.wrong, found.kind, strict=True) if kind == TOLD]
 
 
 def _from_joint(strip: StripResult, row: int, ids: Sequence[str]) -> Document:
@@ -295,35 +310,59 @@ def _from_joint(strip: StripResult, row: int, ids: Sequence[str]) -> Document:
 
 
 def _from_rays(strip: StripResult, observations: PhotoPoints) -> list[Document]:
-    """Rays that contradict the others of their point, in natural order of the points, then of the observations."""
-    found, oriented = strip.contradictions, strip.orientation
+    """Rays that contradict the others of their point, in natural order of the points, then of the observations.
+
+    A ray that all its pairs have rejected stands with those.
+    """
+    found, news = strip.contradictions, rejected_by_strip(strip)
     names = [observations.point_ids[number] for number in found.point]
     rows = []
-    for number in np.argsort(natural_rank(names)).tolist():
-        told = bool(found.ray[number] >= 0)
-        of_point = oriented.used & (oriented.point == found.point[number])
-        rays = [found.ray[number]] if told else np.unique(oriented.rows[of_point]).tolist()
-        rows += [
+    for number in np.argsort(natural_rank(names), kind="stable").tolist():
+        kind = found.kind[number]
+        if not news[number]:
+            continue
+        size = found.size[number]
+        largest = float(size[np.argmax(np.abs(size))]) if np.isfinite(size).all() else float("nan")
+        rows.append(
             {
                 "strip": strip.strip.id,
-                "photo": observations.photo_ids[observations.photo[ray]],
+                "photo": observations.photo_ids[observations.photo[found.wrong[number]]],
                 "other_photo": None,
                 "point": names[number],
                 "stage": "rays",
-                "test": "ratio",
+                "test": "strip",
                 "value": rounded(found.value[number], 2),
                 "limit": rounded(found.limit[number], 2),
                 "unit": "",
                 "parallax_um": None,
                 "zone": None,
-                "size": None,
-                "size_unit": "",
+                "size": rounded(largest * 1000, 2) if np.isfinite(largest) else None,
+                "size_unit": "um" if np.isfinite(largest) else "",
                 "readmitted": False,
-                "reason": MEET if told else CONTRADICT,
+                "reason": REASONS[kind],
             }
-            for ray in rays
-        ]
+        )
     return rows
+
+
+def rejected_by_strip(strip: StripResult) -> Flags:
+    """Tell which of the measurements that the strip found wrong had not been rejected by all their pairs.
+
+    Parameters
+    ----------
+    strip : StripResult
+        The strip.
+
+    Returns
+    -------
+    ndarray of bool
+        For each entry of ``strip.contradictions``.
+    """
+    oriented = strip.orientation
+    logged = np.zeros(len(oriented.point), bool)
+    logged[[each.row for each in strip.rejections if not each.readmitted]] = True
+    news: Flags = np.isin(strip.contradictions.wrong, oriented.rows[~logged])
+    return news
 
 
 def _from_control(strip: StripResult, wrong: ControlRejection) -> Document:

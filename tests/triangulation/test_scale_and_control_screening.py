@@ -1,16 +1,15 @@
-"""Wrong scale ratios, wrong rays and wrong control in whole strips whose truth is known."""
+"""Wrong scale ratios and wrong control in whole strips whose truth is known."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
 from photostrip.pipeline import Settings, triangulate
-from photostrip.triangulation import formation, rays, scale_screening
-from tests.strips import MICROMETRE, control_points, fly, photograph, project
+from photostrip.triangulation import formation, scale_screening
+from tests.strips import MICROMETRE, control_points, fly, project
 
 if TYPE_CHECKING:
     from photostrip.pipeline import Result
@@ -22,14 +21,6 @@ STATIONS = (0, 3, 6, 9, 12)
 
 def flown(seed: int = 1, extra: int = 60) -> Flown:
     return fly(seed, 13, sigma=SIGMA, extra=extra)
-
-
-def shifted(strip: Flown, photo: str, point: str, by: tuple[float, float]) -> Flown:
-    o = strip.observations
-    row = np.flatnonzero((o.photo == o.photo_ids.index(photo)) & (o.point == o.point_ids.index(point)))
-    xy = o.xy.copy()
-    xy[row] += by
-    return replace(strip, observations=replace(o, xy=xy))
 
 
 def adjusted(strip: Flown, wrong: dict[str, tuple[float, float, float]] | None = None) -> Result:
@@ -74,29 +65,6 @@ def test_of_two_ratios_none_is_rejected() -> None:
     ratio, joint = np.array([1.0, 1.1]), np.array([0, 0])
     used, _ = scale_screening.screen(ratio, np.ones(2), (np.full(2, 1e-4), np.zeros(2)), joint, 1)
     assert used.all()
-
-
-# -------------------------------------------------------------------------------------------------------- rays
-
-
-def test_an_error_along_the_base_takes_a_point_on_three_photos_out_of_the_result() -> None:
-    strip = shifted(flown(), "105", "p4_1", (0.3, 0.0))
-    result = adjusted(strip)
-    assert "p4_1" in result.not_determined
-    found = result.strips[0].contradictions
-    assert [strip.observations.point_ids[number] for number in found.point] == ["p4_1"]
-    assert adjusted(flown()).strips[0].contradictions.point.tolist() == []
-
-
-def test_the_misfit_of_rays_is_the_sum_of_their_distances_at_photo_scale() -> None:
-    centers = np.array([[0.0, 0, 1000], [600, 0, 1000], [1200, 0, 1000], [1800, 0, 1000]])
-    point, focal = np.array([900.0, 50.0, 0.0]), 150.0
-    images = np.array([photograph(point[None], c, np.eye(3), focal)[0] for c in centers])
-    images[2, 1] += 0.05
-    directions = np.column_stack([images, np.full(4, -focal)])
-    # across the base all points see the same y to the first order: the mean takes a quarter of the error
-    assert rays.misfit(centers, directions) == pytest.approx(0.05**2 * 3 / 4, rel=0.1)
-    assert rays.misfit(centers[[0, 1, 3]], directions[[0, 1, 3]]) == pytest.approx(0.0, abs=1e-12)
 
 
 # ----------------------------------------------------------------------------------------------------- control

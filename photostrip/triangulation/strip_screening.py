@@ -1,0 +1,311 @@
+"""Wrong rays by the evidence of the whole strip: every point judged by all its rays, on photos that all others orient.
+
+A pair sees y parallaxes only, and an error in a corner zone can make a good point look wrong. A point on three photos
+says more: its y parallaxes in two pairs, and whether both models put it at one place. So wherever a pair or a
+joint had to reject something, windows of the strip are adjusted with all their measurements, those rejected before
+included: first with weights that fall with the misclosure, then with those points that agree. Each point is predicted
+by an adjustment without it. What contradicts the prediction is left out, what agrees is taken back.
+
+What a point's rays say of each other is judged in :mod:`photostrip.triangulation.ray_decisions`.
+
+Source: derived; see docs/sources.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.triangulation import windows
+from photostrip.triangulation.ray_decisions import GOOD, NONE, PAIR, RAY, RAYS, Decision, decide
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.points import PhotoPoints
+    from photostrip.triangulation.formation import FormedStrip
+    from photostrip.triangulation.relative import Orientation
+    from photostrip.triangulation.windows import Group, Rays, Solved
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+    Flags = NDArray[np.bool_]
+
+LONGEST_REACH = 8  # photos; windows do not grow for points that reach over more
+BATCH = 48  # windows solved together
+ABSOLUTE_STEPS, WELSCH_STEPS = 15, 8
+WELSCH = 3.0  # standard deviations
+LEAST_WEIGHT = 1e-9  # keeps a photo in its window
+ROUNDS = 12
+TOLD, BOTH, SEVERAL = "ray", "pair", "rays"
+"""What was found at a point: its wrong ray; two rays that contradict each other; several of which any may be wrong."""
+KINDS = {GOOD: SEVERAL, RAY: TOLD, PAIR: BOTH, RAYS: SEVERAL, NONE: SEVERAL}
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What the strip says about the points it was asked about.
+
+    Parameters
+    ----------
+    judged : ndarray of int, shape (j,)
+        Points that were judged.
+    wrong : ndarray of int, shape (c,)
+        Rows of the observations that must not be used.
+    point : ndarray of int, shape (c,)
+        Their points.
+    kind : tuple of str
+        Why: :data:`TOLD`, :data:`BOTH` or :data:`SEVERAL`.
+    value, limit : ndarray, shape (c,)
+        Test value of the point with all its rays, as the root of a sum of squares, and its critical value.
+    size : ndarray, shape (c, 2)
+        Estimated errors of the image coordinates, mm; NaN where nothing can be said.
+    across : ndarray of bool, shape (c,)
+        Whether the y parallaxes of the point are good: it may orient pairs, but has no place.
+    """
+
+    judged: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))
+    wrong: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))
+    point: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))
+    kind: tuple[str, ...] = ()
+    value: Floats = field(default_factory=lambda: np.zeros(0))
+    limit: Floats = field(default_factory=lambda: np.zeros(0))
+    size: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+    across: Flags = field(default_factory=lambda: np.zeros(0, bool))
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A formed strip and its measurements.
+
+    Parameters
+    ----------
+    orientation : Orientation
+        Oriented pairs.
+    formed : FormedStrip
+        The strip formed from them.
+    observations : PhotoPoints
+        Image points.
+    photos : sequence of str
+        Photos of the strip in flight order.
+    sigma : ndarray, shape (p,)
+        Standard deviations of a y parallax of weight one in each pair, mm.
+    stated : float
+        Standard deviation of an image coordinate of weight one, mm.
+    """
+
+    orientation: Orientation
+    formed: FormedStrip
+    observations: PhotoPoints
+    photos: Sequence[str]
+    sigma: Floats
+    stated: float
+
+
+def suspects(scene: Scene) -> Numbers:
+    """Points that were rejected in a pair or at a joint, or stand on one of two photos only."""
+    oriented, junctions = scene.orientation, scene.formed.junctions
+    out = oriented.point[~oriented.used]
+    return np.union1d(out, junctions.point[~junctions.used]).astype(np.intp)
+
+
+def collect(scene: Scene) -> Rays:
+    """Collect and linearise all rays of the points that have a place in the strip.
+
+    Parameters
+    ----------
+    scene : Scene
+        The strip.
+
+    Returns
+    -------
+    Rays
+        Ordered by point and photo; points with one ray are left out.
+    """
+    o, formed = scene.observations, scene.formed
+    place = {photo: number for number, photo in enumerate(scene.photos)}
+    position = np.array([place.get(photo, -1) for photo in o.photo_ids], np.intp)[o.photo]
+    row = np.unique(scene.orientation.rows)
+    row = row[np.lexsort((position[row], o.point[row]))]
+    photo, point = position[row], np.asarray(o.point[row], np.intp)
+    factor = scene.sigma / (np.sqrt(2.0) * scene.stated)
+    by_photo = np.maximum(np.append(factor, factor[-1]), np.append(factor[0], factor))
+    image = o.xy[row], o.sigma[row] * by_photo[photo, None], scene.orientation.pairs.focal
+    photos = formed.centers, formed.rotations
+    rays = _best_start(scene, (row, photo, point), image, photos)
+    sound = np.isfinite(rays.misfit).all(axis=1) & np.isfinite(rays.by_photo).all(axis=(1, 2))
+    several = np.bincount(rays.point[sound], minlength=len(o.point_ids)) > 1
+    return rays.take(np.flatnonzero(sound & several[rays.point]))
+
+
+def _best_start(
+    scene: Scene,
+    place: tuple[Numbers, Numbers, Numbers],
+    image: tuple[Floats, Floats, float],
+    photos: tuple[Floats, Floats],
+) -> Rays:
+    """Linearise at that of the places of each point, one from each model, with which most of its rays agree."""
+    oriented, formed = scene.orientation, scene.formed
+    known = np.flatnonzero(np.isfinite(formed.model_xyz).all(axis=1))
+    known = known[np.lexsort((oriented.pairs.pair[known], oriented.point[known]))]
+    point = oriented.point[known]
+    slot = np.arange(len(known)) - np.searchsorted(point, point)
+    best = np.full((len(scene.observations.point_ids), 3), np.nan)
+    cost = np.full(len(best), np.inf)
+    for number in range(int(slot.max(initial=-1)) + 1):
+        here = slot == number
+        candidate = np.full(best.shape, np.nan)
+        candidate[point[here]] = formed.model_xyz[known[here]]
+        rays = windows.linearise(place, image, photos, candidate[place[2]])
+        size = np.minimum(np.nan_to_num(np.abs(rays.misfit).max(axis=1), nan=np.inf), 1e6)
+        total = np.bincount(place[2], np.sqrt(size), len(best))
+        better = np.isfinite(candidate[:, 0]) & (total < cost)
+        best[better], cost[better] = candidate[better], total[better]
+    return windows.linearise(place, image, photos, best[place[2]])
+
+
+def examine(scene: Scene, points: Numbers, kept: Numbers) -> Verdict:
+    """Judge all points near some suspected ones.
+
+    Parameters
+    ----------
+    scene : Scene
+        The strip.
+    points : ndarray of int
+        Points that are suspected.
+    kept : ndarray of int
+        Rows of the observations that the user keeps: their points are not judged.
+
+    Returns
+    -------
+    Verdict
+        What must not be used, and which points were judged at all.
+    """
+    if not len(points):
+        return Verdict()
+    rays = collect(scene)
+    number, begin = np.unique(rays.point, return_index=True)
+    last = np.append(begin[1:], len(rays.point)) - 1
+    reach = int(min((rays.photo[last] - rays.photo[begin]).max(initial=1), LONGEST_REACH)) + 1
+    first = windows.starts(len(scene.photos), reach)
+    length = min(windows.size_of(reach)[0], len(scene.photos))
+    home = np.full(len(scene.observations.point_ids), -1)
+    home[number] = windows.homes((rays.photo[begin] + rays.photo[last]) / 2, first, reach)
+    at = np.unique(home[points[home[points] >= 0]])
+    found: list[Decision] = []
+    for part in range(0, len(at), BATCH):
+        batch = at[part : part + BATCH]
+        decisions = _adjusted(windows.groups(rays, first[batch], length), len(batch), length)
+        found += [each.take(home[rays.point[each.group.ray[:, 0]]] == batch[each.group.window]) for each in decisions]
+    return _verdict(scene, rays, found, kept)
+
+
+def _adjusted(groups: list[Group], count: int, length: int) -> list[Decision]:
+    """Adjust windows and judge their points, until the points that take part are those that agree."""
+    number = np.sum([np.bincount(group.window, minlength=count) for group in groups], axis=0)
+    solved = _robust(groups, count, length)
+    found = [decide(group, solved.of(group), number) for group in groups]
+    state = [_State(each, each.weight, *(np.zeros(each.weight.shape, bool) for _ in range(2))) for each in found]
+    for _ in range(ROUNDS):
+        solved = _least_squares(groups, [each.weight for each in state], count, length)
+        judged = [decide(each.group, windows.without(each.group, each.weight, solved), number) for each in state]
+        worst = np.zeros(count)
+        for old, new in zip(state, judged, strict=True):
+            np.maximum.at(worst, old.group.window, np.where(old.loses(new), new.value / new.limit, 0.0))
+        fresh = [old.after(new, worst) for old, new in zip(state, judged, strict=True)]
+        settled = all((new.weight == old.weight).all() for new, old in zip(fresh, state, strict=True))
+        state = fresh
+        if settled:
+            break
+    return [each.decided for each in state]
+
+
+@dataclass(frozen=True, eq=False)
+class _State:
+    """Decisions on the points of a group from round to round.
+
+    Wrong points that take part make good ones look wrong: of the points that should go only the worst of a window goes
+    in a round. Two wrong points can each agree with all others and not with each other: what came back once
+    and had to go again stays out.
+    """
+
+    decision: Decision
+    weight: Floats
+    returned: Flags
+    barred: Flags
+
+    @property
+    def group(self) -> Group:
+        return self.decision.group
+
+    @property
+    def decided(self) -> Decision:
+        return replace(self.decision, weight=self.weight)
+
+    def loses(self, fresh: Decision) -> Flags:
+        """Whether points lose a ray that takes part."""
+        return np.asarray((fresh.weight < self.weight).any(axis=1), bool)
+
+    def after(self, fresh: Decision, worst: Floats) -> _State:
+        """Give the state after one more round."""
+        spared = np.asarray(self.loses(fresh) & (fresh.value / fresh.limit < worst[self.group.window]), bool)
+        barred = self.barred | (self.returned & (fresh.weight < self.weight) & ~spared[:, None])
+        weight = np.where(barred, 0.0, np.where(spared[:, None], self.weight, fresh.weight))
+        # what stays as it was against the new decision keeps the reason for which it was
+        old = np.asarray((weight != fresh.weight).any(axis=1) & (self.weight == weight).all(axis=1), bool)
+        merged = replace(
+            fresh,
+            value=np.where(old, self.decision.value, fresh.value),
+            size=np.where(old[:, None, None], self.decision.size, fresh.size),
+            kind=np.where(old, self.decision.kind, fresh.kind),
+        )
+        return _State(merged, weight, self.returned | (weight > self.weight), barred)
+
+
+def _robust(groups: list[Group], count: int, length: int) -> Solved:
+    """Adjust windows with weights of the conditions that fall with their misclosures."""
+    conditions = windows.stacked([(group, windows.coplanarities(group)) for group in groups], count, length)
+    solved = conditions.solved(np.ones(conditions.misfit.shape))
+    for step in range(ABSOLUTE_STEPS + WELSCH_STEPS):
+        left = np.abs(conditions.misfit - np.einsum("wcj,wj->wc", conditions.design, solved.estimate))
+        falling = 1 / np.maximum(left, 1.0) if step < ABSOLUTE_STEPS else np.exp(-((left / WELSCH) ** 2)) + LEAST_WEIGHT
+        solved = conditions.solved(falling)
+    return solved
+
+
+def _least_squares(groups: list[Group], weights: list[Floats], count: int, length: int) -> Solved:
+    """Adjust windows with the rays that count."""
+    matrices = [windows.projectors(group, weight) for group, weight in zip(groups, weights, strict=True)]
+    conditions = windows.stacked(list(zip(groups, matrices, strict=True)), count, length)
+    return conditions.solved(np.ones(conditions.misfit.shape))
+
+
+def _verdict(scene: Scene, rays: Rays, found: list[Decision], kept: Numbers) -> Verdict:
+    """Put what was found about all points into one list, by rows of the observations."""
+    spared = np.unique(scene.observations.point[kept])
+    judged, columns = [], []
+    for each in found:
+        point = rays.point[each.group.ray[:, 0]]
+        free = ~np.isin(point, spared)
+        judged.append(point[free])
+        place, number = np.nonzero((each.weight == 0) & free[:, None])
+        ray = each.group.ray[place, number]
+        size = each.size[place, number] * rays.sigma[ray]
+        columns.append((rays.row[ray], each.kind[place], each.value[place], each.limit[place], size))
+    rows, kind, value, limit, size = (np.concatenate(each) for each in zip(*columns, strict=True))
+    order = np.argsort(rows, kind="stable")
+    rows = np.asarray(rows[order], np.intp)
+    return Verdict(
+        np.unique(np.concatenate(judged)).astype(np.intp),
+        rows,
+        np.asarray(scene.observations.point[rows], np.intp),
+        tuple(KINDS[int(each)] for each in kind[order]),
+        value[order],
+        limit[order],
+        size[order],
+        kind[order] == RAYS,
+    )
