@@ -518,6 +518,28 @@ def tie_frames(
     return [frames[spec] for spec in specs], frames[target]
 
 
+def area_of_use(spec: FrameSpec, *, directory: Path | None = None) -> tuple[float, float, float, float] | None:
+    """Give the area that a coordinate reference system is made for.
+
+    Parameters
+    ----------
+    spec : FrameSpec
+        Frame of a control list.
+    directory : Path, optional
+        As for :func:`tie_frames`.
+
+    Returns
+    -------
+    tuple of float or None
+        West, south, east, north in degrees; west is larger than east across the meridian of 180 degrees. None where
+        nobody has said it: for `local`, `geocentric` and PROJ strings.
+    """
+    if spec.crs in {"local", "geocentric"}:
+        return None
+    area = _parse(spec, directory).area_of_use
+    return None if area is None else (float(area.west), float(area.south), float(area.east), float(area.north))
+
+
 def _read_all(
     wanted: list[tuple[str, FrameSpec]], directory: Path | None, faults: list[Fault]
 ) -> dict[FrameSpec, _Parts]:

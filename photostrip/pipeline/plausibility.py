@@ -12,16 +12,34 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import PhotostripError
+from photostrip.geodesy.crs import area_of_use, tie_frames
+from photostrip.pipeline import evidence
 from photostrip.triangulation import interior
-from photostrip.triangulation.plausibility import accepted, flight_order, units
+from photostrip.triangulation.plausibility import (
+    accepted,
+    control_place,
+    control_reading,
+    flight,
+    flight_order,
+    given_points,
+    identity,
+    layout,
+    units,
+)
+from photostrip.triangulation.plausibility import rotations as rotations_given
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
     from numpy.typing import NDArray
 
+    from photostrip.geodesy.crs import GroundFrame
     from photostrip.notes import Finding
-    from photostrip.pipeline.inputs import Inputs, Settings
+    from photostrip.pipeline.inputs import Inputs, Settings, Strip
     from photostrip.pipeline.results import Result
-    from photostrip.points import PhotoPoints
+    from photostrip.points import ControlPoints, PhotoPoints
+    from photostrip.triangulation.plausibility.control_reading import Given
     from photostrip.triangulation.plausibility.flight_order import Arranged
 
     Floats = NDArray[np.float64]
@@ -62,8 +80,9 @@ def before(inputs: Inputs, settings: Settings) -> Examined:
         What was found; what the user has accepted is not marked yet.
     """
     cameras = {photo: strip.camera for strip in inputs.strips for photo in strip.photos}
-    observations = _photo_coordinates(inputs, settings)
-    told, factors = units.examine(observations, cameras)
+    observations, told = _photo_coordinates(inputs, settings)
+    of_units, factors = units.examine(observations, cameras)
+    told += of_units
     arranged = []
     for strip in inputs.strips:
         findings, order = flight_order.examine(observations, strip.id, strip.photos)
@@ -78,15 +97,17 @@ def before(inputs: Inputs, settings: Settings) -> Examined:
     return Examined(tuple(told), _put_right(observations, factor, mirrored), tuple(arranged))
 
 
-def _photo_coordinates(inputs: Inputs, settings: Settings) -> PhotoPoints:
-    """Image points in the system of the photo, of photos that belong to a strip."""
+def _photo_coordinates(inputs: Inputs, settings: Settings) -> tuple[PhotoPoints, list[Finding]]:
+    """Give image points in the system of the photo, and what the fiducial marks say."""
     cameras = {photo: strip.camera for strip in inputs.strips for photo in strip.photos}
     if inputs.fiducials is None:
-        return inputs.observations
+        return inputs.observations, []
     try:
-        return interior.transform(inputs.observations, interior.orient(inputs.fiducials, cameras, settings.interior))
+        oriented = interior.orient(inputs.fiducials, cameras, settings.interior)
+        observations = interior.transform(inputs.observations, oriented)
     except PhotostripError:
-        return inputs.observations  # what is wrong with the marks is told elsewhere
+        return inputs.observations, []  # what is wrong with the marks is told elsewhere
+    return observations, units.of_marks(oriented.scale_x, oriented.photo_ids)
 
 
 def _put_right(observations: PhotoPoints, factor: dict[str, float], mirrored: frozenset[str]) -> PhotoPoints:
@@ -97,7 +118,7 @@ def _put_right(observations: PhotoPoints, factor: dict[str, float], mirrored: fr
     return replace(observations, xy=observations.xy * by_photo[observations.photo])
 
 
-def of_inputs(inputs: Inputs, settings: Settings) -> tuple[Finding, ...]:
+def of_inputs(inputs: Inputs, settings: Settings, directory: Path | None = None) -> tuple[Finding, ...]:
     """Tell what the data say against themselves before anything is adjusted.
 
     Parameters
@@ -106,32 +127,46 @@ def of_inputs(inputs: Inputs, settings: Settings) -> tuple[Finding, ...]:
         What is given.
     settings : Settings
         What is to be done, and what is accepted.
+    directory : Path, optional
+        Where geoid grids named in a CRS are looked for first.
 
     Returns
     -------
     tuple of Finding
         By code.
     """
-    return accepted(before(inputs, settings).findings, settings.accept)
+    examined = before(inputs, settings)
+    strips = _as_they_lie(inputs, examined)
+    told = [*examined.findings, *_of_control(inputs, examined, strips, [None] * len(strips), directory)]
+    return accepted(told, settings.accept)
 
 
-def of_result(result: Result) -> tuple[Finding, ...]:
+def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, ...]:
     """Tell what the data say against themselves, the adjustment being done.
 
     Parameters
     ----------
     result : Result
         What a run found.
+    directory : Path, optional
+        Where geoid grids named in a CRS are looked for first.
 
     Returns
     -------
     tuple of Finding
         By code.
     """
-    return of_inputs(result.inputs, result.settings)
+    inputs, settings = result.inputs, result.settings
+    examined = replace(before(inputs, settings), observations=result.refined.observations)
+    formed = [evidence.Formed(each.strip, each.orientation, each.formed) for each in result.strips]
+    told = [*examined.findings, *_of_control(inputs, examined, inputs.strips, formed, directory)]
+    for each in formed:
+        told += _of_strip(each, result.refined.observations)
+    told += _of_rotations(result)
+    return accepted(told, settings.accept)
 
 
-def of_failure(inputs: Inputs, settings: Settings) -> tuple[Finding, ...]:
+def of_failure(inputs: Inputs, settings: Settings, directory: Path | None = None) -> tuple[Finding, ...]:
     """Tell what the data say against themselves, the adjustment having failed.
 
     Parameters
@@ -140,6 +175,8 @@ def of_failure(inputs: Inputs, settings: Settings) -> tuple[Finding, ...]:
         What is given.
     settings : Settings
         What was to be done.
+    directory : Path, optional
+        Where geoid grids named in a CRS are looked for first.
 
     Returns
     -------
@@ -147,6 +184,130 @@ def of_failure(inputs: Inputs, settings: Settings) -> tuple[Finding, ...]:
         By code; empty when the evidence cannot be put together either.
     """
     try:
-        return of_inputs(inputs, settings)
-    except (PhotostripError, ArithmeticError, ValueError):
+        examined = before(inputs, settings)
+        strips = _as_they_lie(inputs, examined)
+        points = evidence.ideal(examined.observations, strips, settings)
+        formed = [evidence.form(strip, points, settings) for strip in strips]
+        told = [*examined.findings, *_of_control(inputs, examined, strips, formed, directory)]
+        for each in formed:
+            told += _of_strip(each, points) if each is not None else []
+        return accepted(told, settings.accept)
+    except (PhotostripError, ArithmeticError, LookupError, ValueError):
         return ()  # the failure itself is what must be told
+
+
+def _as_they_lie(inputs: Inputs, examined: Examined) -> tuple[Strip, ...]:
+    """Give the strips with their photos as they lie, each place once."""
+    pairs = zip(inputs.strips, examined.arranged, strict=True)
+    return tuple(replace(strip, photos=arranged.photos) for strip, arranged in pairs)
+
+
+# ------------------------------------------------------------------------------------------------- the control
+
+
+def _of_control(
+    inputs: Inputs,
+    examined: Examined,
+    strips: Sequence[Strip],
+    formed: Sequence[evidence.Formed | None],
+    directory: Path | None,
+) -> list[Finding]:
+    """Examine given coordinates: where they lie, how they go with each strip, how they hold it."""
+    control = inputs.control
+    try:
+        frames, _ = tie_frames(inputs.frames, inputs.output, directory=directory)
+    except PhotostripError:
+        return []  # what is wrong with the frames is told elsewhere
+    told: list[Finding] = []
+    sure: list[bool | None] = []
+    nowhere = False
+    for number, frame in enumerate(frames):
+        rows = (control.frame == number) & control.use[:, 0]
+        area = area_of_use(inputs.frames[number], directory=directory)
+        place = control_place.examine(frame, area, control.enu[rows], number)
+        told += place.findings
+        sure.append(place.sure)
+        nowhere |= not place.inside
+    axes_are_right = sure[0] if len(set(sure)) == 1 else None
+    for strip, each in zip(strips, formed, strict=True):
+        told += _on_strip(strip, each, examined, control, frames, as_written=nowhere, axes_are_right=axes_are_right)
+        told += _held(strip, examined, control, frames)
+    return told
+
+
+def _on_strip(
+    strip: Strip,
+    formed: evidence.Formed | None,
+    examined: Examined,
+    control: ControlPoints,
+    frames: Sequence[GroundFrame],
+    *,
+    as_written: bool,
+    axes_are_right: bool | None,
+) -> list[Finding]:
+    """Compare given points with a strip: the formed one, or else the mosaic of its photos."""
+    if formed is not None:
+        rows, seen = evidence.sighted(formed, examined.observations, control)
+    else:
+        mosaic = evidence.sighted_in_mosaic(strip, examined.observations, control)
+        if mosaic is None:
+            return []
+        rows, seen = mosaic
+    here = control.take(rows)
+    given = given_points.level(here, frames, as_written=as_written)
+    if given is None:
+        return []
+
+    def exchanged() -> Given | None:
+        order = [1, 0, 2]
+        return given_points.level(replace(here, enu=here.enu[:, order], use=here.use[:, order]), frames)
+
+    return control_reading.examine(given, seen, axes_are_right=axes_are_right, exchanged=exchanged)
+
+
+def _held(strip: Strip, examined: Examined, control: ControlPoints, frames: Sequence[GroundFrame]) -> list[Finding]:
+    """Judge where the control of a strip lies."""
+    rows, place = evidence.stations(strip, examined.observations, control)
+    counts = control.use[rows, 0] & ~control.check[rows]
+    rows, place = rows[counts], place[counts]
+    here = control.take(rows)
+    given = given_points.level(here, frames)
+    if given is None:
+        return []
+    return list(layout.examine(place, given.level[:, :2], strip.photos, strip.id, here.ids))
+
+
+# --------------------------------------------------------------------------------------------- after forming
+
+
+def _of_strip(each: evidence.Formed, observations: PhotoPoints) -> list[Finding]:
+    """Examine a formed strip: its perspective centres, and the ids of its points."""
+    strip, formed = each.strip, each.formed
+    sigma = float(np.median(observations.sigma))
+    told = list(flight.examine(formed.centers, each.depth, each.up, strip.photos, strip.id))
+    names = observations.point_ids
+    told += identity.one_id(each.orientation, formed, names, strip.photos, sigma, strip.id)
+    focal = strip.camera.principal_distance
+    told += identity.two_ids(observations, formed, focal, strip.photos, strip.id, sigma)
+    return told
+
+
+def _of_rotations(result: Result) -> list[Finding]:
+    """Compare given angles with the rotations found."""
+    given = result.inputs.orientations
+    if given is None:
+        return []
+    frame = tie_frames([given.frame], result.inputs.output or result.inputs.frames[0])[0][0]
+    rows = {photo: row for row, photo in enumerate(given.photos)}
+    photos, angles, rotations = [], [], []
+    for strip in result.strips:
+        cartesian = strip.intermediate.cartesian_from_intermediate(strip.resection.centers)
+        turned = frame.axes_at(cartesian) @ strip.intermediate.cartesian_rotations(strip.resection.rotations)
+        for number, photo in enumerate(strip.strip.photos):
+            if photo in rows:
+                photos.append(photo)
+                angles.append(given.angles[rows[photo]])
+                rotations.append(turned[number])
+    if not photos:
+        return []
+    return list(rotations_given.examine(np.array(angles), given.system, np.array(rotations), photos))

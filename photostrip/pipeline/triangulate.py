@@ -63,9 +63,9 @@ def triangulate(inputs: Inputs, settings: Settings, *, directory: Path | None = 
     try:
         result = _triangulated(inputs, settings, directory)
     except (InputError, GeometryError) as error:
-        error.findings = plausibility.of_failure(inputs, settings)
+        error.findings = plausibility.of_failure(inputs, settings, directory)
         raise
-    return replace(result, findings=plausibility.of_result(result))
+    return replace(result, findings=plausibility.of_result(result, directory))
 
 
 def _triangulated(inputs: Inputs, settings: Settings, directory: Path | None) -> Result:

@@ -122,7 +122,7 @@ def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
 def _against_themselves(project: Project) -> tuple[Finding, ...]:
     """Let the gate examine the data as far as that needs no adjustment."""
     try:
-        return project.placed(plausibility.of_inputs(project.inputs, project.settings))
+        return project.placed(plausibility.of_inputs(project.inputs, project.settings, project.directory))
     except (InputError, GeometryError):
         return ()  # what is wrong is told as a fault
 

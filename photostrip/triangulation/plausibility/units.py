@@ -30,8 +30,9 @@ REACH_OF_DISTANCE = (0.02, 8.0)  # of the principal distance, when no format is 
 LIKELY_OF_DISTANCE = (0.1, 2.0)
 MOST_LIKELY = 0.5  # of the upper end of such a range; below it other readings come first
 LIKELY_PIXELS = 2.2  # counted from a corner they reach twice as far
-HALF_DIAGONAL = (0.15, 3.5)  # of the principal distance: fields of 17 to 148 degrees
+HALF_DIAGONAL = (0.2, 3.5)  # of the principal distance: fields of 23 to 148 degrees
 USUAL_HALF_DIAGONAL = (0.24, 1.9)  # a 610 mm lens and an 85 mm lens on 23 cm film
+MARKS = (0.5, 2.0)  # calibrated over measured distances; a scan is known to a percent
 READINGS = (
     (1e-3, "micrometres read as millimetres"),
     (1e3, "millimetres read as micrometres"),
@@ -154,6 +155,38 @@ def examine(observations: PhotoPoints, cameras: Mapping[str, Camera]) -> tuple[l
         if wrong is not None:
             told.append(wrong)
     return told, factors
+
+
+def of_marks(scales: Floats, photos: Sequence[str]) -> list[Finding]:
+    """Look for fiducial marks that are measured in another unit.
+
+    Parameters
+    ----------
+    scales : ndarray, shape (p,)
+        Calibrated over measured distances of the marks of each photo.
+    photos : sequence of str
+        The photos.
+
+    Returns
+    -------
+    list of Finding
+        P106, at most one.
+    """
+    odd = (scales < MARKS[0]) | (scales > MARKS[1])
+    if not odd.any():
+        return []
+    scale = float(np.median(scales[odd]))
+    names = tuple(photo for photo, each in zip(photos, odd, strict=True) if each)
+    reading = reading_of(1.0 / scale, MARKS)
+    message = (
+        f"the fiducial marks of {len(names)} photos are measured {1 / scale:.4g} times as far apart as they are "
+        "calibrated"
+    )
+    if reading.name:
+        message += f": {reading.name}"
+    fix = "correct `unit`: the points come out right all the same, their standard deviations do not"
+    evidence = {"measured_over_calibrated": 1.0 / scale, "photos": len(names)}
+    return [found("P106", message, fix, evidence, photos=names, key="fiducial_measurements.unit")]
 
 
 def _wrong_unit(camera: Camera, reach: float, reading: Reading, photos: Sequence[str]) -> Finding:

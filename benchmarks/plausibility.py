@@ -1,0 +1,670 @@
+"""How often the gate finds a planted mistake, and how often it finds one where there is none.
+
+Run it as ``python benchmarks/plausibility.py [strips] [strips without a mistake]``. Short simulated strips of all kinds
+(film and digital cameras, 4 to 8 photos, end laps of 58 to 80 %, any azimuth and turn of the photos, flat and hilly
+ground, projected, geographic, geocentric and local frames, few and many control points in several layouts, measured
+well and badly) are examined as they are, and with one mistake each. A mistake counts where its effect is larger than
+three times what noise does; what that is stands beside each kind.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from anywhere, installed or not
+
+from photostrip.errors import InputError, PhotostripError
+from photostrip.formats.simulation import inputs_of, settings_of
+from photostrip.geometry.rotation import angles
+from photostrip.pipeline import plausibility, triangulate
+from photostrip.pipeline.inputs import GivenOrientations
+from photostrip.simulate import DIGITAL, FILM, Control, Flight, GrossError, Ground, Image, Points, Spec, Terrain
+from photostrip.simulate.simulation import simulate
+from photostrip.triangulation.plausibility import KINDS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from photostrip.pipeline import Inputs, Settings
+    from photostrip.points import ControlPoints, PhotoPoints
+    from photostrip.simulate.simulation import Simulation
+
+    Floats = NDArray[np.float64]
+
+FOOT = 0.3048
+GROSS_SHARE = 0.2  # of the strips without a mistake have two gross errors of image coordinates, which are none of these
+THIRD, HALF, LINE = 0.3, 0.55, 0.3  # of the length of the strip; of a base
+EVEN = 0.5
+WIDE = replace(FILM, name="wide", principal_distance=88.0)
+LONG = replace(FILM, name="long", principal_distance=305.0)
+CAMERAS = (FILM, FILM, DIGITAL, WIDE, LONG)
+GROUNDS = (
+    Ground("EPSG:32633"),
+    Ground("EPSG:32633", ("north", "east", "up")),
+    Ground("EPSG:32719", center_deg=(-68.0, -33.0)),
+    Ground("EPSG:25832", center_deg=(9.4, 47.5), height="orthometric", geoid_undulation=48.0),
+    Ground("EPSG:4326"),
+    Ground("geocentric", ("x", "y", "z")),
+    Ground("local"),
+    Ground("local"),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A simulated strip as it would be given."""
+
+    simulation: Simulation
+    inputs: Inputs
+    settings: Settings
+    rng: np.random.Generator
+
+    @property
+    def photos(self) -> tuple[str, ...]:
+        """Photos of the strip."""
+        return self.inputs.strips[0].photos
+
+    @property
+    def spec(self) -> Spec:
+        """What was simulated."""
+        return self.simulation.spec
+
+    @property
+    def noise(self) -> tuple[float, float]:
+        """Standard deviation of a point of one model in plan and height with that of the control, metres."""
+        plan = self.spec.image.sigma_um * 1e-6 * self.spec.scale
+        height = plan * np.sqrt(2.0) * self.spec.flying_height / self.spec.base
+        return float(np.hypot(plan, self.spec.control.sigma[0])), float(np.hypot(height, self.spec.control.sigma[2]))
+
+
+def sound(seed: int) -> Case:
+    """Simulate a strip without a mistake."""
+    rng = np.random.default_rng([7, seed])
+    for attempt in range(20):
+        spec = drawn(rng, seed * 20 + attempt)
+        try:
+            simulation = simulate(spec)
+        except InputError:
+            continue  # the pass points of so few photos did not suffice
+        return Case(simulation, inputs_of(simulation), settings_of(simulation), rng)
+    raise SystemExit(f"no strip can be made of seed {seed}")
+
+
+def drawn(rng: np.random.Generator, seed: int) -> Spec:
+    """Draw what is to be simulated."""
+    camera = CAMERAS[rng.integers(len(CAMERAS))]
+    scale = float(np.exp(rng.uniform(np.log(3000), np.log(40000))))
+    height = scale * camera.principal_distance / 1000.0
+    relief = float(rng.choice([0.0, 0.02, 0.05, 0.1])) * height
+    tilt = float(rng.choice([0.3, 1.0, 2.5]))
+    sigma = float(rng.choice([2.0, 5.0, 12.0]))
+    ground_sigma = float(rng.choice([0.5, 1.0, 3.0])) * sigma * 1e-6 * scale
+    rows = int(rng.choice([3, 3, 5]))
+    shares: tuple[dict[str, float], ...] = ({"xyz": 1.0}, {"xyz": 1.0}, {"xyz": 0.7, "xy": 0.1, "z": 0.2})
+    ground = GROUNDS[rng.integers(len(GROUNDS))]
+    use = shares[rng.integers(3)] if ground.crs != "geocentric" else shares[0]
+    layout = str(rng.choice(["bands", "bands", "bands", "corners", "corners+centre", "random"]))
+    layout = "bands" if len(use) > 1 else layout
+    return Spec(
+        seed=seed,
+        camera=camera,
+        ground=ground,
+        flight=Flight(
+            photos=int(rng.integers(4, 9)),
+            end_lap_percent=float(rng.uniform(58, 80)),
+            scale=scale,
+            heading_deg=float(rng.uniform(0, 360)),
+            photo_rotation_deg=float(rng.choice([0.0, 0.0, 0.0, 180.0, 90.0])),
+            attitude_sigma_deg=(tilt, tilt, tilt),
+        ),
+        terrain=Terrain(relief=relief, slope_percent=(float(rng.uniform(-5, 5)), float(rng.uniform(-5, 5)))),
+        points=Points(rows=rows, extra_per_model=int(rng.integers(3, 15))),
+        control=Control(
+            layout=layout,
+            bands=int(rng.integers(3 if len(use) > 1 else 2, 4)),
+            per_band=3,
+            count=int(rng.integers(8, 14)),
+            use=use,
+            sigma=(ground_sigma, ground_sigma, 1.5 * ground_sigma),
+        ),
+        image=Image(sigma_um=sigma),
+        gross_errors=(GrossError("image", count=2),) if rng.random() < GROSS_SHARE else (),
+    )
+
+
+# ------------------------------------------------------------------------------------------- planting mistakes
+
+Planted = tuple["Inputs", frozenset[str]]  # the inputs and the ids that must be named; empty when none need be
+NOBODY: frozenset[str] = frozenset()
+
+
+def with_xy(case: Case, xy: Floats) -> Inputs:
+    """Give the inputs with other image coordinates."""
+    return replace(case.inputs, observations=replace(case.inputs.observations, xy=xy))
+
+
+def rows_of(case: Case, photo: str) -> NDArray[np.bool_]:
+    """Find the image points of a photo."""
+    o = case.inputs.observations
+    return np.asarray(o.photo == o.photo_ids.index(photo))
+
+
+def unit(case: Case) -> Planted | None:
+    """Multiply all image coordinates by the factor of a wrong unit."""
+    factor = float(case.rng.choice([1000.0, 0.001, 10.0, 0.1]))
+    return with_xy(case, case.inputs.observations.xy * factor), NOBODY
+
+
+def unit_of_one(case: Case) -> Planted | None:
+    """Give one photo in micrometres."""
+    photo = str(case.rng.choice(case.photos))
+    xy = case.inputs.observations.xy.copy()
+    xy[rows_of(case, photo)] *= float(case.rng.choice([1000.0, 0.001, 10.0]))
+    return with_xy(case, xy), frozenset({photo})
+
+
+def mirrored(case: Case) -> Planted | None:
+    """Turn all photos over: y down, negatives, or x and y exchanged."""
+    xy = case.inputs.observations.xy
+    return with_xy(case, (xy * [1, -1], xy * [-1, 1], xy[:, ::-1])[case.rng.integers(3)]), NOBODY
+
+
+def one_mirrored(case: Case) -> Planted | None:
+    """Turn one photo over."""
+    photo = str(case.rng.choice(case.photos))
+    xy, rows = case.inputs.observations.xy.copy(), rows_of(case, photo)
+    xy[rows] = (xy[rows] * [1, -1], xy[rows] * [-1, 1], xy[rows][:, ::-1])[case.rng.integers(3)]
+    return with_xy(case, xy), frozenset({photo})
+
+
+def with_camera(case: Case, factor: float) -> Inputs:
+    """Give the inputs with another principal distance."""
+    strips = tuple(
+        replace(each, camera=replace(each.camera, principal_distance=each.camera.principal_distance * factor))
+        for each in case.inputs.strips
+    )
+    return replace(case.inputs, strips=strips)
+
+
+def distance_by_ten(case: Case) -> Planted | None:
+    """Misplace the decimal point of the principal distance."""
+    return with_camera(case, float(case.rng.choice([10.0, 0.1, 1000.0, 0.001]))), NOBODY
+
+
+def distance(case: Case) -> Planted | None:
+    """Take the principal distance of another lens; seen in the heights of the control only."""
+    factor = float(case.rng.choice([0.58, 0.73, 1.37, 2.0]))
+    if not seen_in_heights(case, abs(factor - 1.0)):
+        return None
+    return with_camera(case, factor), NOBODY
+
+
+def seen_in_heights(case: Case, change: float) -> bool:
+    """Whether a stretch of the heights moves the control by more than three times what noise does in a fit of them."""
+    control = case.inputs.control
+    o = case.inputs.observations
+    rows = control.use.all(axis=1) & ~control.check & np.isin(control.ids, o.point_ids)
+    if case.spec.ground.crs == "geocentric" or rows.sum() < 7:
+        return False
+    xyz = case.simulation.truth.ground.xyz
+    index = {name: row for row, name in enumerate(case.simulation.truth.ground.ids)}
+    enu = xyz[[index[name] for name, row in zip(control.ids, rows, strict=True) if row]]
+    d = enu[:, :2] - enu[:, :2].mean(axis=0)
+    u, _, _ = np.linalg.svd(d, full_matrices=False)
+    along = d @ np.linalg.svd(d)[2][0]
+    columns = np.column_stack([np.ones(len(d)), u, (along / np.abs(along).max()) ** 2, u[:, 0] * u[:, 1]])
+    left = enu[:, 2] - columns @ np.linalg.lstsq(columns, enu[:, 2], rcond=None)[0]
+    freedom = len(left) - columns.shape[1] - 1
+    return freedom >= 3 and change * float(np.linalg.norm(left)) > 3.0 * critical(freedom) * case.noise[1]
+
+
+def critical(freedom: int) -> float:
+    """Give what noise alone reaches once in a hundred thousand tests, in standard deviations."""
+    from scipy.stats import t
+
+    return float(t.ppf(1 - 1e-5, freedom))
+
+
+def with_photos(case: Case, photos: list[str]) -> Inputs:
+    """Give the inputs with another list of photos."""
+    return replace(case.inputs, strips=(replace(case.inputs.strips[0], photos=tuple(photos)),))
+
+
+def pair_exchanged(case: Case) -> Planted | None:
+    """Exchange two neighbours in the list."""
+    photos = list(case.photos)
+    place = int(case.rng.integers(len(photos) - 1))
+    photos[place], photos[place + 1] = photos[place + 1], photos[place]
+    return with_photos(case, photos), frozenset(photos[place : place + 2])
+
+
+def moved(case: Case) -> Planted | None:
+    """List one photo somewhere else."""
+    photos = list(case.photos)
+    photo = photos.pop(int(case.rng.integers(len(photos))))
+    places = [k for k in range(len(photos) + 1) if abs(k - case.photos.index(photo)) > 1]
+    if not places:
+        return None
+    photos.insert(int(case.rng.choice(places)), photo)
+    return with_photos(case, photos), frozenset({photo})
+
+
+def no_overlap(case: Case) -> Planted | None:
+    """Give the points of all photos from one on other names, as those of another flight."""
+    o = case.inputs.observations
+    place = int(case.rng.integers(1, len(case.photos)))
+    later = np.isin(o.photo, [o.photo_ids.index(name) for name in case.photos[place:]])
+    names = (*o.point_ids, *(f"{name}x" for name in o.point_ids))
+    changed = replace(o, point_ids=names, point=np.where(later, o.point + len(o.point_ids), o.point))
+    return replace(case.inputs, observations=changed), frozenset(case.photos[place - 1 : place + 1])
+
+
+def twice(case: Case) -> Planted | None:
+    """Give one photo a second time under another name, measured again."""
+    o = case.inputs.observations
+    place = int(case.rng.integers(len(case.photos)))
+    rows = np.flatnonzero(rows_of(case, case.photos[place]))
+    noise = case.rng.normal(0.0, case.spec.image.sigma_um / 1000.0, (len(rows), 2))
+    copy = replace(
+        o,
+        photo_ids=(*o.photo_ids, "copy"),
+        photo=np.r_[o.photo, np.full(len(rows), len(o.photo_ids))],
+        point=np.r_[o.point, o.point[rows]],
+        xy=np.r_[o.xy, o.xy[rows] + noise],
+        sigma=np.r_[o.sigma, o.sigma[rows]],
+    )
+    photos = [*case.photos[: place + 1], "copy", *case.photos[place + 1 :]]
+    return replace(with_photos(case, photos), observations=copy), frozenset({case.photos[place], "copy"})
+
+
+def photo_missing(case: Case) -> Planted | None:
+    """Take one photo out of the list, where its neighbours overlap."""
+    if case.spec.flight.end_lap_percent < 72 or len(case.photos) < 6:
+        return None
+    place = int(case.rng.integers(2, len(case.photos) - 2))
+    photos = [*case.photos[:place], *case.photos[place + 1 :]]
+    o = case.inputs.observations
+    seen = [set(o.point[rows_of(case, name)].tolist()) for name in photos]
+    if min(len(a & b) for a, b in pairwise(seen)) < 7:
+        return None
+    if min(len(a & b & c) for a, b, c in zip(seen, seen[1:], seen[2:], strict=False)) < 2:
+        return None
+    kept = ~rows_of(case, case.photos[place])
+    o = replace(o, photo=o.photo[kept], point=o.point[kept], xy=o.xy[kept], sigma=o.sigma[kept])
+    inputs = replace(with_photos(case, photos), observations=compact(o))
+    return inputs, frozenset({case.photos[place - 1], case.photos[place + 1]})
+
+
+def compact(o: PhotoPoints) -> PhotoPoints:
+    """Drop photos without points."""
+    names = [o.photo_ids[n] for n in np.unique(o.photo)]
+    number = np.searchsorted(np.unique(o.photo), o.photo)
+    return replace(o, photo_ids=tuple(names), photo=number)
+
+
+# ------------------------------------------------------------------------------------------ mistakes in the control
+
+
+def with_control(case: Case, **columns: object) -> Inputs:
+    """Give the inputs with other columns of the control."""
+    changed: ControlPoints = replace(case.inputs.control, **columns)  # type: ignore[arg-type]
+    return replace(case.inputs, control=changed)
+
+
+def kind_of(case: Case) -> str:
+    """Say which kind of frame the control has."""
+    return {"EPSG:4326": "geographic"}.get(case.spec.ground.crs, case.spec.ground.crs.partition(":")[0])
+
+
+def enough(case: Case, least: int = 6) -> bool:
+    """Whether the control has some points in full, so that one of them can be told to be wrong."""
+    control = case.inputs.control
+    return int((control.use.all(axis=1) & ~control.check).sum()) >= least
+
+
+def axes_exchanged(case: Case) -> Planted | None:
+    """Exchange two axes of the control."""
+    if kind_of(case) == "geocentric":
+        return None
+    control = case.inputs.control
+    return with_control(case, enu=control.enu[:, [1, 0, 2]], use=control.use[:, [1, 0, 2]]), NOBODY
+
+
+def left_handed(case: Case) -> Planted | None:
+    """Count one axis of a local system backwards."""
+    if kind_of(case) != "local":
+        return None
+    sign = ([-1, 1, 1], [1, -1, 1])[case.rng.integers(2)]
+    return with_control(case, enu=case.inputs.control.enu * sign), NOBODY
+
+
+def another_crs(case: Case) -> Planted | None:
+    """Name a coordinate reference system of another country."""
+    if kind_of(case) != "EPSG":
+        return None
+    spec = replace(case.inputs.frames[0], crs=str(case.rng.choice(["EPSG:2154", "EPSG:31468", "EPSG:27700"])))
+    return replace(case.inputs, frames=(spec,)), NOBODY
+
+
+def feet(case: Case) -> Planted | None:
+    """Give projected coordinates in feet, international or US survey."""
+    if kind_of(case) != "EPSG":
+        return None
+    foot = float(case.rng.choice([FOOT, 1200 / 3937]))
+    return with_control(case, enu=case.inputs.control.enu / foot), NOBODY
+
+
+def in_two_lists(case: Case, change: Callable[[Floats], Floats]) -> Planted | None:
+    """Put every third control point into a second list of the same frame, changed."""
+    if kind_of(case) in {"geocentric", "geographic"} or not enough(case, 9):
+        return None
+    control = case.inputs.control
+    full = np.flatnonzero(
+        control.use.all(axis=1) & ~control.check & np.isin(control.ids, case.inputs.observations.point_ids)
+    )
+    second = full[::3] if len(full) >= 9 else full[:0]
+    if len(second) < 3:
+        return None
+    enu, frame = control.enu.copy(), np.zeros(len(control), int)
+    enu[second] = change(enu[second])
+    frame[second] = 1
+    inputs = with_control(case, enu=enu, frame=frame)
+    return replace(inputs, frames=(case.inputs.frames[0],) * 2), NOBODY
+
+
+def list_in_feet(case: Case) -> Planted | None:
+    """Give one of two lists in feet."""
+    return in_two_lists(case, lambda enu: enu / FOOT) if kind_of(case) == "local" else None
+
+
+def list_in_another_frame(case: Case) -> Planted | None:
+    """Give one of two lists in a frame that lies elsewhere."""
+    shift = np.array([*case.rng.uniform(2.0, 8.0, 2) * case.spec.base * case.rng.choice([-1, 1], 2), 0.0])
+    return in_two_lists(case, lambda enu: enu + shift)
+
+
+def heights_of_another_kind(case: Case) -> Planted | None:
+    """Give one of two lists heights that differ by a constant."""
+    step = float(case.rng.choice([-1, 1]) * case.rng.uniform(15, 60))
+    if step**2 < (3 * critical(3) * case.noise[1]) ** 2:
+        return None
+    return in_two_lists(case, lambda enu: enu + np.array([0.0, 0.0, step]))
+
+
+def heights_in_feet(case: Case) -> Planted | None:
+    """Give heights in feet and plan in metres, or the other way round."""
+    factor = float(case.rng.choice([1 / FOOT, FOOT]))
+    if kind_of(case) == "geographic" or not seen_in_heights(case, min(abs(factor - 1.0), 1.0)):
+        return None
+    return with_control(case, enu=case.inputs.control.enu * [1, 1, factor]), NOBODY
+
+
+def slip_of_a_digit(case: Case, *, check: bool) -> Planted | None:
+    """Change one digit of a given coordinate by one to nine."""
+    control = case.inputs.control
+    if kind_of(case) in {"geocentric", "geographic"} or not enough(case, 8):
+        return None
+    seen = np.isin(control.ids, case.inputs.observations.point_ids) & control.use.all(axis=1) & (control.check == check)
+    if not seen.any():
+        return None
+    row, axis = int(case.rng.choice(np.flatnonzero(seen))), int(case.rng.integers(3))
+    noise = case.noise[0 if axis < 2 else 1]
+    worth = 10.0 ** case.rng.integers(0, 4)
+    text = f"{abs(control.enu[row, axis]):.3f}".rjust(12, "0")
+    place = text.index(".") - 1 - round(np.log10(worth))
+    digit = int(text[place])
+    other = int(case.rng.choice([each for each in range(10) if each != digit]))
+    step = (other - digit) * worth * np.sign(control.enu[row, axis] or 1.0)
+    # what noise does at a point that takes no part: the end of a strip that is bent by what few points say
+    if abs(step) < 3 * critical(6) * 2 * noise or worth < 12 * noise:
+        return None
+    enu = control.enu.copy()
+    enu[row, axis] += step
+    return with_control(case, enu=enu), frozenset({control.ids[row]})
+
+
+def exchanged(case: Case) -> Planted | None:
+    """Exchange the coordinates of two control points."""
+    control = case.inputs.control
+    if not enough(case, 8):
+        return None
+    seen = np.flatnonzero(
+        np.isin(control.ids, case.inputs.observations.point_ids) & control.use.all(axis=1) & ~control.check
+    )
+    if len(seen) < 8:
+        return None
+    one, other = (int(each) for each in case.rng.choice(seen, 2, replace=False))
+    enu = control.enu.copy()
+    enu[[one, other]] = enu[[other, one]]
+    return with_control(case, enu=enu), frozenset({control.ids[one], control.ids[other]})
+
+
+def same_id(case: Case) -> Planted | None:
+    """Give a point of the last photos the id of one of the first photos."""
+    o = case.inputs.observations
+    given = set(case.inputs.control.ids)
+    if len(case.photos) < 5:
+        return None
+    seen = [set(o.point[rows_of(case, name)].tolist()) for name in case.photos]
+    inside = [sum(number in each for each in seen) for number in range(len(o.point_ids))]
+    first = [n for n in seen[0] & seen[1] if inside[n] == 2 and o.point_ids[n] not in given]
+    last = [n for n in seen[-1] & seen[-2] if inside[n] == 2 and o.point_ids[n] not in given]
+    if not first or not last or set(first) & set(last):
+        return None
+    one, other = int(case.rng.choice(first)), int(case.rng.choice(last))
+    changed = replace(o, point=np.where(o.point == other, one, o.point))
+    return replace(case.inputs, observations=changed), frozenset({o.point_ids[one]})
+
+
+def two_ids(case: Case) -> Planted | None:
+    """Measure a point a second time under another id."""
+    o = case.inputs.observations
+    place = int(case.rng.integers(len(case.photos) - 1))
+    both = set(o.point[rows_of(case, case.photos[place])]) & set(o.point[rows_of(case, case.photos[place + 1])])
+    number = int(case.rng.choice(sorted(both)))
+    rows = np.flatnonzero(o.point == number)
+    noise = case.rng.normal(0.0, case.spec.image.sigma_um / 1000.0, (len(rows), 2))
+    copy = replace(
+        o,
+        point_ids=(*o.point_ids, "again"),
+        photo=np.r_[o.photo, o.photo[rows]],
+        point=np.r_[o.point, np.full(len(rows), len(o.point_ids))],
+        xy=np.r_[o.xy, o.xy[rows] + noise],
+        sigma=np.r_[o.sigma, o.sigma[rows]],
+    )
+    return replace(case.inputs, observations=copy), frozenset({o.point_ids[number], "again"})
+
+
+def kept(case: Case, wanted: Callable[[Floats, Floats], NDArray[np.bool_]]) -> Planted | None:
+    """Keep control where it is wanted, by its place along the strip (0 to 1) and across it (in bases)."""
+    o, control = case.inputs.observations, case.inputs.control
+    index = {name: row for row, name in enumerate(case.simulation.truth.points.ids)}
+    centers = case.simulation.truth.centers
+    order = [case.simulation.truth.photo_ids.index(name) for name in case.photos]
+    first, last = centers[order[0]], centers[order[-1]]
+    axis = (last - first) / np.linalg.norm(last - first)
+    up = case.simulation.truth.rotations[:, :, 2].mean(axis=0)
+    side = np.cross(up, axis)
+    xyz = case.simulation.truth.points.xyz[[index[name] for name in control.ids]] - first
+    along, across = xyz @ axis / np.linalg.norm(last - first), xyz @ side / case.spec.base
+    keep = control.check | wanted(along, across)
+    inside = keep & ~control.check & control.use.all(axis=1) & np.isin(control.ids, o.point_ids)
+    if inside.sum() < 3 or len(case.photos) < 6:
+        return None
+    return replace(case.inputs, control=control.take(keep & (control.check | inside))), NOBODY
+
+
+def at_one_end(case: Case) -> Planted | None:
+    """Keep control in the first third of the strip only."""
+    return kept(case, lambda along, _: along < THIRD)
+
+
+def on_one_line(case: Case) -> Planted | None:
+    """Keep control along the flight only."""
+    return kept(case, lambda _, across: np.abs(across) < LINE)
+
+
+def half_of_the_strip(case: Case) -> Planted | None:
+    """Keep control in the first 55 % of the strip only."""
+    return kept(case, lambda along, _: along < HALF)
+
+
+# --------------------------------------------------------------------------------------------------- given angles
+
+
+def with_angles(case: Case, read: Callable[[Floats], Floats], system: str) -> Inputs:
+    """Give orientations whose angles were read in another way."""
+    truth = case.simulation.truth
+    spec = case.inputs.output or case.inputs.frames[0]
+    values = read(angles(truth.rotations_local, "omega-phi-kappa"))
+    nan = np.full((len(values), 3), np.nan)
+    given = GivenOrientations(truth.photo_ids, spec, truth.centers_ground, values, system, nan, nan, observed=False)
+    return replace(case.inputs, orientations=given)
+
+
+def angle_unit(case: Case) -> Planted | None:
+    """Read gons as degrees, degrees as radians, and the like."""
+    factor = float(case.rng.choice([200 / 180, 180 / 200, 180 / np.pi, np.pi / 180]))
+    return with_angles(case, lambda values: values * factor, "omega-phi-kappa"), NOBODY
+
+
+def angle_system(case: Case) -> Planted | None:
+    """Read omega, phi, kappa as another system, or with another sense of kappa."""
+    if case.spec.flight.attitude_sigma_deg[0] < 1.0:
+        return None
+    if case.rng.random() < EVEN:
+        return with_angles(case, lambda values: values * [1, 1, -1], "omega-phi-kappa"), NOBODY
+    return with_angles(case, lambda values: values, "alpha-omega-kappa"), NOBODY
+
+
+# ------------------------------------------------------------------------------------------------------- the table
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """One kind of mistake: how it is planted, which codes tell it, and when it counts."""
+
+    name: str
+    plant: Callable[[Case], Planted | None]
+    codes: tuple[str, ...]
+
+
+MISTAKES = (
+    Mistake("image coordinates in another unit", unit, ("P101",)),
+    Mistake("one photo in another unit", unit_of_one, ("P102",)),
+    Mistake("image coordinates mirrored", mirrored, ("P103", "P401")),
+    Mistake("one photo mirrored", one_mirrored, ("P104",)),
+    Mistake("principal distance off by 10 or 1000", distance_by_ten, ("P105",)),
+    Mistake("principal distance of another lens", distance, ("P105",)),
+    Mistake("two neighbours exchanged in the list", pair_exchanged, ("P201",)),
+    Mistake("a photo listed elsewhere", moved, ("P201",)),
+    Mistake("no overlap from one photo on", no_overlap, ("P202",)),
+    Mistake("a photo twice", twice, ("P203",)),
+    Mistake("a photo left out of the list", photo_missing, ("P206",)),
+    Mistake("one id for two points", same_id, ("P301",)),
+    Mistake("two ids for one point", two_ids, ("P302",)),
+    Mistake("axes of the control exchanged", axes_exchanged, ("P401", "P103")),
+    Mistake("an axis of a local system backwards", left_handed, ("P401",)),
+    Mistake("crs of another country", another_crs, ("P402",)),
+    Mistake("control in feet (projected)", feet, ("P403",)),
+    Mistake("one of two lists in feet", list_in_feet, ("P403",)),
+    Mistake("one of two lists in another frame", list_in_another_frame, ("P407",)),
+    Mistake("heights of two kinds in two lists", heights_of_another_kind, ("P404",)),
+    Mistake("heights in feet, plan in metres", heights_in_feet, ("P405",)),
+    Mistake("slip of a digit, control", lambda case: slip_of_a_digit(case, check=False), ("P406",)),
+    Mistake("slip of a digit, check point", lambda case: slip_of_a_digit(case, check=True), ("P406",)),
+    Mistake("two control points exchanged", exchanged, ("P408",)),
+    Mistake("control at one end", at_one_end, ("P501",)),
+    Mistake("control on one line", on_one_line, ("P502",)),
+    Mistake("control in one half", half_of_the_strip, ("P501", "P503")),
+    Mistake("angles in another unit", angle_unit, ("P601",)),
+    Mistake("angles in another system", angle_system, ("P602",)),
+)
+
+
+def told(inputs: Inputs, settings: Settings) -> tuple[dict[str, set[str]], dict[str, set[str]]]:
+    """Give codes with the ids that they name: what `check` tells, and what `run` tells."""
+    try:
+        findings = triangulate(inputs, settings).findings
+    except PhotostripError as error:
+        findings = error.findings
+    try:
+        before = plausibility.of_inputs(inputs, settings)
+    except PhotostripError:
+        before = ()
+    both = []
+    for each in (before, findings):
+        named: dict[str, set[str]] = {}
+        for finding in each:
+            named.setdefault(finding.code, set()).update(finding.names)
+        both.append(named)
+    return both[0], both[1]
+
+
+def is_found(named: dict[str, set[str]], mistake: Mistake, ids: frozenset[str]) -> bool:
+    """Whether one of the codes was told and names what it must name."""
+    return any(code in named and (not ids or ids & named[code]) for code in mistake.codes)
+
+
+def false_alarms(strips: int) -> int:
+    """Examine strips without a mistake and print what was told."""
+    alarms: Counter[str] = Counter()
+    wrong = 0
+    for seed in range(strips):
+        case = sound(seed)
+        before, after = told(case.inputs, case.settings)
+        named = before | after
+        wrong += bool(named)
+        alarms.update(named)
+        if named and "-v" in sys.argv:
+            print("  alarm", seed, named, case.spec)
+    print(f"{strips} strips without a mistake: {wrong} with a finding, {100 * wrong / strips:.2f} %")
+    for code, count in sorted(alarms.items()):
+        print(f"  {code} {KINDS[code].title}: {count}")
+    return wrong
+
+
+def main() -> None:
+    """Print both tables."""
+    numbers = [int(each) for each in sys.argv[1:] if each.isdecimal()]
+    strips, without = (numbers + [100, 1000][len(numbers) :])[:2]
+    only = [each for each in sys.argv[1:] if not each.isdecimal() and each != "-v"]
+    if without:
+        false_alarms(without)
+    print(f"{'mistake':<40} {'code':<10} {'strips':>6} {'check':>7} {'run':>7}")
+    for mistake in MISTAKES:
+        if not only or any(each in mistake.name for each in only):
+            row(mistake, strips)
+
+
+def row(mistake: Mistake, strips: int) -> None:
+    """Plant one mistake in many strips and print how often it was found."""
+    done, by_check, by_run, seed = 0, 0, 0, 100_000
+    while done < strips and seed < 100_000 + 12 * strips:
+        seed += 1
+        case = sound(seed)
+        planted = mistake.plant(case)
+        if planted is None:
+            continue
+        inputs, ids = planted
+        before, after = told(inputs, case.settings)
+        done += 1
+        by_check += is_found(before, mistake, ids)
+        by_run += is_found(after, mistake, ids)
+        if not is_found(after, mistake, ids) and "-v" in sys.argv:
+            print("  missed", seed, sorted(ids), after, case.spec)
+    share = [f"{100 * each / max(done, 1):.1f} %" for each in (by_check, by_run)]
+    print(f"{mistake.name:<40} {'/'.join(mistake.codes):<10} {done:>6} {share[0]:>7} {share[1]:>7}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

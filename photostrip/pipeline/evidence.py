@@ -1,0 +1,270 @@
+"""What the gate looks at: strips formed for evidence alone, and given points as strips see them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import PhotostripError
+from photostrip.triangulation import formation, refinement, relative, screening
+from photostrip.triangulation.plausibility import mosaic
+from photostrip.triangulation.plausibility.control_reading import Seen
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.pipeline.inputs import Settings, Strip
+    from photostrip.points import ControlPoints, PhotoPoints
+    from photostrip.triangulation.formation import FormedStrip
+    from photostrip.triangulation.relative import Orientation
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+WINDOW = 10  # photos of a mosaic that is laid on control: a longer one curls
+SEEN_BY = 2  # photos that must show a given point
+MOSAIC_SIGMA = 0.02  # of the flying height: what relief and tilts leave in a mosaic
+
+
+@dataclass(frozen=True, eq=False)
+class Formed:
+    """A strip, formed for evidence.
+
+    Parameters
+    ----------
+    strip : Strip
+        The strip with its photos in the order in which they were formed.
+    orientation : relative.Orientation
+        Its pairs.
+    formed : formation.FormedStrip
+        The strip.
+    """
+
+    strip: Strip
+    orientation: Orientation
+    formed: FormedStrip
+
+    @property
+    def up(self) -> Floats:
+        """Direction from the ground to the cameras, of length one."""
+        axis = self.formed.rotations[:, :, 2].mean(axis=0)
+        return np.asarray(axis / max(float(np.linalg.norm(axis)), 1e-12), float)
+
+    @property
+    def depth(self) -> Floats:
+        """Height of every perspective centre above the points of its models, shape (n,)."""
+        up, pair = self.up, self.orientation.pairs.pair
+        height = self.formed.model_xyz @ up
+        good = np.isfinite(height) & self.orientation.used
+        count = np.maximum(np.bincount(pair[good], minlength=self.orientation.pairs.size), 1)
+        ground = np.bincount(pair[good], height[good], self.orientation.pairs.size) / count
+        centers = self.formed.centers @ up
+        return np.concatenate([centers[:1] - ground[:1], centers[1:] - ground])
+
+
+def form(strip: Strip, observations: PhotoPoints, settings: Settings) -> Formed | None:
+    """Form a strip as far as that goes, for evidence alone.
+
+    Parameters
+    ----------
+    strip : Strip
+        The strip, its photos as they lie.
+    observations : PhotoPoints
+        Image points in the system of the photo, mm.
+    settings : Settings
+        What was to be done.
+
+    Returns
+    -------
+    Formed or None
+        None when a pair or a joint cannot be determined.
+    """
+    members = [photo in strip.photos for photo in observations.photo_ids]
+    sigma = float(np.median(observations.sigma[np.array(members, bool)[observations.photo]]))
+    try:
+        pairs, point, rows = relative.collect_pairs(observations, strip.photos, strip.camera.principal_distance)
+        first, converged = relative.attempt(pairs, point, rows)
+        screened = screening.examine(first, settings.relative, sigma, converged)
+        relative.require(screened.orientation, screened.converged, strip.photos)
+        scatter = screened.scatter.by_pair
+        formed = formation.form(screened.orientation, settings.formation, strip.photos, scatter)
+    except (PhotostripError, ArithmeticError, ValueError):
+        return None
+    return Formed(strip, screened.orientation, formed)
+
+
+def ideal(observations: PhotoPoints, strips: Sequence[Strip], settings: Settings) -> PhotoPoints:
+    """Give image points free of distortion, without refraction, whose heights are not known.
+
+    Parameters
+    ----------
+    observations : PhotoPoints
+        Image points in the system of the photo, mm.
+    strips : sequence of Strip
+        Strips with their cameras.
+    settings : Settings
+        What was to be done.
+
+    Returns
+    -------
+    PhotoPoints
+        Ideal coordinates; as they are where they cannot be corrected.
+    """
+    cameras = {photo: strip.camera for strip in strips for photo in strip.photos}
+    try:
+        return refinement.refine(observations, cameras, replace(settings.refinement, refraction=False)).observations
+    except (PhotostripError, LookupError):
+        return observations
+
+
+# ------------------------------------------------------------------------------- given points as a strip sees them
+
+
+def sighted(formed: Formed, observations: PhotoPoints, control: ControlPoints) -> tuple[Numbers, Seen]:
+    """Give the points of a formed strip whose ground coordinates are given.
+
+    Parameters
+    ----------
+    formed : Formed
+        The strip.
+    observations : PhotoPoints
+        Image points.
+    control : ControlPoints
+        Given points.
+
+    Returns
+    -------
+    rows : ndarray of int
+        Rows of the given points.
+    Seen
+        The same points in the strip.
+    """
+    strip, depth = formed.formed, float(np.median(formed.depth))
+    number = {name: n for n, name in enumerate(observations.point_ids)}
+    row_of = {int(n): row for row, n in enumerate(strip.point)}
+    places = np.array([row_of.get(number.get(name, -1), -1) for name in control.ids], np.intp)
+    rows = np.flatnonzero(places >= 0)
+    base = float(np.median(np.linalg.norm(np.diff(strip.centers, axis=0), axis=1)))
+    share = _sigma(observations, formed.strip) / formed.strip.camera.principal_distance
+    seen = Seen(
+        formed.strip.id,
+        strip.xyz[places[rows]],
+        strip.rotations[:, :, 2],
+        strip.centers,
+        (2.0 * share, 2.0 * np.sqrt(2.0) * share * depth / max(base, 1e-12)),
+        depth,
+        _base_angle(observations, formed.strip.photos),
+    )
+    return rows, seen
+
+
+def _sigma(observations: PhotoPoints, strip: Strip) -> float:
+    """Median standard deviation of the image coordinates of a strip, mm."""
+    members = np.array([photo in set(strip.photos) for photo in observations.photo_ids], bool)
+    return float(np.median(observations.sigma[members[observations.photo]]))
+
+
+def _base_angle(observations: PhotoPoints, photos: Sequence[str]) -> float:
+    """Mean direction on the photos towards the next one, radians."""
+    links = mosaic.link(observations, photos)
+    steps = np.array([links.toward(number, number + 1) for number in range(len(photos) - 1)])
+    steps = steps[np.isfinite(steps) & (steps != 0)]
+    return float(np.angle((steps / np.abs(steps)).sum())) if len(steps) else 0.0
+
+
+def sighted_in_mosaic(strip: Strip, observations: PhotoPoints, control: ControlPoints) -> tuple[Numbers, Seen] | None:
+    """Give the points of a mosaic of some photos whose ground coordinates are given.
+
+    Parameters
+    ----------
+    strip : Strip
+        The strip, its photos as they lie.
+    observations : PhotoPoints
+        Image points, mm.
+    control : ControlPoints
+        Given points.
+
+    Returns
+    -------
+    rows : ndarray of int
+        Rows of the given points.
+    Seen
+        The same points in the mosaic, without heights; of the ten photos in a row that show most of them.
+    """
+    photos = _richest(strip, observations, control)
+    links = mosaic.link(observations, photos)
+    layout = mosaic.lay_out(links, len(photos))
+    place = {photo: number for number, photo in enumerate(photos)}
+    position = np.array([place.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo]
+    rows = np.flatnonzero(position >= 0)
+    rows = rows[layout.part[position[rows]] == 0]
+    if not len(rows):
+        return None
+    z = observations.xy[rows, 0] + 1j * observations.xy[rows, 1]
+    z = np.where(layout.mirrored[position[rows]], np.conj(z), z)
+    z = layout.factor[position[rows]] * z + layout.offset[position[rows]]
+    total = np.bincount(observations.point[rows], minlength=len(observations.point_ids))
+    count = np.maximum(total, 1)
+    mean = (
+        np.bincount(observations.point[rows], z.real, len(total)) / count
+        + 1j * np.bincount(observations.point[rows], z.imag, len(total)) / count
+    )
+    number = {name: n for n, name in enumerate(observations.point_ids)}
+    points = np.array([number.get(name, -1) for name in control.ids], np.intp)
+    given = np.flatnonzero((points >= 0) & (total[points] > 0))
+    here = mean[points[given]]
+    depth = strip.camera.principal_distance * float(np.median(np.abs(layout.factor)))
+    xyz = np.column_stack([here.real, here.imag, np.full(len(here), np.nan)])
+    centers = np.column_stack([layout.center.real, layout.center.imag, np.full(len(photos), depth)])
+    up = np.array([[0.0, 0.0, 1.0]])
+    seen = Seen(strip.id, xyz, up, centers, (MOSAIC_SIGMA, MOSAIC_SIGMA), depth, _base_angle(observations, photos))
+    return given, seen
+
+
+def _richest(strip: Strip, observations: PhotoPoints, control: ControlPoints) -> tuple[str, ...]:
+    """Photos in a row that show most given points in plan."""
+    if len(strip.photos) <= WINDOW:
+        return strip.photos
+    given = {name for name, use in zip(control.ids, control.use[:, 0], strict=True) if use}
+    wanted = np.array([name in given for name in observations.point_ids], bool)[observations.point]
+    count = dict.fromkeys(observations.photo_ids, 0)
+    for number, hits in enumerate(np.bincount(observations.photo[wanted], minlength=len(observations.photo_ids))):
+        count[observations.photo_ids[number]] = int(hits)
+    sums = np.convolve([count.get(photo, 0) for photo in strip.photos], np.ones(WINDOW), "valid")
+    first = int(sums.argmax())
+    return strip.photos[first : first + WINDOW]
+
+
+def stations(strip: Strip, observations: PhotoPoints, control: ControlPoints) -> tuple[Numbers, Floats]:
+    """Give where along a strip given points lie.
+
+    Parameters
+    ----------
+    strip : Strip
+        The strip, its photos as they lie.
+    observations : PhotoPoints
+        Image points.
+    control : ControlPoints
+        Given points.
+
+    Returns
+    -------
+    rows : ndarray of int, shape (m,)
+        Rows of the given points that at least two of its photos show.
+    place : ndarray, shape (m,)
+        Mean number of those photos, from 0.
+    """
+    order = {photo: number for number, photo in enumerate(strip.photos)}
+    position = np.array([order.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo]
+    rows = position >= 0
+    size = len(observations.point_ids)
+    count = np.bincount(observations.point[rows], minlength=size)
+    total = np.bincount(observations.point[rows], position[rows].astype(float), size)
+    number = {name: n for n, name in enumerate(observations.point_ids)}
+    points = np.array([number.get(name, -1) for name in control.ids], np.intp)
+    seen = np.flatnonzero((points >= 0) & (count[points] >= SEEN_BY))
+    return seen, total[points[seen]] / count[points[seen]]

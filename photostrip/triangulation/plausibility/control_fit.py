@@ -1,0 +1,232 @@
+"""A strip, or the mosaic of its photos, laid on given points in plan and height, whatever else is wrong with them.
+
+The strip is set upright by its cameras, which look down; so it cannot come out upside down, and a mirror image shows as
+a mirror image. In plan, the similarity through two given points whose middle misclosure is the smallest of all pairs
+is taken, once as it is and once with the strip mirrored. Up to nearly half of the points may be wrong.
+
+Source: least median of squares (Rousseeuw 1984); derived, see docs/sources.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from photostrip.statistics import t_quantile
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Complex = NDArray[np.complex128]
+    Flags = NDArray[np.bool_]
+
+LEAST = 3  # points in plan; two always fit
+MOST_PAIRS = 1500  # tried
+MOST_POINTS = 400  # from which the middle misclosure is taken
+FAR = 0.25  # of the largest distance: two points that give a similarity
+NORMAL = 1.4826
+STEPS, ROBUST_STEPS = 12, 8
+KEPT = 5.0  # robust standard deviations within which a point goes with the others
+TAIL = 1e-6  # probability that a good point is called odd
+SMALL = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Laid:
+    """A strip laid on given points in plan.
+
+    Parameters
+    ----------
+    turn, shift : complex
+        Plan from strip: E + iN = turn w + shift, with conj(w) where `mirrored`.
+    mirrored : bool
+        Whether the strip was mirrored.
+    middle : float
+        Misclosure that a good half of the points does not exceed, metres.
+    """
+
+    turn: complex
+    shift: complex
+    mirrored: bool
+    middle: float
+
+    def __call__(self, w: Complex) -> Complex:
+        """Bring places of the upright strip to the plan."""
+        result: Complex = self.turn * (np.conj(w) if self.mirrored else w) + self.shift
+        return result
+
+
+def upright(axes: Floats) -> Floats:
+    """Rotation that turns a strip upright.
+
+    Parameters
+    ----------
+    axes : ndarray, shape (n, 3)
+        Third axes of the photos in the strip's frame: from the ground to the camera.
+
+    Returns
+    -------
+    ndarray, shape (3, 3)
+        Rotation that takes their mean to (0, 0, 1).
+    """
+    up = axes.mean(axis=0)
+    up /= max(float(np.linalg.norm(up)), SMALL)
+    helper = np.eye(3)[int(np.abs(up).argmin())]
+    first = np.cross(helper, up)
+    first /= np.linalg.norm(first)
+    return np.array([first, np.cross(up, first), up])
+
+
+def lay(w: Complex, plan: Complex, *, mirrored: bool = False) -> Laid | None:
+    """Lay a strip on given points in plan.
+
+    Parameters
+    ----------
+    w : ndarray of complex, shape (n,)
+        Places of the points in the upright strip.
+    plan : ndarray of complex, shape (n,)
+        Given places E + iN, metres.
+    mirrored : bool
+        Whether the strip is to be mirrored.
+
+    Returns
+    -------
+    Laid or None
+        The similarity with the smallest middle misclosure; None for fewer than three points, or when all stand at one
+        place.
+    """
+    if len(w) < LEAST:
+        return None
+    z = np.conj(w) if mirrored else w
+    i, j = _pairs(z, plan)
+    if not len(i):
+        return None
+    turn = (plan[j] - plan[i]) / (z[j] - z[i])
+    shift = plan[i] - turn * z[i]
+    some = np.unique(np.linspace(0, len(z) - 1, min(len(z), MOST_POINTS)).astype(np.intp))
+    size = np.abs(turn[:, None] * z[some] + shift[:, None] - plan[some])
+    place = min((len(some) + LEAST) // 2, len(some)) - 1
+    middle = np.partition(size, place, axis=1)[:, place]
+    best = int(middle.argmin())
+    return _refined(z, plan, complex(turn[best]), complex(shift[best]), mirrored=mirrored)
+
+
+def _pairs(z: Complex, plan: Complex) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Pairs of points far enough from each other on both sides, evenly drawn from all."""
+    n = len(z)
+    if n * (n - 1) // 2 > 20 * MOST_PAIRS:
+        draw = np.random.default_rng(n)  # the same for the same number of points
+        i, j = draw.integers(0, n, (2, 20 * MOST_PAIRS))
+    else:
+        i, j = np.triu_indices(n, 1)
+    far = np.abs(z[j] - z[i])
+    keep = np.flatnonzero((far > FAR * far.max(initial=0.0)) & (far > 0) & (np.abs(plan[j] - plan[i]) > SMALL))
+    if len(keep) > MOST_PAIRS:
+        keep = keep[np.linspace(0, len(keep) - 1, MOST_PAIRS).astype(np.intp)]
+    return i[keep].astype(np.intp), j[keep].astype(np.intp)
+
+
+def _refined(z: Complex, plan: Complex, turn: complex, shift: complex, *, mirrored: bool) -> Laid:
+    """Fit the better half of the points by least squares."""
+    place = min((len(z) + LEAST) // 2, len(z)) - 1
+    for _ in range(3):
+        size = np.abs(turn * z + shift - plan)
+        middle = float(np.partition(size, place)[place])
+        good = size <= max(2.5 * NORMAL * middle, SMALL)
+        d, t = z[good] - z[good].mean(), plan[good] - plan[good].mean()
+        squares = float((np.abs(d) ** 2).sum())
+        if squares < SMALL:
+            break
+        turn = complex((np.conj(d) * t).sum() / squares)
+        shift = complex(plan[good].mean() - turn * z[good].mean())
+    size = np.abs(turn * z + shift - plan)
+    return Laid(turn, shift, mirrored, float(np.partition(size, place)[place]))
+
+
+@dataclass(frozen=True, eq=False)
+class Bent:
+    """What is left at given points after a strip was laid on them and its bending taken out.
+
+    Parameters
+    ----------
+    residual : ndarray of float or complex, shape (n,)
+        Given minus predicted, metres; of every point, whether it took part or not.
+    spread : ndarray, shape (n,)
+        Standard deviation of a residual of a point that did not take part, in each direction; metres.
+    used : ndarray of bool, shape (n,)
+        Points that took part and go with the others.
+    coefficient, sigma : ndarray, shape (c,)
+        Coefficients of the columns and their standard deviations.
+    freedom : int
+        Redundancy.
+    sigma0 : float
+        Standard deviation of a given coordinate, metres; not below what makes sense, infinite without redundancy.
+    """
+
+    residual: NDArray[Any]
+    spread: Floats
+    used: Flags
+    coefficient: NDArray[Any]
+    sigma: Floats
+    freedom: int
+    sigma0: float
+
+    @property
+    def limit(self) -> Floats:
+        """Residuals beyond which a point contradicts the others, shape (n,), metres."""
+        if self.freedom < 1:
+            return np.full(len(self.spread), np.inf)
+        return self.spread * t_quantile(1 - TAIL, self.freedom)
+
+    @property
+    def odd(self) -> Flags:
+        """Points that contradict the others."""
+        found: Flags = np.abs(self.residual) > self.limit
+        return found
+
+
+def bend(columns: NDArray[Any], values: NDArray[Any], took_part: Flags, floor: float) -> Bent:
+    """Fit columns to values, with less and less weight for what does not go with the others.
+
+    Parameters
+    ----------
+    columns : ndarray of float or complex, shape (n, c)
+        Columns, the same for all points.
+    values : ndarray of float or complex, shape (n,)
+        Values, metres.
+    took_part : ndarray of bool, shape (n,)
+        Points that may take part.
+    floor : float
+        Smallest standard deviation that makes sense, metres.
+
+    Returns
+    -------
+    Bent
+        The fit, its residuals, and which points go with it.
+    """
+    size = np.maximum(np.abs(columns[took_part]).max(axis=0, initial=SMALL), SMALL)
+    scaled = columns / size
+    weight = took_part.astype(float)
+    coefficient, residual = np.zeros(columns.shape[1], values.dtype), values
+    for step in range(STEPS):
+        root = np.sqrt(weight)
+        coefficient = np.linalg.lstsq(scaled * root[:, None], values * root, rcond=1e-9)[0]
+        residual = values - scaled @ coefficient
+        middle = max(NORMAL * float(np.median(np.abs(residual[took_part]))), floor)
+        if step < ROBUST_STEPS:  # first by absolute residuals, then without what is far away
+            weight = took_part / np.maximum(np.abs(residual) / middle, 0.5)
+        else:
+            weight = (took_part & (np.abs(residual) < KEPT * middle)).astype(float)
+    used = weight > 0
+    parts = 2 if np.iscomplexobj(values) else 1
+    freedom = parts * (int(used.sum()) - columns.shape[1])
+    squares = float((np.abs(residual[used]) ** 2).sum())
+    sigma0 = max(float(np.sqrt(squares / freedom)), floor) if freedom > 0 else np.inf
+    inverse = np.linalg.pinv(scaled[used].conj().T @ scaled[used], rcond=1e-12)
+    lever = np.einsum("ni,ij,nj->n", scaled, inverse, scaled.conj()).real
+    sigma = np.sqrt(np.maximum(np.diag(inverse).real, 0.0)) * (sigma0 if freedom > 0 else np.inf)
+    spread = np.sqrt(1.0 + np.maximum(lever, 0.0)) * (sigma0 if freedom > 0 else np.inf)
+    return Bent(residual, spread, used, coefficient / size, sigma / size, freedom, sigma0)

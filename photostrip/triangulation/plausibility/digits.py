@@ -1,0 +1,88 @@
+"""Slips of the pen in one given coordinate: what is written and what was meant differ by a slip that explains it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
+CLEAR = 6.0  # scatters that the value of the digit must have: below, any error looks like a slip
+NEAR = 0.3  # of the correction, within which the corrected coordinate must lie at most
+MOST_DECIMALS = 4
+
+
+class Slip(NamedTuple):
+    """A slip of the pen.
+
+    Parameters
+    ----------
+    meant : float
+        The coordinate that was meant.
+    text : str
+        What happened, in words.
+    """
+
+    meant: float
+    text: str
+
+
+def slip(given: float, predicted: float, scatter: float, tolerance: float) -> Slip | None:
+    """Find the slip that turns a coordinate into one that fits.
+
+    Parameters
+    ----------
+    given : float
+        The coordinate as it is written, in its own unit.
+    predicted : float
+        What everything else lets expect, in the same unit.
+    scatter : float
+        Standard deviation of the prediction.
+    tolerance : float
+        How far the corrected coordinate may lie from the prediction; never more than a part of the digit's value.
+
+    Returns
+    -------
+    Slip or None
+        The slip that brings the coordinate nearest to the prediction; None when none brings it near.
+    """
+    if abs(given - predicted) < CLEAR * scatter:
+        return None
+    fits = [
+        each
+        for each in _slips(given, scatter)
+        if abs(each.meant - predicted) <= min(tolerance, max(NEAR * abs(each.meant - given), scatter))
+    ]
+    return min(fits, key=lambda each: abs(each.meant - predicted), default=None)
+
+
+def _slips(given: float, scatter: float) -> Iterator[Slip]:
+    """Give every coordinate that one slip of the pen turns into the one given."""
+    text = f"{abs(given):.{MOST_DECIMALS}f}"
+    sign = -1.0 if given < 0 else 1.0
+    point = text.index(".")
+    digits = [(place, int(sign_)) for place, sign_ in enumerate(text) if sign_ != "."]
+    yield Slip(-given, "the sign is wrong")
+    for number, (place, digit) in enumerate(digits):
+        worth = 10.0 ** (point - place - (1 if place < point else 0))
+        if worth < CLEAR * scatter:
+            break
+        for other in range(10):
+            if other != digit:
+                change = sign * (other - digit) * worth
+                what = f"a typing error in the {_ordinal(number)} digit ({digit} for {other})"
+                yield Slip(given + change, what)
+        if number + 1 < len(digits):
+            after = digits[number + 1][1]
+            if after != digit:
+                swapped = sign * (after - digit) * (worth - worth / 10.0)
+                yield Slip(given + swapped, f"the {_ordinal(number)} and the {_ordinal(number + 1)} digit exchanged")
+    for times in (10.0, 100.0, 1000.0):
+        if abs(given) / times > scatter:
+            yield Slip(given / times, f"the decimal point is {len(str(int(times))) - 1} places too far right")
+            yield Slip(given * times, f"the decimal point is {len(str(int(times))) - 1} places too far left")
+
+
+def _ordinal(number: int) -> str:
+    return ORDINALS[number] if number < len(ORDINALS) else f"{number + 1}th"

@@ -1,0 +1,115 @@
+"""Perspective centres of a formed strip: heights, base lengths and base directions that do not go with the others.
+
+All is measured against the strip itself, in units of its flying height and of its usual base, so that a wrong control
+does not disturb it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.triangulation.plausibility.finding import found
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.notes import Finding
+
+    Floats = NDArray[np.float64]
+
+HIGH = 0.2  # of the flying height, from the line of the neighbours
+LONG, SHORT = 1.75, 0.5  # of the usual base
+TURNED_DEG = 30.0  # of a base against its neighbours
+WINDOW = 3  # bases on either side that say what is usual
+FEWEST = 4  # photos
+
+
+def examine(centers: Floats, depth: Floats, up: Floats, photos: Sequence[str], strip: str) -> Iterator[Finding]:
+    """Look for perspective centres that do not go with their neighbours.
+
+    Parameters
+    ----------
+    centers : ndarray, shape (n, 3)
+        Perspective centres in order, any unit and frame.
+    depth : ndarray, shape (n,)
+        Height of each above the points it shows, in that unit.
+    up : ndarray, shape (3,)
+        Direction from the ground to the cameras.
+    photos : sequence of str
+        Their photos.
+    strip : str
+        Id of the strip.
+
+    Yields
+    ------
+    Finding
+        P204 to P207.
+    """
+    names = (strip,)
+    for number in np.flatnonzero(depth <= 0).tolist():
+        message = f"the perspective centre of photo {photos[number]} lies below the points that it shows"
+        fix = "are x and y of the image coordinates or the axes of the control exchanged?"
+        evidence = {"height_over_usual": float(depth[number] / np.median(np.abs(depth)))}
+        yield found("P204", message, fix, evidence, photos=(photos[number],), strips=names)
+    if len(photos) < FEWEST:
+        return
+    flying = float(np.median(np.abs(depth)))
+    yield from _heights(centers @ up, flying, photos, names)
+    bases = np.diff(centers, axis=0)
+    bases = bases - (bases @ up)[:, None] * up
+    yield from _lengths(np.linalg.norm(bases, axis=1), photos, names)
+    yield from _directions(bases, up, photos, names)
+
+
+def _heights(height: Floats, flying: float, photos: Sequence[str], names: tuple[str, ...]) -> Iterator[Finding]:
+    for number in range(len(photos)):
+        near = [k for k in range(max(number - WINDOW, 0), min(number + WINDOW + 1, len(photos))) if k != number]
+        line = _robust_line(np.array(near, float), height[near])
+        off = float(height[number] - line[0] - line[1] * number) / flying
+        inside = near[0] < number < near[-1]  # at an end a line is extended
+        if abs(off) > (HIGH if inside else 2.0 * HIGH):
+            message = (
+                f"the perspective centre of photo {photos[number]} lies {100 * abs(off):.0f} % of the flying height "
+                f"{'above' if off > 0 else 'below'} those of its neighbours"
+            )
+            fix = "does it have another principal distance, unit, or flight?"
+            evidence = {"off_over_flying_height": off}
+            yield found("P205", message, fix, evidence, photos=(photos[number],), strips=names)
+
+
+def _robust_line(x: Floats, y: Floats) -> tuple[float, float]:
+    """Line whose slope is the median of those of all pairs of points."""
+    i, j = np.triu_indices(len(x), 1)
+    slope = float(np.median((y[j] - y[i]) / (x[j] - x[i])))
+    return float(np.median(y - slope * x)), slope
+
+
+def _lengths(length: Floats, photos: Sequence[str], names: tuple[str, ...]) -> Iterator[Finding]:
+    for number in range(len(length)):
+        near = [k for k in range(max(number - WINDOW, 0), min(number + WINDOW + 1, len(length))) if k != number]
+        usual = float(np.median(length[near]))
+        ratio = float(length[number]) / max(usual, 1e-12)
+        if SHORT < ratio < LONG:
+            continue
+        pair = (photos[number], photos[number + 1])
+        message = f"the base of photos {pair[0]} and {pair[1]} is {ratio:.2f} times as long as those beside it"
+        fix = "is a photo missing between them?" if ratio > 1 else "is one of them from another flight?"
+        yield found("P206", message, fix, {"base_over_usual": ratio}, photos=pair, strips=names)
+
+
+def _directions(bases: Floats, up: Floats, photos: Sequence[str], names: tuple[str, ...]) -> Iterator[Finding]:
+    for number in range(len(bases)):
+        near = [k for k in range(max(number - WINDOW, 0), min(number + WINDOW + 1, len(bases))) if k != number]
+        unit = bases[near] / np.maximum(np.linalg.norm(bases[near], axis=1, keepdims=True), 1e-12)
+        usual = np.median(unit, axis=0)
+        turn = np.degrees(np.arctan2(np.cross(usual, bases[number]) @ up, usual @ bases[number]))
+        if abs(turn) <= TURNED_DEG:
+            continue
+        pair = (photos[number], photos[number + 1])
+        message = f"the base of photos {pair[0]} and {pair[1]} turns by {turn:+.0f} degrees against those beside it"
+        fix = "does the strip bend there? else: is a photo listed in the wrong place or measured wrongly?"
+        yield found("P207", message, fix, {"turn_deg": float(turn)}, photos=pair, strips=names)

@@ -1,0 +1,176 @@
+"""Ids of points: one id for two points, two ids for one point."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.triangulation.plausibility.finding import found
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.notes import Finding
+    from photostrip.points import PhotoPoints
+    from photostrip.triangulation.formation import FormedStrip
+    from photostrip.triangulation.relative import Orientation
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+    Flags = NDArray[np.bool_]
+
+GOOD_PARALLAX = 6.0  # standard deviations of a y parallax
+APART = 0.05  # of the distance from camera to ground: no bending of a strip moves a point by it
+SAME_PLACE = 12.0  # standard deviations of an image coordinate, at photo scale, in plan
+SAME_DEPTH = 3.0  # times that in height, times height over base
+CHANCE = 0.01  # points that may stand at one place by chance in the whole strip; else nothing is said
+SAME_IMAGE = 3.5  # standard deviations of the mean difference of image coordinates on common photos
+
+
+def one_id(orientation: Orientation, formed: FormedStrip, names: Sequence[str], strip: Sequence[str], sigma: float,
+           strip_id: str) -> Iterator[Finding]:  # fmt: skip
+    """Find ids that stand for two points: two pairs without a common photo put it at two places, each one soundly.
+
+    Parameters
+    ----------
+    orientation : Orientation
+        Oriented pairs.
+    formed : FormedStrip
+        The strip formed from them.
+    names : sequence of str
+        Ids of the points by number.
+    strip : sequence of str
+        Photos of the strip in order.
+    sigma : float
+        Standard deviation of an image coordinate, mm.
+    strip_id : str
+        Id of the strip.
+
+    Yields
+    ------
+    Finding
+        P301.
+    """
+    sound = np.isfinite(formed.model_xyz).all(axis=1) & (np.abs(orientation.parallax) < GOOD_PARALLAX * 1.5 * sigma)
+    rows = np.flatnonzero(sound)
+    pair = orientation.pairs.pair[rows]
+    order = np.lexsort((pair, orientation.point[rows]))
+    rows, pair = rows[order], pair[order]
+    point = orientation.point[rows]
+    apart = np.flatnonzero((point[1:] == point[:-1]) & (pair[1:] > pair[:-1] + 1))
+    distance = np.linalg.norm(formed.model_xyz[rows[apart + 1]] - formed.model_xyz[rows[apart]], axis=1)
+    depth = np.linalg.norm(formed.model_xyz[rows[apart]] - formed.centers[pair[apart]], axis=1)
+    told: set[int] = set()
+    for k in np.flatnonzero(distance > APART * (pair[apart + 1] - pair[apart]) * depth).tolist():
+        number = int(point[apart[k]])
+        if number in told:
+            continue
+        told.add(number)
+        one, two = (tuple(strip[int(pair[apart[k] + more]) :][:2]) for more in (0, 1))
+        share = float(distance[k] / depth[k])
+        message = (
+            f"point {names[number]} stands for two points: photos {' and '.join(one)} put it {100 * share:.0f} % of "
+            f"the flying height away from where photos {' and '.join(two)} put it, each without a y parallax"
+        )
+        evidence = {
+            "distance_over_flying_height": share,
+            "parallax_mm": float(np.abs(orientation.parallax[rows[apart[k]]])),
+            "other_parallax_mm": float(np.abs(orientation.parallax[rows[apart[k] + 1]])),
+        }
+        fix = f"give one of the two another id on photos {' and '.join(two)}"
+        yield found("P301", message, fix, evidence, points=(names[number],), photos=(*one, *two), strips=(strip_id,))
+
+
+def two_ids(observations: PhotoPoints, formed: FormedStrip, focal: float, strip: Sequence[str], strip_id: str,
+            sigma: float) -> Iterator[Finding]:  # fmt: skip
+    """Find points that stand at one place and are on no photo two different points.
+
+    Parameters
+    ----------
+    observations : PhotoPoints
+        Image points of the project.
+    formed : FormedStrip
+        The strip.
+    focal : float
+        Principal distance, mm.
+    strip : sequence of str
+        Photos of the strip in order.
+    strip_id : str
+        Its id.
+    sigma : float
+        Standard deviation of an image coordinate, mm.
+
+    Yields
+    ------
+    Finding
+        P302.
+    """
+    bases = np.linalg.norm(np.diff(formed.centers, axis=0), axis=1)
+    depth = _depth(formed)
+    reach = SAME_PLACE * sigma / focal * depth
+    tall = SAME_DEPTH * reach * depth / max(float(np.median(bases)), 1e-12)
+    one, two = _near(formed.xyz, reach)
+    expected = len(formed.xyz) ** 2 * reach**2 * np.pi / 2.0 / max(_area(formed.xyz), 1e-12)
+    if expected > CHANCE:
+        return
+    for a, b in zip(one.tolist(), two.tolist(), strict=True):
+        if abs(formed.xyz[a, 2] - formed.xyz[b, 2]) > tall:
+            continue
+        numbers = (int(formed.point[a]), int(formed.point[b]))
+        if _two_on_a_photo(observations, numbers, strip):
+            continue
+        names = tuple(observations.point_ids[number] for number in numbers)
+        gap = float(np.linalg.norm(formed.xyz[a, :2] - formed.xyz[b, :2]) / depth * focal)
+        message = (
+            f"points {names[0]} and {names[1]} stand at one place, {1000 * gap:.0f} µm from each other at photo scale, "
+            "and no photo shows them as two: two ids for one point"
+        )
+        fix = f"give {names[1]} the id {names[0]}"
+        evidence = {"distance_at_photo_scale_mm": gap, "expected_by_chance": float(expected)}
+        yield found("P302", message, fix, evidence, points=names, strips=(strip_id,))
+
+
+def _depth(formed: FormedStrip) -> float:
+    """Usual distance of the points from the line of the cameras, units of the strip."""
+    axis = formed.rotations[:, :, 2].mean(axis=0)
+    axis /= max(float(np.linalg.norm(axis)), 1e-12)
+    return float(abs(np.median(formed.centers @ axis) - np.median(formed.xyz @ axis)))
+
+
+def _area(xyz: Floats) -> float:
+    low, high = xyz[:, :2].min(axis=0), xyz[:, :2].max(axis=0)
+    return float(np.prod(high - low))
+
+
+def _near(xyz: Floats, reach: float) -> tuple[Numbers, Numbers]:
+    """Pairs of points nearer to each other in plan than a reach: sorted along one axis, each with those behind it."""
+    axis = int(np.ptp(xyz[:, :2], axis=0).argmax())
+    order = np.argsort(xyz[:, axis], kind="stable")
+    along = xyz[order, axis]
+    ones, twos = [], []
+    for lag in range(1, len(order)):
+        close = np.flatnonzero(along[lag:] - along[:-lag] < reach)
+        if not len(close):
+            break
+        hit = close[np.abs(xyz[order[close + lag], 1 - axis] - xyz[order[close], 1 - axis]) < reach]
+        ones.append(order[hit])
+        twos.append(order[hit + lag])
+    if not ones:
+        return np.zeros(0, np.intp), np.zeros(0, np.intp)
+    return np.concatenate(ones), np.concatenate(twos)
+
+
+def _two_on_a_photo(observations: PhotoPoints, numbers: tuple[int, int], strip: Sequence[str]) -> bool:
+    """Whether a photo shows two points at two places."""
+    inside = np.array([name in set(strip) for name in observations.photo_ids], bool)[observations.photo]
+    rows = [np.flatnonzero((observations.point == number) & inside) for number in numbers]
+    _, one, two = np.intersect1d(observations.photo[rows[0]], observations.photo[rows[1]], return_indices=True)
+    if not len(one):
+        return False
+    a, b = rows[0][one], rows[1][two]
+    difference = (observations.xy[a] - observations.xy[b]).mean(axis=0)
+    variance = (observations.sigma[a] ** 2 + observations.sigma[b] ** 2).sum(axis=0) / len(a) ** 2
+    return bool((np.abs(difference) > SAME_IMAGE * np.sqrt(variance)).any())

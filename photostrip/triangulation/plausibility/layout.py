@@ -1,0 +1,92 @@
+"""Where the control of a strip lies: at one end, on one line, with points far beyond it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.triangulation.plausibility.finding import found
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.notes import Finding
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+ONE_END = 0.4  # of the strip's length: control that spans less, all in one half, is at one end
+HALF = 0.55
+BEYOND = 0.5  # of the control's length: what lies farther out is extrapolated by more than half of it
+NARROW = 0.02  # breadth over length of the control
+FEWEST = 4  # photos of a strip that has ends
+LEAST = 2
+
+
+def examine(place: Floats, plan: Floats, photos: Sequence[str], strip: str, ids: Sequence[str]) -> Iterator[Finding]:
+    """Judge where the control of a strip lies.
+
+    Parameters
+    ----------
+    place : ndarray, shape (n,)
+        Place of each control point along the strip: the mean number of the photos that show it, from 0.
+    plan : ndarray, shape (n, 2)
+        Its given plan coordinates in metres; NaN where it has none.
+    photos : sequence of str
+        Photos of the strip in order.
+    strip : str
+        Id of the strip.
+    ids : sequence of str
+        Ids of the control points.
+
+    Yields
+    ------
+    Finding
+        P501, P502, P503.
+    """
+    known = np.asarray(np.isfinite(plan).all(axis=1), bool)
+    if known.sum() < LEAST:
+        return
+    yield from _on_a_line(plan[known], [name for name, each in zip(ids, known, strict=True) if each], strip)
+    last = len(photos) - 1
+    if len(photos) < FEWEST:
+        return
+    low, high = float(place[known].min()), float(place[known].max())
+    names = tuple(name for name, each in zip(ids, known, strict=True) if each)
+    evidence: dict[str, float | int | str] = {
+        "first_control_at_photo": low + 1,
+        "last_control_at_photo": high + 1,
+        "photos": len(photos),
+    }
+    at_begin, at_end = high <= HALF * last, low >= (1 - HALF) * last
+    if high - low < ONE_END * last and (at_begin or at_end):
+        end = "beginning" if at_begin else "end"
+        message = (
+            f"strip {strip}: all control lies at its {end}, within {high - low:.1f} of {last} bases; from there the "
+            "strip hangs free, its errors grow with the 1.5th power of the length"
+        )
+        fix = "add control at the other end"
+        yield found("P501", message, fix, evidence, points=names, strips=(strip,))
+        return
+    for gap, end in ((low, photos[0]), (last - high, photos[-1])):
+        if gap > max(BEYOND * (high - low), 1.0):
+            message = (
+                f"strip {strip}: its end at photo {end} lies {gap:.1f} bases beyond the control, which spans "
+                f"{high - low:.1f}; what is there is extrapolated"
+            )
+            fix = f"add control near photo {end}, or leave the photos beyond it out"
+            yield found("P503", message, fix, evidence, photos=(end,), strips=(strip,))
+
+
+def _on_a_line(plan: Floats, ids: Sequence[str], strip: str) -> Iterator[Finding]:
+    """Tell control whose breadth is a small part of its length: nothing holds the rotation about that line."""
+    values = np.linalg.svd(plan - plan.mean(axis=0), compute_uv=False)
+    if len(plan) < LEAST + 1 or values[0] <= 0 or values[-1] > NARROW * values[0]:
+        return
+    share = float(values[-1] / values[0])
+    message = f"strip {strip}: its control stands on one line, its breadth is {100 * share:.2g} % of its length"
+    fix = "add a control point at some distance from that line: the strip turns about it"
+    yield found("P502", message, fix, {"breadth_over_length": share}, points=ids, strips=(strip,))
