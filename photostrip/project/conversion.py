@@ -15,6 +15,7 @@ from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec
 from photostrip.pipeline import Settings, Strip
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations
 from photostrip.points import ControlPoints, PhotoPoints
+from photostrip.triangulation import certificate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from photostrip.formats.exterior import OrientationTable, PositionTable
     from photostrip.formats.measurements import Measurements
     from photostrip.project import schema
+    from photostrip.triangulation.certificate import Certificate
 
     Floats = NDArray[np.float64]
 
@@ -70,8 +72,33 @@ def cameras(project: schema.ProjectFile) -> dict[str, camera.Camera]:
     return {name: _camera(name, each) for name, each in project.cameras.items()}
 
 
+def certificate_of(given: schema.Camera) -> Certificate | None:
+    """Solve the distances between the fiducial marks of a camera.
+
+    Parameters
+    ----------
+    given : Camera
+        The camera as the project describes it.
+
+    Returns
+    -------
+    Certificate or None
+        Coordinates of the marks; None when no distances are given.
+
+    Raises
+    ------
+    InputError
+        When the distances give no figure; keys begin at the camera.
+    """
+    if not given.fiducial_distances:
+        return None
+    nominal = dict(given.fiducials) if given.fiducials else None
+    distances = [(str(first), str(second), length) for first, second, length in given.fiducial_distances]
+    return certificate.solve(distances, nominal=nominal, places=given.fiducial_places)
+
+
 def _camera(name: str, given: schema.Camera) -> camera.Camera:
-    distortion = None
+    distortion, solved = None, certificate_of(given)
     if given.distortion is not None:
         lens = given.distortion
         distortion = camera.Distortion(
@@ -82,7 +109,7 @@ def _camera(name: str, given: schema.Camera) -> camera.Camera:
         given.principal_distance,
         given.principal_point,
         given.format,
-        dict(given.fiducials),
+        dict(given.fiducials) if solved is None else solved.marks,
         given.pixel_size,
         distortion,
     )
@@ -409,7 +436,7 @@ def settings(project: schema.ProjectFile) -> Settings:
             self_calibration=tuple(wanted.bundle.self_calibration),
             calibration_sigma=dict(wanted.bundle.calibration_sigma),
         ),
-        interior=replace(usual.interior, transform=wanted.interior.transform),
+        interior=replace(usual.interior, **wanted.interior.model_dump()),
         refinement=replace(
             usual.refinement,
             refraction=wanted.refraction,

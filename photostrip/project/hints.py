@@ -8,8 +8,10 @@ import numpy as np
 
 from photostrip.formats.findings import counted, listed
 from photostrip.notes import Note
+from photostrip.project.conversion import certificate_of
 from photostrip.project.document import key_path
 from photostrip.project.tables import alike, rays
+from photostrip.triangulation.certificate import POOR_FIT
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     from photostrip.project import schema
     from photostrip.project.document import Node
     from photostrip.project.tables import Tables
+    from photostrip.triangulation.certificate import Certificate
 
 NEAR_NAMED = 3
 
@@ -43,6 +46,9 @@ def hints(project: schema.ProjectFile, tables: Tables, root: Node) -> Iterator[N
     """
     photos = {str(photo) for strip in project.strips for photo in strip.photos}
     yield from _unused_cameras(project, root)
+    for name, camera in project.cameras.items():
+        if (solved := certificate_of(camera)) is not None:
+            yield _solved_marks(name, camera, solved, root)
     for measured in (tables.observations, tables.fiducials):
         if measured is not None:
             yield from _photos_in_no_strip(measured, photos)
@@ -86,6 +92,25 @@ def _unused_cameras(project: schema.ProjectFile, root: Node) -> Iterator[Note]:
         place, key = root.entries["cameras"].keys[unused[0]], key_path(("cameras", unused[0]))
         message = f"{number} {verb} to no strip: {listed(unused)}"
         yield Note("unused-camera", message, "note", file=place.file, line=place.line, column=place.column, key=key)
+
+
+def _solved_marks(name: str, camera: schema.Camera, solved: Certificate, root: Node) -> Note:
+    """Tell how well the distances between the fiducial marks of a camera fit each other."""
+    path = ("cameras", name, "fiducial_distances")
+    worst = int(np.argmax(np.abs(solved.residuals)))
+    first, second, _ = camera.fiducial_distances[worst]
+    largest = float(abs(solved.residuals[worst]))
+    message = f"camera {name}: {len(solved.marks)} fiducial marks from {counted(len(solved.residuals), 'distance')}"
+    if solved.redundancy:
+        scatter, most = 1000 * solved.sigma0, 1000 * largest
+        message += f", standard deviation of one {scatter:.0f} µm, largest residual {most:.0f} µm at {first}-{second}"
+    else:
+        message += ": none is left over to check them"
+    severity = "note" if solved.redundancy and largest <= POOR_FIT else "warning"
+    place = root.place_of(path)
+    return Note(
+        "certificate", message, severity, file=place.file, line=place.line, column=place.column, key=key_path(path)
+    )
 
 
 def _photos_in_no_strip(read: Measurements, photos: set[str]) -> Iterator[Note]:

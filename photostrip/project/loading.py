@@ -20,6 +20,7 @@ from photostrip.project.conversion import (
     ImageSystem,
     camera_positions,
     cameras,
+    certificate_of,
     control_points,
     first_frame,
     frame_spec,
@@ -174,6 +175,7 @@ def load_project(path: Path, overrides: Sequence[str] = ()) -> Project:
     check_tables(root, tables, findings)
     source = current()
     grid_folder = source.grids if source is not None and source.grids is not None else Path(name).parent
+    _check_certificates(root, findings)
     _check_frames(root, grid_folder, findings)
     findings.stop()
     if project is None:  # cannot be: validate() had a reason, and stop() told it
@@ -200,6 +202,22 @@ def _seen_from(file: str, folder: Path) -> str:
         return seen_from(file, folder)
     except ValueError:  # another drive
         return file
+
+
+def _check_certificates(root: Node, findings: Findings) -> None:
+    """Solve the distances between fiducial marks once, to find out whether that can be done."""
+    known = root.find("cameras")
+    for name, node in (known.entries if known is not None else {}).items():
+        given = valid_section(schema.Camera, node)
+        if given is None:
+            continue  # the schema has told what is wrong with it
+        try:
+            certificate_of(given)
+        except InputError as error:
+            for fault in error.faults:
+                path = ("cameras", name, *steps(fault.key))
+                told = fault_at(root, path, fault.message, fault.code, expected=fault.expected, fix=fault.fix)
+                findings.add(told)
 
 
 def _check_frames(root: Node, directory: Path, findings: Findings) -> None:

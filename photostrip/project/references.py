@@ -105,6 +105,23 @@ def _photos(root: Node, findings: Findings) -> None:
         findings.add(fault_at(root, photo.path, message, "duplicate-photo", fix="list every photo once"))
 
 
+def marks_of(camera: Node) -> Node | None:
+    """Give the fiducial marks of a camera by name: their coordinates, or their places; None when it has none.
+
+    Parameters
+    ----------
+    camera : Node
+        The camera.
+
+    Returns
+    -------
+    Node or None
+        A mapping with a key for each mark.
+    """
+    marks = camera.find("fiducials")
+    return camera.find("fiducial_places") if marks is None else marks
+
+
 def _cameras(root: Node, findings: Findings) -> None:
     """Ask cameras for what their photos need: marks to orient by, the size of a pixel."""
     cameras, strips = root.find("cameras"), root.find("strips")
@@ -115,7 +132,7 @@ def _cameras(root: Node, findings: Findings) -> None:
     cornered = origin in {"top-left", "first-pixel"} and not marked
     for name, camera in (cameras.entries if cameras is not None else {}).items():
         path = ("cameras", name)
-        marks = camera.find("fiducials")
+        marks = marks_of(camera)
         if marks is not None and len(marks.entries) == 1:
             message = "one mark alone does not orient a photo"
             findings.add(fault_at(root, (*path, "fiducials"), message, "length", expected="at least 2 marks"))

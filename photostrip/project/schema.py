@@ -26,6 +26,7 @@ from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.geometry.rotation import SYSTEMS
 from photostrip.pipeline import ADJUSTMENTS, Settings
 from photostrip.triangulation.bundle.settings import CALIBRATION, SCREENINGS, TESTS
+from photostrip.triangulation.certificate import PLACES
 from photostrip.triangulation.formation import SCALE_TRANSFERS
 from photostrip.triangulation.plausibility import KINDS
 from photostrip.triangulation.polynomial import DEGREES
@@ -198,6 +199,7 @@ Columns = Annotated[dict[str, Words], BeforeValidator(_if_empty)]
 PointColumns = Annotated[Columns, _columns(OBSERVATIONS, *LAYOUTS)]
 MarkColumns = Annotated[Columns, _columns(FIDUCIALS)]
 ControlColumns = Annotated[Columns, _columns(CONTROL)]
+Place = Annotated[str, *_choice(tuple(PLACES))]
 YAxis = Annotated[str, *_choice(("up", "down"))]
 Height = Annotated[str, *_choice(("ellipsoidal", "orthometric"))]
 Parameter = Annotated[str, *_choice(CALIBRATION)]
@@ -284,13 +286,30 @@ class Camera(Section):
     format: tuple[Positive, Positive] | None = key("Width and height of the photo; needed for pixels", None, unit="mm")
     pixel_size: Positive | None = key("Size of a pixel; needed for pixels", None, unit="mm")
     fiducials: Annotated[dict[str, Pair], BeforeValidator(_if_empty)] = key(
-        "Calibrated coordinates of the fiducial marks, by mark", {}, unit="mm"
+        "Coordinates of the fiducial marks, by mark: calibrated, or nominal beside `fiducial_distances`", {}, unit="mm"
+    )
+    fiducial_places: Annotated[dict[str, Place], BeforeValidator(_if_empty)] = key(
+        f"Where on the photo each mark is, for `fiducial_distances` without coordinates: {_or(tuple(PLACES))}", {}
+    )
+    fiducial_distances: list[tuple[Id, Id, Positive]] = key(
+        "Calibrated distances between marks, `[[F1, F2, 211.98], ...]`, where nothing else is calibrated", [], unit="mm"
     )
     distortion: Distortion | None = key("Lens distortion", None)
     self_calibration: list[Parameter] | None = key(
         "Parameters of this camera that the bundle adjustment estimates. Default: `processing.bundle.self_calibration`",
         None,
     )
+
+    @model_validator(mode="after")
+    def _marks_have_a_place(self) -> Self:
+        if self.fiducial_places and (self.fiducials or not self.fiducial_distances):
+            message = "places of fiducial marks are for distances between them without coordinates"
+            raise wrong(message, at="fiducial_places", fix="remove them, or give fiducial_distances and no fiducials")
+        if self.fiducial_distances and not (self.fiducials or self.fiducial_places):
+            message = "distances alone do not say which mark is where"
+            fix = "give fiducial_places: {F1: bottom-right, ...}, or nominal coordinates in fiducials"
+            raise wrong(message, at="fiducial_distances", fix=fix)
+        return self
 
 
 class Strip(Section):
@@ -506,6 +525,10 @@ class Interior(Section):
     transform: Annotated[str, *_choice(("auto", "conformal", "affine", "bilinear", "projective"))] = key(
         "`auto` (affine from four marks on, else conformal), `conformal`, `affine`, `bilinear` or `projective`",
         DEFAULTS.interior.transform,
+    )
+    residuals: Annotated[str, *_choice(("ignore", "interpolate"))] = key(
+        "What the residuals of the marks do: `ignore`, or `interpolate` them to the points",
+        DEFAULTS.interior.residuals,
     )
 
 

@@ -19,7 +19,7 @@ from photostrip.formats.observations import Manner, read_measurements
 from photostrip.geometry.rotation import SYSTEMS
 from photostrip.project.document import fault_at
 from photostrip.project.merging import path_of, told_where_named
-from photostrip.project.references import listed_photos
+from photostrip.project.references import listed_photos, marks_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -219,7 +219,8 @@ def _known_marks(root: Node, photos: list[ListedPhoto], read: Measurements, find
     _, rows = np.unique(owner * len(read.target_ids) + read.target, return_index=True)  # each mark of a camera once
     for row in sorted(rows[owner[rows] >= 0].tolist()):
         camera, mark = cameras[owner[row]], read.target_ids[read.target[row]]
-        marks = root.find("cameras", camera, "fiducials")
+        owner_node = root.find("cameras", camera)
+        marks = None if owner_node is None else marks_of(owner_node)
         if marks is None or not marks.entries or mark in marks.entries:
             continue
         fix = suggestion(mark, marks.entries)

@@ -223,6 +223,8 @@ def _interior(interior: Document) -> str:
             f"; residuals rms {micrometres(interior['rms_um'])} µm, largest {micrometres(interior['largest_um'])} µm, "
             f"at mark {interior['largest_mark']} of photo {interior['largest_photo']}"
         )
+    if interior.get("interpolated"):
+        text += "; interpolated to the points"
     return text
 
 

@@ -8,7 +8,7 @@ show everything that goes wrong here, so the pattern of the marks is looked at f
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +18,7 @@ from photostrip.geometry import plane
 from photostrip.notes import Note
 from photostrip.points import PhotoPoints, frozen
 from photostrip.triangulation.fiducial_marks import QUARTER, Marks, enough, fault, gather, right_pattern
+from photostrip.triangulation.film import Deformation
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -49,9 +50,13 @@ class Settings:
         ``"conformal"`` (two marks or more), ``"affine"`` (three or more), ``"bilinear"`` or ``"projective"``
         (four or more); ``"auto"``: affine from four marks on, so that one redundant mark for each axis is left,
         conformal with two or three.
+    residuals : str
+        ``"interpolate"`` the residuals of the marks to the points, for film that is deformed in other ways than the
+        transformation has, or ``"ignore"`` them.
     """
 
     transform: str = "auto"
+    residuals: str = "ignore"
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +90,8 @@ class InteriorOrientation:
         Photos of cameras without fiducial marks: their coordinates are taken as they are.
     notes : tuple of Note
         What the marks show beside the numbers.
+    film : Deformation or None
+        Deformation beyond the transformations, when it is interpolated.
     """
 
     photo_ids: tuple[str, ...]
@@ -101,6 +108,7 @@ class InteriorOrientation:
     mirrored: Flags
     without_marks: tuple[str, ...] = ()
     notes: tuple[Note, ...] = ()
+    film: Deformation | None = None
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""
@@ -160,7 +168,8 @@ def orient(fiducials: PhotoPoints, cameras: Mapping[str, Camera], settings: Sett
     if faults:
         raise InputError(faults)
     notes += _marks_of_no_strip(fiducials, cameras)
-    return _joined(parts, tuple(cameras), digital, tuple(notes))
+    joined = _joined(parts, tuple(cameras), digital, tuple(notes))
+    return joined if settings.residuals == "ignore" else _with_film(joined, cameras)
 
 
 def transform(observations: PhotoPoints, interior: InteriorOrientation) -> PhotoPoints:
@@ -178,7 +187,7 @@ def transform(observations: PhotoPoints, interior: InteriorOrientation) -> Photo
     PhotoPoints
         The same rows in the system of the fiducial marks, mm. Standard deviations go through the derivatives of the
         transformation; the correlation that a turn by half a quarter gives to x and y is dropped, and so is the
-        uncertainty of the interior orientation, which all points of a photo share.
+        uncertainty of the interior orientation, which all points of a photo share, and that of the interpolation.
 
     Raises
     ------
@@ -197,10 +206,53 @@ def transform(observations: PhotoPoints, interior: InteriorOrientation) -> Photo
     points = observations.xy[film][:, None, :]
     xy, variance = observations.xy.copy(), observations.sigma**2
     xy[film] = photo_from_measured(points)[:, 0]
+    if interior.film is not None:
+        xy[film] = interior.film.corrected(rows[film], xy[film])
     variance[film] = (photo_from_measured.jacobian(points)[:, 0] ** 2 @ variance[film][:, :, None])[:, :, 0]
     return PhotoPoints(
         observations.photo_ids, observations.point_ids, observations.photo, observations.point, xy, np.sqrt(variance)
     )
+
+
+def measured(photo_points: PhotoPoints, interior: InteriorOrientation) -> PhotoPoints:
+    """Give the measured coordinates of photo points; the inverse of :func:`transform`.
+
+    Parameters
+    ----------
+    photo_points : PhotoPoints
+        Points in the system of the fiducial marks, mm.
+    interior : InteriorOrientation
+        Interior orientation of their photos.
+
+    Returns
+    -------
+    PhotoPoints
+        The same rows as they are measured, exact to 1e-9 mm, with the standard deviations of the photo points.
+    """
+    number = {photo: row for row, photo in enumerate(interior.photo_ids)}
+    rows = np.array([number.get(photo, -1) for photo in photo_points.photo_ids], np.intp)[photo_points.photo]
+    on_film = rows >= 0
+    xy = photo_points.xy.copy()
+    if interior.film is not None:
+        xy[on_film] = interior.film.deformed(rows[on_film], xy[on_film])
+    xy[on_film] = interior.photo_from_measured.take(rows[on_film]).inverse(xy[on_film][:, None, :])[:, 0]
+    return replace(photo_points, xy=xy)
+
+
+def _with_film(joined: InteriorOrientation, cameras: Mapping[str, Camera]) -> InteriorOrientation:
+    """Add the deformation that the residuals of the marks show."""
+    marks = [
+        np.array([cameras[photo].fiducials[name] for name in names], float).reshape(-1, 2)
+        for photo, names in zip(joined.photo_ids, joined.marks, strict=True)
+    ]
+    film = Deformation.from_residuals(marks, joined.residuals)
+    unseen = film.unseen()
+    if not len(unseen):
+        return replace(joined, film=film)
+    photos = tuple(joined.photo_ids[row] for row in unseen)
+    message = f"residuals of fiducial marks cannot be interpolated on {_listed(photos)}: fewer than four marks, or all "
+    message += "on one line; film deformation stays in the coordinates"
+    return replace(joined, film=film, notes=(*joined.notes, Note("film-unseen", message, photos=photos)))
 
 
 def _fit(marks: Marks, mirrored: Flags, kind: str) -> tuple[InteriorOrientation, list[Fault]]:

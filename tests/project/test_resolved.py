@@ -77,6 +77,7 @@ processing:
   ground_height: auto
   interior:
     transform: auto
+    residuals: ignore
 tolerances:
   check_rms_xy: 0.4
 """

@@ -106,6 +106,7 @@ def _interior(result: Result) -> Document | None:
         "largest_photo": found.photo_ids[worst] if mark >= 0 else None,
         "largest_mark": found.marks[worst][mark] if mark >= 0 else None,
         "without_marks": list(found.without_marks),
+        "interpolated": found.film is not None,
     }
 
 
