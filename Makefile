@@ -7,7 +7,7 @@ SOURCES := photostrip tests $(wildcard benchmarks)
 DEMO_PROJECTS ?= $(wildcard sample_data/*/project.yaml)
 WORKERS ?= 2
 
-.PHONY: demo test check lint types lowest bench docs golden regress clean
+.PHONY: demo test check lint types lowest bench docs golden regress man clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/photostrip.installed ## run the main job on every sample project and print its accuracy report
@@ -49,6 +49,9 @@ regress: $(VENV)/photostrip.installed ## adjust the sample projects that changed
 
 golden: $(VENV)/dev.installed ## compute the baselines of sample_data, which regress and the tests compare with, anew
 	$(BIN)/python -m tests.renew_golden
+
+man: $(VENV)/photostrip.installed ## write the manual pages into build/man/man1
+	$(BIN)/photostrip man -o build/man/man1
 
 clean: ## remove everything that make has made
 	rm -rf $(VENV) .venv-lowest build dist .hypothesis .mypy_cache .pytest_cache .ruff_cache

@@ -28,7 +28,10 @@ FORMATS = {
         "accuracy report (text, Markdown, JSON, annotations): photostrip run, report",
         "comparison (text, Markdown, JSON, JUnit, annotations), baseline.json: photostrip compare",
         "project with tables and truth.json: photostrip simulate -o",
+        "trace of every iteration (text, Markdown, JSON): photostrip run --trace",
+        "rule for make: photostrip run --depfile",
         "JSON Schema: photostrip schema",
+        "manual pages: photostrip man; completion of shells: photostrip completion",
     ],
 }
 OWN = ("test", "dev")  # extras for those who work on photostrip itself

@@ -84,6 +84,16 @@ COMMANDS = {
         "Print the JSON Schema of the project file, for editors.",
         "photostrip schema -o photostrip.schema.json",
     ),
+    "completion": Entry(
+        "photostrip.cli.completion",
+        "Print the script that makes a shell complete commands.",
+        "photostrip completion bash >> ~/.bashrc",
+    ),
+    "man": Entry(
+        "photostrip.cli.man",
+        "Print a manual page, or write all of them.",
+        "photostrip man -o ~/.local/share/man/man1",
+    ),
     "info": Entry(
         "photostrip.cli.info",
         "Print versions and formats, and how to get what is missing.",
@@ -165,6 +175,9 @@ def _never_fail_on_characters(stream: TextIO) -> None:
 
 def _dispatch(arguments: list[str]) -> int:
     """Answer the options that come before a command, or call the command."""
+    if "_PHOTOSTRIP_COMPLETE" in os.environ:  # the shell asks what can stand at the cursor
+        completion = import_module(COMMANDS["completion"].module)
+        return int(completion.answer(os.environ["_PHOTOSTRIP_COMPLETE"]))
     first, rest = (arguments[0], arguments[1:]) if arguments else ("", [])
     if first == "--version":
         sys.stdout.write(f"photostrip {__version__}\n")

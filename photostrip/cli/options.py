@@ -8,9 +8,22 @@ import typer
 
 from photostrip.cli.showing import Format
 
+
+def _keys(incomplete: str) -> list[str]:
+    """Complete the key of an assignment."""
+    from photostrip.cli.completion import keys
+
+    return keys(incomplete)
+
+
 Assignments = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the project file; may be repeated."),
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Override a key of the project file; may be repeated.",
+        autocompletion=_keys,
+    ),
 ]
 Shape = Annotated[Format, typer.Option("--format", envvar="PHOTOSTRIP_FORMAT", help="How the answer is printed.")]
 Width = Annotated[
