@@ -1,0 +1,241 @@
+"""The strip that a flight is meant to give: level photos at equal distances, pass points where they belong, no errors.
+
+It is simulated and taken through the operations of the strip method, so that what is planned is what will be computed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.camera import Camera
+from photostrip.errors import Fault, InputError
+from photostrip.geometry.similarity import Similarity
+from photostrip.points import PhotoPoints
+from photostrip.simulate import Control, Flight, Ground, Image, Points, Spec, Terrain, simulate
+from photostrip.triangulation import formation, relative
+from photostrip.triangulation.strip_errors import StripErrors, strip_errors
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.simulate import Simulation
+    from photostrip.triangulation.formation import FormedStrip
+    from photostrip.triangulation.relative import Orientation
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+SAME = 1e-6  # of a base: a point this near to the nadir of a photo belongs to its column
+LEAST_PHOTOS = 3
+
+
+@dataclass(frozen=True)
+class StripGeometry:
+    """What is flown and measured.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera; its lens counts as ideal.
+    photos : int
+        Photos of the strip.
+    end_lap_percent : float
+        Overlap.
+    scale : float
+        Denominator of the photo scale.
+    points : Points
+        Pass points: rows of them across the flight at each nadir, and further ones in each model.
+    image_sigma : float
+        Standard deviation of an image coordinate, mm.
+    """
+
+    camera: Camera
+    photos: int
+    end_lap_percent: float = 60.0
+    scale: float = 10_000.0
+    points: Points = Points(rows=3, scatter_percent=0.0, extra_per_model=4)
+    image_sigma: float = 0.005
+
+    @property
+    def base(self) -> float:
+        """Distance of neighbouring perspective centres, metres."""
+        return self._spec.base
+
+    @property
+    def _spec(self) -> Spec:
+        camera = replace(self.camera, principal_point=(0.0, 0.0), distortion=None, fiducials={})
+        flight = Flight(
+            photos=self.photos,
+            end_lap_percent=self.end_lap_percent,
+            scale=self.scale,
+            attitude_sigma_deg=(0.0, 0.0, 0.0),
+            position_sigma=(0.0, 0.0, 0.0),
+        )
+        return Spec(
+            name="plan",
+            camera=camera,
+            ground=Ground(crs="local"),
+            flight=flight,
+            terrain=Terrain(height=0.0, relief=0.0),
+            points=self.points,
+            control=Control(layout="corners", check=0),
+            image=Image(sigma_um=0.0),
+        )
+
+    def simulated(self) -> Simulation:
+        """Simulate it without any errors, flown along X of a local frame."""
+        return simulate(self._spec)
+
+
+@dataclass(frozen=True, eq=False)
+class IdealStrip:
+    """An error-free strip with its derivatives.
+
+    Parameters
+    ----------
+    geometry : StripGeometry
+        What is flown.
+    photos : tuple of str
+        Photos in flight order.
+    observations : PhotoPoints
+        Image coordinates without errors, with their standard deviations.
+    orientation : Orientation
+        Relative orientation of the pairs.
+    formed : FormedStrip
+        The strip in the frame of its first photo.
+    similarity : Similarity
+        From there to the ground: X along the strip, Y to its left, Z up, metres, the middle of the strip at 0.
+    xyz : ndarray, shape (q, 3)
+        Points of ``formed.point`` on the ground.
+    centers, rotations : ndarray, shape (m, 3), (m, 3, 3)
+        Photos on the ground.
+    station, row : ndarray of int, shape (q,)
+        Photo at whose nadir a point lies and its row from left to right; -1 for further points.
+    errors : StripErrors
+        Derivatives of the strip by the image coordinates.
+    """
+
+    geometry: StripGeometry
+    photos: tuple[str, ...]
+    observations: PhotoPoints
+    orientation: Orientation
+    formed: FormedStrip
+    similarity: Similarity
+    xyz: Floats
+    centers: Floats
+    rotations: Floats
+    station: Numbers
+    row: Numbers
+    errors: StripErrors
+
+    @property
+    def candidates(self) -> Numbers:
+        """Points that control can be placed at: those in columns at the nadirs, by station and row."""
+        found = np.flatnonzero(self.station >= 0)
+        return found[np.lexsort((self.row[found], self.station[found]))]
+
+    def at(self, station: int, row: int) -> int:
+        """Give the point of a column.
+
+        Parameters
+        ----------
+        station : int
+            Photo, counted from 0.
+        row : int
+            Row from left to right, counted from 0.
+
+        Returns
+        -------
+        int
+            Its number among the points.
+
+        Raises
+        ------
+        InputError
+            When there is none.
+        """
+        found = np.flatnonzero((self.station == station) & (self.row == row))
+        if not len(found):
+            message = f"photo {station + 1} has no pass point in row {row + 1}"
+            expected = f"photos 1 to {self.geometry.photos}, rows 1 to {self.geometry.points.rows}"
+            raise InputError(Fault(message, "plan-place", key="points", expected=expected))
+        return int(found[0])
+
+
+def ideal_strip(geometry: StripGeometry) -> IdealStrip:
+    """Simulate a strip without errors and form it.
+
+    Parameters
+    ----------
+    geometry : StripGeometry
+        What is flown.
+
+    Returns
+    -------
+    IdealStrip
+        The strip.
+
+    Raises
+    ------
+    InputError
+        When photos do not overlap enough.
+    """
+    if geometry.photos < LEAST_PHOTOS:
+        message = f"{geometry.photos} photos are no strip; a single model is planned by `plan model`"
+        raise InputError(Fault(message, "plan-photos", key="photos", expected=f"{LEAST_PHOTOS} or more"))
+    simulation = geometry.simulated()
+    observed = simulation.observations
+    observations = PhotoPoints(
+        observed.photo_ids,
+        observed.point_ids,
+        observed.photo,
+        observed.point,
+        simulation.truth.image,
+        np.full(observed.sigma.shape, geometry.image_sigma),
+    )
+    photos = simulation.strips[0][1]
+    pairs, point, rows = relative.collect_pairs(observations, photos, geometry.camera.principal_distance)
+    orientation, converged = relative.attempt(pairs, point, rows)
+    relative.require(orientation, converged, photos)
+    formed = formation.form(orientation, formation.Settings(), photos)
+    middle = simulation.truth.centers.mean(axis=0)
+    middle[2] = 0.0
+    truth = simulation.truth.points.xyz - middle
+    return _strip(geometry, simulation, observations, (orientation, formed), truth)
+
+
+def _strip(
+    geometry: StripGeometry,
+    simulation: Simulation,
+    observations: PhotoPoints,
+    found: tuple[Orientation, FormedStrip],
+    truth: Floats,
+) -> IdealStrip:
+    """Carry the formed strip to the ground and find the columns of points."""
+    orientation, formed = found
+    xyz = truth[formed.point]
+    similarity = Similarity.from_points(formed.xyz, xyz)
+    centers = similarity(formed.centers)
+    rotations = similarity.rotation @ formed.rotations
+    station, row = _columns(geometry, centers, xyz)
+    photos = simulation.strips[0][1]
+    position = np.array([photos.index(photo) for photo in observations.photo_ids], np.intp)
+    errors = strip_errors(orientation, formed, similarity, position[observations.photo], observations.sigma)
+    return IdealStrip(
+        geometry, photos, observations, orientation, formed, similarity, xyz, centers, rotations, station, row, errors
+    )
+
+
+def _columns(geometry: StripGeometry, centers: Floats, xyz: Floats) -> tuple[Numbers, Numbers]:
+    """Photo at whose nadir each point lies, and its row from left to right; -1 for others."""
+    near = np.abs(xyz[:, None, 0] - centers[None, :, 0])
+    station = near.argmin(axis=1)
+    station[near.min(axis=1) > SAME * geometry.base] = -1
+    row = np.full(len(xyz), -1)
+    for each in range(len(centers)):
+        here = np.flatnonzero(station == each)
+        row[here[np.argsort(-xyz[here, 1])]] = np.arange(len(here))
+    return station, row

@@ -1,0 +1,261 @@
+"""How precise a planned strip becomes with a layout of control, by each method of adjustment.
+
+The covariances are those that a run reports for a measured strip: nothing is propagated here a second time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import GeometryError
+from photostrip.geodesy.crs import tie_frames
+from photostrip.geodesy.frame_spec import FrameSpec
+from photostrip.geodesy.local_frame import IntermediateFrame
+from photostrip.planning.control_layout import USES, Layout, Spot, numbers_of
+from photostrip.points import ControlPoints
+from photostrip.triangulation import absolute, bundle, control_errors, polynomial, precision
+from photostrip.triangulation.screening import DETECTABLE
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from photostrip.planning.ideal_strip import IdealStrip
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+SIMILARITY, COVARIANCE, BUNDLE = "similarity", "covariance", "bundle"
+DEGREES = {"degree 1": "1", "degree 2": "2", "degree 3": "3"}
+METHODS = (SIMILARITY, *DEGREES, COVARIANCE, BUNDLE)
+TINY = 1e-9  # redundancy number of a control coordinate that nothing checks
+
+
+@dataclass(frozen=True, eq=False)
+class Accuracy:
+    """Expected precision of a strip.
+
+    Parameters
+    ----------
+    method : str
+        One of `METHODS`.
+    used : str
+        What the control carries of it: ``degree 2`` where degree 3 was asked for and three bands are given.
+    covariance : ndarray, shape (q, 3, 3)
+        Of the points of the strip, along, across and up, metres^2.
+    control : ndarray of int, shape (c,)
+        Points that are control.
+    detectable : ndarray, shape (c, 3)
+        Smallest error of each given coordinate that a test at 0.1 % finds in 80 % of cases, metres; infinite where
+        nothing checks it, NaN where it is not given.
+    """
+
+    method: str
+    used: str
+    covariance: Floats
+    control: Numbers
+    detectable: Floats
+
+    @property
+    def sigmas(self) -> Floats:
+        """Standard deviations along, across and up, shape (q, 3)."""
+        return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
+
+    @property
+    def plan_and_height(self) -> Floats:
+        """Standard deviations in plan (both coordinates together) and in height, shape (q, 2)."""
+        variance = np.diagonal(self.covariance, axis1=1, axis2=2)
+        return np.sqrt(np.column_stack([variance[:, 0] + variance[:, 1], variance[:, 2]]))
+
+    @property
+    def new(self) -> Numbers:
+        """Points that are not control."""
+        return np.setdiff1d(np.arange(len(self.covariance)), self.control)
+
+
+def control_of(strip: IdealStrip, spots: tuple[Spot, ...], sigma: tuple[float, float, float]) -> ControlPoints:
+    """Give the control points of a layout.
+
+    Parameters
+    ----------
+    strip : IdealStrip
+        The strip.
+    spots : tuple of Spot
+        Where they are.
+    sigma : tuple of float
+        Standard deviations along, across and in height, metres.
+
+    Returns
+    -------
+    ControlPoints
+        In the order of the spots, along X, Y, Z of the strip.
+    """
+    numbers = numbers_of(strip, spots)
+    ids = tuple(f"{spot.photo}/{spot.row}" for spot in spots)
+    use = np.array([USES[spot.use] for spot in spots], bool).reshape(-1, 3)
+    given = np.broadcast_to(np.array(sigma, float), use.shape)
+    return ControlPoints(ids, np.where(use, strip.xyz[numbers], np.nan), use, np.zeros(len(ids), bool), given)
+
+
+def accuracy(strip: IdealStrip, layout: Layout, spots: tuple[Spot, ...], method: str) -> Accuracy:
+    """Compute the expected precision of a strip with one layout of control, by one method.
+
+    Parameters
+    ----------
+    strip : IdealStrip
+        The strip.
+    layout : Layout
+        Precision of the control and of measured perspective centres, which only the bundle uses.
+    spots : tuple of Spot
+        The control points.
+    method : str
+        One of `METHODS`.
+
+    Returns
+    -------
+    Accuracy
+        Covariances and detectable errors of the control.
+
+    Raises
+    ------
+    GeometryError
+        When the control does not determine the strip.
+    """
+    control = control_of(strip, spots, layout.sigma)
+    if method == BUNDLE:
+        return _bundle(strip, layout, spots, control)
+    _require_control(control)
+    if method == COVARIANCE:
+        return _covariance(strip, spots, control)
+    return _fitted(strip, spots, control, method)
+
+
+def _require_control(control: ControlPoints) -> None:
+    plan, height = int(control.use[:, 0].sum()), int(control.use[:, 2].sum())
+    if plan < 2 or height < 3:
+        message = f"{plan} control points in plan and {height} in height do not orient a strip"
+        raise GeometryError(message, code="plan-control")
+
+
+# --------------------------------------------------------------------------------------- similarity, polynomials
+
+
+def _fitted(strip: IdealStrip, spots: tuple[Spot, ...], control: ControlPoints, method: str) -> Accuracy:
+    """Similarity, and polynomials of a fixed degree as far as the control carries them."""
+    numbers = np.array(numbers_of(strip, spots), np.intp)
+    frames, _ = tie_frames([FrameSpec("local", ("east", "north", "up"))])
+    plan = control.use[:, 0]
+    intermediate = IntermediateFrame.at_local_centre(strip.xyz[numbers[plan]], np.pi / 2)
+    xyz = intermediate.intermediate_from_cartesian(strip.xyz)
+    targets = absolute.Targets(control, frames, intermediate)
+    weight = absolute.weights(control, _precision(strip))
+    terms: list[tuple[str, ...]] = [(), (), ()]
+    if method in DEGREES:
+        problem = polynomial.Problem(xyz[numbers], targets, weight, strip.geometry.base, _breadth(xyz))
+        terms = [axis.terms for axis in polynomial.fit(problem, polynomial.Settings(DEGREES[method])).axes]
+    axes = targets.axes(xyz[numbers])
+    found = control_errors.misclosures(strip.errors.points, control, numbers, axes)
+    shift = intermediate.intermediate_from_cartesian(strip.errors.origin[None])[0]
+    fit = control_errors.correction(found, weight, xyz[numbers], terms, shift)
+    parameters = precision.fitted(strip.errors, found, fit.operator)
+    influence = fit.influence(xyz)
+    covariance = precision.covariances(strip.errors, strip.errors.points, parameters, influence)
+    share = np.einsum("wi,wit,tw->w", found.direction, influence[numbers[found.point]], fit.operator)
+    variance = np.diagonal(covariance, axis1=1, axis2=2)[numbers[found.point], found.axis]
+    residual = variance + found.variance * (1 - 2 * share)
+    detectable = np.full((len(numbers), 3), np.nan)
+    free = 1 - share
+    with np.errstate(divide="ignore", invalid="ignore"):
+        size = np.where(free > TINY, DETECTABLE * np.sqrt(np.maximum(residual, 0.0)) / free, np.inf)
+    detectable[found.point, found.axis] = size
+    return Accuracy(method, _used(terms) if method in DEGREES else method, covariance, numbers, detectable)
+
+
+def _used(terms: list[tuple[str, ...]]) -> str:
+    """Say which degree the control carries; plan and height apart where they differ."""
+    powers = [max((polynomial.POWERS[term][0] for term in each), default=0) for each in (terms[0], terms[2])]
+    names = ["similarity" if power == 0 else f"degree {power}" for power in powers]
+    return names[0] if names[0] == names[1] else f"{names[0]} in plan, {names[1]} in height"
+
+
+def _breadth(xyz: Floats) -> float:
+    return max(float(np.quantile(np.abs(xyz[:, 1]), 0.95)), 1e-6)
+
+
+def _precision(strip: IdealStrip) -> tuple[float, float]:
+    """A-priori standard deviation of a point of one model in plan and height, metres, as a run takes it."""
+    geometry = strip.geometry
+    plan = geometry.image_sigma * geometry.scale / 1000.0
+    depth = float(strip.centers[:, 2].mean())
+    return plan, plan * float(np.sqrt(2.0)) * depth / geometry.base
+
+
+# -------------------------------------------------------------------------------------------------------- bundle
+
+
+def _bundle(strip: IdealStrip, layout: Layout, spots: tuple[Spot, ...], control: ControlPoints) -> Accuracy:
+    """All rays with control and perspective centres in one solution."""
+    numbers = np.array(numbers_of(strip, spots), np.intp)
+    problem = bundle_problem(strip, layout, numbers, control)
+    found = bundle.precision(bundle.solve(problem))
+    given = np.where(control.use, control.sigma, np.nan)
+    redundant = np.diagonal(found.control_residuals, axis1=1, axis2=2) / given**2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        detectable = np.where(redundant > TINY, DETECTABLE * given / np.sqrt(redundant), np.inf)
+    return Accuracy(BUNDLE, BUNDLE, found.points, numbers, np.where(control.use, detectable, np.nan))
+
+
+def bundle_problem(strip: IdealStrip, layout: Layout, numbers: Numbers, control: ControlPoints) -> bundle.Problem:
+    """Give the strip and its control to the bundle adjustment.
+
+    Parameters
+    ----------
+    strip : IdealStrip
+        The strip.
+    layout : Layout
+        Precision of measured perspective centres.
+    numbers : ndarray of int, shape (c,)
+        Points that are control.
+    control : ControlPoints
+        Their coordinates.
+
+    Returns
+    -------
+    bundle.Problem
+        Its points are those of the strip, in their order; it starts at the truth.
+    """
+    observed = strip.observations
+    point = np.full(len(observed.point_ids), -1)
+    point[strip.formed.point] = np.arange(len(strip.formed.point))
+    seen = np.flatnonzero(point[observed.point] >= 0)
+    place = {name: number for number, name in enumerate(strip.photos)}
+    photo = np.array([place[name] for name in observed.photo_ids], np.intp)[observed.photo[seen]]
+    axes = np.broadcast_to(np.eye(3), (len(numbers), 3, 3))
+    count = len(strip.centers)
+    return bundle.Problem(
+        bundle.Images(photo, point[observed.point[seen]], observed.xy[seen], observed.sigma[seen]),
+        bundle.Cameras(np.zeros(count, np.intp), np.array([strip.geometry.camera.principal_distance])),
+        bundle.Start(strip.centers, strip.rotations, strip.xyz),
+        bundle.Control(numbers, strip.xyz[numbers], axes, np.where(control.use, control.sigma, np.inf)),
+        bundle.Positions() if layout.gnss is None else _positions(strip, layout.gnss, offset=layout.gnss_offset),
+    )
+
+
+def _positions(strip: IdealStrip, sigma: tuple[float, float, float], *, offset: bool) -> bundle.Positions:
+    """Give all perspective centres, with a constant offset that is free or absent."""
+    count = len(strip.centers)
+    return bundle.Positions(
+        np.arange(count),
+        strip.centers,
+        np.broadcast_to(np.eye(3), (count, 3, 3)),
+        np.broadcast_to(np.array(sigma, float), (count, 3)),
+        np.zeros((count, 3)),
+        np.zeros(count, np.intp),
+        np.linspace(-1.0, 1.0, count),
+        np.array([np.inf if offset else 0.0]),
+        np.zeros(1),
+    )
