@@ -1,8 +1,8 @@
 """How well plans agree with simulated measurements: one geometry, thousands of measurements of it, whole runs.
 
-For each layout of control and each method the standard deviations that `photostrip plan strip` predicts stand beside the
-scatter of adjusted points over all repetitions. The part on one model does the same for `photostrip plan model`, with
-the exact relative orientation, intersection and absolute orientation of every repetition.
+For each layout of control and each method the standard deviations that `photostrip plan strip` predicts stand beside
+the scatter of adjusted points over all repetitions. The part on one model does the same for `photostrip plan model`,
+with the exact relative orientation, intersection and absolute orientation of every repetition.
 
 Usage: python benchmarks/planning.py [--repeat N] [--photos N] [--layouts NAME ...] [--methods NAME ...] [--workers N]
 """
@@ -28,7 +28,7 @@ from photostrip.geodesy.frame_spec import FrameSpec  # noqa: E402
 from photostrip.pipeline import Inputs, Settings, Strip, triangulate  # noqa: E402
 from photostrip.planning.control_layout import Layout, Spot, numbers_of, spots_of  # noqa: E402
 from photostrip.planning.ideal_strip import StripGeometry, ideal_strip  # noqa: E402
-from photostrip.planning.strip_methods import BUNDLE, DEGREES, METHODS, accuracy, control_of  # noqa: E402
+from photostrip.planning.strip_methods import DEGREES, METHODS, accuracy, control_of  # noqa: E402
 from photostrip.points import ControlPoints  # noqa: E402
 from photostrip.simulate.spec import FILM  # noqa: E402
 from photostrip.triangulation import polynomial, relative  # noqa: E402
@@ -159,8 +159,8 @@ def main() -> None:
     geometry = StripGeometry(replace(FILM, principal_distance=153.0, fiducials={}), options.photos)
     print(f"{options.photos} photos, 60 % overlap, 1:10000, 5 um; {options.repeat} repetitions of one geometry; metres")
     print("rms over all new points; single: range of predicted over actual of single coordinates\n")
-    head = f"{'control':<16} {'method':<11} {'plan':>8} {'actual':>8} {'ratio':>7} {'height':>8} {'actual':>8} {'ratio':>7}"
-    print(f"{head}   single")
+    columns = " ".join(f"{name:>8} {'actual':>8} {'ratio':>7}" for name in ("plan", "height"))
+    print(f"{'control':<16} {'method':<11} {columns}   single")
     for name in options.layouts:
         compare(geometry, LAYOUTS[name], options.methods, options)
 

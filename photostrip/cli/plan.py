@@ -115,6 +115,65 @@ def model(  # noqa: PLR0913, PLR0917 (an argument for each option)
         deliver(document, form, output, fine, quiet=quiet)
 
 
+@_command("strip", "--models 15 --control bands=3 --control every=5", "strip.yaml -o strip.svg")
+def strip(  # noqa: PLR0913, PLR0917 (an argument for each option)
+    file: PlanFile = None,
+    camera: Preset = None,
+    principal_distance: Distance = None,
+    photo_format: PhotoFormat = None,
+    models: Annotated[str | None, typer.Option("--models", metavar="N", help="Models, one less than photos.")] = None,
+    overlap: Overlap = None,
+    scale: Scale = None,
+    flying_height: Height = None,
+    sigma_um: SigmaUm = None,
+    control: Annotated[
+        list[str] | None,
+        typer.Option("--control", metavar="LAYOUT", help="corners, corners+centre, bands=N, every=N; may be repeated."),
+    ] = None,
+    control_sigma: ControlSigma = None,
+    methods: Annotated[
+        str | None, typer.Option("--methods", metavar="A,B", help="Methods of adjustment; default: all.")
+    ] = None,
+    required: Annotated[
+        str | None,
+        typer.Option("--required", metavar="PLAN,HEIGHT", help="Accuracy needed everywhere, metres: how many bands?"),
+    ] = None,
+    place: Annotated[
+        str | None, typer.Option("--place", metavar="N", help="Find the best places for N further control points.")
+    ] = None,
+    into: Annotated[
+        str | None, typer.Option("--into", metavar="LAYOUT", help="With --place: layout they are added to.")
+    ] = None,
+    assignments: Assignments = None,
+    form: Shape = "text",
+    output: Output = None,
+    quiet: Silent = False,
+) -> None:
+    """Compute the expected accuracy along a strip, for layouts of control and methods of adjustment."""
+    with told(form):
+        from photostrip.formats.plan_strip import strip_document
+        from photostrip.planning.strip_design import plan_strip
+        from photostrip.project.plan_strip_file import layout_assignment, load_strip_plan
+
+        options = {
+            "camera.preset": camera, "camera.principal_distance": principal_distance,
+            "camera.format": listed(photo_format), "models": models, "end_lap_percent": overlap, "scale": scale,
+            "flying_height": flying_height, "image_sigma_um": sigma_um, "control_sigma": listed(control_sigma),
+            "methods": listed(methods), "place.points": place, "place.into": into, **_required(required),
+        }  # fmt: skip
+        _is_picture(output)  # refused before anything is computed
+        layouts = [layout_assignment(word) for word in control or []]
+        given = load_strip_plan(file, [*layouts, *as_assignments(options, assignments)])
+        document = strip_document(given.name, plan_strip(given.design))
+        deliver(document, form, output, document, quiet=quiet)
+
+
+def _required(text: str | None) -> dict[str, str | None]:
+    """Split ``PLAN,HEIGHT``; either may be empty."""
+    in_plan, _, in_height = (text or "").partition(",")
+    return {"required.plan": in_plan.strip() or None, "required.height": in_height.strip() or None}
+
+
 @_command("camera", "cameras.yaml", "--source-table")
 def camera(
     file: PlanFile = None,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.formats.plan_strip import along_rows
 from photostrip.formats.result.numbers import GROUND, Document, micrometres, rms, rounded, significant
 from photostrip.planning.camera_efficiency import PRINTED_TABLE, by_efficiency, compare, source_cameras
 from photostrip.planning.model_plan import simple_accuracy
@@ -228,7 +229,8 @@ def plan_csv(document: Document) -> str:
     str
         Header and rows; the columns are the keys of the document's rows.
     """
-    rows = document[TABLES[document["kind"]]]
+    kind = document["kind"]
+    rows = along_rows(document) if kind == "strip" else document[TABLES[kind]]
     stream = StringIO()
     writer = csv.DictWriter(stream, fieldnames=list(rows[0]), lineterminator="\n")
     writer.writeheader()

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.camera import Camera
 from photostrip.errors import Fault, InputError
 from photostrip.geometry.similarity import Similarity
 from photostrip.points import PhotoPoints
@@ -21,6 +20,7 @@ from photostrip.triangulation.strip_errors import StripErrors, strip_errors
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from photostrip.camera import Camera
     from photostrip.simulate import Simulation
     from photostrip.triangulation.formation import FormedStrip
     from photostrip.triangulation.relative import Orientation
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 SAME = 1e-6  # of a base: a point this near to the nadir of a photo belongs to its column
 LEAST_PHOTOS = 3
+USUAL_POINTS = Points(rows=5, scatter_percent=0.0, extra_per_model=0)
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ class StripGeometry:
     photos: int
     end_lap_percent: float = 60.0
     scale: float = 10_000.0
-    points: Points = Points(rows=3, scatter_percent=0.0, extra_per_model=4)
+    points: Points = USUAL_POINTS
     image_sigma: float = 0.005
 
     @property

@@ -16,12 +16,13 @@ from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.local_frame import IntermediateFrame
 from photostrip.planning.control_layout import USES, Layout, Spot, numbers_of
 from photostrip.points import ControlPoints
-from photostrip.triangulation import absolute, bundle, control_errors, polynomial, precision
+from photostrip.triangulation import absolute, control_errors, polynomial, precision
+from photostrip.triangulation.bundle import problem as bundle
+from photostrip.triangulation.bundle.precision import precision as bundle_precision
+from photostrip.triangulation.bundle.solve import solve
 from photostrip.triangulation.screening import DETECTABLE
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import NDArray
 
     from photostrip.planning.ideal_strip import IdealStrip
@@ -29,9 +30,9 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
 
-SIMILARITY, COVARIANCE, BUNDLE = "similarity", "covariance", "bundle"
+SIMILARITY, BUNDLE = "similarity", "bundle"
 DEGREES = {"degree 1": "1", "degree 2": "2", "degree 3": "3"}
-METHODS = (SIMILARITY, *DEGREES, COVARIANCE, BUNDLE)
+METHODS = (SIMILARITY, *DEGREES, BUNDLE)
 TINY = 1e-9  # redundancy number of a control coordinate that nothing checks
 
 
@@ -129,8 +130,6 @@ def accuracy(strip: IdealStrip, layout: Layout, spots: tuple[Spot, ...], method:
     if method == BUNDLE:
         return _bundle(strip, layout, spots, control)
     _require_control(control)
-    if method == COVARIANCE:
-        return _covariance(strip, spots, control)
     return _fitted(strip, spots, control, method)
 
 
@@ -201,7 +200,7 @@ def _bundle(strip: IdealStrip, layout: Layout, spots: tuple[Spot, ...], control:
     """All rays with control and perspective centres in one solution."""
     numbers = np.array(numbers_of(strip, spots), np.intp)
     problem = bundle_problem(strip, layout, numbers, control)
-    found = bundle.precision(bundle.solve(problem))
+    found = bundle_precision(solve(problem))
     given = np.where(control.use, control.sigma, np.nan)
     redundant = np.diagonal(found.control_residuals, axis1=1, axis2=2) / given**2
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from photostrip.report.figures import counted, fixed, metres, micrometres, short
 from photostrip.report.parts import Column, Facts, Part, Section, Table, Words
+from photostrip.report.plan_strip import strip_sections
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -249,6 +250,7 @@ def _misprints(document: Document) -> tuple[Part, ...]:
 
 BUILDERS = {
     "model": ("Expected errors over one model", _model),
+    "strip": ("Expected accuracy of a strip", strip_sections),
     "cameras": ("Efficiency of cameras", _cameras),
     "source-table": ("Efficiency of cameras: the table of the source", _source_table),
 }

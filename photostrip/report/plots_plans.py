@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photostrip.errors import Fault, InputError
+from photostrip.report.plots_plan_strip import strip_figure
 from photostrip.report.plots_terrestrial import INSTALL, styled
 
 if TYPE_CHECKING:
@@ -148,4 +149,13 @@ def _cameras(document: Document) -> Figure:
     return figure
 
 
-DRAWINGS: dict[str, Callable[[Document], Figure]] = {"model": _model, "cameras": _cameras, "source-table": _cameras}
+def _strip(document: Document) -> Figure:
+    return strip_figure(_figure(11, 7), document)
+
+
+DRAWINGS: dict[str, Callable[[Document], Figure]] = {
+    "model": _model,
+    "strip": _strip,
+    "cameras": _cameras,
+    "source-table": _cameras,
+}

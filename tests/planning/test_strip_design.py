@@ -1,0 +1,298 @@
+"""Planned strips: their geometry, expected precision against simulation, reliability, bands needed, best places."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from benchmarks.planning import Task, repetitions
+from photostrip.errors import GeometryError, InputError
+from photostrip.planning.control_layout import Layout, Spot, across, spots_of
+from photostrip.planning.ideal_strip import StripGeometry, ideal_strip
+from photostrip.planning.placement import Placement, Required, best_places, equal_ways, worst
+from photostrip.planning.strip_design import Design, along_the_strip, bands_needed, outcome, plan_strip
+from photostrip.planning.strip_methods import BUNDLE, METHODS, SIMILARITY, accuracy
+from photostrip.simulate import FILM, Points
+from photostrip.triangulation.screening import DETECTABLE
+
+if TYPE_CHECKING:
+    from photostrip.planning.ideal_strip import IdealStrip
+
+SIMPLE = Points(rows=3, scatter_percent=0.0, extra_per_model=0)
+
+
+def strip_of(photos: int = 8, points: Points = SIMPLE, sigma: float = 0.005) -> IdealStrip:
+    return ideal_strip(StripGeometry(FILM, photos, points=points, image_sigma=sigma))
+
+
+# ------------------------------------------------------------------------------------------------- the geometry
+
+
+def test_the_ideal_strip_is_what_was_asked_for() -> None:
+    strip = ideal_strip(StripGeometry(FILM, 6, end_lap_percent=65.0, scale=8000.0))
+    base = 230.0 * 0.35 * 8.0
+    assert np.diff(strip.centers[:, 0]) == pytest.approx(np.full(5, base))
+    assert strip.centers[:, 2] == pytest.approx(np.full(6, 153.0 * 8.0))
+    assert strip.centers.mean(axis=0)[:2] == pytest.approx([0, 0], abs=1e-6)
+    assert np.abs(strip.rotations - np.eye(3)).max() < 1e-9
+    assert np.abs(strip.xyz[:, 2]).max() < 1e-9
+    assert strip.xyz[:, 1].max() == pytest.approx(115.0 * 0.8 * 8.0)
+    assert strip.similarity(strip.formed.xyz) == pytest.approx(strip.xyz, abs=1e-8)
+    first = strip.at(0, 0)
+    assert strip.xyz[first, :2] == pytest.approx([strip.centers[0, 0], 115.0 * 0.8 * 8.0])
+    assert len(strip.candidates) == 6 * 5
+    with pytest.raises(InputError, match="has no pass point in row 9"):
+        strip.at(0, 8)
+    with pytest.raises(InputError, match="no strip"):
+        ideal_strip(StripGeometry(FILM, 2))
+
+
+def test_lens_and_principal_point_of_the_camera_do_not_matter() -> None:
+    moved = replace(FILM, principal_point=(0.5, -0.3))
+    assert ideal_strip(StripGeometry(moved, 4)).observations.xy == pytest.approx(strip_of(4, USUAL).observations.xy)
+
+
+USUAL = StripGeometry.points
+
+
+@pytest.mark.parametrize(
+    ("layout", "places"),
+    [
+        (Layout("", bands=2), [(1, 1), (1, 3), (1, 5), (9, 1), (9, 3), (9, 5)]),
+        (Layout("", every=5, per_band=1), [(1, 3), (6, 3), (9, 3)]),
+        (Layout("", every=4, per_band=2), [(1, 1), (1, 5), (5, 1), (5, 5), (9, 1), (9, 5)]),
+        (Layout("", bands=1, per_band=1), [(5, 3)]),
+        (Layout("", kind="corners"), [(1, 1), (1, 5), (9, 1), (9, 5)]),
+        (Layout("", kind="corners+centre"), [(1, 1), (1, 5), (5, 3), (9, 1), (9, 5)]),
+        (Layout("", kind="points", spots=(Spot(3, 2), Spot(2, 2))), [(2, 2), (3, 2)]),
+    ],
+)
+def test_layouts(layout: Layout, places: list[tuple[int, int]]) -> None:
+    assert [(spot.photo, spot.row) for spot in spots_of(layout, 9, 5)] == places
+
+
+def test_a_single_point_wins_over_that_of_a_band() -> None:
+    spots = spots_of(Layout("", bands=2, per_band=1, spots=(Spot(1, 2, "z"),)), 5, 3)
+    assert spots == (Spot(1, 2, "z"), Spot(5, 2))
+
+
+@pytest.mark.parametrize(
+    "layout",
+    [
+        Layout("a", bands=12),
+        Layout("a", per_band=4),
+        Layout("a", spots=(Spot(6, 1),)),
+        Layout("a", spots=(Spot(1, 4),)),
+    ],
+)
+def test_layouts_that_do_not_fit_are_refused(layout: Layout) -> None:
+    with pytest.raises(InputError) as caught:
+        spots_of(layout, 5, 3)
+    assert caught.value.faults[0].code == "plan-place"
+
+
+def test_points_of_a_band_stand_evenly() -> None:
+    assert [across(count, 5) for count in (1, 2, 3, 5)] == [[2], [0, 4], [0, 2, 4], [0, 1, 2, 3, 4]]
+
+
+# -------------------------------------------------------------------------------------------- expected precision
+
+
+@pytest.mark.slow
+def test_expected_precision_is_the_scatter_of_whole_runs() -> None:
+    single = (Spot(3, 2, "z"), Spot(5, 1, "xy"), Spot(6, 3))
+    layout = Layout("mixed", kind="corners", spots=single, sigma=(0.03, 0.03, 0.05))
+    geometry = StripGeometry(FILM, 8)
+    strip = ideal_strip(geometry)
+    methods = (SIMILARITY, "degree 2")
+    count = 250
+    found = repetitions(Task(geometry, layout, methods, 0, count))
+    for method in methods:
+        expected = accuracy(strip, layout, spots_of(layout, 8, 5), method)
+        total, squares = found[method]
+        scatter = np.sqrt(squares / count - (total / count) ** 2)[expected.new]
+        ratio = expected.sigmas[expected.new] / scatter
+        # 250 repetitions know the rms over all points to about 4 %, single coordinates to 5 %
+        assert np.sqrt((ratio**2).mean()) == pytest.approx(1.0, abs=0.08)
+        assert ratio.min() > 0.8
+        assert ratio.max() < 1.25
+
+
+def test_better_methods_are_better_and_symmetric() -> None:
+    strip = strip_of(9, USUAL)
+    layout = Layout("4 bands", bands=4)
+    spots = spots_of(layout, 9, 5)
+    rms = {}
+    for method in METHODS:
+        found = accuracy(strip, layout, spots, method)
+        rms[method] = np.sqrt((found.plan_and_height[found.new] ** 2).mean(axis=0))
+        ends = along_the_strip(strip, found)
+        assert len(ends) == 9
+        # the formed strip begins at one end, but what it knows hardly depends on which
+        assert ends == pytest.approx(ends[::-1], rel=0.25)
+    assert np.all(rms[BUNDLE] < rms["degree 2"])
+    assert np.all(rms["degree 2"] < rms[SIMILARITY])
+
+
+def test_what_the_control_carries_is_said() -> None:
+    strip = strip_of(9)
+    for layout, method, used in (
+        (Layout("", bands=3), "degree 3", "degree 2"),
+        (Layout("", bands=4), "degree 3", "degree 3"),
+        (Layout("", kind="corners"), "degree 2", "degree 1"),
+        (
+            Layout("", kind="corners", spots=(Spot(5, 1, "z"), Spot(5, 3, "z"))),
+            "degree 2",
+            "degree 1 in plan, degree 2 in height",
+        ),
+    ):
+        assert accuracy(strip, layout, spots_of(layout, 9, 3), method).used == used
+
+
+def test_measured_perspective_centres_help_the_bundle_only() -> None:
+    strip = strip_of(12)
+    plain, with_gnss = Layout("", kind="corners"), Layout("", kind="corners", gnss=(0.05, 0.05, 0.08))
+    spots = spots_of(plain, 12, 3)
+    without, offset, absolute = (
+        worst(accuracy(strip, layout, spots, BUNDLE))
+        for layout in (plain, with_gnss, replace(with_gnss, gnss_offset=False))
+    )
+    assert absolute[1] <= offset[1] < 0.5 * without[1]
+    for method in (SIMILARITY, "degree 1"):
+        assert worst(accuracy(strip, plain, spots, method)) == worst(accuracy(strip, with_gnss, spots, method))
+    # without any offset the centres alone are control enough, with one they are too, but not in the plan's place
+    none = Layout("", kind="points", gnss=(0.05, 0.05, 0.08), gnss_offset=False)
+    assert outcome(strip, none, SIMILARITY).accuracy is None
+
+
+def test_too_little_control_is_told_and_not_raised() -> None:
+    found = outcome(strip_of(5), Layout("", kind="points", spots=(Spot(1, 1), Spot(5, 1))), SIMILARITY)
+    assert found.accuracy is None
+    assert "2 in height" in found.reason
+    with pytest.raises(GeometryError):
+        accuracy(strip_of(5), Layout(""), (Spot(1, 1),), SIMILARITY)
+
+
+def test_errors_go_with_the_image_coordinates_when_control_is_good() -> None:
+    layout = Layout("", bands=3, sigma=(1e-4, 1e-4, 1e-4))
+    one, two = (
+        worst(accuracy(strip_of(8, sigma=s), layout, spots_of(layout, 8, 3), "degree 2")) for s in (0.004, 0.008)
+    )
+    assert np.array(two) / one == pytest.approx([2, 2], rel=1e-3)
+
+
+# --------------------------------------------------------------------------------------------------- reliability
+
+
+def test_detectable_errors_of_the_bundle_follow_from_its_sigmas() -> None:
+    strip = strip_of(9)
+    layout = Layout("", bands=3, sigma=(0.2, 0.2, 0.3))
+    found = accuracy(strip, layout, spots_of(layout, 9, 3), BUNDLE)
+    adjusted = np.diagonal(found.covariance[found.control], axis1=1, axis2=2)
+    given = np.array(layout.sigma) ** 2
+    # a coordinate predicted by all others: variance given^2 / (given - adjusted)
+    assert found.detectable == pytest.approx(DETECTABLE * given / np.sqrt(given - adjusted), rel=1e-6)
+
+
+@pytest.mark.parametrize("method", [SIMILARITY, "degree 2"])
+def test_detectable_errors_of_a_fit_are_those_of_prediction_without_the_point(method: str) -> None:
+    strip = strip_of(9, USUAL)
+    layout = Layout("", bands=4)
+    spots = spots_of(layout, 9, 5)
+    whole = accuracy(strip, layout, spots, method)
+    for number in (0, 4):
+        without = tuple(replace(spot, use="xy") if k == number else spot for k, spot in enumerate(spots))
+        left = accuracy(strip, layout, without, method)
+        assert left.used == whole.used
+        predicted = left.covariance[whole.control[number], 2, 2] + layout.sigma[2] ** 2
+        assert whole.detectable[number, 2] == pytest.approx(DETECTABLE * np.sqrt(predicted), rel=1e-6)
+        assert np.isnan(left.detectable[number, 2])
+
+
+def test_what_nothing_checks_is_never_found() -> None:
+    layout = Layout("", kind="points", spots=(Spot(1, 1), Spot(8, 2), Spot(4, 3, "z")))
+    found = accuracy(strip_of(8), layout, layout.spots, SIMILARITY)
+    assert np.isinf(found.detectable[:, 2]).all()  # three heights for three parameters
+    assert np.isnan(found.detectable[2, :2]).all()
+
+
+# ----------------------------------------------------------------------------------- bands needed, best places
+
+
+@pytest.mark.parametrize("method", [SIMILARITY, "degree 2", BUNDLE])
+def test_the_number_of_bands_is_the_least(method: str) -> None:
+    strip = strip_of(12)
+    required = Required(0.3, 0.4)
+    needed = bands_needed(strip, Layout("", per_band=2), method, required)
+    if needed.bands is None:
+        assert not required.met(needed.worst)
+        return
+    assert required.met(needed.worst)
+    assert needed.points == 2 * needed.bands
+    for bands in range(2, needed.bands):
+        found = outcome(strip, Layout("", bands=bands, per_band=2), method).accuracy
+        assert found is None or not required.met(worst(found))
+
+
+def test_an_accuracy_that_no_control_gives() -> None:
+    needed = bands_needed(strip_of(6), Layout(""), BUNDLE, Required(height=0.001))
+    assert needed.bands is None
+    assert needed.worst[1] > 0.001
+    assert Required().met((1e9, 1e9))
+
+
+@pytest.mark.parametrize(("method", "count"), [(SIMILARITY, 2), ("degree 2", 2), (BUNDLE, 1)])
+def test_the_search_finds_the_very_best_places_of_a_small_strip(method: str, count: int) -> None:
+    strip = strip_of(7)
+    base = Layout("corners", kind="corners")
+    placed = best_places(strip, base, Placement(count, "corners", method), Required(1.0, 1.0))
+    fixed = spots_of(base, 7, 3)
+    free = [Spot(p, r) for p in range(1, 8) for r in range(1, 4) if Spot(p, r) not in fixed]
+    every = []
+    for more in combinations(free, count):
+        spots = tuple(sorted((*fixed, *more), key=lambda s: (s.photo, s.row)))
+        every.append(max(worst(accuracy(strip, base, spots, method))))
+    assert max(placed.found) <= max(placed.equal) + 1e-12
+    # better places by less than 1 % are not told
+    assert max(placed.found) <= min(every) / (1 - 0.0101)
+    assert max(placed.found) >= min(every) - 1e-12
+
+
+def test_the_search_beats_equal_spacing_or_says_that_it_cannot() -> None:
+    strip = strip_of(9)
+    gains = []
+    for count, method in ((1, "degree 2"), (3, "degree 2"), (4, SIMILARITY)):
+        placed = best_places(strip, Layout("c", kind="corners"), Placement(count, "c", method), Required())
+        assert len(placed.spots) == len(placed.equal_spots) == count
+        assert not set(placed.spots) & set(spots_of(Layout("c", kind="corners"), 9, 3))
+        assert (placed.gain > 0) == (placed.spots != placed.equal_spots)
+        gains.append(placed.gain)
+    assert max(gains) > 0.03
+    assert min(gains) >= 0
+
+
+def test_ways_of_equal_spacing() -> None:
+    ways = list(equal_ways(Placement(2, ""), 9, 3))
+    assert frozenset({Spot(4, 1), Spot(6, 3)}) in ways
+    assert frozenset({Spot(4, 2), Spot(6, 2)}) in ways
+    assert frozenset({Spot(5, 1), Spot(5, 3)}) in ways
+    assert all(len(way) == 2 for way in ways)
+    assert list(equal_ways(Placement(30, ""), 5, 3)) == []
+
+
+def test_a_whole_design() -> None:
+    layouts = (Layout("corners", kind="corners"), Layout("bands", bands=3))
+    design = Design(
+        StripGeometry(FILM, 7, points=SIMPLE), layouts, (SIMILARITY, BUNDLE), Required(0.2), Placement(1, "corners")
+    )
+    report = plan_strip(design)
+    assert [(each.layout.name, each.method) for each in report.outcomes] == [
+        (layout, method) for layout in ("corners", "bands") for method in (SIMILARITY, BUNDLE)
+    ]
+    assert [each.method for each in report.needed] == [SIMILARITY, BUNDLE]
+    assert report.placed is not None
+    assert len(report.placed.spots) == 1
