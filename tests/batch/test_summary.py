@@ -1,0 +1,165 @@
+"""The summary on paper, and what a person at a terminal sees meanwhile."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import pty
+import re
+import subprocess
+import xml.etree.ElementTree as ET
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from photostrip.batch.run import named
+from photostrip.batch.selection import Chosen
+from photostrip.batch.tasks import EXIT_CODES, failure, not_run
+from photostrip.errors import Fault, InputError
+from photostrip.formats.batch import parsed_record, record_text, summary_csv, summary_json
+from photostrip.report.batch import ORDER, ROWS, batch_junit, batch_sections, counts, outcome_line
+from photostrip.report.progress import BatchTable, batch_table, clock
+from photostrip.report.text import to_text
+from tests.batch.projects import command, environment, write_projects
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def good(**changes: Any) -> dict[str, Any]:  # noqa: ANN401 (any value of a line)
+    numbers = {
+        "strips": 1, "photos": 20, "points": 174, "rejected": 2, "sigma0_um": 4.8, "rms_at": "check",
+        "rms_plan_m": 0.163, "rms_height_m": None,
+    }  # fmt: skip
+    return {
+        "status": "good",
+        "exit_code": 0,
+        "adjustment": "polynomial",
+        **numbers,
+        "messages": [],
+        "findings": [],
+    } | changes
+
+
+def lines(*outcomes: dict[str, Any]) -> list[dict[str, Any]]:
+    return [named(each, Chosen(n, f"strip {n}.yaml", f"strip {n}"), written=True) for n, each in enumerate(outcomes)]
+
+
+FAULTY = failure("faulty", InputError([Fault("no <such> photo & \x01", "photo", "a.csv", 3), Fault("empty", "key")]))
+
+
+def test_every_status_has_an_exit_code_and_a_place_in_the_order() -> None:
+    assert set(ORDER) == set(EXIT_CODES)
+    assert [EXIT_CODES[status] for status in ORDER] == [70, 70, 70, 3, 2, 2, 1, 0, 0, 0]
+
+
+def test_counts_in_words() -> None:
+    assert counts(lines(good(), FAULTY, not_run(), good())) == "4 projects: 1 faulty, 1 not run, 2 good"
+    assert counts(lines(good())) == "1 project: 1 good"
+
+
+def test_of_too_many_projects_the_worst_are_shown() -> None:
+    many = lines(*[good() for _ in range(ROWS + 20)], *[FAULTY] * 3)
+    text = to_text("", batch_sections(many))
+    assert text.count(".yaml  good") + text.count(".yaml   good") == ROWS - 3
+    assert "23 more projects not shown, none worse" in text
+    assert len(to_text("", batch_sections(many, everything=True)).splitlines()) > ROWS + 23
+    assert "strip 0.yaml" not in to_text("", batch_sections(many, quiet=True))
+
+
+def test_a_line_of_the_log() -> None:
+    first, second, third = lines(good(), FAULTY, good(status="failed", exit_code=1, messages=["sigma0 is 3"]))
+    assert outcome_line(first) == "strip 0.yaml: good, rms 0.163 m in plan at check points"
+    assert outcome_line(second) == "strip 1.yaml: faulty: a.csv:3: no <such> photo & \x01 (and 1 more)"
+    assert outcome_line(third) == "strip 2.yaml: failed: sigma0 is 3"
+
+
+def test_the_summary_is_true_xml_and_json() -> None:
+    told = lines(good(), FAULTY, not_run())
+    suite = ET.fromstring(batch_junit(told))[0]  # noqa: S314 (our own)
+    assert [(case.get("name"), [inner.tag for inner in case]) for case in suite] == [
+        ("strip 0.yaml", []),
+        ("strip 1.yaml", ["error"]),
+        ("strip 2.yaml", ["skipped"]),
+    ]
+    assert suite[1][0].text == "a.csv:3: no <such> photo & ?\nempty"
+    summary = json.loads(summary_json(told, 2))
+    assert summary["projects"] == told
+    assert (summary["finished"], summary["counts"]) == (False, {"faulty": 1, "good": 1, "not run": 1})
+    rows = summary_csv(told).splitlines()
+    assert rows[1] == "strip 0.yaml,strip 0,good,0,polynomial,1,20,174,2,4.8,check,0.163,,"
+    assert rows[3] == "strip 2.yaml,,not run,0,,,,,,,,,,"
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"{", b"[]", b"\xff", b'{"photostrip_batch_record": 2}', b'{"photostrip_batch_record": 1}']
+)
+def test_what_is_no_record_is_not_taken_for_one(content: bytes) -> None:
+    assert parsed_record(content) is None
+
+
+def test_a_record_comes_back() -> None:
+    record = {
+        "photostrip_batch_record": 1, "program": {"a": "1"}, "project": "µ.yaml", "set": [], "inputs": {"x": None},
+        "outputs": {}, "outcome": good(),
+    }  # fmt: skip
+    assert parsed_record(record_text(record).encode()) == record
+
+
+# ------------------------------------------------------------------------------------------------- meanwhile
+
+
+def test_how_far_and_how_long_still() -> None:
+    table = BatchTable(io.StringIO(), 10, live=False)
+    for name in ("a", "b", "c", "d"):
+        table.begun(name)
+    table.finished("a", failed=False, unchanged=False)
+    table.finished("b", failed=True, unchanged=False)
+    table.finished("x", failed=False, unchanged=True)
+    assert table.head(60.0) == "#########..................... 3 of 10, 1 failed, 1 unchanged, 1:00, about 3:30 to go"
+    cells = [list(column.cells) for column in table.page().columns]
+    assert cells == [["0:00", "0:00"], ["c", "d"]]
+
+
+@pytest.mark.parametrize(("seconds", "text"), [(0.4, "0:00"), (61, "1:01"), (3600 * 26 + 125, "26:02:05")])
+def test_clock(seconds: float, text: str) -> None:
+    assert clock(seconds) == text
+
+
+def test_without_a_terminal_what_is_said_goes_straight_out() -> None:
+    stream = io.StringIO()
+    with batch_table(stream, 2) as table:
+        table.say("one")
+        assert stream.getvalue() == "one\n"
+
+
+@pytest.mark.slow
+def test_a_person_at_a_terminal_sees_a_table(tmp_path: Path) -> None:
+    """Stderr is a terminal: the table is there and goes away, failures stay above it; stdout is the summary alone."""
+    write_projects(tmp_path / "strips", 12)
+    (tmp_path / "strips" / "s3" / "control.csv").unlink()
+    ours, theirs = pty.openpty()
+    with subprocess.Popen(
+        command("strips", "-j", "1", "--format", "csv"),
+        cwd=tmp_path,
+        env={**environment(), "TERM": "xterm"},
+        stdout=subprocess.PIPE,
+        stderr=theirs,
+        text=True,
+    ) as process:
+        os.close(theirs)
+        seen = b""
+        while True:
+            try:
+                seen += os.read(ours, 4096)
+            except OSError:  # the other end is closed
+                break
+        out, _ = process.communicate()
+    os.close(ours)
+    assert process.returncode == 2
+    assert len(out.splitlines()) == 13
+    text = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", seen.decode())
+    assert re.search(r"[#.]{30} \d+ of 12", text)
+    assert " of 12  strips/s3/project.yaml: faulty: strips/s3/project.yaml" in text
+    assert "strips/s4/project.yaml: good" not in text  # the table says enough
