@@ -169,42 +169,30 @@ def print_found(rounds: list[dict[str, Spent]], strips: int) -> None:
         return median(map(ratio, rounds))
 
     plain = [json.loads(found["plain"].said[0]) for found in rounds]
-    bare = median(each["loop"] for each in plain) / part
-    adjusting = median(each["adjusting"] for each in plain) / part
-    line("bare computation of a strip, seconds of computing", f"{bare:.4f} s")
-    line("  of it adjusting", f"{adjusting:.4f} s")
-    overhead = middle(lambda found: found["one"].computing / part) / bare
-    line("batch -j 1, all processes, to the bare computation", f"{overhead:.2f}", f"target {OVERHEAD:.2f}")
-    line("  of it the start of two interpreters", f"{2 * median(each['start'] for each in plain) / part / bare:.2f}")
-    line(
-        "batch -j 2, all processes, to the bare computation",
-        f"{middle(lambda f: f['two'].computing / part) / bare:.2f}",
-    )
-    line(
-        "two plain loops side by side, speed-up on the clock",
-        f"{middle(lambda f: f['plain'].wall / f['two plain'].wall):.2f}",
-    )
-    line(
-        "batch -j 2 to batch -j 1, speed-up on the clock",
-        f"{middle(lambda f: f['one'].wall / f['two'].wall):.2f}",
-        f"target {SPEED_UP:.2f}",
-    )
-    line(
-        "batch -j 2 to one plain loop, speed-up on the clock",
-        f"{middle(lambda f: f['plain'].wall / f['two'].wall):.2f}",
-    )
+    for found, each in zip(rounds, plain, strict=True):
+        found["loop"] = Spent(0.0, each["loop"], 0.0, [])
+
+    def to_bare(way: str) -> str:
+        return f"{middle(lambda found: found[way].computing / found['loop'].computing):.2f}"
+
+    def speed_up(slow: str, fast: str) -> str:
+        return f"{middle(lambda found: found[slow].wall / found[fast].wall):.2f}"
+
+    line("bare computation of a strip, seconds of computing", f"{middle(lambda f: f['loop'].computing) / part:.4f} s")
+    line("  of it adjusting", f"{median(each['adjusting'] for each in plain) / part:.4f} s")
+    line("batch -j 1, all processes, to the bare computation", to_bare("one"), f"target {OVERHEAD:.2f}")
+    starts = median(2 * each["start"] / each["loop"] for each in plain)
+    line("  of it the start of two interpreters", f"{starts:.2f}")
+    line("batch -j 2, all processes, to the bare computation", to_bare("two"))
+    line("two plain loops side by side, speed-up on the clock", speed_up("plain", "two plain"))
+    line("batch -j 2 to batch -j 1, speed-up on the clock", speed_up("one", "two"), f"target {SPEED_UP:.2f}")
+    line("batch -j 2 to one plain loop, speed-up on the clock", speed_up("plain", "two"))
     again = middle(lambda found: found["unchanged"].wall) / part
     line("unchanged, on the clock", f"{again * 1000:.1f} ms")
     line("memory of the largest process", f"{max(found['two'].megabytes for found in rounds):.0f} MB")
     if "dask" in rounds[0]:
-        line(
-            "batch --executor dask:local -j 2, all processes, to bare",
-            f"{middle(lambda f: f['dask'].computing / part) / bare:.2f}",
-        )
-        line(
-            "batch --executor dask:local -j 2 to -j 1, on the clock",
-            f"{middle(lambda f: f['one'].wall / f['dask'].wall):.2f}",
-        )
+        line("batch --executor dask:local -j 2, all processes, to bare", to_bare("dask"))
+        line("batch --executor dask:local -j 2 to -j 1, on the clock", speed_up("one", "dask"))
     two = middle(lambda found: found["two"].wall) / part
     line("strips an hour with -j 2", f"{3600 / two:.0f}")
     line(f"{ARCHIVE} such strips with -j 2", f"{ARCHIVE * two / 3600:.2f} h")
