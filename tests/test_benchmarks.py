@@ -39,3 +39,14 @@ def test_strip_prints_seconds_memory_parts_and_growth() -> None:
     shares = [float(value) for value in re.findall(r"^\w[\w ,]+ +\d\.\d{4} +(\d+\.\d)%", out, re.MULTILINE)]
     assert shares[-1] == 100.0
     assert sum(shares[:-1]) == pytest.approx(100.0, abs=0.5)
+
+
+@pytest.mark.slow
+def test_batch_prints_overhead_and_speed_up() -> None:
+    out = printed("batch.py", "--strips", "4", "--rounds", "1", "--photos", "5")
+    for words in (
+        "batch -j 1, all processes, to the bare computation",
+        "batch -j 2 to batch -j 1, speed-up on the clock",
+    ):
+        assert re.search(rf"^{words} +\d+\.\d\d  target 1\.\d0$", out, re.MULTILINE)
+    assert re.search(r"^50000 such strips unchanged +\d+\.\d min$", out, re.MULTILINE)
