@@ -13,8 +13,12 @@ from photostrip.triangulation.bundle.linearise import PHOTO
 from photostrip.triangulation.bundle.reduced import factored, given_at
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
+    from photostrip.triangulation.bundle.layout import Batch
+    from photostrip.triangulation.bundle.linearise import Eliminated
     from photostrip.triangulation.bundle.model import Model, State
     from photostrip.triangulation.bundle.problem import Problem
     from photostrip.triangulation.bundle.reduced import Reduced
@@ -79,22 +83,40 @@ def refuse_weak_points(model: Model, reduced: Reduced) -> None:
     GeometryError
         With all of these points (``bundle-rays``).
     """
+    refuse_weak(model, model.structure.batches, reduced.points)
+
+
+def refuse_weak(model: Model, batches: Sequence[Batch], eliminated: Sequence[Eliminated]) -> None:
+    """Refuse weak points of some batches; see :func:`refuse_weak_points`."""
     weak = [
         model.problem.point_name(number)
-        for batch, eliminated in zip(model.structure.batches, reduced.points, strict=True)
-        for number in batch.point[batch.real][~(eliminated.strength[batch.real] > PARALLEL)].tolist()
+        for batch, each in zip(batches, eliminated, strict=True)
+        for number in batch.point[batch.real][~(each.strength[batch.real] > PARALLEL)].tolist()
     ]
     if weak:
         raise GeometryError(
-            f"rays and control do not determine {_listed('point', weak)}: "
+            f"rays and control do not determine {listed('point', weak)}: "
             "a point needs two rays that meet at an angle, or one and its given height",
             points=weak,
             code="bundle-rays",
         )
 
 
-def _listed(noun: str, names: list[str]) -> str:
-    """Name some of many."""
+def listed(noun: str, names: list[str]) -> str:
+    """Name some of many.
+
+    Parameters
+    ----------
+    noun : str
+        What they are, in the singular.
+    names : list of str
+        Their names.
+
+    Returns
+    -------
+    str
+        The first few, and how many more.
+    """
     more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
     return f"{noun}{'s' if len(names) > 1 else ''} {', '.join(names[:NAMED])}{more}"
 
@@ -149,7 +171,7 @@ def refuse_loose(model: Model, state: State) -> None:
         loose = vectors[:, values < LOOSE**-2.0]
         if loose.shape[1]:
             names = [model.problem.photo_name(number) for number in photos.tolist()]
-            whole = "" if len(parts) == 1 else f" of {_listed('photo', names)}"
+            whole = "" if len(parts) == 1 else f" of {listed('photo', names)}"
             raise GeometryError(
                 f"what is given does not determine {_moves(model, state, held, loose)}{whole}: {_reason(held)}",
                 photos=() if len(parts) == 1 else names,
@@ -312,7 +334,7 @@ def refuse_singular(model: Model, reduced: Reduced, extra: Floats | None) -> NoR
         names = [MOVES[int(np.argmax(size[int(np.argmax(worst))]))]]
     what = f"; least of all the {names[0]}" if names else ""
     raise GeometryError(
-        f"the observations do not determine {_listed('photo', photos) or 'the photos'}{what}: "
+        f"the observations do not determine {listed('photo', photos) or 'the photos'}{what}: "
         "they need more points in common with the others, or control",
         photos=photos,
         code="bundle-rank",

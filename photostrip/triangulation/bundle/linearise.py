@@ -153,8 +153,8 @@ class Eliminated:
     rows : ndarray, shape (6 k + more + 1, 3, S)
         T: for each ray six rows, then the common parameters; last L^-1 times the right-hand side of the point.
     strength : ndarray, shape (S,)
-        Smallest part of a diagonal element of a point's normal matrix that its other coordinates leave over: the
-        square of the sine of an angle between rays. NaN where the matrix is not positive definite.
+        Least information on a direction as part of all on the point: about the square of the sine of the angle
+        between rays. NaN where the matrix is not positive definite.
     """
 
     root: tuple[Floats, ...]
@@ -263,7 +263,7 @@ def cholesky(normal: list[Floats], damping: float = 0.0) -> tuple[tuple[Floats, 
     root : tuple of ndarray, shape (S,)
         Reciprocals of 11, 22, 33 of the factor; its elements 21, 31, 32. NaN where a matrix is not positive.
     strength : ndarray, shape (S,)
-        Smaller of the parts of 22 and 33 of the matrix that are left over when the factor reaches them.
+        Smallest square of the diagonal of the factor as part of the trace of the matrix.
     """
     n11, n22, n33 = (element * (1.0 + damping) for element in normal[:3]) if damping else normal[:3]
     n21, n31, n32 = normal[3:]
@@ -273,7 +273,7 @@ def cholesky(normal: list[Floats], damping: float = 0.0) -> tuple[tuple[Floats, 
         r2 = 1.0 / np.sqrt(n22 - l21 * l21)
         l32 = (n32 - l21 * l31) * r2
         r3 = 1.0 / np.sqrt(n33 - l31 * l31 - l32 * l32)
-        strength = np.minimum(1.0 / (r2 * r2 * n22), 1.0 / (r3 * r3 * n33))
+        strength = 1.0 / (np.maximum(np.maximum(r1, r2), r3) ** 2 * (n11 + n22 + n33))
     return (r1, r2, r3, l21, l31, l32), strength
 
 

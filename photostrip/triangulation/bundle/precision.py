@@ -46,11 +46,14 @@ class Inverse:
         That inverse times the border.
     common : ndarray, shape (p, p)
         Cofactors of the common parameters.
+    factor : Band
+        Cholesky factor of the photos' part: for photos farther apart than the band is wide.
     """
 
     band: Band
     cross: Floats
     common: Floats
+    factor: Band
 
     def joint(self, sets: Numbers, more: int) -> Floats:
         """Joint cofactors of sets of photos and the first common parameters.
@@ -71,7 +74,14 @@ class Inverse:
         number = (PHOTO * sets[:, :, None] + np.arange(PHOTO)).reshape(groups, n)
         row, column = number[:, :, None], number[:, None, :]
         whole = np.empty((groups, n + more, n + more))
-        whole[:, :n, :n] = self.band.flat[self.band.place(np.maximum(row, column), np.minimum(row, column))]
+        near = np.abs(row - column) <= self.band.width
+        late, early = np.where(near, np.maximum(row, column), 0), np.where(near, np.minimum(row, column), 0)
+        whole[:, :n, :n] = self.band.flat[self.band.place(late, early)]
+        if not near.all():
+            far = np.unique(number[~near.all(axis=(1, 2))])
+            columns = self.factor.solve(np.eye(self.band.size)[:, far])
+            row, column = np.broadcast_arrays(row, column)
+            whole[:, :n, :n][~near] = columns[row[~near], np.searchsorted(far, column[~near])]
         if len(self.common):
             cross = self.cross[sets].reshape(groups, n, -1)
             whole[:, :n, :n] += cross @ self.common @ cross.swapaxes(1, 2)
@@ -100,12 +110,7 @@ def precision(solution: Solution) -> Precision:
         When the normal matrix is singular at the solution (``bundle-rank``).
     """
     model = solution.model
-    state = state_of(model, solution.centers, solution.rotations, solution.points, solution.common)
-    reduced = reduce(model, state)
-    own = reduced.blocks[model.structure.own]
-    band = factored(model, reduced, datum.anchor(model, state, own) if solution.free else None)
-    if band is None:
-        raise GeometryError("the normal matrix is singular at the solution", code="bundle-rank")
+    state, reduced, band = _at(solution)
     inverse = _inverse(reduced, band)
     points = np.full((model.problem.points, 3, 3), np.nan)
     residuals = np.zeros((len(model.problem.images), 2, 2))
@@ -134,13 +139,43 @@ def precision(solution: Solution) -> Precision:
     )
 
 
+def inverse_of(solution: Solution) -> Inverse:
+    """Give the inverse of photos and common parameters alone.
+
+    Parameters
+    ----------
+    solution : Solution
+        An adjusted problem, not a free network: there the cofactors of photos mean nothing without the datum.
+
+    Returns
+    -------
+    Inverse
+        The inverse.
+    """
+    _, reduced, band = _at(solution)
+    return _inverse(reduced, band)
+
+
+def _at(solution: Solution) -> tuple[State, Reduced, Band]:
+    """Linearise and factor at a solution."""
+    model = solution.model
+    state = state_of(model, solution.centers, solution.rotations, solution.points, solution.common)
+    reduced = reduce(model, state)
+    own = reduced.blocks[model.structure.own]
+    band = factored(model, reduced, datum.anchor(model, state, own) if solution.free else None)
+    if band is None:
+        raise GeometryError("the normal matrix is singular at the solution", code="bundle-rank")
+    return state, reduced, band
+
+
 def _inverse(reduced: Reduced, band: Band) -> Inverse:
     """Invert photos and common parameters."""
     p = len(reduced.corner) - 1
     border = reduced.border.reshape(-1, p + 1)[:, :p]
     cross = band.solve(border) if p else np.zeros_like(border)
     common = np.linalg.inv(reduced.corner[:p, :p] - border.T @ cross)
-    return Inverse(band.inverse_in_band(), cross.reshape(len(reduced.border), PHOTO, p), 0.5 * (common + common.T))
+    cross = cross.reshape(len(reduced.border), PHOTO, p)
+    return Inverse(band.inverse_in_band(), cross, 0.5 * (common + common.T), band)
 
 
 def _batch(
@@ -153,17 +188,17 @@ def _batch(
     white = by_point(rays)
     forward(eliminated.root, white)
     joint = inverse.joint(batch.sets, more)
-    carried = _carried(batch, joint, eliminated.rows[:-1])
-    of_point = np.einsum("pcs,pds->cds", eliminated.rows[:-1], carried)
+    spread = carried(batch, joint, eliminated.rows[:-1])
+    of_point = np.einsum("pcs,pds->cds", eliminated.rows[:-1], spread)
     of_point[range(3), range(3)] += 1.0
     partials = by_photo(rays, more)[:-1]
     if common is not None:
         partials[PHOTO:] = common
     mixed = np.einsum(
-        "pakr,kpcr->ackr", partials[:PHOTO], carried[: PHOTO * k].reshape(k, PHOTO, 3, slots), optimize=False
+        "pakr,kpcr->ackr", partials[:PHOTO], spread[: PHOTO * k].reshape(k, PHOTO, 3, slots), optimize=False
     )
     if more:
-        mixed += np.einsum("pakr,pcr->ackr", partials[PHOTO:], carried[PHOTO * k :])
+        mixed += np.einsum("pakr,pcr->ackr", partials[PHOTO:], spread[PHOTO * k :])
     fitted = _quadratic(batch, joint, partials)
     # white M white' - B Y white' - (B Y white')' + B Z B'
     half = 0.5 * np.einsum("cds,daks->caks", of_point, white) - mixed.transpose(1, 0, 2, 3)
@@ -177,16 +212,31 @@ def _batch(
     return of_point.transpose(2, 0, 1), found
 
 
-def _carried(batch: Batch, joint: Floats, rows: Floats) -> Floats:
-    """Give Z T for all slots of a batch, shape of `rows`."""
-    carried = np.empty_like(rows)
+def carried(batch: Batch, joint: Floats, rows: Floats) -> Floats:
+    """Multiply the rows T of a batch with the joint cofactors of their photos.
+
+    Parameters
+    ----------
+    batch : Batch
+        The groups.
+    joint : ndarray, shape (groups, q, q)
+        Joint cofactors of the photos of each group and the calibration parameters.
+    rows : ndarray, shape (q, 3, S)
+        T.
+
+    Returns
+    -------
+    ndarray, shape (q, 3, S)
+        Z T.
+    """
+    product = np.empty_like(rows)
     q, done = len(rows), 0
     for first, last, count, size in batch.runs:
         part = rows[..., first:last].reshape(q, 3, count, size).transpose(1, 2, 0, 3)
-        product = joint[done : done + count] @ part
-        carried[..., first:last] = product.transpose(2, 0, 1, 3).reshape(q, 3, -1)
+        own = joint[done : done + count] @ part
+        product[..., first:last] = own.transpose(2, 0, 1, 3).reshape(q, 3, -1)
         done += count
-    return carried
+    return product
 
 
 def _quadratic(batch: Batch, joint: Floats, partials: Floats) -> Floats:
@@ -273,17 +323,17 @@ def _inner(
     found = points.copy()
     for batch, move, shift in zip(model.structure.batches, moves, shifts, strict=True):
         real = batch.real
-        own, carried = move[..., real].transpose(2, 0, 1), shift[..., real].transpose(2, 0, 1) @ inverse
-        found[batch.point[real]] += _carried_over(own, carried, middle)
+        own, swept = move[..., real].transpose(2, 0, 1), shift[..., real].transpose(2, 0, 1) @ inverse
+        found[batch.point[real]] += _carried_over(own, swept, middle)
     turned = np.zeros((len(photos), PHOTO + p, datum.DEFECT))
     turned[:, :PHOTO] = datum.photo_generators(model, state, origin)
-    carried = np.concatenate([photos, np.broadcast_to(common, (len(photos), *common.shape))], axis=1) @ inverse
-    return found, joint + _carried_over(turned, carried, middle)
+    swept = np.concatenate([photos, np.broadcast_to(common, (len(photos), *common.shape))], axis=1) @ inverse
+    return found, joint + _carried_over(turned, swept, middle)
 
 
-def _carried_over(moves: Floats, carried: Floats, middle: Floats) -> Floats:
+def _carried_over(moves: Floats, swept: Floats, middle: Floats) -> Floats:
     """Give G M G' - G P' - P G'."""
-    product = moves @ carried.swapaxes(1, 2)
+    product = moves @ swept.swapaxes(1, 2)
     changed: Floats = moves @ middle @ moves.swapaxes(1, 2) - product - product.swapaxes(1, 2)
     return changed
 

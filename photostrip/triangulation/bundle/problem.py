@@ -118,7 +118,7 @@ class Positions:
         What the drift is multiplied with: time or place along the strip, best centred.
     offset_sigma, drift_sigma : ndarray, shape (groups,)
         A-priori standard deviations of each of the three components of a group's offset (metres) and drift (metres
-        per unit of time) about zero; infinite: free; 0: there is none.
+        per unit of time) about zero; infinite: free; 0: there is none. They are what has to be added to what is given.
     """
 
     photo: Numbers = field(default_factory=_no_numbers)

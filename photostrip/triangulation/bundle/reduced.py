@@ -96,9 +96,8 @@ def reduce(model: Model, state: State, damping: float = 0.0) -> Reduced:
 def _add_given(model: Model, state: State, blocks: Floats, border: Floats, corner: Floats) -> float:
     """Add camera positions, attitudes and a-priori values; give their sum of squares."""
     structure, total = model.structure, 0.0
-    for linear in given_at(model, state):
-        if not len(linear.photo):
-            continue
+    given_too = len(model.problem.positions) or len(model.problem.attitudes)
+    for linear in given_at(model, state) if given_too else ():
         by_own, others = linear.scaled()
         place = structure.rank[linear.photo]
         np.add.at(blocks, structure.own[place], by_own.swapaxes(1, 2) @ by_own)
@@ -135,7 +134,13 @@ def control_residuals(model: Model, state: State) -> Floats:
     control = model.problem.control
     if not len(control):
         return np.zeros((0, 3))
-    found: Floats = np.einsum("nij,nj->ni", control.axes, points_of(model, state)[control.point] - control.xyz)
+    points = np.array(model.problem.start.points[control.point], float)
+    where = np.zeros(model.problem.points, np.intp)
+    where[control.point] = np.arange(len(control))
+    for batch, xyz in zip(model.structure.batches, state.xyz, strict=True):
+        points[where[batch.point[batch.control]]] = xyz[:, batch.control].T
+    points = points[where[control.point]]
+    found: Floats = np.einsum("nij,nj->ni", control.axes, points - control.xyz)
     return found
 
 

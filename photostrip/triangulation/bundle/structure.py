@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -123,6 +124,7 @@ def build(problem: Problem) -> Structure:
     )
 
 
+@cache
 def triangle(rays: int) -> tuple[Numbers, Numbers]:
     """Pairs of a set of photos, the later one first: positions within the set.
 

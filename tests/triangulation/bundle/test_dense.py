@@ -31,6 +31,7 @@ NO_STEP = 1e-5  # standard deviations: what a further step would still move
 LENS = np.zeros((1, 10))
 LENS[0, [0, 1, 2, 6, 7, 8, 9]] = np.inf
 LENS[0, [3, 4]] = 1e-8, 1e-12
+HELD_LENS = np.where(np.isinf(LENS), [[0.02, 0.02, 0.02, 0, 0, 0, 1e-6, 1e-6, 1e-4, 1e-4]], LENS)
 
 
 @cache
@@ -87,7 +88,7 @@ PROBLEMS: dict[str, Callable[[], Problem]] = {
     "plan and height apart": with_height_only,
     "free": lambda: replace(strip(), control=Control()),
     "free block, calibrated": lambda: replace(
-        strip(4, 2), control=Control(), cameras=replace(strip(4, 2).cameras, sigma=LENS)
+        strip(4, 2), control=Control(), cameras=replace(strip(4, 2).cameras, sigma=HELD_LENS)
     ),
     "calibrated": lambda: replace(strip(), cameras=replace(strip().cameras, sigma=LENS)),
     "everything": with_everything,
