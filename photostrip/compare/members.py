@@ -80,6 +80,10 @@ def _findings(document: Document) -> Iterator[Member]:
         about = [f"strip {note['strip']}"] if note["strip"] else []
         about += [f"photo {photo}" for photo in note["photos"]] + [f"point {point}" for point in note["points"]]
         yield "notes", note["code"], f"{note['severity']} {note['code']}{': ' if about else ''}{', '.join(about)}"
+    for each in document.get("findings", []):
+        about = [f"{one} {name}" for one in ("strip", "photo", "point") for name in each[f"{one}s"]]
+        words = f"{each['severity']} {each['code']}, {each['title']}{': ' if about else ''}{', '.join(about)}"
+        yield "findings", each["code"], words
     for row in document["not_determined"]:
         yield "not_determined", row["id"], f"point {row['id']} has no coordinates"
 

@@ -219,12 +219,17 @@ def test_sets_are_told_by_what_is_missing_and_new() -> None:
         {"strip": "A", "photo": "1", "other_photo": "2", "point": "P", "stage": "relative", "test": "t"}
     )
     now["notes"].append({"severity": "warning", "code": "weak", "strip": "A", "photos": [], "points": ["P"]})
+    finding = {"severity": "error", "code": "P101", "title": "unit", "strips": ["A"], "photos": [], "points": []}
+    now["findings"] = [*now["findings"], finding]
     now["polynomials"][0]["degree"] += 1
     sets = {each["kind"]: each for each in compare_results(now, before)["sets"]}
     assert f"point {gone['id']}" in [row["what"] for row in sets["ids"]["missing"]]
     assert "photo another" in [row["what"] for row in sets["ids"]["new"]]
     assert [row["what"] for row in sets["rejected"]["new"]] == ["P on 1 – 2, relative"]
-    assert [row["what"] for row in sets["findings"]["new"]] == ["warning weak: strip A, point P"]
+    assert [row["what"] for row in sets["findings"]["new"]] == [
+        "error P101, unit: strip A",
+        "warning weak: strip A, point P",
+    ]
     assert len(sets["choices"]["missing"]) == len(sets["choices"]["new"]) == 1
     assert all(each["differs"] for each in sets.values())
     loose = SetTolerance(missing=0, new=1)

@@ -1,0 +1,139 @@
+"""The presets of configs/ on strips like those they are made for: gross errors found, good points lost, accuracy.
+
+Run it as ``python benchmarks/presets.py [seeds]``. Each strip has eight photos, four bands of three control points and
+three gross errors of forty standard deviations in y.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+from contextlib import redirect_stdout
+from dataclasses import dataclass
+from io import StringIO
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from anywhere, installed or not
+
+from photostrip import simulate
+from photostrip.cli.main import main as photostrip
+from photostrip.formats.simulation import project_files
+from photostrip.simulate.simulation import simulate as simulated
+
+CONFIGS = Path(__file__).resolve().parents[1] / "configs"
+SEEDS = 8
+GROSS = 40  # standard deviations
+OWN = ("  unit:", "  y_axis:", "  origin:", "  sigma: 0")  # of the observations: the preset says them
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What a preset is made for.
+
+    Parameters
+    ----------
+    camera : str
+        Preset of the simulated camera.
+    sigma_um : float
+        Standard deviation of an image coordinate, the one that the preset states.
+    points : int
+        Further points of each model.
+    refraction : bool
+        Whether the rays are bent.
+    """
+
+    camera: str
+    sigma_um: float
+    points: int
+    refraction: bool
+
+
+KINDS = {
+    "film-archive": Kind("film", 10.0, 12, refraction=True),
+    "film-mapping": Kind("film", 5.0, 12, refraction=True),
+    "digital-frame": Kind("digital", 1.8, 12, refraction=True),
+    "uav-corridor": Kind("digital", 3.0, 60, refraction=False),
+    "teaching": Kind("film", 10.0, 12, refraction=False),
+}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a preset made of one strip: gross errors, found ones, good points lost, sigma0, rms of check points."""
+
+    wrong: int
+    found: int
+    lost: int
+    sigma0: float
+    check_um: float
+
+
+def outcome(preset: str, seed: int, *options: str) -> Outcome:
+    """Simulate a strip, run it with a preset and compare what was rejected with what is wrong."""
+    kind = KINDS[preset]
+    film = kind.camera == "film"
+    spec = simulate.Spec(
+        name=preset,
+        seed=seed,
+        camera=simulate.PRESETS[kind.camera],
+        flight=simulate.Flight(photos=8),
+        points=simulate.Points(extra_per_model=kind.points),
+        control=simulate.Control(bands=4, per_band=3, check=8, sigma=(0.01, 0.01, 0.02)),
+        image=simulate.Image(kind.sigma_um, unit="mm" if film else "px", y_axis="up" if film else "down"),
+        film=simulate.Film() if film else None,
+        gross_errors=(simulate.GrossError("image", count=3, size_um=GROSS * kind.sigma_um, axis="y"),),
+        refraction=kind.refraction,
+    )
+    files = project_files(simulated(spec))
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        for name, text in {**files, "project.yaml": bare(files["project.yaml"], preset)}.items():
+            (folder / name).write_text(text, encoding="utf-8")
+        with redirect_stdout(StringIO()):
+            code = photostrip(["run", str(folder / "project.yaml"), "-o", str(folder / "out"), "--quiet", *options])
+        if code:
+            message = f"{preset}, seed {seed}: exit code {code}"
+            raise RuntimeError(message)
+        result = json.loads((folder / "out/result.json").read_text(encoding="utf-8"))
+    wrong = {row["point"] for row in json.loads(files["truth.json"])["errors"]}
+    rejected = {row["point"] for row in result["rejected"] if not row.get("readmitted", False)}
+    # a point that is wrong on two photos by the same amount is wrong without a contradiction
+    check = [row["plan_um"] for row in result["control"] if row["role"] == "check" and row["id"] not in wrong]
+    return Outcome(
+        len(wrong),
+        len(wrong & rejected),
+        len(rejected - wrong),
+        result["summary"]["sigma0_um"] / kind.sigma_um,
+        (sum(value**2 for value in check) / len(check)) ** 0.5 / kind.sigma_um,
+    )
+
+
+def bare(project: str, preset: str) -> str:
+    """Give a project file that takes from the preset what the preset says."""
+    lines, inside, kept = project.splitlines(), "", []
+    for line in lines:
+        if not line.startswith(" "):
+            inside = line.partition(":")[0]
+        if inside != "processing" and not (inside == "observations" and line.startswith(OWN)):
+            kept.append(line)
+    return "\n".join([*kept, f"extends: {CONFIGS / preset}.yaml"]) + "\n"
+
+
+def main(arguments: list[str]) -> int:
+    """Print the table."""
+    seeds = int(arguments[0]) if arguments else SEEDS
+    print("preset          screening        gross errors  found  good points lost  sigma0  check plan")
+    for preset in KINDS:
+        for screening in ("of the preset", "auto", "parallax+grubbs", "tau"):
+            options = [] if screening == "of the preset" else ["--set", f"processing.relative.screening={screening}"]
+            rows = [outcome(preset, seed, *options) for seed in range(1, seeds + 1)]
+            wrong, found, lost = (sum(getattr(row, name) for row in rows) for name in ("wrong", "found", "lost"))
+            sigma0, check = (sum(getattr(row, name) for row in rows) / seeds for name in ("sigma0", "check_um"))
+            print(f"{preset:<14}  {screening:<15}  {wrong:12d}  {found:5d}  {lost:16d}  {sigma0:6.2f}  {check:10.1f}")
+    print("sigma0 and check plan (rms, at photo scale) in units of the standard deviation of an image coordinate")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
