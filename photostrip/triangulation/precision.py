@@ -216,7 +216,7 @@ def _formed(errors: StripErrors, rows: Rows, base: Chain) -> Floats:
     """Covariances in the formed strip, relative to the similarity of its first model."""
     slots = rows.core.shape[1]
     with_units = own_with_units(errors, rows)
-    local = _local(errors, rows, with_units)
+    local = local_covariances(errors, rows, with_units)
     first, ahead = rows.first, base.ahead[rows.first]
     shared = ahead[:, 0] @ rows.core[:, 0].transpose(0, 2, 1)
     if slots > 1:
@@ -264,7 +264,7 @@ def own_with_units(errors: StripErrors, rows: Rows) -> Floats:
     return result
 
 
-def _local(errors: StripErrors, rows: Rows, with_units: Floats) -> Floats:
+def local_covariances(errors: StripErrors, rows: Rows, with_units: Floats) -> Floats:
     """Covariances of the rows without the similarity of their first model."""
     n, slots, size, _ = rows.core.shape
     result = np.zeros((n, size, size))
