@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 
     from photostrip.geodesy.local_frame import IntermediateFrame
     from photostrip.pipeline import Inputs, Result
-    from photostrip.triangulation.strip_errors import Rows, StripErrors
+    from photostrip.triangulation.error_rows import Rows
+    from photostrip.triangulation.strip_errors import StripErrors
 
     Floats = NDArray[np.float64]
 

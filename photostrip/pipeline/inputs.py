@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Flags = NDArray[np.bool_]
 
-ADJUSTMENTS = ("similarity", "polynomial", "bundle")
+ADJUSTMENTS = ("similarity", "polynomial", "covariance", "bundle")
 
 
 @dataclass(frozen=True)

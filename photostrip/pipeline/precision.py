@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.pipeline.covariance import measured
 from photostrip.pipeline.results import Precision
-from photostrip.statistics import chi2_quantile
 from photostrip.triangulation import absolute, control_errors, photo_errors, precision, strip_errors
 
 if TYPE_CHECKING:
@@ -18,14 +18,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.geodesy.crs import GroundFrame
+    from photostrip.pipeline.covariance import CovarianceAdjustment
     from photostrip.pipeline.results import Adjusted, StripResult
     from photostrip.points import PhotoPoints
+    from photostrip.triangulation.error_rows import Rows
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
-
-A_PRIORI, A_POSTERIORI = "a-priori", "a-posteriori"
-LEVEL = 0.01  # of the test that keeps the stated standard deviation of the image coordinates
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,32 +61,6 @@ class StripPrecision:
     basis: str
 
 
-def image_variance(strip: StripResult, sigma: float) -> tuple[float, str]:
-    """Variance factor of the image coordinates: 1 unless the y parallaxes contradict what is stated.
-
-    Parameters
-    ----------
-    strip : StripResult
-        The strip.
-    sigma : float
-        Stated standard deviation of an image coordinate of weight one, mm.
-
-    Returns
-    -------
-    factor : float
-        Variance found over variance stated, or 1.
-    basis : str
-        ``"a-posteriori"`` or ``"a-priori"``.
-    """
-    pairs = strip.orientation.pairs
-    redundancy = int((strip.orientation.points_used - 5).sum())
-    squares = float((pairs.weight * strip.orientation.parallax**2)[strip.orientation.used].sum()) / (2 * sigma**2)
-    if redundancy < 1:
-        return 1.0, A_PRIORI
-    low, high = (chi2_quantile(p, redundancy) for p in (LEVEL / 2, 1 - LEVEL / 2))
-    return (1.0, A_PRIORI) if low <= squares <= high else (squares / redundancy, A_POSTERIORI)
-
-
 @dataclass(frozen=True, eq=False)
 class Propagation:
     """Rows of derivatives of one strip in its intermediate frame, and what the fit to the control takes away.
@@ -102,7 +75,7 @@ class Propagation:
         Similarity and polynomials.
     influence : ndarray, shape (q, 3, t)
         Points by the parameters of the fit.
-    photos : strip_errors.Rows
+    photos : Rows
         Photos that could be oriented.
     photo_influence : ndarray, shape (k, 6, t)
         The same of them.
@@ -114,7 +87,7 @@ class Propagation:
     control: control_errors.Misclosures
     fit: control_errors.Correction
     influence: Floats
-    photos: strip_errors.Rows
+    photos: Rows
     photo_influence: Floats
     oriented: Numbers
 
@@ -136,7 +109,7 @@ def propagation(strip: StripResult, observations: PhotoPoints, frames: Sequence[
     Propagation
         Everything that covariances are made of.
     """
-    position = places(strip, observations)
+    position = measured(strip.strip, observations)
     similarity = strip.absolute.similarity
     errors = strip_errors.strip_errors(strip.orientation, strip.formed, similarity, position, observations.sigma)
     xyz = similarity(strip.formed.xyz)
@@ -146,17 +119,11 @@ def propagation(strip: StripResult, observations: PhotoPoints, frames: Sequence[
     return Propagation(errors, found, fit, influence, *rows)
 
 
-def places(strip: StripResult, observations: PhotoPoints) -> Numbers:
-    """Place in a strip of the photo of every image point; -1 for photos of other strips."""
-    place = {photo: number for number, photo in enumerate(strip.strip.photos)}
-    return np.array([place.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo]
-
-
 def sightings(strip: StripResult, observations: PhotoPoints) -> photo_errors.Sightings:
     """Collect the image points on which the photos of a strip were oriented."""
     point = np.searchsorted(strip.formed.point, observations.point[strip.rows])
     focal = strip.strip.camera.principal_distance
-    photo = places(strip, observations)[strip.rows]
+    photo = measured(strip.strip, observations)[strip.rows]
     return photo_errors.Sightings(photo, point, strip.rows, strip.xyz[point], focal)
 
 
@@ -177,27 +144,47 @@ def of_strip(strip: StripResult, observations: PhotoPoints, frames: Sequence[Gro
     StripPrecision
         Covariances of points and photos.
     """
+    if strip.covariance is not None:
+        return _of_covariance(strip, strip.covariance)
     found = propagation(strip, observations, frames)
     errors, operator = found.errors, found.fit.operator
-    stated = float(np.median(observations.sigma[places(strip, observations) >= 0]))
-    factor, basis = image_variance(strip, stated)
+    stated = float(np.median(observations.sigma[measured(strip.strip, observations) >= 0]))
+    factor, basis = precision.image_variance(strip.orientation, stated)
     parameters = precision.fitted(errors, found.control, operator, factor)
     points = precision.covariances(errors, errors.points, parameters, found.influence) * factor
     photos = np.full((len(strip.strip.photos), 6, 6), np.nan)
     photos[found.oriented] = precision.covariances(errors, found.photos, parameters, found.photo_influence) * factor
-    axes, both = strip.intermediate.axes, np.zeros((6, 6))
-    both[:3, :3] = both[3:, 3:] = axes
     numbers = strip.formed.point[strip.control_rows][found.control.point]
     return StripPrecision(
-        axes @ points @ axes.T,
-        both @ photos @ both.T,
-        axes @ found.influence,
+        *_turned(strip, points, photos),
+        strip.intermediate.axes @ found.influence,
         operator,
         np.column_stack([numbers, found.control.axis]),
         found.control.variance,
         stated * float(np.sqrt(factor)),
         basis,
     )
+
+
+def _of_covariance(strip: StripResult, adjusted: CovarianceAdjustment) -> StripPrecision:
+    """Covariances that the adjustment with the strip's own covariance has found already."""
+    numbers = strip.formed.point[strip.control_rows][adjusted.control.point]
+    return StripPrecision(
+        *_turned(strip, adjusted.points, adjusted.photos),
+        np.zeros((len(adjusted.points), 3, 0)),  # what it shares with other strips through their control dies away
+        np.zeros((0, len(numbers))),
+        np.column_stack([numbers, adjusted.control.axis]),
+        adjusted.control.variance,
+        adjusted.sigma,
+        adjusted.basis,
+    )
+
+
+def _turned(strip: StripResult, points: Floats, photos: Floats) -> tuple[Floats, Floats]:
+    """Covariances from the intermediate to the Cartesian frame."""
+    axes, both = strip.intermediate.axes, np.zeros((6, 6))
+    both[:3, :3] = both[3:, 3:] = axes
+    return axes @ points @ axes.T, both @ photos @ both.T
 
 
 def _fit_to_control(

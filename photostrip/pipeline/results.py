@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from photostrip.geodesy.crs import GroundFrame
     from photostrip.geodesy.local_frame import IntermediateFrame
     from photostrip.notes import Finding, Note
+    from photostrip.pipeline.covariance import CovarianceAdjustment
     from photostrip.pipeline.inputs import Inputs, Settings, Strip
     from photostrip.points import ControlPoints
     from photostrip.triangulation import (
@@ -77,6 +78,8 @@ class StripResult:
         Measurements that the strip as a whole does not confirm.
     wrong_control : tuple of control_screening.ControlRejection
         Control coordinates that were not used; ``control`` says so in its ``use``.
+    covariance : CovarianceAdjustment or None
+        The adjustment with the strip's own covariance; None with other adjustments.
     """
 
     strip: Strip
@@ -98,6 +101,7 @@ class StripResult:
     screened: screening.Screened
     contradictions: strip_screening.Verdict
     wrong_control: tuple[control_screening.ControlRejection, ...]
+    covariance: CovarianceAdjustment | None = None
 
     @property
     def scale_number(self) -> float:

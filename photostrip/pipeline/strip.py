@@ -10,7 +10,7 @@ import numpy as np
 from photostrip.errors import GeometryError
 from photostrip.geodesy.local_frame import IntermediateFrame, mean_position, strip_azimuth
 from photostrip.notes import Note
-from photostrip.pipeline import overruling
+from photostrip.pipeline import covariance, overruling
 from photostrip.pipeline.results import StripResult
 from photostrip.triangulation import (
     absolute,
@@ -36,8 +36,6 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
     Flags = NDArray[np.bool_]
-
-LONG_STRIP = 25  # models; beyond it polynomials fall far behind a rigorous adjustment
 
 
 def adjust_strip(
@@ -96,8 +94,13 @@ def adjust_strip(
         weight = absolute.weights(targets.turned(xyz[rows]), precision)
         problem = polynomial.Problem(xyz[rows], targets, weight, *_extent(formed, orientation))
         correction = polynomial.fit(problem, settings.polynomial)
-    adjusted = xyz if correction is None else correction(xyz)
-    resection, image_rows = _orient_photos(strip, observations, oriented, formed, adjusted, orientation)
+    own = None
+    if settings.adjustment == "covariance":
+        targets = absolute.Targets(here, frames, intermediate)
+        images = (covariance.measured(strip, observations), observations.sigma, sigma)
+        own = covariance.adjust((oriented, formed), orientation, (targets, rows), images)
+    adjusted = own.xyz if own is not None else xyz if correction is None else correction(xyz)
+    resection, image_rows = _orient_photos(strip, observations, oriented, formed, adjusted, orientation, own)
     return StripResult(
         strip,
         oriented,
@@ -119,10 +122,12 @@ def adjust_strip(
             *_screening_notes(strip, screened, sigma),
             *_wrong_control_notes(strip, wrong),
             *_notes(strip, oriented, formed, orientation, correction, adjusted, resection),
+            *covariance.notes(strip, here, own),
         ),
         screened,
         contradictions,
         wrong,
+        own,
     )
 
 
@@ -254,8 +259,12 @@ def _orient_photos(
     formed: formation.FormedStrip,
     adjusted: Floats,
     orientation: absolute.AbsoluteOrientation,
+    own: covariance.CovarianceAdjustment | None,
 ) -> tuple[exterior.Resection, Numbers]:
-    """Orient every photo on its adjusted points, so that orientations and points belong together."""
+    """Orient every photo on its adjusted points, so that orientations and points belong together.
+
+    The adjustment with the strip's own covariance gives photos and points together.
+    """
     in_models = oriented.rows[oriented.used & np.isfinite(formed.model_xyz).all(axis=1)]
     used = np.union1d(in_models, formed.bridging)
     place = {photo: n for n, photo in enumerate(strip.photos)}
@@ -264,6 +273,9 @@ def _orient_photos(
     used, position = used[order], position[order]
     rows = np.searchsorted(formed.point, observations.point[used])
     points = adjusted[rows]
+    if own is not None:
+        seen = (position, observations.xy[used], points)
+        return covariance.resection(own, seen, strip.camera.principal_distance), used
     similarity = orientation.similarity
     # A polynomial can move a long strip by much: a photo starts where its points went, on the average.
     moved = points - similarity(formed.xyz[rows])
@@ -429,13 +441,7 @@ def _polynomial_notes(strip: Strip, correction: polynomial.Polynomial | None, ad
         if min(axis.redundancy for axis in correction.axes) < 3:
             text = f"strip {strip.id}: the polynomial has a redundancy below 3 in an axis: its residuals say little"
             notes.append(Note("little-redundancy", text, strip=strip.id))
-    if len(strip.photos) - 1 > LONG_STRIP:
-        text = (
-            f"strip {strip.id}: {len(strip.photos) - 1} models; beyond about {LONG_STRIP} a polynomial falls far "
-            "behind a rigorous adjustment (errors 2.5 times larger at 30 models, 12 times at 100)"
-        )
-        notes.append(Note("long-strip", text, strip=strip.id))
-    return notes
+    return notes + covariance.proposal(strip, correction)
 
 
 def _photo_notes(strip: Strip, resection: exterior.Resection) -> list[Note]:

@@ -569,8 +569,9 @@ class Bundle(Section):
 class Processing(Section):
     """What is computed and how."""
 
-    adjustment: Annotated[str, *_choice(ADJUSTMENTS, "covariance")] = key(
-        "`polynomial` (the strip method), `similarity` (without a polynomial) or `bundle` (all strips rigorously)",
+    adjustment: Annotated[str, *_choice(ADJUSTMENTS)] = key(
+        "`polynomial` (the strip method), `similarity` (without a polynomial), `covariance` (each strip with its own "
+        "covariance) or `bundle` (all strips rigorously)",
         DEFAULTS.adjustment,
     )
     polynomial: Polynomial = key("Polynomial adjustment", Polynomial.model_construct())

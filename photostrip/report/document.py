@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from photostrip.errors import Fault, InputError
 from photostrip.report import (
+    covariance_sections,
     decision_sections,
     deformation_sections,
     finding_sections,
@@ -58,6 +59,11 @@ def sections_of(document: Document, *, everything: bool = False) -> tuple[Sectio
         strip_sections.junction_section(document, everything=everything),
         strip_sections.absolute_section(document),
         *([strip_sections.polynomial_section(document, everything=everything)] if document.get("polynomials") else []),
+        *(
+            [covariance_sections.covariance_section(document, everything=everything)]
+            if "covariance" in document
+            else []
+        ),
         decision_sections.weights_section(document, everything=everything),
         *([precision_sections.precision_section(document, everything=everything)] if "precision" in document else []),
         *([deformation_sections.deformation_section(document)] if document.get("deformations") else []),
@@ -187,6 +193,8 @@ def project_section(document: Document) -> Section:
 
 
 def _adjustment(document: Document) -> str:
+    if document["adjustment"] == "covariance":
+        return "with the covariance of the strip itself"
     if document["adjustment"] != "polynomial":
         return str(document["adjustment"])
     return f"polynomial, degree {document['settings']['polynomial']['degree']}"

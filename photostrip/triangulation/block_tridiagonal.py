@@ -49,7 +49,7 @@ class Factors:
         reduced = right.copy()
         for number in range(1, len(right)):
             reduced[number] -= self.shares[number - 1].T @ reduced[number - 1]
-        result = np.einsum("nij,nj->ni", self.inverses, reduced)
+        result: Floats = np.einsum("nij,nj->ni", self.inverses, reduced)
         for number in range(len(right) - 2, -1, -1):
             result[number] -= self.shares[number] @ result[number + 1]
         return result

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.triangulation.error_rows import PARAMETERS, Rows, similarity_rows
 from photostrip.triangulation.polynomial import POWERS
-from photostrip.triangulation.strip_errors import PARAMETERS, Rows, similarity_rows
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.triangulation import exterior
-from photostrip.triangulation.strip_errors import UNITS, Rows
+from photostrip.triangulation.error_rows import UNITS, Rows
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

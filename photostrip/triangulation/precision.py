@@ -14,17 +14,48 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.triangulation.strip_errors import PARAMETERS, REACH, SPAN, UNITS, Rows, StripErrors
+from photostrip.statistics import chi2_quantile
+from photostrip.triangulation.error_rows import PARAMETERS, REACH, SPAN, UNITS, Rows
+from photostrip.triangulation.relative import MINIMUM_POINTS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.triangulation.control_errors import Misclosures
+    from photostrip.triangulation.relative import Orientation
+    from photostrip.triangulation.strip_errors import StripErrors
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
 
+A_PRIORI, A_POSTERIORI = "a-priori", "a-posteriori"
+LEVEL = 0.01  # of the test that keeps the stated standard deviation of the image coordinates
 ENTRIES = 2000  # coefficients of image points worked on at a time: what fits into the processor's cache
+
+
+def image_variance(orientation: Orientation, sigma: float) -> tuple[float, str]:
+    """Variance factor of the image coordinates: 1 unless the y parallaxes contradict what is stated.
+
+    Parameters
+    ----------
+    orientation : Orientation
+        Oriented pairs.
+    sigma : float
+        Stated standard deviation of an image coordinate of weight one, mm.
+
+    Returns
+    -------
+    factor : float
+        Variance found over variance stated, or 1.
+    basis : str
+        ``"a-posteriori"`` or ``"a-priori"``.
+    """
+    redundancy = int((orientation.points_used - MINIMUM_POINTS).sum())
+    squares = float((orientation.pairs.weight * orientation.parallax**2)[orientation.used].sum()) / (2 * sigma**2)
+    if redundancy < 1:
+        return 1.0, A_PRIORI
+    low, high = (chi2_quantile(p, redundancy) for p in (LEVEL / 2, 1 - LEVEL / 2))
+    return (1.0, A_PRIORI) if low <= squares <= high else (squares / redundancy, A_POSTERIORI)
 
 
 @dataclass(frozen=True, eq=False)

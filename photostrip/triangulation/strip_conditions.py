@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geometry.rotation import cross_matrix
-from photostrip.triangulation.strip_errors import ELEMENTS, PARAMETERS, UNITS, Rows, scale_shares, similarity_rows
+from photostrip.triangulation.error_rows import ELEMENTS, PARAMETERS, UNITS, Rows, similarity_rows
+from photostrip.triangulation.strip_errors import scale_shares
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -90,8 +91,7 @@ class Conditions:
 def conditions(
     errors: StripErrors,
     strip: tuple[Orientation, FormedStrip],
-    control: Misclosures,
-    given: Floats,
+    control: tuple[Misclosures, Floats],
     local: Local,
     *,
     distances: bool = True,
@@ -104,10 +104,8 @@ def conditions(
         The formed strip.
     strip : tuple of Orientation and FormedStrip
         Its pairs and their points.
-    control : Misclosures
-        Control coordinates that count.
-    given : ndarray, shape (w,)
-        Strip minus given, metres.
+    control : tuple of Misclosures and ndarray
+        Control coordinates that count, and strip minus given in metres.
     local : Local
         Unknowns of the models.
     distances : bool
@@ -119,7 +117,7 @@ def conditions(
         Joints, control and distances, model by model.
     """
     slots = errors.points.core.shape[1]
-    parts = [_joints(errors, local, slots), _control(control, given, local)]
+    parts = [_joints(errors, local, slots), _control(*control, local)]
     if distances:
         parts.append(_distances(errors, *strip, max(slots, 2)))
     return _sorted(parts, max(slots, 2))
@@ -191,8 +189,9 @@ def _distances(errors: StripErrors, orientation: Orientation, formed: FormedStri
     before_share, _ = scale_shares(orientation, formed, pairs)
     size = (before_share[chosen] ** 2).sum(axis=1)
     order = np.lexsort((size, joined.joint[chosen]))
-    last = np.append(joined.joint[chosen][order][1:] != joined.joint[chosen][order][:-1], True) if len(order) else []
-    chosen = np.sort(chosen[order[~np.asarray(last, bool)]])
+    number = joined.joint[chosen][order]
+    last = np.append(number[1:] != number[:-1], np.ones(min(len(number), 1), bool))
+    chosen = np.sort(chosen[order[~last]])
     joint, before, after = joined.joint[chosen], joined.before[chosen], joined.after[chosen]
     arms = (pairs.arm[before] - pairs.reach[joint], pairs.arm[after])
     lengths = [np.linalg.norm(arm, axis=1) for arm in arms]

@@ -22,6 +22,18 @@ import numpy as np
 
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.triangulation import pair_errors
+from photostrip.triangulation.bridge_errors import with_bridges
+from photostrip.triangulation.error_rows import (
+    ELEMENTS,
+    PARAMETERS,
+    REACH,
+    SCALE,
+    SPAN,
+    UNITS,
+    Images,
+    Rows,
+    similarity_rows,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -33,76 +45,6 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
-
-UNITS, PARAMETERS = 6, 7
-ELEMENTS, SCALE = slice(0, 5), 5  # units of a model
-REACH = 2  # models between which units share image coordinates
-SPAN = REACH + 1  # photos on which the image coordinates of a unit lie
-
-
-@dataclass(frozen=True, eq=False)
-class Images:
-    """Image points that take part, ordered by photo, and how units depend on them.
-
-    Parameters
-    ----------
-    row : ndarray of int, shape (n,)
-        Row in the table of image points.
-    photo : ndarray of int, shape (n,)
-        Place of its photo in the strip, ascending.
-    sigma : ndarray, shape (n, 2)
-        Stated standard deviations of x and y, mm.
-    units : ndarray, shape (n, 3, 6, 2)
-        Units of the models photo - 2, photo - 1 and photo by x and y in units of their standard deviations.
-    """
-
-    row: Numbers
-    photo: Numbers
-    sigma: Floats
-    units: Floats
-
-
-@dataclass(frozen=True, eq=False)
-class Rows:
-    """Errors of things with d coordinates as rows of derivatives, sparse.
-
-    The error is ``frame xi + sum_s core[s] u[first + s] + sum own l`` with xi the similarity of model ``first``, u the
-    units of the models and l the errors of image coordinates in units of their standard deviations.
-
-    Parameters
-    ----------
-    first : ndarray of int, shape (n,)
-        Model whose similarity moves the thing as a whole.
-    frame : ndarray, shape (n, d, 7)
-        Coefficients of that similarity.
-    core : ndarray, shape (n, s, d, 6)
-        Coefficients of the units of the models from ``first`` on.
-    item : ndarray of int, shape (e,)
-        Thing of each image point that enters by itself, ascending.
-    image : ndarray of int, shape (e,)
-        That image point, a row of :class:`Images`.
-    own : ndarray, shape (e, d, 2)
-        Its coefficients.
-    """
-
-    first: Numbers
-    frame: Floats
-    core: Floats
-    item: Numbers
-    image: Numbers
-    own: Floats
-
-    def part(self, start: int, stop: int) -> Rows:
-        """Give the rows of the things from start to stop."""
-        low, high = np.searchsorted(self.item, [start, stop])
-        return Rows(
-            self.first[start:stop],
-            self.frame[start:stop],
-            self.core[start:stop],
-            self.item[low:high] - start,
-            self.image[low:high],
-            self.own[low:high],
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,29 +81,6 @@ class StripErrors:
         return len(self.steps)
 
 
-def similarity_rows(xyz: Floats, origin: Floats) -> Floats:
-    """Displacements by an infinitesimal similarity: dX = t + theta x (X - O) + lambda (X - O).
-
-    Parameters
-    ----------
-    xyz : ndarray, shape (n, 3)
-        Positions, metres.
-    origin : ndarray, shape (3,)
-        Origin O.
-
-    Returns
-    -------
-    ndarray, shape (n, 3, 7)
-        Derivatives by shift (metres), rotation (radians) and logarithm of the scale.
-    """
-    arm = xyz - origin
-    rows = np.zeros((len(arm), 3, PARAMETERS))
-    rows[:, :, :3] = np.eye(3)
-    rows[:, :, 3:6] = -cross_matrix(arm)
-    rows[:, :, 6] = arm
-    return rows
-
-
 def strip_errors(
     orientation: Orientation, formed: FormedStrip, similarity: Similarity, position: Numbers, sigma: Floats
 ) -> StripErrors:
@@ -194,6 +113,9 @@ def strip_errors(
     images = Images(images.row, images.photo, images.sigma, units * images.sigma[:, None, None, :])
     steps = _steps(derivatives, centers[1:] - origin)
     points = _point_rows(orientation, formed, derivatives, similarity(formed.xyz) - origin, (images, place, steps))
+    if len(formed.bridging):
+        photos = (centers - origin, similarity.rotation @ formed.rotations)
+        points = with_bridges(points, (orientation, formed), (images, place), photos, steps)
     return StripErrors(images, steps, _unit_covariances(images, len(steps)), points, derivatives, origin)
 
 

@@ -107,14 +107,6 @@ SCHEMA = [
     (Y, "0.40", "-0.40", "project.yaml:32:28:", "out of range"),
 ]
 NOT_YET = [
-    (
-        Y,
-        "processing:",
-        "processing:\n  adjustment: covariance",
-        "project.yaml:30:15:",
-        "not available yet",
-        "polynomial",
-    ),
     (Y, "processing:", "processing:\n  earth_curvature: image", "project.yaml:30:20:", "counted twice", "EPSG:32633"),
 ]
 REFERENCES = [

@@ -130,3 +130,35 @@ def test_a_photo_goes_where_all_its_points_go() -> None:
     assert found.photos.frame[:, :3, 6] == pytest.approx(centers, abs=1e-6)
     assert found.photos.frame[:, 3:, 3:6] == pytest.approx(np.broadcast_to(np.eye(3), (6, 3, 3)), abs=1e-9)
     assert found.photos.frame[:, 3:, [0, 1, 2, 6]] == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("adjustment", ["similarity", "covariance"])
+def test_points_without_a_model_have_rows_too(adjustment: str) -> None:
+    """A point whose middle measurement is wrong is placed by the outer two; its derivatives against differences."""
+    inputs = without_noise(spec(7, 62.0))
+    observations = inputs.observations
+    counts = np.bincount(observations.point)
+    point = int(np.flatnonzero(counts == 3)[5])
+    rows = np.flatnonzero(observations.point == point)
+    rows = rows[np.argsort(observations.photo[rows])]
+    xy = observations.xy.copy()
+    xy[rows[1]] += [0.3, 0.4]
+    inputs = replace(inputs, observations=replace(observations, xy=xy))
+    plain = Settings(adjustment="similarity")
+    result = triangulate(inputs, plain)
+    formed = result.strips[0].formed
+    assert set(formed.bridging) == {rows[0], rows[2]}
+    found = errors_of(result)
+    place = int(np.searchsorted(formed.point, point))
+    misclosures = written_out(found.control.rows, found.errors)[:, 0]
+    by_image = written_out(found.errors.points, found.errors) - found.influence @ found.fit.operator @ misclosures
+    for row in (rows[0], rows[2], int(np.flatnonzero(observations.photo == 3)[2])):
+        by_points, _ = differenced(inputs, plain, (int(row), 1), 2e-4)
+        image = int(np.flatnonzero(found.errors.images.row == row)[0])
+        derivative = by_image[place, :, 2 * image + 1] / found.errors.images.sigma[image, 1]
+        assert derivative == pytest.approx(by_points[place], abs=CLOSE * np.abs(by_points).max())
+    precise = triangulate(inputs, Settings(adjustment=adjustment)).precision
+    assert precise is not None
+    sigma = np.sqrt(np.diagonal(precise.points, axis1=1, axis2=2))
+    assert (sigma > 0.01).all()
+    assert (sigma < 0.6).all()

@@ -5,7 +5,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from photostrip import __version__
-from photostrip.formats.result import conventions, deformation, ground, pairs, photos, precision, strips, summary
+from photostrip.formats.result import (
+    conventions,
+    covariance,
+    deformation,
+    ground,
+    pairs,
+    photos,
+    precision,
+    strips,
+    summary,
+)
 from photostrip.formats.result.numbers import Document, natural_rank
 from photostrip.formats.result.verdict import verdict_of
 
@@ -52,6 +62,7 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         "strips": strips.strips_of(result),
         "absolute": strips.absolute_of(result),
         **({"polynomial": polynomials[0], "polynomials": polynomials} if polynomials else {}),
+        **covariance.covariances_of(result),
         **precision.precision_of(result),
         "control": ground.control_of(result, found),
         "misclosures": ground.misclosures_of(result),

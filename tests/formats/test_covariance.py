@@ -1,0 +1,75 @@
+"""The adjustment with the strip's own covariance in result.json and in the report."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from photostrip.distributions import gamma_cdf
+from photostrip.formats.simulation import inputs_of
+from photostrip.pipeline import Settings
+from photostrip.report import sections_of, title_of
+from photostrip.report.text import to_text
+from photostrip.simulate.simulation import simulate
+from photostrip.simulate.spec import GrossError
+from tests.results import Case, case, solved, spec
+
+
+@cache
+def adjusted(strips: int = 1) -> Case:
+    return solved(inputs_of(simulate(spec("projected", strips))), Settings(adjustment="covariance"))
+
+
+@pytest.mark.parametrize("strips", [1, 2])
+def test_the_block_holds_the_tests(strips: int) -> None:
+    known = adjusted(strips)
+    assert known.document["adjustment"] == "covariance"
+    assert "polynomial" not in known.document
+    blocks = known.document["covariance"]
+    assert [block["strip"] for block in blocks] == [strip.strip.id for strip in known.result.strips]
+    for block, strip in zip(blocks, known.result.strips, strict=True):
+        assert block["redundancy"] == block["control_coordinates"] - 7 + block["distances"]
+        assert block["control_coordinates"] == int(strip.control.use.sum())
+        assert block["sigma0"] == pytest.approx(np.sqrt(block["squares"] / block["redundancy"]), rel=1e-3)
+        assert block["p"] == pytest.approx(1 - gamma_cdf(block["squares"] / 2, block["redundancy"] / 2), rel=1e-2)
+        assert [row["id"] for row in block["control"][::3]] == sorted(strip.control.ids, key=lambda n: int(n[1:]))
+        joints = len(strip.formed.junctions.factor)
+        assert block["distances"] == int(strip.formed.junctions.used.sum()) - joints
+
+
+def test_points_are_better_than_with_a_polynomial() -> None:
+    """The stated standard deviations of the new points are smaller: least squares leaves nothing better."""
+    for name in ("plan", "height"):
+        own, other = (known.document["precision"]["points"][name]["rms"] for known in (adjusted(), case("projected")))
+        assert own <= other
+
+
+def test_photos_and_points_belong_together() -> None:
+    """Image residuals are of the size of the errors of the image coordinates, 5 micrometres, or below."""
+    assert 2.0 < adjusted().document["summary"]["image_rms_um"] < 5.5
+
+
+def test_the_report_shows_the_tests() -> None:
+    text = to_text(title_of(adjusted().document), sections_of(adjusted().document), 100)
+    text = " ".join(text.split())
+    assert "Adjustment with the covariance of the strip" in text
+    assert "probability of a larger one by chance" in text
+    assert "Polynomial adjustment" not in text
+
+
+def test_a_polynomial_is_told_of_the_alternative() -> None:
+    """Three bands of control are few for a polynomial; with none used there is nothing to propose."""
+    for known in (case("projected"), adjusted()):
+        polynomial = known.result.strips[0].polynomial
+        used = polynomial is not None and polynomial.degree > 0
+        codes = {note["code"] for note in known.document["notes"]}
+        assert ("covariance-proposed" in codes) == used
+
+
+def test_exchanged_image_points_do_not_stop_it() -> None:
+    """Gross errors are found before, as with every adjustment."""
+    inputs = inputs_of(simulate(spec("projected", 1, 5.0, GrossError("image", count=3, size_um=500.0))))
+    known = solved(inputs, Settings(adjustment="covariance"))
+    assert known.document["summary"]["check"]["plan"]["rms"] < 0.3

@@ -1,0 +1,170 @@
+"""The banded adjustment against the same written out in full; what it makes of wrong control; its special cases."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from photostrip.pipeline import Result, Settings, StripResult, triangulate
+from photostrip.pipeline import covariance as pipeline_covariance
+from photostrip.triangulation import block_tridiagonal, strip_conditions, strip_covariance, strip_system
+from tests.derivatives import UNSCREENED, errors_of, spec, without_noise, written_out
+
+if TYPE_CHECKING:
+    from photostrip.triangulation.error_rows import Rows
+    from photostrip.triangulation.strip_errors import StripErrors
+
+    Prepared = tuple[StripErrors, strip_conditions.Conditions, strip_conditions.Local]
+
+COVARIANCE = Settings(adjustment="covariance", relative=UNSCREENED)
+SIMILARITY = Settings(adjustment="similarity", relative=UNSCREENED)
+
+
+@cache
+def noisy(photos: int, lap: float, bands: int = 3, seed: int = 4) -> Result:
+    """A strip with errors of 5 micrometres, oriented by the similarity alone."""
+    inputs = without_noise(spec(photos, lap, bands=bands))
+    errors = np.random.default_rng(seed).normal(0, 0.005, inputs.observations.xy.shape)
+    observations = replace(inputs.observations, xy=inputs.observations.xy + errors)
+    return triangulate(replace(inputs, observations=observations), SIMILARITY)
+
+
+def prepared(result: Result, *, distances: bool) -> Prepared:
+    found = errors_of(result)
+    (strip,) = result.strips
+    local = strip_conditions.Local.about(strip_conditions.centers_of(found.errors)[:-1], 900.0)
+    given = strip.absolute.misclosures[found.control.point, found.control.axis]
+    formed = (strip.orientation, strip.formed)
+    wanted = strip_conditions.conditions(found.errors, formed, (found.control, given), local, distances=distances)
+    return found.errors, wanted, local
+
+
+def without_frame(rows: Rows) -> Rows:
+    return replace(rows, frame=np.zeros_like(rows.frame))
+
+
+@pytest.mark.parametrize("distances", [False, True])
+@pytest.mark.parametrize(("photos", "lap"), [(2, 62.0), (3, 60.0), (4, 62.0), (8, 62.0), (9, 80.0)])
+def test_the_band_gives_what_the_whole_matrix_gives(photos: int, lap: float, *, distances: bool) -> None:
+    """Coordinates, covariances and test values against K [lambda; y] = [w; 0] with everything written out."""
+    result = noisy(photos, lap, min(3, photos))
+    errors, wanted, local = prepared(result, distances=distances)
+    factor, n = 1.3, errors.models
+    solved = strip_system.system(errors, wanted, factor)
+    things = [errors.points, pipeline_covariance.photo_rows(errors)]
+    predicted, cofactors = strip_covariance.predict(errors, wanted, local, solved, things)
+
+    by_images = written_out(without_frame(wanted.rows), errors)[:, 0]
+    design = np.zeros((len(wanted.value), 7 * (n + 1)))
+    for row, model in enumerate(wanted.rows.first.tolist()):
+        design[row, 7 * model : 7 * model + 7] = wanted.rows.frame[row, 0]
+        design[row, 7 * model + 7 : 7 * model + 14] = wanted.following[row]
+    design = design[:, : 7 * n]
+    corner = np.zeros((7 * n, 7 * n))
+    whole = np.block([[by_images @ by_images.T + np.diag(wanted.noise / factor), design], [design.T, corner]])
+    solution = np.linalg.solve(whole, np.concatenate([wanted.value, np.zeros(7 * n)]))
+    inverse = np.linalg.inv(whole)
+    assert cofactors == pytest.approx(np.diag(inverse)[: len(cofactors)], abs=1e-8 * np.abs(inverse).max())
+    for rows, found in zip(things, predicted, strict=True):
+        own = written_out(without_frame(rows), errors)
+        size = rows.frame.shape[1]
+        for thing in range(len(rows.first)):
+            column = np.zeros((len(whole), size))
+            column[: len(by_images)] = by_images @ own[thing].T
+            start = len(by_images) + 7 * rows.first[thing]
+            column[start : start + 7] = (rows.frame[thing] @ local.to_common[rows.first[thing]]).T
+            assert found.error[thing] == pytest.approx(column.T @ solution, abs=1e-9)
+            covariance = own[thing] @ own[thing].T - column.T @ inverse @ column
+            assert found.covariance[thing] == pytest.approx(covariance, abs=1e-8 * np.abs(covariance).max())
+
+
+def test_blocks_are_eliminated_like_any_system() -> None:
+    """Indefinite blocks of random numbers, against the dense inverse."""
+    rng = np.random.default_rng(8)
+    diagonal, beside = rng.normal(size=(5, 4, 4)), rng.normal(size=(5, 4, 4))
+    diagonal = diagonal + diagonal.transpose(0, 2, 1) + np.diag([9.0, 9.0, -9.0, -9.0])
+    beside[-1] = 0.0
+    dense = np.zeros((20, 20))
+    for number in range(5):
+        rows = slice(4 * number, 4 * number + 4)
+        dense[rows, rows] = diagonal[number]
+        if number < 4:
+            after = slice(4 * number + 4, 4 * number + 8)
+            dense[rows, after], dense[after, rows] = beside[number], beside[number].T
+    factors = block_tridiagonal.eliminate(diagonal, beside)
+    right = rng.normal(size=(5, 4))
+    assert factors.solve(right).ravel() == pytest.approx(np.linalg.solve(dense, right.ravel()), rel=1e-9)
+    inverse = np.linalg.inv(dense)
+    for number, blocks in factors.inverse():
+        for apart, block in enumerate(blocks):
+            first, second = 4 * number, 4 * (number + apart)
+            if second < 20:
+                assert block == pytest.approx(inverse[first : first + 4, second : second + 4], abs=1e-9)
+
+
+@pytest.mark.parametrize("lap", [60.0, 80.0])
+def test_true_coordinates_come_back(lap: float) -> None:
+    inputs = without_noise(spec(7, lap))
+    result, plain = triangulate(inputs, COVARIANCE), triangulate(inputs, SIMILARITY)
+    assert result.points.cartesian == pytest.approx(plain.points.cartesian, abs=1e-6)
+    (strip,) = result.strips
+    assert strip.resection.rotations == pytest.approx(plain.strips[0].resection.rotations, abs=1e-9)
+    assert strip.resection.residuals == pytest.approx(0.0, abs=1e-9)
+
+
+def adjusted(seed: int, *, wrong: float = 0.0, axis: int = 2) -> tuple[StripResult, str]:
+    """A strip of 12 photos with its errors, and one control point made wrong."""
+    inputs = without_noise(spec(12, bands=5))
+    rng = np.random.default_rng(seed)
+    xy = inputs.observations.xy + rng.normal(0, 0.005, inputs.observations.xy.shape)
+    control = inputs.control
+    given = control.enu + rng.normal(0, 1, control.enu.shape) * control.sigma
+    row = [n for n, check in enumerate(control.check) if not check][7]
+    given[row, axis] += wrong
+    changed = replace(inputs, observations=replace(inputs.observations, xy=xy), control=replace(control, enu=given))
+    return triangulate(changed, COVARIANCE).strips[0], control.ids[row]
+
+
+@pytest.mark.parametrize(("axis", "size"), [(0, 1.0), (1, -1.0), (2, 1.5)])
+def test_a_wrong_control_point_is_named(axis: int, size: float) -> None:
+    """And the error is estimated; without it no point is named."""
+    strip, name = adjusted(3, wrong=size, axis=axis)
+    notes = [note for note in strip.notes if note.code == "control-doubtful"]
+    assert [note.points for note in notes] == [(name,)]
+    assert strip.covariance is not None
+    worst = strip.covariance.tested.doubtful[0]
+    assert strip.covariance.tested.size[worst] == pytest.approx(size, abs=0.45)
+    clean, _ = adjusted(3)
+    assert not [note for note in clean.notes if note.code in {"control-doubtful", "strip-contradicted"}]
+
+
+@pytest.mark.slow
+def test_sums_of_squares_follow_chi_square() -> None:
+    """Mean and scatter of the test of the whole over 60 strips, and of the test values of control."""
+    found = [adjusted(seed)[0].covariance for seed in range(60)]
+    tested = [each.tested for each in found if each is not None]
+    ratio = np.array([each.squares / each.redundancy for each in tested])
+    expected = np.sqrt(2 / tested[0].redundancy)
+    assert ratio.mean() == pytest.approx(1.0, abs=4 * expected / np.sqrt(60))
+    assert ratio.std(ddof=1) == pytest.approx(expected, rel=0.4)
+    values = np.concatenate([each.normalised for each in tested])
+    assert np.sqrt(np.mean(values**2)) == pytest.approx(1.0, abs=0.06)
+
+
+def test_coordinates_worse_than_stated_are_told() -> None:
+    """A lens that distorts is in no covariance: the test of the whole fails."""
+    inputs = without_noise(spec(12, bands=5))
+    observations = inputs.observations
+    xy = observations.xy + np.random.default_rng(1).normal(0, 0.001, observations.xy.shape)
+    radius = np.linalg.norm(xy, axis=1, keepdims=True)
+    bent = xy * (1 + 0.03 * (radius / 100) ** 2 / 100)  # 30 micrometres at 100 mm
+    sharp = replace(observations, xy=bent, sigma=np.full_like(observations.sigma, 0.001))
+    (strip,) = triangulate(replace(inputs, observations=sharp), COVARIANCE).strips
+    assert strip.covariance is not None
+    tested = strip.covariance.tested
+    assert tested.probability < 1e-3
+    assert {note.code for note in strip.notes} & {"control-doubtful", "strip-contradicted"}
