@@ -1,10 +1,12 @@
-"""How well plans agree with simulated measurements: one geometry, thousands of measurements of it, whole runs.
+"""How well plans agree with simulated measurements: one geometry, thousands of measurements of it.
 
 For each layout of control and each method the standard deviations that `photostrip plan strip` predicts stand beside
-the scatter of adjusted points over all repetitions. The part on one model does the same for `photostrip plan model`,
-with the exact relative orientation, intersection and absolute orientation of every repetition.
+the scatter of adjusted points over all repetitions of whole runs (the bundle: over repetitions of its adjustment). The
+part on one model does the same for `photostrip plan model`, with the exact relative orientation, intersection and
+absolute orientation of every repetition.
 
-Usage: python benchmarks/planning.py [--repeat N] [--photos N] [--layouts NAME ...] [--methods NAME ...] [--workers N]
+Usage: python benchmarks/planning.py [--part model strip] [--repeat N] [--models N] [--layouts NAME ...]
+       [--methods NAME ...] [--workers N]
 """
 
 from __future__ import annotations
@@ -28,35 +30,60 @@ from photostrip.geodesy.frame_spec import FrameSpec  # noqa: E402
 from photostrip.pipeline import Inputs, Settings, Strip, triangulate  # noqa: E402
 from photostrip.planning.control_layout import Layout, Spot, numbers_of, spots_of  # noqa: E402
 from photostrip.planning.ideal_strip import StripGeometry, ideal_strip  # noqa: E402
-from photostrip.planning.strip_methods import DEGREES, METHODS, accuracy, control_of  # noqa: E402
+from photostrip.planning.model_plan import (  # noqa: E402
+    LAYOUTS as MODEL_LAYOUTS,
+)
+from photostrip.planning.model_plan import (  # noqa: E402
+    ControlPoint,
+    ModelSpec,
+    control_layout,
+    plan_model,
+    standard_zones,
+)
+from photostrip.planning.single_model import Control, orientation_operator  # noqa: E402
+from photostrip.planning.strip_methods import (  # noqa: E402
+    BUNDLE,
+    DEGREES,
+    METHODS,
+    accuracy,
+    bundle_problem,
+    control_of,
+)
 from photostrip.points import ControlPoints  # noqa: E402
 from photostrip.simulate.spec import FILM  # noqa: E402
-from photostrip.triangulation import polynomial, relative  # noqa: E402
+from photostrip.triangulation import formation, gruber, polynomial, relative  # noqa: E402
+from photostrip.triangulation.bundle.solve import solve  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
+    from photostrip.planning.control_layout import Spot as ControlSpot
     from photostrip.planning.ideal_strip import IdealStrip
 
     Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 SEED = 20_240
 FEWEST = 2  # repetitions that give a scatter
+FOCAL = 153.0
+MODEL_REPETITIONS = 4000
+SIGMA = (0.05, 0.05, 0.05)
 LAYOUTS = {
-    "bands every 4": Layout("bands every 4", every=4, sigma=(0.05, 0.05, 0.05)),
-    "3 bands": Layout("3 bands", bands=3, sigma=(0.05, 0.05, 0.05)),
-    "corners": Layout("corners", kind="corners", sigma=(0.05, 0.05, 0.05)),
-    "corners+centre": Layout("corners+centre", kind="corners+centre", sigma=(0.05, 0.05, 0.05)),
+    "bands every 4": Layout("bands every 4", every=4, sigma=SIGMA),
+    "3 bands": Layout("3 bands", bands=3, sigma=SIGMA),
+    "corners": Layout("corners", kind="corners", sigma=SIGMA),
+    "corners+centre": Layout("corners+centre", kind="corners+centre", sigma=SIGMA),
     "mixed": Layout(
         "mixed",
         kind="corners",
-        spots=(Spot(4, 2, "z"), Spot(6, 1, "xy"), Spot(6, 3, "z"), Spot(8, 2, "xyz")),
+        spots=(Spot(3, 3, "z"), Spot(5, 1, "xy"), Spot(5, 5, "z"), Spot(7, 3)),
         sigma=(0.03, 0.03, 0.05),
     ),
 }
+
+
+# ------------------------------------------------------------------------------------------------------- strips
 
 
 @dataclass(frozen=True)
@@ -79,19 +106,19 @@ def repetitions(task: Task) -> dict[str, tuple[Floats, Floats]]:
         rng = np.random.default_rng([SEED, number])
         inputs = measured(strip, spots, task.layout, rng)
         for method in task.methods:
-            error = adjusted(strip, inputs, method) - strip.xyz
+            solved = bundled(strip, task.layout, inputs) if method == BUNDLE else adjusted(strip, inputs, method)
+            error = solved - strip.xyz
             found[method][0][:] += error
             found[method][1][:] += error**2
     return found
 
 
-def measured(strip: IdealStrip, spots: tuple[Spot, ...], layout: Layout, rng: np.random.Generator) -> Inputs:
+def measured(strip: IdealStrip, spots: tuple[ControlSpot, ...], layout: Layout, rng: np.random.Generator) -> Inputs:
     """Give a strip as it would be measured: errors in the image coordinates and in the control."""
     observed = strip.observations
     noise = rng.normal(size=observed.xy.shape) * observed.sigma
     control = control_of(strip, spots, layout.sigma)
-    numbers = numbers_of(strip, spots)
-    names = tuple(observed.point_ids[strip.formed.point[number]] for number in numbers)
+    names = tuple(observed.point_ids[strip.formed.point[number]] for number in numbers_of(strip, spots))
     given = control.enu + rng.normal(size=control.enu.shape) * control.sigma
     return Inputs(
         "plan",
@@ -104,15 +131,31 @@ def measured(strip: IdealStrip, spots: tuple[Spot, ...], layout: Layout, rng: np
 
 def adjusted(strip: IdealStrip, inputs: Inputs, method: str) -> Floats:
     """Coordinates of the points of the strip by a whole run."""
-    adjustment = "polynomial" if method in DEGREES else method
     settings = Settings(
         relative=relative.Settings(screening="none"),
         polynomial=polynomial.Settings(DEGREES.get(method, "auto")),
-        adjustment=adjustment,
+        adjustment="polynomial" if method in DEGREES else method,
     )
     result = triangulate(inputs, settings)
     order = np.searchsorted(result.points.number, strip.formed.point)
     xyz: Floats = result.points.cartesian[order]
+    return xyz
+
+
+def bundled(strip: IdealStrip, layout: Layout, inputs: Inputs) -> Floats:
+    """Coordinates of the points of the strip by a bundle adjustment that starts at the truth."""
+    control = inputs.control
+    names = [inputs.observations.point_ids[number] for number in strip.formed.point]
+    numbers = np.array([names.index(name) for name in control.ids], np.intp)
+    problem = bundle_problem(strip, layout, numbers, control)
+    seen = np.isin(inputs.observations.point, strip.formed.point)
+    given = np.where(control.use, control.enu, strip.xyz[numbers])
+    problem = replace(
+        problem,
+        images=replace(problem.images, xy=inputs.observations.xy[seen]),
+        control=replace(problem.control, xyz=given),
+    )
+    xyz: Floats = solve(problem).points
     return xyz
 
 
@@ -132,37 +175,108 @@ def compare(geometry: StripGeometry, layout: Layout, methods: Sequence[str], opt
         total, squares = (sum(part[method][k] for part in parts) for k in range(2))
         scatter = np.sqrt(squares / options.repeat - (total / options.repeat) ** 2)
         expected = accuracy(strip, layout, spots, method)
-        new = expected.new
-        plan, height = (_rms(expected.sigmas[new][:, k]) for k in ((0, 1), (2,)))
-        found_plan, found_height = (_rms(scatter[new][:, k]) for k in ((0, 1), (2,)))
-        single = expected.sigmas[new] / scatter[new]
-        print(
-            f"{layout.name:<16} {method:<11} {plan:8.3f} {found_plan:8.3f} {plan / found_plan:7.3f}"
-            f" {height:8.3f} {found_height:8.3f} {height / found_height:7.3f}   {single.min():.2f}-{single.max():.2f}"
-        )
+        print(line(f"{layout.name:<16} {method:<11}", expected.sigmas[expected.new], scatter[expected.new]))
+
+
+def line(head: str, expected: Floats, scatter: Floats) -> str:
+    """Predicted and actual rms in plan and height, their ratios, and the range of the ratios of single coordinates."""
+    parts = [head]
+    for columns in ((0, 1), (2,)):
+        predicted, actual = (_rms(values[:, columns]) for values in (expected, scatter))
+        parts.append(f"{predicted:8.3f} {actual:8.3f} {predicted / actual:7.3f}")
+    single = expected / scatter
+    return f"{' '.join(parts)}   {single.min():.2f}-{single.max():.2f}"
 
 
 def _rms(values: Floats) -> float:
     return float(np.sqrt((values**2).sum(axis=1).mean()))
 
 
+def strips(options: argparse.Namespace) -> None:
+    """Print the table of strips."""
+    geometry = StripGeometry(replace(FILM, principal_distance=FOCAL, fiducials={}), options.models + 1)
+    print(f"{options.models} models, 60 % overlap, 1:10000, 5 um; {options.repeat} repetitions; metres")
+    print(f"{'control':<16} {'method':<11} {HEAD}")
+    for name in options.layouts:
+        compare(geometry, LAYOUTS[name], options.methods, options)
+
+
+# ---------------------------------------------------------------------------------------------------- one model
+
+HEAD = " ".join(f"{name:>8} {'actual':>8} {'ratio':>7}" for name in ("plan", "height")) + "   single"
+
+
+def models(options: argparse.Namespace) -> None:
+    """Print the table of one model."""
+    mixed = (
+        ((0.0, 80.0), "xyz"),
+        ((92.0, -80.0), "xyz"),
+        ((90.0, 70.0), "z"),
+        ((5.0, -75.0), "xy"),
+        ((40.0, 0.0), "z"),
+    )
+    count = max(MODEL_REPETITIONS, FEWEST) if options.repeat >= 1000 else options.repeat
+    print(f"one model, b = a = 92 mm, 1:10000, 5 um, six standard points; {count} repetitions; metres")
+    print(f"{'control':<16} {'points':<11} {HEAD}")
+    for name in (*MODEL_LAYOUTS, "mixed"):
+        points = tuple(ControlPoint(at, use) for at, use in mixed) if name == "mixed" else control_layout(name, 92, 92)
+        spec = ModelSpec(FOCAL, 92.0, 92.0, control=points, control_sigma=SIGMA)
+        forecast = plan_model(spec)
+        scatter = measured_models(spec, forecast.places, count)
+        new = len(forecast.places)
+        print(line(f"{name:<16} {'new':<11}", forecast.sigmas, scatter[:new]))
+        print(line(f"{name:<16} {'control':<11}", forecast.at_control, scatter[new:]))
+
+
+def measured_models(spec: ModelSpec, places: Floats, count: int) -> Floats:
+    """Scatter in metres of new points and control of a model that is measured, oriented and fitted many times."""
+    rng = np.random.default_rng(SEED)
+    six, at = np.array(standard_zones(spec.base, spec.width)), np.array([point.at for point in spec.control])
+    every = np.vstack([six, places, at])
+    n = len(every)
+    left = np.tile(every, (count, 1)) + spec.image_sigma * rng.normal(size=(count * n, 2))
+    right = np.tile(every - (spec.base, 0.0), (count, 1)) + spec.image_sigma * rng.normal(size=(count * n, 2))
+    weight = np.tile(np.arange(n) < len(six), count).astype(float)
+    pairs = relative.Pairs(np.arange(count) * n, np.repeat(np.arange(count), n), left, right, weight, spec.focal)
+    oriented, _ = relative.attempt(pairs, np.tile(np.arange(n), count), np.zeros((count * n, 2), np.intp))
+    vectors, _, _ = formation.model_points(oriented)
+    direction, _ = gruber.dependent_pair(oriented.elements)
+    model = vectors.reshape(count, n, 3) * (spec.base / direction[:, :1])[:, :, None]
+    error = (model - np.column_stack([every, np.full(n, -spec.focal)]))[:, len(six) :]
+    control = Control(
+        np.column_stack([at, np.full(len(at), spec.focal)]),
+        np.array(["xy" in point.use for point in spec.control]),
+        np.array(["z" in point.use for point in spec.control]),
+        np.zeros((len(at), 3, 3)),
+        np.zeros((len(at), 3, 3)),
+    )
+    where = np.column_stack([every[len(six) :], np.full(n - len(six), spec.focal)])
+    given = rng.normal(size=(count, len(at), 3)) * spec.control_sigma / spec.ground_unit
+    misclosure = error[:, len(places) :] - given
+    fitted = error - np.einsum("qanb,rnb->rqa", orientation_operator(where, control), misclosure)
+    scatter: Floats = fitted.std(axis=0) * spec.ground_unit
+    return scatter
+
+
+PARTS = {"model": models, "strip": strips}
+
+
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--part", nargs="+", default=list(PARTS), choices=list(PARTS))
     parser.add_argument("--repeat", type=int, default=1000)
-    parser.add_argument("--photos", type=int, default=11)
+    parser.add_argument("--models", type=int, default=8)
     parser.add_argument("--layouts", nargs="+", default=list(LAYOUTS), choices=list(LAYOUTS))
     parser.add_argument("--methods", nargs="+", default=list(METHODS), choices=list(METHODS))
     parser.add_argument("--workers", type=int, default=1)
     options = parser.parse_args()
     options.repeat = max(options.repeat, FEWEST)
-    geometry = StripGeometry(replace(FILM, principal_distance=153.0, fiducials={}), options.photos)
-    print(f"{options.photos} photos, 60 % overlap, 1:10000, 5 um; {options.repeat} repetitions of one geometry; metres")
-    print("rms over all new points; single: range of predicted over actual of single coordinates\n")
-    columns = " ".join(f"{name:>8} {'actual':>8} {'ratio':>7}" for name in ("plan", "height"))
-    print(f"{'control':<16} {'method':<11} {columns}   single")
-    for name in options.layouts:
-        compare(geometry, LAYOUTS[name], options.methods, options)
+    print("predicted and actual standard deviations, rms over all points; plan: both coordinates together;")
+    print("single: range of predicted over actual of single coordinates\n")
+    for part in options.part:
+        PARTS[part](options)
+        print()
 
 
 if __name__ == "__main__":
