@@ -50,3 +50,14 @@ def test_batch_prints_overhead_and_speed_up() -> None:
     ):
         assert re.search(rf"^{words} +\d+\.\d\d  target 1\.\d0$", out, re.MULTILINE)
     assert re.search(r"^50000 such strips unchanged +\d+\.\d min$", out, re.MULTILINE)
+
+
+@pytest.mark.slow
+def test_planning_prints_predicted_and_actual_deviations() -> None:
+    options = ("--repeat", "60", "--models", "4", "--layouts", "3 bands", "--methods", "similarity", "bundle")
+    out = printed("planning.py", *options)
+    rows = re.findall(r"^(\S+(?: \S+)?) +(new|control|similarity|bundle)((?: +\d+\.\d{3}){6})   \d", out, re.MULTILINE)
+    assert [row[:2] for row in rows][-2:] == [("3 bands", "similarity"), ("3 bands", "bundle")]
+    ratios = [float(value) for row in rows for value in (row[2].split()[2], row[2].split()[5])]
+    assert len(ratios) == 20
+    assert all(0.7 < ratio < 1.4 for ratio in ratios)

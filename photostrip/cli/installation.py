@@ -20,6 +20,7 @@ FORMATS = {
         "simulation (YAML): photostrip simulate",
         "result.json, baseline.json: photostrip report, compare",
         "tolerance profile (YAML): photostrip compare",
+        "plans of a model, a strip, cameras (YAML): photostrip plan",
         "phototheodolite projects and tables (YAML, .csv): photostrip terrestrial",
     ],
     "written": [

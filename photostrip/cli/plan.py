@@ -152,7 +152,6 @@ def strip(  # noqa: PLR0913, PLR0917 (an argument for each option)
     """Compute the expected accuracy along a strip, for layouts of control and methods of adjustment."""
     with told(form):
         from photostrip.formats.plan_strip import strip_document
-        from photostrip.planning.strip_design import plan_strip
         from photostrip.project.plan_strip_file import layout_assignment, load_strip_plan
 
         options = {
@@ -164,7 +163,7 @@ def strip(  # noqa: PLR0913, PLR0917 (an argument for each option)
         _is_picture(output)  # refused before anything is computed
         layouts = [layout_assignment(word) for word in control or []]
         given = load_strip_plan(file, [*layouts, *as_assignments(options, assignments)])
-        document = strip_document(given.name, plan_strip(given.design))
+        document = strip_document(given.name, given.worked_out())
         deliver(document, form, output, document, quiet=quiet)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -12,6 +12,10 @@ def schema(
     simulation: Annotated[
         bool, typer.Option("--simulation", help="The specification of `photostrip simulate` instead.")
     ] = False,
+    plan: Annotated[
+        Literal["model", "strip", "camera"] | None,
+        typer.Option("--plan", help="The file of this command of `photostrip plan` instead."),
+    ] = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="FILE", help="File to write; default: stdout.")
     ] = None,
@@ -24,10 +28,12 @@ def schema(
     import json
 
     from photostrip.formats.writing import write_text
+    from photostrip.project.plan_schemas import plan_schema
     from photostrip.project.schema import json_schema
     from photostrip.project.simulation_spec import simulation_schema
 
-    text = json.dumps(simulation_schema() if simulation else json_schema(), indent=2, ensure_ascii=True) + "\n"
+    found = plan_schema(plan) if plan else simulation_schema() if simulation else json_schema()
+    text = json.dumps(found, indent=2, ensure_ascii=True) + "\n"
     if output is None:
         typer.echo(text, nl=False)
     else:

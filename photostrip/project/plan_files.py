@@ -7,7 +7,7 @@ these keys.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Self, TypeVar
+from typing import TYPE_CHECKING, Annotated, Self, TypeVar
 
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
@@ -18,7 +18,7 @@ from photostrip.planning import camera_efficiency
 from photostrip.planning.model_plan import LAYOUTS, ControlPoint, ModelSpec, control_layout
 from photostrip.project.document import COMMAND_LINE, Node, Place
 from photostrip.project.merging import override, read_tree
-from photostrip.project.schema import Id, Pair, Positive, Section, Words, described, key, wrong
+from photostrip.project.schema import Id, Pair, Positive, Section, Words, key, wrong
 from photostrip.project.simulation_spec import SimulatedCamera, Three, Whole, camera_of
 from photostrip.project.terrestrial_presets import one_of
 from photostrip.project.terrestrial_ranges import Range, bounded
@@ -165,7 +165,7 @@ def load_model_plan(path: Path | None, assignments: Sequence[str]) -> ModelPlan:
     InputError
         With every fault.
     """
-    given, files = read_plan(ModelPlanFile, path, assignments)
+    given, files, _ = read_plan(ModelPlanFile, path, assignments)
     camera = camera_of(given.camera)
     along, across = camera.format or (230.0, 230.0)
     base = given.base or along * (1.0 - given.end_lap_percent / 100.0)
@@ -272,7 +272,7 @@ def load_camera_plan(path: Path, assignments: Sequence[str]) -> CameraPlan:
     InputError
         With every fault.
     """
-    given, files = read_plan(CameraPlanFile, path, assignments)
+    given, files, _ = read_plan(CameraPlanFile, path, assignments)
     cameras = tuple(_plan_camera(str(name), each, given.end_lap_percent) for name, each in given.cameras.items())
     named = {camera.name: camera for camera in cameras}
     return CameraPlan(str(given.name), cameras, named.get(str(given.reference), cameras[-1]), files)
@@ -290,7 +290,7 @@ def _plan_camera(name: str, given: PlanCamera, end_lap: float) -> camera_efficie
 # ---------------------------------------------------------------------------------------------------- any plan
 
 
-def read_plan(kind: type[T], path: Path | None, assignments: Sequence[str]) -> tuple[T, tuple[str, ...]]:
+def read_plan(kind: type[T], path: Path | None, assignments: Sequence[str]) -> tuple[T, tuple[str, ...], Node]:
     """Read a plan file, or make one of assignments alone.
 
     Parameters
@@ -308,6 +308,8 @@ def read_plan(kind: type[T], path: Path | None, assignments: Sequence[str]) -> t
         What is given, with all defaults.
     tuple of str
         Every file that was read.
+    Node
+        The plan as a tree.
 
     Raises
     ------
@@ -327,18 +329,4 @@ def read_plan(kind: type[T], path: Path | None, assignments: Sequence[str]) -> t
     findings.stop()
     if given is None:  # cannot be: checked() had a reason, and stop() told it
         raise InputError(f"{path} is not a valid plan")
-    return given, tuple(files)
-
-
-def plan_schemas() -> dict[str, dict[str, Any]]:
-    """JSON Schemas of the plan files.
-
-    Returns
-    -------
-    dict of str to dict
-        By ``model`` and ``cameras``.
-    """
-    return {
-        "model": described(ModelPlanFile, "photostrip plan model"),
-        "cameras": described(CameraPlanFile, "photostrip plan camera"),
-    }
+    return given, tuple(files), root

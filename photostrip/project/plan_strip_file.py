@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING, Annotated, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
+from photostrip.errors import InputError
 from photostrip.formats.findings import suggestion
 from photostrip.planning.control_layout import LAYOUTS, USES, Layout, Spot
 from photostrip.planning.ideal_strip import LEAST_PHOTOS, StripGeometry
 from photostrip.planning.placement import Placement, Required
-from photostrip.planning.strip_design import Design
+from photostrip.planning.strip_design import Design, plan_strip
 from photostrip.planning.strip_methods import METHODS
+from photostrip.project.document import fault_at
+from photostrip.project.merging import steps
 from photostrip.project.plan_files import SCHEMA_NUMBER, Percent, Sigmas, SigmaUm, read_plan
 from photostrip.project.schema import Flag, Id, Positive, Section, Words, key, wrong
 from photostrip.project.simulation_spec import SimulatedCamera, Whole, camera_of
@@ -24,12 +27,18 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from photostrip.errors import Fault
+    from photostrip.planning.strip_design import Report
+    from photostrip.project.document import Node
+
 MODELS = Range(LEAST_PHOTOS - 1, 400, "models")
 ROWS = Range(2, 20, "rows")
 EXTRA = Range(0, 200, "points")
 PLACED = Range(1, 40, "points")
 REACH = Range(5.0, 95.0, "%")
 USUAL, USUAL_LAYOUT = StripGeometry.points, Layout("")
+# Keys of a simulation by which the strip is refused, and those of the plan.
+SIMULATED = {"flight.end_lap_percent": "end_lap_percent", "flight.photos": "models", "flight": "end_lap_percent"}
 DEFAULT_LAYOUTS = {"3 bands": "bands=3", "4 bands": "bands=4", "corners": "corners"}
 
 
@@ -169,11 +178,36 @@ class StripPlan:
         What is to be designed.
     files : tuple of str
         Every file that was read.
+    root : Node
+        The plan as a tree.
     """
 
     name: str
     design: Design
     files: tuple[str, ...]
+    root: Node
+
+    def worked_out(self) -> Report:
+        """Work out the design.
+
+        Returns
+        -------
+        Report
+            Everything about it.
+
+        Raises
+        ------
+        InputError
+            With all that cannot be planned, each fault at its place in the file.
+        """
+        try:
+            return plan_strip(self.design)
+        except InputError as error:
+            raise InputError(self._placed(fault) for fault in error.faults) from None
+
+    def _placed(self, fault: Fault) -> Fault:
+        key = SIMULATED.get(fault.key, fault.key)
+        return fault_at(self.root, steps(key), fault.message, fault.code, expected=fault.expected, fix=fault.fix)
 
 
 def load_strip_plan(path: Path | None, assignments: Sequence[str]) -> StripPlan:
@@ -196,7 +230,7 @@ def load_strip_plan(path: Path | None, assignments: Sequence[str]) -> StripPlan:
     InputError
         With every fault.
     """
-    given, files = read_plan(StripPlanFile, path, assignments)
+    given, files, root = read_plan(StripPlanFile, path, assignments)
     camera = camera_of(given.camera)
     scale = given.scale or (given.flying_height or 0.0) / camera.principal_distance * 1000.0 or StripGeometry.scale
     points = Points(given.points.rows, given.points.reach_percent, 0.0, given.points.extra_per_model)
@@ -212,7 +246,7 @@ def load_strip_plan(path: Path | None, assignments: Sequence[str]) -> StripPlan:
         placement = Placement(given.place.points, into, str(given.place.method), str(given.place.use))
     methods = tuple(dict.fromkeys(str(method) for method in given.methods))
     required = Required(given.required.plan, given.required.height)
-    return StripPlan(str(given.name), Design(geometry, layouts, methods, required, placement), files)
+    return StripPlan(str(given.name), Design(geometry, layouts, methods, required, placement), files, root)
 
 
 def _of_layout(name: str, given: StripLayout, sigma: tuple[float, float, float]) -> Layout:

@@ -33,7 +33,7 @@ def strip_sections(document: Document) -> tuple[Section, ...]:
     near = "near each photo, m"
     sections = [
         Section("", (Facts(_facts(document)), _layouts(document))),
-        Section("Expected standard deviations of new points", (_accuracy(document),)),
+        Section("Expected standard deviations of new points", (_accuracy(document), *_reasons(document))),
         Section(f"Along the strip: worst standard deviation in height {near}", (_along(document, "z_m"),)),
         Section(f"Along the strip: worst standard deviation in plan {near}", (_along(document, "plan_m"),)),
         Section("Smallest control error that is found", (_detectable(document),)),
@@ -120,7 +120,7 @@ def _accuracy(document: Document) -> Table:
     for row in document["accuracy"]:
         head = (row["layout"], row["method"])
         if row["used"] is None:
-            rows.append((*head, *[DASH] * (6 if required else 5), row["reason"]))
+            rows.append((*head, *[DASH] * (6 if required else 5), "too little"))
             continue
         names = ("rms_plan_m", "worst_plan_m", "rms_z_m", "worst_z_m")
         rows.append(
@@ -133,6 +133,15 @@ def _accuracy(document: Document) -> Table:
             )
         )
     return Table(columns, tuple(rows), note="plan: both coordinates together; photo: nearest to the worst height")
+
+
+def _reasons(document: Document) -> tuple[Words, ...]:
+    """Say why a layout determines no strip."""
+    return tuple(
+        Words(f"{row['layout']}, {row['method']}: {row['reason']}.", "look", mark="-")
+        for row in document["accuracy"]
+        if row["used"] is None
+    )
 
 
 def _along(document: Document, name: str) -> Table:

@@ -166,3 +166,99 @@ def test_a_picture_without_matplotlib_names_the_extra(
     monkeypatch.setitem(__import__("sys").modules, "matplotlib", None)
     assert main(["plan", "model", "-o", str(tmp_path / "p.png")]) == 2
     assert "pip install photostrip[report]" in capsys.readouterr().err
+
+
+# --------------------------------------------------------------------------------------------------------- strips
+
+
+STRIP = """\
+photostrip_plan_strip: 1
+models: 5
+points: {rows: 3, extra_per_model: 0}
+layouts:
+  ends: bands=2
+  signals: {layout: points, points: [[1, 1], [1, 3], {at: [6, 1]}, {at: [3, 2], use: xy}], sigma: [0.02, 0.02, 0.03]}
+  gnss: {layout: corners, gnss: [0.05, 0.05, 0.08]}
+methods: [similarity, bundle]
+required: {height: 0.5}
+place: {points: 1, into: ends, method: similarity}
+"""
+
+
+def test_a_strip_from_options_and_from_a_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    options = ["--models", "5", "--control", "bands=2", "--control", "corners", "--methods", "similarity,degree 2"]
+    options += ["--set", "points.rows=3", "--required", "0.4,0.5", "--control-sigma", "0.02,0.02,0.03"]
+    from_options = answer(capsys, "plan", "strip", *options, "--format", "json")
+    file = tmp_path / "s.yaml"
+    file.write_text(
+        'photostrip_plan_strip: 1\nmodels: 5\nlayouts: {"2 bands": {bands: 2}, corners: {layout: corners}}\n'
+        "methods: [similarity, degree 2]\npoints: {rows: 3}\nrequired: {plan: 0.4, height: 0.5}\n"
+        "control_sigma: [0.02, 0.02, 0.03]\n"
+    )
+    assert answer(capsys, "plan", "strip", str(file), "--format", "json") == from_options
+    document = json.loads(from_options)
+    assert [row["layout"] for row in document["accuracy"]] == ["2 bands", "2 bands", "corners", "corners"]
+    assert len(document["accuracy"][0]["along"]) == document["geometry"]["photos"] == 6
+    assert {row["method"] for row in document["needed"]} == {"similarity", "degree 2"}
+
+
+def test_the_report_of_a_strip(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "s.yaml"
+    file.write_text(STRIP)
+    text = answer(capsys, "plan", "strip", str(file))
+    for words in ("ends", "0.050 0.050 0.080, offset free", "3/2 xy", "0.500 m in height", "Best places", "never"):
+        assert words in text
+    document = json.loads(answer(capsys, "plan", "strip", str(file), "--format", "json"))
+    by = {(row["layout"], row["method"]): row for row in document["accuracy"]}
+    assert by["gnss", "bundle"]["worst_z_m"] < by["gnss", "similarity"]["worst_z_m"]
+    for row in by.values():
+        along = row["along"]
+        assert max(each["z_m"] for each in along) == pytest.approx(row["worst_z_m"], abs=0.05)
+        assert row["meets"] == (row["worst_z_m"] <= 0.5)
+    rows = list(csv.DictReader(io.StringIO(answer(capsys, "plan", "strip", str(file), "--format", "csv"))))
+    assert len(rows) == 6 * 6
+    assert list(rows[0]) == ["layout", "method", "photo", "plan_m", "z_m"]
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "message"),
+    [
+        ("--set=layouts.a=bunds=3", 2, "did you mean `bands`"),
+        ("--set=layouts.a=bands=30", 2, "30 bands do not fit 11 photos"),
+        ("--set=layouts.a={layout: points, points: [[12, 1]]}", 2, "no row 1 at photo 12"),
+        ("--set=methods=[cubic]", 2, "`cubic` is not known"),
+        ("--set=place={points: 2, into: nowhere}", 2, "no layout `nowhere`"),
+        ("--models=1", 2, "1 is out of range"),
+        ("--overlap=30", 2, "error: --set: end_lap_percent: an end lap of 30 %"),
+    ],
+)
+def test_a_wrong_strip_is_refused(change: str, code: int, message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    name, _, value = change.partition("=")
+    assert main(["plan", "strip", name, value]) == code
+    assert message in capsys.readouterr().err
+
+
+def test_too_little_control_stands_in_the_table(capsys: pytest.CaptureFixture[str]) -> None:
+    options = ("--models", "4", "--set", "layouts.one={layout: points, points: [[1, 1]]}", "--methods", "similarity")
+    assert "do not orient a strip" in answer(capsys, "plan", "strip", *options)
+
+
+@pytest.mark.slow
+def test_pictures_of_strips_are_the_same_every_time(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "s.yaml"
+    file.write_text(STRIP)
+    for ending in (".svg", ".png"):
+        found = []
+        for number in range(2):
+            target = tmp_path / f"{number}{ending}"
+            assert answer(capsys, "plan", "strip", str(file), "-q", "-o", str(target)) == ""
+            found.append(target.read_bytes())
+        assert found[0] == found[1]
+
+
+@pytest.mark.parametrize("kind", ["model", "strip", "camera"])
+def test_schemas_of_plans_know_every_key(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
+    schema = json.loads(answer(capsys, "schema", "--plan", kind))
+    assert schema["title"] == f"photostrip plan {kind}"
+    assert f"photostrip_plan_{kind}s" in schema["properties"] or f"photostrip_plan_{kind}" in schema["properties"]
+    assert all("description" in each for each in schema["properties"].values())
