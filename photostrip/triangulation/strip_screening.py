@@ -113,13 +113,15 @@ def suspects(scene: Scene) -> Numbers:
     return np.union1d(out, junctions.point[~junctions.used]).astype(np.intp)
 
 
-def collect(scene: Scene) -> Rays:
-    """Collect and linearise all rays of the points that have a place in the strip.
+def collect(scene: Scene, wanted: Flags | None = None) -> Rays:
+    """Collect and linearise the rays of the points that have a place in the strip.
 
     Parameters
     ----------
     scene : Scene
         The strip.
+    wanted : ndarray of bool, shape (photos,), optional
+        Photos whose rays are wanted; all by default.
 
     Returns
     -------
@@ -130,6 +132,8 @@ def collect(scene: Scene) -> Rays:
     place = {photo: number for number, photo in enumerate(scene.photos)}
     position = np.array([place.get(photo, -1) for photo in o.photo_ids], np.intp)[o.photo]
     row = np.unique(scene.orientation.rows)
+    if wanted is not None:
+        row = row[wanted[position[row]]]
     row = row[np.lexsort((position[row], o.point[row]))]
     photo, point = position[row], np.asarray(o.point[row], np.intp)
     factor = scene.sigma / (np.sqrt(2.0) * scene.stated)
@@ -140,6 +144,16 @@ def collect(scene: Scene) -> Rays:
     sound = np.isfinite(rays.misfit).all(axis=1) & np.isfinite(rays.by_photo).all(axis=(1, 2))
     several = np.bincount(rays.point[sound], minlength=len(o.point_ids)) > 1
     return rays.take(np.flatnonzero(sound & several[rays.point]))
+
+
+def _spans(scene: Scene) -> tuple[Numbers, Numbers]:
+    """First and last photo of each point; the last is -1 for points of no pair."""
+    oriented = scene.orientation
+    begin = np.full(len(scene.observations.point_ids), len(scene.photos))
+    last = np.full(len(begin), -1)
+    np.minimum.at(begin, oriented.point, oriented.pairs.pair)
+    np.maximum.at(last, oriented.point, oriented.pairs.pair + 1)
+    return begin, last
 
 
 def _best_start(
@@ -187,15 +201,17 @@ def examine(scene: Scene, points: Numbers, kept: Numbers) -> Verdict:
     """
     if not len(points):
         return Verdict()
-    rays = collect(scene)
-    number, begin = np.unique(rays.point, return_index=True)
-    last = np.append(begin[1:], len(rays.point)) - 1
-    reach = int(min((rays.photo[last] - rays.photo[begin]).max(initial=1), LONGEST_REACH)) + 1
+    begin, last = _spans(scene)
+    seen = last >= 0
+    reach = int(min((last - begin)[seen].max(initial=1), LONGEST_REACH)) + 1
     first = windows.starts(len(scene.photos), reach)
     length = min(windows.size_of(reach)[0], len(scene.photos))
-    home = np.full(len(scene.observations.point_ids), -1)
-    home[number] = windows.homes((rays.photo[begin] + rays.photo[last]) / 2, first, reach)
-    at = np.unique(home[points[home[points] >= 0]])
+    home = np.full(len(begin), -1)
+    home[seen] = windows.homes((begin + last)[seen] / 2, first, reach)
+    at = np.unique(home[points])
+    wanted = np.zeros(len(scene.photos), bool)
+    wanted[np.minimum(first[at, None] + np.arange(length), len(wanted) - 1)] = True
+    rays = collect(scene, wanted)
     found: list[Decision] = []
     for part in range(0, len(at), BATCH):
         batch = at[part : part + BATCH]
