@@ -152,6 +152,7 @@ def of_strip(strip: StripResult, observations: PhotoPoints, frames: Sequence[Gro
     factor, basis = precision.image_variance(strip.orientation, stated)
     parameters = precision.fitted(errors, found.control, operator, factor)
     points = precision.covariances(errors, errors.points, parameters, found.influence) * factor
+    points[strip.formed.models == 0] = np.nan  # placed by photos that are no neighbours: they have no row
     photos = np.full((len(strip.strip.photos), 6, 6), np.nan)
     photos[found.oriented] = precision.covariances(errors, found.photos, parameters, found.photo_influence) * factor
     numbers = strip.formed.point[strip.control_rows][found.control.point]

@@ -14,13 +14,18 @@ from photostrip.pipeline import covariance, overruling
 from photostrip.pipeline.results import StripResult
 from photostrip.triangulation import (
     absolute,
+    control_errors,
     control_screening,
+    control_tests,
+    error_rows,
     exterior,
     formation,
     polynomial,
+    precision,
     relative,
     screening,
     settling,
+    strip_errors,
     strip_screening,
 )
 
@@ -79,19 +84,20 @@ def adjust_strip(
     oriented = screened.orientation
 
     here, rows = _control_of(formed, control, observations)
-    intermediate, orientation, precision = _to_ground(strip, formed, here, rows, frames, oriented, sigma)
+    intermediate, orientation, spread = _to_ground(strip, formed, here, rows, frames, oriented, sigma)
     wrong: tuple[control_screening.ControlRejection, ...] = ()
     if settings.relative.screening != "none":
         extent = _extent(formed, orientation)
-        place = control_screening.Setting(formed.xyz[rows], frames, intermediate, precision, *extent)
+        joint = _joint(strip, observations, screened, formed, (here, rows, frames), intermediate, orientation, sigma)
+        place = control_screening.Setting(formed.xyz[rows], frames, intermediate, spread, *extent, joint)
         here, wrong = control_screening.screen(here, place)
     if wrong:
-        intermediate, orientation, precision = _to_ground(strip, formed, here, rows, frames, oriented, sigma)
+        intermediate, orientation, spread = _to_ground(strip, formed, here, rows, frames, oriented, sigma)
     xyz = orientation.similarity(formed.xyz)
     correction = None
     if settings.adjustment == "polynomial":
         targets = absolute.Targets(here, frames, intermediate)
-        weight = absolute.weights(targets.turned(xyz[rows]), precision)
+        weight = absolute.weights(targets.turned(xyz[rows]), spread)
         problem = polynomial.Problem(xyz[rows], targets, weight, *_extent(formed, orientation))
         correction = polynomial.fit(problem, settings.polynomial)
     own = None
@@ -106,7 +112,7 @@ def adjust_strip(
         oriented,
         screened.rejections,
         formed,
-        precision,
+        spread,
         intermediate,
         here,
         rows,
@@ -129,6 +135,36 @@ def adjust_strip(
         wrong,
         own,
     )
+
+
+def _joint(
+    strip: Strip,
+    observations: PhotoPoints,
+    screened: screening.Screened,
+    formed: formation.FormedStrip,
+    given: tuple[ControlPoints, Numbers, Sequence[GroundFrame]],
+    intermediate: IntermediateFrame,
+    orientation: absolute.AbsoluteOrientation,
+    sigma: float,
+) -> control_tests.Joint | None:
+    """Covariance of all misclosures at the control; None where there are too many to form it as a whole."""
+    control, rows, frames = given
+    if control.use.sum() > control_tests.LARGEST or len(strip.photos) > control_tests.LONGEST:
+        return None
+    place = {photo: number for number, photo in enumerate(strip.photos)}
+    position = np.array([place.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo]
+    errors = strip_errors.strip_errors(
+        screened.orientation, formed, orientation.similarity, position, observations.sigma
+    )
+    xyz = orientation.similarity(formed.xyz[rows])
+    targets = absolute.Targets(control, frames, intermediate)
+    found = control_errors.misclosures(errors.points, targets.turned(xyz), rows, targets.axes(xyz))
+    # image coordinates are taken as good as stated, or as bad as the pairs have proved
+    factor = max(1.0, float(np.median(screened.scatter.by_pair)) ** 2 / (2 * sigma**2))
+    covariance = precision.fitted(errors, found, np.eye(len(found.point)), factor).parameters * factor
+    moved = error_rows.similarity_rows(xyz[found.point], errors.origin)
+    design = np.einsum("wi,wij->wj", found.direction, moved)
+    return control_tests.Joint(found.point, found.axis, design, covariance)
 
 
 def _extent(formed: formation.FormedStrip, orientation: absolute.AbsoluteOrientation) -> tuple[float, float]:
@@ -165,7 +201,8 @@ def _control_of(
 ) -> tuple[ControlPoints, Numbers]:
     """Control points that have strip coordinates, and their rows there."""
     number = {name: n for n, name in enumerate(observations.point_ids)}
-    row_of = {int(n): row for row, n in enumerate(formed.point)}
+    # a point without a model has no place in the strip's covariance
+    row_of = {int(n): row for row, n in enumerate(formed.point) if formed.models[row]}
     found = [(row, row_of.get(number[name], -1)) for row, name in enumerate(control.ids)]
     kept = np.array([pair for pair in found if pair[1] >= 0], np.intp).reshape(-1, 2)
     return control.take(kept[:, 0]), kept[:, 1]
@@ -198,15 +235,15 @@ def _to_ground(
         )
         ends = provisional.similarity(formed.centers[[0, -1]])
         intermediate = provisional_frame.with_azimuth(strip_azimuth(ends[0], ends[1]))
-        precision = _precision(formed, oriented, sigma, provisional.similarity.scale)
+        spread = _precision(formed, oriented, sigma, provisional.similarity.scale)
         targets = absolute.Targets(control, frames, intermediate)
         cartesian = provisional_frame.cartesian_from_intermediate(provisional.similarity(formed.xyz[rows]))
         turned = targets.turned(intermediate.intermediate_from_cartesian(cartesian))
-        final = absolute.orient(formed.xyz[rows], targets, absolute.weights(turned, precision), formed.xyz)
+        final = absolute.orient(formed.xyz[rows], targets, absolute.weights(turned, spread), formed.xyz)
     except GeometryError as error:
         msg = f"strip {strip.id}: {error}"
         raise GeometryError(msg, photos=strip.photos, points=error.points, code=error.code) from error
-    return intermediate, final, precision
+    return intermediate, final, spread
 
 
 def _intermediate(control: ControlPoints, frames: Sequence[GroundFrame]) -> IntermediateFrame:

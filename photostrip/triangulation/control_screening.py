@@ -6,7 +6,9 @@ that the fit leaves (its redundancy number), in units of the scatter of the othe
 similarity that minimises absolute residuals. Two large ones that fit exchanged are named as an exchange.
 
 A strip bends as a whole: control of one band that agrees in itself and contradicts the other bands shows the bend, not
-an error. A coordinate is therefore rejected only against a witness, another point of its own band that stays.
+an error. Where the covariance of the strip is known, and the strip is bent no more than it allows, that covariance says
+what belongs to the bend (:mod:`photostrip.triangulation.control_tests`). Otherwise the deformation is a polynomial,
+and a coordinate is rejected only against a witness, another point of its own band that stays.
 
 Source: data snooping after a robust start; derived, see docs/sources.md.
 """
@@ -20,7 +22,7 @@ import numpy as np
 
 from photostrip.errors import PhotostripError
 from photostrip.statistics import t_quantile
-from photostrip.triangulation import absolute, polynomial
+from photostrip.triangulation import absolute, control_tests, polynomial
 from photostrip.triangulation.absolute import Targets
 
 if TYPE_CHECKING:
@@ -67,6 +69,8 @@ class ControlRejection:
         Smallest redundancy number of the coordinates rejected.
     exchanged_with : str
         The point with which it seems to have been exchanged; empty when there is none.
+    detectable : float
+        Smallest error of the worst coordinate that is found in 80 % of cases, metres; NaN when unknown.
     """
 
     id: str
@@ -76,6 +80,7 @@ class ControlRejection:
     size: tuple[float, float, float]
     redundancy: float
     exchanged_with: str = ""
+    detectable: float = float("nan")
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +99,8 @@ class Setting:
         A-priori standard deviation of a strip point in plan and height, metres.
     spacing, breadth : float
         As in :class:`polynomial.Problem`.
+    joint : control_tests.Joint, optional
+        Covariance of all misclosures; without it polynomials stand for the strip's deformation.
     """
 
     strip: Floats
@@ -102,6 +109,7 @@ class Setting:
     precision: tuple[float, float]
     spacing: float
     breadth: float
+    joint: control_tests.Joint | None = None
 
     def problem(self, control: ControlPoints) -> polynomial.Problem:
         """Fit the similarity, and give what is left to a polynomial."""
@@ -110,6 +118,13 @@ class Setting:
         weight = absolute.weights(targets.turned(first.similarity(self.strip)), self.precision)
         orientation = absolute.orient(self.strip, targets, weight)
         return polynomial.Problem(orientation.similarity(self.strip), targets, weight, self.spacing, self.breadth)
+
+    def misclosures(self, kept: ControlPoints, control: ControlPoints | None = None) -> Floats:
+        """Misclosures of all control after a similarity on what is kept, metres along the ground axes."""
+        targets = Targets(kept, self.frames, self.intermediate)
+        first = absolute.orient(self.strip, targets, kept.use.astype(float))
+        whole = Targets(control or kept, self.frames, self.intermediate)
+        return whole.misclosures(first.similarity(self.strip))
 
 
 def screen(control: ControlPoints, setting: Setting) -> tuple[ControlPoints, tuple[ControlRejection, ...]]:
@@ -131,6 +146,7 @@ def screen(control: ControlPoints, setting: Setting) -> tuple[ControlPoints, tup
     """
     try:
         start = _without(control, _gross(control, setting))
+        setting = _fitting(start, setting)
         kept = _snoop(start, setting)
         if np.array_equal(kept.use, control.use):
             return control, ()
@@ -241,16 +257,21 @@ def judged(problem: polynomial.Problem, fit: polynomial.Polynomial) -> tuple[Flo
     return np.where(seen, value, 0.0), np.broadcast_to(limit, value.shape), size, redundancy
 
 
+def _fitting(control: ControlPoints, setting: Setting) -> Setting:
+    """Leave the covariance out where it does not explain the misclosures of most of the control."""
+    if setting.joint is None:
+        return setting
+    kept = _snoop(control, setting)
+    found = control_tests.judge(setting.joint, setting.misclosures(kept), kept.use, ALPHA)
+    bent = not found.sigma0 < control_tests.BENT
+    return replace(setting, joint=None) if bent else setting
+
+
 def _snoop(control: ControlPoints, setting: Setting) -> ControlPoints:
     """Take out the worst coordinate, fit again, until none is beyond its limit."""
     kept = control
     while True:
-        problem = setting.problem(kept)
-        fit = _richest(problem)
-        if fit is None:
-            return kept
-        value, limit, _, _ = judged(problem, fit)
-        ratio = np.where(_witnessed(problem.xyz[:, 0], setting.spacing, kept.use), value / limit, 0.0)
+        ratio = _by_covariance(kept, setting) if setting.joint is not None else _by_polynomial(kept, setting)
         row = int(ratio.max(axis=1).argmax())
         out = np.zeros(kept.use.shape, bool)
         out[row, _together(int(ratio[row].argmax()))] = True
@@ -259,8 +280,34 @@ def _snoop(control: ControlPoints, setting: Setting) -> ControlPoints:
         kept = _without(kept, out)
 
 
+def _by_covariance(kept: ControlPoints, setting: Setting) -> Floats:
+    """Test values over limits by the covariance of the strip; 0 for coordinates that take no part."""
+    found = control_tests.judge(_joint(setting), setting.misclosures(kept), kept.use, ALPHA)
+    return np.where(kept.use, found.value / found.limit, 0.0)
+
+
+def _joint(setting: Setting) -> control_tests.Joint:
+    if setting.joint is None:
+        msg = "no covariance"
+        raise ValueError(msg)
+    return setting.joint
+
+
+def _by_polynomial(kept: ControlPoints, setting: Setting) -> Floats:
+    """Test values over limits by the richest polynomial, of coordinates that have a witness."""
+    problem = setting.problem(kept)
+    fit = _richest(problem)
+    if fit is None:
+        return np.zeros(kept.use.shape)
+    value, limit, _, _ = judged(problem, fit)
+    return np.where(_witnessed(problem.xyz[:, 0], setting.spacing, kept.use), value / limit, 0.0)
+
+
 def _predicted(control: ControlPoints, kept: ControlPoints, setting: Setting) -> tuple[Floats, Floats, Floats, Floats]:
-    """Judge all given coordinates, the rejected ones too, by a fit of those that are kept."""
+    """Judge all given coordinates, the rejected ones too, by those that are kept."""
+    if setting.joint is not None:
+        found = control_tests.judge(setting.joint, setting.misclosures(kept, control), kept.use, ALPHA)
+        return found.value, found.limit, found.size, found.redundancy
     problem = setting.problem(kept)
     fit = _richest(problem)
     if fit is None:
@@ -303,7 +350,8 @@ def _log(control: ControlPoints, kept: ControlPoints, setting: Setting) -> tuple
     if not out.any():
         return ()
     value, limit, size, redundancy = _predicted(control, kept, setting)
-    partner = _exchanges(control, out, size)
+    partner = _exchanges(control, kept, setting, size)
+    detectable = _detectable(control, kept, setting)
     rows = np.flatnonzero(out.any(axis=1)).tolist()
     found = []
     for row in rows:
@@ -318,22 +366,43 @@ def _log(control: ControlPoints, kept: ControlPoints, setting: Setting) -> tuple
                 (float(size[row, 0]), float(size[row, 1]), float(size[row, 2])),
                 float(redundancy[row, axes].min()),
                 partner.get(row, ""),
+                float(detectable[row, worst]),
             )
         )
     return tuple(found)
 
 
-def _exchanges(control: ControlPoints, out: Flags, size: Floats) -> dict[int, str]:
-    """Find pairs of rejected points whose errors vanish when their coordinates are exchanged."""
+def _detectable(control: ControlPoints, kept: ControlPoints, setting: Setting) -> Floats:
+    """Smallest errors that are found in 80 % of cases, metres; NaN without the strip's covariance."""
+    if setting.joint is None:
+        return np.full(control.use.shape, np.nan)
+    return control_tests.judge(setting.joint, setting.misclosures(kept, control), kept.use, ALPHA).detectable
+
+
+def _exchanges(control: ControlPoints, kept: ControlPoints, setting: Setting, size: Floats) -> dict[int, str]:
+    """Find pairs of rejected points that fit when their coordinates are exchanged, by trying the exchange."""
+    out = control.use & ~kept.use
     rows = np.flatnonzero(out[:, :2].any(axis=1)).tolist()
     found: dict[int, str] = {}
-    for one in rows:
-        for other in rows:
-            if other <= one or control.frame[one] != control.frame[other]:
+    for number, one in enumerate(rows):
+        for other in rows[number + 1 :]:
+            if control.frame[one] != control.frame[other] or not (control.use[one] == control.use[other]).all():
                 continue
             step = (control.enu[other] - control.enu[one])[:2]
             gaps = np.array([size[one, :2] + step, size[other, :2] - step])
             before = np.array([size[one, :2], size[other, :2]])
-            if np.linalg.norm(gaps) < EXCHANGED * np.linalg.norm(before):
+            # a try is worth while when the exchange takes away most of both errors
+            if np.linalg.norm(gaps) < EXCHANGED * np.linalg.norm(before) and _fit_exchanged(
+                control, kept, setting, (one, other)
+            ):
                 found[one], found[other] = control.ids[other], control.ids[one]
     return found
+
+
+def _fit_exchanged(control: ControlPoints, kept: ControlPoints, setting: Setting, rows: tuple[int, int]) -> bool:
+    """Whether two points agree with all others when each has the coordinates of the other."""
+    order = np.arange(len(control))
+    order[list(rows)] = rows[::-1]
+    exchanged = replace(control, enu=control.enu[order], sigma=control.sigma[order])
+    value, limit, _, _ = _predicted(exchanged, kept, setting)
+    return bool((value[list(rows)] <= limit[list(rows)]).all())

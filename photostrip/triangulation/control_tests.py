@@ -1,0 +1,152 @@
+"""Control coordinates judged with the strip's own covariance.
+
+The misclosures of a formed strip at its control are correlated: the strip bends as a whole. With the covariance of all
+of them together, every coordinate is predicted by all others, near ones most, and no band mate is needed to tell a
+wrong coordinate from a bend.
+
+Source: data snooping with correlated observations; derived, see docs/sources.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.statistics import t_quantile
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+    Flags = NDArray[np.bool_]
+
+LARGEST = 400  # control coordinates whose covariance is formed as a whole
+LONGEST = 300  # photos of a strip for which it is formed; for more it takes longer than all the rest
+LEAST_REDUNDANCY = 3
+SEEN = 1e-3  # share of a coordinate's variance below which nothing checks it
+POWER = 0.84  # normal quantile: an error is called detectable when it is found in 80 % of cases
+BENT = 2.5  # standard deviation of unit weight beyond which the strip is bent by more than its random errors
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """Misclosures at the control as one vector.
+
+    Parameters
+    ----------
+    point, axis : ndarray of int, shape (w,)
+        Control point and ground axis of each coordinate.
+    design : ndarray, shape (w, 7)
+        Derivatives by a similarity.
+    covariance : ndarray, shape (w, w)
+        Covariance of the strip and of the given coordinates together, m^2.
+    """
+
+    point: Numbers
+    axis: Numbers
+    design: Floats
+    covariance: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """What all other coordinates say of each one; arrays by control point and axis, shape (n, 3).
+
+    Parameters
+    ----------
+    value, limit : ndarray
+        Test values and critical values; value 0 where nothing can be said.
+    size : ndarray
+        Given minus predicted, metres.
+    redundancy : ndarray
+        Redundancy numbers; 1 for coordinates that took no part.
+    detectable : ndarray
+        Smallest error that is found in 80 % of cases, metres; infinite where none is.
+    sigma0 : float
+        Standard deviation of unit weight of the coordinates that took part; NaN without redundancy.
+    """
+
+    value: Floats
+    limit: Floats
+    size: Floats
+    redundancy: Floats
+    detectable: Floats
+    sigma0: float
+
+
+def judge(joint: Joint, misclosures: Floats, used: Flags, alpha: float) -> Judged:
+    """Judge every control coordinate by what the others predict.
+
+    Parameters
+    ----------
+    joint : Joint
+        Covariance and design of all coordinates.
+    misclosures : ndarray, shape (n, 3)
+        Strip minus given along the ground axes, metres, after any similarity near the truth.
+    used : ndarray of bool, shape (n, 3)
+        Coordinates that take part; the others are judged by them.
+    alpha : float
+        Level of rejecting anything in a strip without wrong control.
+
+    Returns
+    -------
+    Judged
+        Test values.
+    """
+    w = misclosures[joint.point, joint.axis]
+    inside = np.flatnonzero(used[joint.point, joint.axis])
+    count = len(inside)
+    columns = [np.zeros(misclosures.shape) for _ in range(5)]
+    value, limit, size, redundancy, detectable = columns
+    limit[:] = detectable[:] = np.inf
+    freedom = count - joint.design.shape[1]
+    if freedom < LEAST_REDUNDANCY:
+        return Judged(value, limit, size, redundancy, detectable, float("nan"))
+    tail = alpha / (2 * max(len(w), 1))
+    critical = t_quantile(1 - tail, freedom - 1)
+    projector = _projector(joint, inside)
+    pulled = projector @ w[inside]
+    total = float(w[inside] @ pulled)
+    for number in range(len(w)):
+        place = joint.point[number], joint.axis[number]
+        weight, pull, rest = _of_one(joint, w, inside, number, (projector, pulled, total))
+        share = weight * joint.covariance[number, number]
+        if share < SEEN:
+            continue
+        # a covariance is never believed to be too large: what is not modelled makes misclosures larger
+        spread = max(1.0, float(np.sqrt(max(rest, 0.0) / (freedom - 1))))
+        limit[place] = critical
+        value[place] = abs(pull) / np.sqrt(weight) / spread
+        size[place] = -pull / weight
+        detectable[place] = (critical + POWER) * spread / np.sqrt(weight)
+        redundancy[place] = 1.0
+    redundancy[joint.point[inside], joint.axis[inside]] = np.diag(projector @ joint.covariance[np.ix_(inside, inside)])
+    return Judged(value, limit, size, redundancy, detectable, float(np.sqrt(max(total, 0.0) / freedom)))
+
+
+def _projector(joint: Joint, rows: Numbers) -> Floats:
+    """Weight matrix of the coordinates after a similarity has taken what it can."""
+    weight = np.linalg.inv(joint.covariance[np.ix_(rows, rows)])
+    design = joint.design[rows] / np.maximum(np.abs(joint.design[rows]).max(axis=0), 1e-300)
+    pulled = weight @ design
+    return np.asarray(weight - pulled @ np.linalg.pinv(design.T @ pulled, hermitian=True) @ pulled.T, float)
+
+
+def _of_one(
+    joint: Joint, w: Floats, inside: Numbers, number: int, whole: tuple[Floats, Floats, float]
+) -> tuple[float, float, float]:
+    """Weight, pull and remaining sum of squares for an error of one coordinate, which may be outside."""
+    projector, pulled, total = whole
+    found = np.flatnonzero(inside == number)
+    if len(found):
+        at = int(found[0])
+    else:
+        rows = np.append(inside, number)
+        projector = _projector(joint, rows)
+        pulled, at = projector @ w[rows], len(rows) - 1
+        total = float(w[rows] @ pulled)
+    weight, pull = float(projector[at, at]), float(pulled[at])
+    return weight, pull, total - pull**2 / weight if weight > 0 else total
