@@ -41,7 +41,7 @@ def require(settings: relative.Settings, observations: PhotoPoints) -> None:
     """
     faults = []
     for key in ("keep", "drop"):
-        found = _rows(getattr(settings, key), observations)
+        found = rows_of(getattr(settings, key), observations)
         faults += [
             Fault(
                 f"`{entry}` names no measurement",
@@ -61,8 +61,21 @@ def require(settings: relative.Settings, observations: PhotoPoints) -> None:
         raise InputError(faults)
 
 
-def _rows(entries: Sequence[str], observations: PhotoPoints) -> dict[str, int]:
-    """Row of each measurement named photo/point; -1 for none."""
+def rows_of(entries: Sequence[str], observations: PhotoPoints) -> dict[str, int]:
+    """Find the rows of the measurements of a list.
+
+    Parameters
+    ----------
+    entries : sequence of str
+        Measurements, photo/point.
+    observations : PhotoPoints
+        Image points.
+
+    Returns
+    -------
+    dict of str to int
+        Row of each; -1 for none.
+    """
     if not entries:
         return {}
     wanted = dict.fromkeys(entries, -1)
@@ -109,7 +122,7 @@ def touched(entries: Sequence[str], observations: PhotoPoints, rows: Numbers) ->
     ndarray of bool, shape (m,)
         True for those.
     """
-    hits = np.isin(rows, list(_rows(entries, observations).values()))
+    hits = np.isin(rows, list(rows_of(entries, observations).values()))
     found: Flags = hits[:, 0] | hits[:, 1]
     return found
 

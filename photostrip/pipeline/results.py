@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from photostrip.geodesy.crs import GroundFrame
@@ -27,9 +28,14 @@ if TYPE_CHECKING:
         screening,
         strip_screening,
     )
+    from photostrip.triangulation.bundle import reliability, self_calibration, variance_components
+    from photostrip.triangulation.bundle.problem import Problem
+    from photostrip.triangulation.bundle.selection import Selection
+    from photostrip.triangulation.bundle.snooping import Screened
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
+    Flags = NDArray[np.bool_]
 
 NEW, CONTROL, CHECK = "new", "control", "check"
 
@@ -149,6 +155,11 @@ class Ties:
     strips: Numbers
     difference: Floats
 
+    @classmethod
+    def none(cls) -> Ties:
+        """Give the ties of an adjustment in which a point has one position."""
+        return cls(np.zeros(0, np.intp), np.zeros((0, 2), np.intp), np.zeros((0, 3)))
+
 
 @dataclass(frozen=True, eq=False)
 class Precision:
@@ -175,6 +186,123 @@ class Precision:
     photos: tuple[Floats, ...]
     sigma: tuple[float, ...]
     basis: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class BlockStart:
+    """Start values of the bundle adjustment.
+
+    Parameters
+    ----------
+    strips : tuple of StripResult
+        Strips of two photos or more, every stage of the strip method.
+    photos : tuple of str
+        All photos, strip by strip.
+    centers, rotations : ndarray, shapes (m, 3), (m, 3, 3)
+        Their orientations, Cartesian frame.
+    points : ndarray, shape (q, 3)
+        All points of the observations; NaN where one has no coordinates.
+    free : bool
+        Whether nothing ties the block to the ground: its frame and scale are those of the first strip.
+    """
+
+    strips: tuple[StripResult, ...]
+    photos: tuple[str, ...]
+    centers: Floats
+    rotations: Floats
+    points: Floats
+    free: bool
+
+
+@dataclass(frozen=True, eq=False)
+class BlockProblem:
+    """A bundle adjustment with what its rows stand for.
+
+    Parameters
+    ----------
+    problem : Problem
+        The arrays; points as numbered in the observations, photos strip by strip.
+    origin : ndarray, shape (3,)
+        Origin of its frame in the project's Cartesian frame, metres.
+    begin : Selection
+        What takes part at first.
+    kept : ndarray of bool, shape (n,)
+        Rays that the user keeps.
+    rows : ndarray of int, shape (n,)
+        Row in the observations of each ray.
+    control : ndarray of int, shape (c,)
+        Row in the measured control of each row of ``problem.control``.
+    level : dict of str to tuple of bool
+        For ``control`` and ``position``: whether the axes of each row are plan and height.
+    """
+
+    problem: Problem
+    origin: Floats
+    begin: Selection
+    kept: Flags
+    rows: Numbers
+    control: Numbers
+    level: dict[str, tuple[bool, ...]]
+
+
+@dataclass(frozen=True, eq=False)
+class SinglePhoto:
+    """A photo that is a strip of its own.
+
+    Parameters
+    ----------
+    strip : Strip
+        Its strip.
+    center, rotation : ndarray, shapes (3,), (3, 3)
+        Its orientation in the project's Cartesian frame.
+    """
+
+    strip: Strip
+    center: Floats
+    rotation: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Bundle:
+    """What the bundle adjustment found beside points and orientations.
+
+    Parameters
+    ----------
+    start : BlockStart
+        Where it started: the strips as the strip method leaves them.
+    block : BlockProblem
+        All observations, with the standard deviations of the last adjustment.
+    screened : Screened
+        The solution and how it was cleaned.
+    groups : tuple of reliability.Group
+        Observations that took part with their redundancy numbers.
+    sigma0 : reliability.Sigma0Test
+        Test of sigma0, with the stated standard deviations.
+    components : tuple of variance_components.Component
+        Variance components; empty when none were asked for.
+    parameters : tuple of self_calibration.Parameter
+        Calibration parameters.
+    correlations : tuple of self_calibration.Correlation
+        High correlations.
+    singles : tuple of SinglePhoto
+        Photos that are strips of their own.
+    photo_covariances : ndarray, shape (m, 6, 6)
+        Covariances of all photos, strip by strip, as in :class:`photostrip.pipeline.results.Precision`.
+    unit : float
+        Standard deviation of unit weight behind the covariances: sigma0, or 1 with Baarda's test.
+    """
+
+    start: BlockStart
+    block: BlockProblem
+    screened: Screened
+    groups: tuple[reliability.Group, ...]
+    sigma0: reliability.Sigma0Test
+    components: tuple[variance_components.Component, ...]
+    parameters: tuple[self_calibration.Parameter, ...]
+    correlations: tuple[self_calibration.Correlation, ...]
+    singles: tuple[SinglePhoto, ...]
+    photo_covariances: Floats
+    unit: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,6 +338,8 @@ class Result:
         What the surveyor should know.
     precision : Precision or None
         How precise points and photos are; None when it was not computed.
+    bundle : Bundle or None
+        The bundle adjustment; ``strips`` then carry its orientations and points.
     findings : tuple of Finding
         What the data say against themselves.
     """
@@ -228,6 +358,7 @@ class Result:
     not_determined: dict[str, str]
     notes: tuple[Note, ...]
     precision: Precision | None = None
+    bundle: Bundle | None = None
     findings: tuple[Finding, ...] = ()
 
     @property

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -71,6 +71,59 @@ def adjust_strip(
     GeometryError, InputError
         When a pair, a joint or the absolute orientation cannot be determined; the strip is named.
     """
+    return adjust_formed(form_strip(strip, observations, settings), observations, control, frames, settings)
+
+
+@dataclass(frozen=True, eq=False)
+class Formed:
+    """A strip before it meets its control.
+
+    Parameters
+    ----------
+    strip : Strip
+        The strip.
+    sigma : float
+        Median standard deviation of its image coordinates, mm.
+    screened : screening.Screened
+        The search for gross errors in its pairs.
+    oriented : relative.Orientation
+        Relative orientation of the pairs, as the strip was formed.
+    formed : formation.FormedStrip
+        The formed strip.
+    contradictions : rays.Contradictions
+        Points whose rays contradict each other from model to model.
+    """
+
+    strip: Strip
+    sigma: float
+    screened: screening.Screened
+    oriented: relative.Orientation
+    formed: formation.FormedStrip
+    contradictions: rays.Contradictions
+
+
+def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> Formed:
+    """Orient the pairs of a strip and form it, without any control.
+
+    Parameters
+    ----------
+    strip : Strip
+        Photos in flight order and their camera.
+    observations : PhotoPoints
+        Ideal image coordinates of the whole project.
+    settings : Settings
+        What is to be done.
+
+    Returns
+    -------
+    Formed
+        The strip in the frame and scale of its first model.
+
+    Raises
+    ------
+    GeometryError, InputError
+        When a pair or a joint cannot be determined; the strip is named.
+    """
     sigma = _sigma(strip, observations)
     pairs, point, pair_rows = relative.collect_pairs(observations, strip.photos, strip.camera.principal_distance)
     dropped = overruling.touched(settings.relative.drop, observations, pair_rows)
@@ -81,8 +134,33 @@ def adjust_strip(
     screened = overruling.restored(screened, pairs.weight, kept)
     relative.require(screened.orientation, screened.converged, strip.photos)
     screened, formed, contradictions = _form(strip, observations, screened, settings, pairs.weight)
-    oriented = screened.orientation
+    return Formed(strip, sigma, screened, screened.orientation, formed, contradictions)
 
+
+def adjust_formed(
+    stage: Formed, observations: PhotoPoints, control: ControlPoints, frames: Sequence[GroundFrame], settings: Settings
+) -> StripResult:
+    """Take a formed strip to the ground.
+
+    Parameters
+    ----------
+    stage : Formed
+        The formed strip.
+    observations, control, frames, settings
+        As for :func:`adjust_strip`.
+
+    Returns
+    -------
+    StripResult
+        Every stage.
+
+    Raises
+    ------
+    GeometryError
+        When the absolute orientation cannot be determined; the strip is named.
+    """
+    strip, sigma, screened = stage.strip, stage.sigma, stage.screened
+    oriented, formed, contradictions = stage.oriented, stage.formed, stage.contradictions
     here, rows = _control_of(formed, control, observations)
     intermediate, orientation, spread = _to_ground(strip, formed, here, rows, frames, oriented, sigma)
     wrong: tuple[control_screening.ControlRejection, ...] = ()
@@ -226,7 +304,7 @@ def _to_ground(
         msg = f"strip {strip.id}: none of its points is a control point"
         raise GeometryError(msg, photos=strip.photos, code="no-control")
     try:
-        provisional_frame = _intermediate(control, frames)
+        provisional_frame = middle_frame(control, frames)
         provisional = absolute.orient(
             formed.xyz[rows],
             absolute.Targets(control, frames, provisional_frame),
@@ -246,10 +324,25 @@ def _to_ground(
     return intermediate, final, spread
 
 
-def _intermediate(control: ControlPoints, frames: Sequence[GroundFrame]) -> IntermediateFrame:
-    """Frame at the control's centre of gravity, X to the north.
+def middle_frame(control: ControlPoints, frames: Sequence[GroundFrame]) -> IntermediateFrame:
+    """Give the frame at the control's centre of gravity, X to the north.
 
-    Points without plan position do not count; a missing height is taken from the others.
+    Parameters
+    ----------
+    control : ControlPoints
+        Control; points without plan position do not count, a missing height is taken from the others.
+    frames : sequence of GroundFrame
+        Their ground frames.
+
+    Returns
+    -------
+    IntermediateFrame
+        The frame.
+
+    Raises
+    ------
+    GeometryError
+        When no point gives a plan position.
     """
     known = ~np.isnan(control.enu[:, :2]).any(axis=1) & control.use[:, 0]
     chosen = control.take(known)

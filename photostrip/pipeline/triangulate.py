@@ -9,6 +9,7 @@ import numpy as np
 
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geodesy.crs import tie_frames
+from photostrip.geodesy.frame_spec import GROUND_AXES, FrameSpec
 from photostrip.notes import Note
 from photostrip.pipeline import overruling, plausibility, precision
 from photostrip.pipeline.inputs import ADJUSTMENTS
@@ -24,12 +25,15 @@ if TYPE_CHECKING:
 
     from photostrip.camera import Camera
     from photostrip.geodesy.crs import GroundFrame
+    from photostrip.pipeline.bundle import Block
     from photostrip.pipeline.inputs import Inputs, Settings
     from photostrip.pipeline.results import StripResult
     from photostrip.points import ControlPoints, PhotoPoints
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
+
+CAMERAS = ("camera_positions", "orientations")  # keys of what may be given of cameras
 
 
 def triangulate(inputs: Inputs, settings: Settings, *, directory: Path | None = None) -> Result:
@@ -72,18 +76,32 @@ def _triangulated(inputs: Inputs, settings: Settings, directory: Path | None) ->
     """Walk through the method."""
     _require(settings)
     _require_strips(inputs)
-    frames, output = _frames(inputs, settings, directory)
+    frames, output, of_positions, of_orientations = _frames(inputs, settings, directory)
     require_whole(inputs, frames)
     observations, fiducial = _photo_coordinates(inputs, settings)
     overruling.require(settings.relative, observations)
     refined = _ideal_coordinates(observations, inputs, settings, frames)
     control = _measured_control(inputs, refined.observations)
-    strips = tuple(adjust_strip(strip, refined.observations, control, frames, settings) for strip in inputs.strips)
-    points, ties = _join(strips, refined.observations, output)
+    block: Block | None = None
+    if settings.adjustment == "bundle":
+        from photostrip.pipeline.bundle import adjust_block  # a strip needs none of its libraries
+
+        tied = (frames, output, of_positions, of_orientations)
+        block = adjust_block(inputs, settings, refined.observations, control, tied)
+        refined = replace(refined, observations=block.observations)
+        strips, points, ties = block.strips, block.points, Ties.none()
+    else:
+        strips = tuple(adjust_strip(strip, refined.observations, control, frames, settings) for strip in inputs.strips)
+        points, ties = _join(strips, refined.observations, output)
     rows, differences = _at_given_points(inputs, frames, points, refined.observations)
     missing = _not_determined(refined.observations, points, inputs, strips)
-    notes = _notes(inputs, settings, strips, fiducial)
-    precise = [precision.of_strip(strip, refined.observations, frames) for strip in strips]
+    if block is None:
+        precise = [precision.of_strip(strip, refined.observations, frames) for strip in strips]
+        covariances = precision.joined(precise, strips, points)
+    else:
+        covariances = block.precision
+    found = block.notes if block is not None else tuple(note for strip in strips for note in strip.notes)
+    notes = _notes(inputs, settings, found, fiducial)
     return Result(
         inputs,
         settings,
@@ -98,13 +116,14 @@ def _triangulated(inputs: Inputs, settings: Settings, directory: Path | None) ->
         ties,
         missing,
         notes,
-        precision.joined(precise, strips, points),
+        covariances,
+        None if block is None else block.bundle,
     )
 
 
 def _require(settings: Settings) -> None:
     """Refuse what does not exist, by name."""
-    if settings.adjustment not in ADJUSTMENTS or settings.adjustment == "bundle":
+    if settings.adjustment not in ADJUSTMENTS:
         fault = Fault(
             f"adjustment {settings.adjustment!r} is not available",
             code="not-available",
@@ -139,6 +158,8 @@ def require_whole(inputs: Inputs, frames: Sequence[GroundFrame]) -> None:
         With a fault for each such point.
     """
     control = inputs.control
+    if not frames:
+        return
     geocentric = np.array([frame.kind == "geocentric" for frame in frames])
     part = control.use.any(axis=1) & ~control.use.all(axis=1)
     faults = [
@@ -154,18 +175,45 @@ def require_whole(inputs: Inputs, frames: Sequence[GroundFrame]) -> None:
         raise InputError(faults)
 
 
-def _frames(inputs: Inputs, settings: Settings, directory: Path | None) -> tuple[list[GroundFrame], GroundFrame]:
-    """Ground frames tied together; with curvature by eq. 153 all share the control's centre of gravity as origin."""
+def _frames(
+    inputs: Inputs, settings: Settings, directory: Path | None
+) -> tuple[list[GroundFrame], GroundFrame, GroundFrame | None, GroundFrame | None]:
+    """Ground frames of control, output, camera positions and orientations, tied together.
+
+    With curvature by eq. 153 all share the control's centre of gravity as origin.
+    """
     radius = settings.absolute.earth_radius if settings.absolute.earth_curvature == "model" else None
     _refuse_curvature_twice(inputs, settings)
-    specs = [replace(spec, curvature_radius=radius) for spec in inputs.frames]
+    cameras = [None if given is None else given.frame for given in (inputs.positions, inputs.orientations)]
+    if settings.adjustment != "bundle":
+        cameras = [None, None]
+    if settings.adjustment == "bundle" and _nothing_given(inputs):
+        _, target = tie_frames([FrameSpec("local", GROUND_AXES)])
+        return [], target, None, None
+    named = {f"control[{number}]": spec for number, spec in enumerate(inputs.frames)}
+    named |= {key: spec for key, spec in zip(CAMERAS, cameras, strict=True) if spec is not None}
+    specs = [replace(spec, curvature_radius=radius) for spec in named.values()]
     output = None if inputs.output is None else replace(inputs.output, curvature_radius=radius)
-    frames, target = tie_frames(specs, output, directory=directory)
-    if radius is None:
-        return frames, target
+    if not specs and output is not None:
+        specs, named = [output], {"output": output}
+    tied, target = tie_frames(specs, output, directory=directory, keys=list(named))
     plan = inputs.control.use[:, 0] & ~inputs.control.check
-    origin = inputs.control.enu[plan, :2].mean(axis=0)
-    return [frame.with_origin(origin) for frame in frames], target.with_origin(origin)
+    if radius is not None and plan.any():
+        origin = inputs.control.enu[plan, :2].mean(axis=0)
+        tied, target = [frame.with_origin(origin) for frame in tied], target.with_origin(origin)
+    found = dict(zip(named, tied, strict=True))
+    control = [found[f"control[{number}]"] for number in range(len(inputs.frames))]
+    return control, target, found.get(CAMERAS[0]), found.get(CAMERAS[1])
+
+
+def _nothing_given(inputs: Inputs) -> bool:
+    """Whether nothing ties the photos to the ground: a frame of their own is all they can have."""
+    measured = set(inputs.observations.point_ids)
+    control = inputs.control
+    counts = control.use.any(axis=1) & ~control.check
+    given = any(yes and name in measured for name, yes in zip(control.ids, counts.tolist(), strict=True))
+    cameras = any(each is not None and each.photos for each in (inputs.positions, inputs.orientations))
+    return not given and not cameras
 
 
 def _refuse_curvature_twice(inputs: Inputs, settings: Settings) -> None:
@@ -211,7 +259,7 @@ def _ideal_coordinates(
 
 def _heights(first: Result, frames: Sequence[GroundFrame]) -> tuple[float, float]:
     """Mean height of the cameras and of the ground above the ellipsoid, metres."""
-    frame = frames[0]
+    frame = frames[0] if frames else first.output
     centers = np.concatenate([s.intermediate.cartesian_from_intermediate(s.resection.centers) for s in first.strips])
     ground = first.points.cartesian
     heights = [points[:, 2] if frame.kind == "local" else frame.geodetic(points)[:, 2] for points in (centers, ground)]
@@ -304,11 +352,9 @@ def _reason(places: list[tuple[int, int]], *, contradicted: bool) -> str:
 
 
 def _notes(
-    inputs: Inputs, settings: Settings, strips: Sequence[StripResult], fiducial: interior.InteriorOrientation | None
+    inputs: Inputs, settings: Settings, found: Sequence[Note], fiducial: interior.InteriorOrientation | None
 ) -> tuple[Note, ...]:
-    notes: list[Note] = list(fiducial.notes) if fiducial is not None else []
-    for strip in strips:
-        notes += strip.notes
+    notes: list[Note] = [*(fiducial.notes if fiducial is not None else ()), *found]
     if settings.absolute.earth_curvature == "none" and inputs.frames and inputs.frames[0].crs != "local":
         notes.append(
             Note(

@@ -256,7 +256,8 @@ class Paraboloid:
     @property
     def t_values(self) -> Array:
         """C and D over their standard deviations, shape (2,)."""
-        return self.coefficients[3:] / self.sigmas[3:]
+        with np.errstate(divide="ignore", invalid="ignore"):  # parallaxes without any error
+            return np.asarray(self.coefficients[3:] / self.sigmas[3:], float)
 
     def critical(self, alpha: float = 0.05) -> float:
         """Give what |t| exceeds by chance with probability `alpha`; the normal quantile with stated sigmas."""

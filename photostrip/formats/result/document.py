@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from photostrip import __version__
 from photostrip.formats.result import (
+    bundle,
     conventions,
     covariance,
     deformation,
@@ -46,6 +47,7 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
     """
     rank = natural_rank(result.refined.observations.point_ids)
     images = [photos.ImageResiduals.of(result, strip, rank) for strip in result.strips]
+    singles = photos.singles_of(result, rank)
     found = ground.differences(result)
     numbers = summary.summary_of(result, found)
     polynomials = strips.polynomials_of(result)
@@ -54,7 +56,7 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         "frame": ground.frame_of(result),
         "summary": numbers,
         "tolerances": summary.tolerances_of(result, numbers),
-        "counts": summary.counts_of(result, sum(len(image.rows) for image in images)),
+        "counts": summary.counts_of(result, sum(len(image.rows) for image in (*images, *singles))),
         "conventions": conventions.conventions_of(result),
         "settings": conventions.settings_of(result),
         "corrections": conventions.corrections_of(result),
@@ -64,19 +66,20 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         **({"polynomial": polynomials[0], "polynomials": polynomials} if polynomials else {}),
         **covariance.covariances_of(result),
         **precision.precision_of(result),
+        **bundle.bundle_of(result),
         "control": ground.control_of(result, found),
         "misclosures": ground.misclosures_of(result),
         "ties": ground.ties_of(result, rank),
-        "rejected": pairs.rejected_of(result),
+        "rejected": [*pairs.rejected_of(result), *bundle.rejected_by_bundle(result)],
         "not_determined": ground.not_determined_of(result),
         "findings": [_finding(each) for each in result.findings],
         "notes": [_note(note) for note in (*notes, *result.notes)],
         "models": pairs.models_of(result),
         **deformation.deformations_of(result),
         "junctions": pairs.junctions_of(result),
-        "photos": photos.photos_of(result, images),
-        "points": ground.points_of(result, photos.point_rms(result, images), rank),
-        "residuals": photos.residuals_of(result, images),
+        "photos": [*photos.photos_of(result, images), *photos.single_photos_of(result, singles)],
+        "points": ground.points_of(result, photos.point_rms(result, [*images, *singles]), rank),
+        "residuals": [*photos.residuals_of(result, images), *photos.single_residuals_of(result, singles)],
         "parallaxes": pairs.parallaxes_of(result, rank),
     }
     verdict = verdict_of(body)

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
 
+LEAST_SHARE = 0.1  # of its standard deviation that a control point shows of itself at least
+
 
 @dataclass(frozen=True, eq=False)
 class Differences:
@@ -186,6 +188,8 @@ def _expected(result: Result) -> tuple[Floats, Floats, tuple[tuple[str, ...], ..
     count = np.maximum(held.sum(axis=0), 1)
     point = np.array([[s.precision[0], s.precision[0], s.precision[1]] for s in strips])
     variance = (held.T @ point**2) / count[:, None]
+    if result.bundle is not None and result.precision is not None:
+        return _expected_of_bundle(result, result.precision.points, variance, (held, count))
     for index, frame in enumerate(result.frames):
         rows = np.flatnonzero((control.frame == index) & (result.control_rows >= 0))
         if frame.kind == "geocentric" and len(rows):
@@ -194,6 +198,29 @@ def _expected(result: Result) -> tuple[Floats, Floats, tuple[tuple[str, ...], ..
     scale = (held.T @ np.array([s.scale_number for s in strips])) / count
     names = tuple(tuple(s.strip.id for s, yes in zip(strips, column, strict=True) if yes) for column in held.T)
     return np.sqrt(control.sigma**2 + variance), np.where(scale > 0, scale, np.nan), names
+
+
+def _expected_of_bundle(
+    result: Result, covariances: Floats, variance: Floats, members: tuple[NDArray[np.bool_], Numbers]
+) -> tuple[Floats, Floats, tuple[tuple[str, ...], ...]]:
+    """Give the same for a bundle adjustment, which knows the precision of each point.
+
+    A control point has drawn its adjusted position towards itself; the difference there is smaller than that of a check
+    point by twice the variance they share.
+    """
+    control, (held, count) = result.inputs.control, members
+    for index, frame in enumerate(result.frames):
+        rows = np.flatnonzero((control.frame == index) & (result.control_rows >= 0))
+        if len(rows):
+            at = result.control_rows[rows]
+            axes = frame.axes_at(result.points.cartesian[at])
+            variance[rows] = np.einsum("nij,njk,nik->ni", axes, covariances[at], axes)
+    sign = np.where(control.check, 1.0, -1.0)[:, None]
+    sigma = np.sqrt(np.maximum(control.sigma**2 + sign * variance, (control.sigma * LEAST_SHARE) ** 2))
+    strips = result.strips
+    scale = (held.T @ np.array([s.scale_number for s in strips])) / count
+    names = tuple(tuple(s.strip.id for s, yes in zip(strips, column, strict=True) if yes) for column in held.T)
+    return sigma, np.where(scale > 0, scale, np.nan), names
 
 
 def control_of(result: Result, found: Differences) -> list[Document]:

@@ -18,7 +18,7 @@ from photostrip.formats.result.numbers import (
     micrometres,
     rounded,
 )
-from photostrip.formats.result.precision import photo_columns
+from photostrip.formats.result.precision import columns_of_photos, photo_columns
 from photostrip.geometry.rotation import angles
 from photostrip.triangulation.exterior import project
 
@@ -186,3 +186,81 @@ def point_rms(result: Result, residuals: list[ImageResiduals]) -> Floats:
         np.add.at(count, point, 2)
     with np.errstate(invalid="ignore"):
         return np.sqrt(np.where(count > 0, squares / np.maximum(count, 1), np.nan))
+
+
+# ------------------------------------------------------------------------------------------------ single photos
+
+
+def singles_of(result: Result, rank: Numbers) -> list[ImageResiduals]:
+    """Give the residuals of the photos that are strips of their own, which only a bundle adjustment has.
+
+    Parameters
+    ----------
+    result : Result
+        The result.
+    rank : ndarray of int
+        Place of every point in natural order.
+    """
+    if result.bundle is None:
+        return []
+    observations = result.refined.observations
+    known = np.full((len(observations.point_ids), 3), np.nan)
+    known[result.points.number] = result.points.cartesian
+    used = np.zeros(len(observations), bool)
+    used[result.bundle.block.rows[result.bundle.screened.selection.images]] = True
+    found = []
+    for single in result.bundle.singles:
+        rows = np.flatnonzero(observations.photo == observations.photo_ids.index(single.strip.photos[0]))
+        rows = rows[np.argsort(rank[observations.point[rows]], kind="stable")]
+        photo = np.zeros(len(rows), np.intp)
+        focal = np.array([single.strip.camera.principal_distance])
+        with np.errstate(invalid="ignore"):
+            at = known[observations.point[rows]]
+            computed = project(at, single.center[None], single.rotation[None], photo, focal)
+        found.append(ImageResiduals(rows, photo, observations.xy[rows] - computed, used[rows]))
+    return found
+
+
+def single_photos_of(result: Result, residuals: list[ImageResiduals]) -> list[Document]:
+    """Give the entries of ``photos`` for photos that are strips of their own."""
+    if result.bundle is None:
+        return []
+    system, unit = result.settings.angle_system, result.settings.angle_unit
+    rows = []
+    place = {photo: number for number, photo in enumerate(result.bundle.start.photos)}
+    for single, image in zip(result.bundle.singles, residuals, strict=True):
+        photo = single.strip.photos[0]
+        center = single.center[None]
+        (ground,) = coordinates(result.output, result.output.ground_from_cartesian(center, ids=[f"of photo {photo}"]))
+        rotation = result.output.axes_at(center) @ single.rotation[None]
+        covariance = result.bundle.photo_covariances[place[photo]][None]
+        (columns,) = columns_of_photos(result, center, rotation, covariance)
+        values = _angles(rotation, system, unit)[0]
+        fit = micrometres(np.sqrt(np.mean(image.residuals[image.used] ** 2))) if image.used.any() else None
+        rows.append(
+            {
+                "id": photo, "strip": single.strip.id, "x": ground[0], "y": ground[1], "z": ground[2],
+                "rotation": rounded(rotation.reshape(9), ROTATION),
+                "angles": {"system": system, "unit": unit, "values": values}, **columns,
+                "image_rms_um": fit, "points": int(image.used.sum()), "resected": True,
+            }
+        )  # fmt: skip
+    return rows
+
+
+def single_residuals_of(result: Result, residuals: list[ImageResiduals]) -> list[Document]:
+    """Give the entries of ``residuals`` for photos that are strips of their own."""
+    if result.bundle is None:
+        return []
+    observations = result.refined.observations
+    return [
+        {
+            "strip": single.strip.id,
+            "photo": single.strip.photos[0],
+            "points": [observations.point_ids[number] for number in observations.point[image.rows].tolist()],
+            "vx_um": micrometres(image.residuals[:, 0]),
+            "vy_um": micrometres(image.residuals[:, 1]),
+            "used": image.used.tolist(),
+        }
+        for single, image in zip(result.bundle.singles, residuals, strict=True)
+    ]

@@ -135,11 +135,31 @@ def photo_columns(result: Result, number: int, place: Floats, rotations: Floats)
     """
     if result.precision is None:
         return [{"sigma": None} for _ in place]
+    return columns_of_photos(result, place, rotations, result.precision.photos[number])
+
+
+def columns_of_photos(result: Result, place: Floats, rotations: Floats, given: Floats) -> list[Document]:
+    """Give the same for photos with given covariances.
+
+    Parameters
+    ----------
+    result : Result
+        The result: its frame and its angles count.
+    place, rotations : ndarray, shapes (m, 3), (m, 3, 3)
+        As for :func:`photo_columns`.
+    given : ndarray, shape (m, 6, 6)
+        Covariances in the axes of the Cartesian frame, as in :class:`photostrip.pipeline.Precision`.
+
+    Returns
+    -------
+    list of dict
+        As :func:`photo_columns`.
+    """
     axes = result.output.axes_at(place)
     turn = np.zeros((len(place), 6, 6))
     turn[:, :3, :3] = axes[:, list(result.output.order)]
     turn[:, 3:, 3:] = _rates(rotations, result.settings.angle_system) @ axes * UNITS[result.settings.angle_unit]
-    covariances = turn @ result.precision.photos[number] @ turn.transpose(0, 2, 1)
+    covariances = turn @ given @ turn.transpose(0, 2, 1)
     with np.errstate(invalid="ignore"):
         sigma = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
     columns = zip(

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.formats.result.bundle import image_fit
 from photostrip.formats.result.numbers import GROUND, Document, Plain, micrometres, rms, rounded
 from photostrip.formats.result.pairs import Parallaxes, rejected_by_strip, sigma0
 from photostrip.formats.result.strips import AXES
@@ -46,9 +47,11 @@ def counts_of(result: Result, measurements: int) -> Document:
     measured = result.control_rows >= 0
     part = measured & ~control.check & control.use.any(axis=1)
     strips = result.strips
+    bundle = None if result.bundle is None else result.bundle.screened.selection
+    out = 0 if result.bundle is None else sum(not each.readmitted for each in result.bundle.screened.rejections)
     return {
-        "strips": len(strips),
-        "photos": sum(len(s.strip.photos) for s in strips),
+        "strips": len(result.inputs.strips),
+        "photos": sum(len(strip.photos) for strip in result.inputs.strips),
         "models": sum(len(s.formed.scale) for s in strips),
         "points": len(roles),
         "new_points": roles.count("new"),
@@ -58,11 +61,12 @@ def counts_of(result: Result, measurements: int) -> Document:
         "check_points": int((measured & control.check).sum()),
         "given_not_measured": int((~measured).sum()),
         "image_points": measurements,
-        "image_points_used": sum(len(s.rows) for s in strips),
+        "image_points_used": sum(len(s.rows) for s in strips) if bundle is None else int(bundle.images.sum()),
         "pass_point_transfers": sum(int(s.formed.junctions.used.sum()) for s in strips),
         "rejected_in_pairs": sum(not rejection.readmitted for s in strips for rejection in s.rejections),
         "rejected_in_scale_transfer": sum(int((~s.formed.junctions.used).sum()) for s in strips),
         "rejected_for_rays": sum(len(np.unique(s.contradictions.point[rejected_by_strip(s)])) for s in strips),
+        **({} if bundle is None else {"rejected_in_bundle": out}),
         "not_determined": len(result.not_determined),
         "ties": len(result.ties.number),
     }
@@ -95,6 +99,14 @@ def summary_of(result: Result, found: Differences) -> Document:
         "photo_scale": rounded(np.average([s.scale_number for s in result.strips], weights=photos), 1),
         "flying_height": rounded(np.average([s.depth for s in result.strips], weights=photos), 2),
     }
+    if result.bundle is not None:
+        sigma0_found, image_rms, shares = image_fit(result)
+        document |= {
+            "sigma0_um": micrometres(sigma0_found),
+            "redundancy": shares,
+            "image_rms_um": micrometres(image_rms),
+            "sigma0_pairs_um": document["sigma0_um"],
+        }
     for role, rows in roles.items():
         document[f"{role}_rms"] = _axis_rms(found.axes[rows])
         document[f"{role}_rms_um"] = _axis_rms(found.axes[rows] / found.scale[rows, None] * 1e6, 1)

@@ -1,0 +1,126 @@
+"""Which observations of a problem take part: taking them out, putting them back, starting again from a solution."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.triangulation.bundle.problem import Images, Problem, Start
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.triangulation.bundle.solution import Solution
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+    Flags = NDArray[np.bool_]
+
+LEAST_RAYS = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """Which observations take part.
+
+    Parameters
+    ----------
+    images : ndarray of bool, shape (n,)
+        Rays.
+    control, positions, attitudes : ndarray of bool, shapes (c, 3), (g, 3), (a, 3)
+        Coordinates.
+    """
+
+    images: Flags
+    control: Flags
+    positions: Flags
+    attitudes: Flags
+
+    @classmethod
+    def everything(cls, problem: Problem) -> Selection:
+        """Give the selection of all observations that are given."""
+        given = (np.isfinite(each.sigma) for each in (problem.control, problem.positions, problem.attitudes))
+        return cls(np.ones(len(problem.images), bool), *given)
+
+    def without(self, kind: str, row: int, axis: int) -> Selection:
+        """Take one ray or one coordinate out."""
+        name = {"image": "images", "control": "control", "position": "positions", "attitude": "attitudes"}[kind]
+        flags = getattr(self, name).copy()
+        flags[row if kind == "image" else (row, axis)] = False
+        return replace(self, **{name: flags})
+
+
+def supported(problem: Problem, selection: Selection) -> Selection:
+    """Take out the rays of points that too few rays are left of.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem with all observations.
+    selection : Selection
+        What is to take part.
+
+    Returns
+    -------
+    Selection
+        Without the rays of points that have one ray only and are not given in all three coordinates.
+    """
+    point = problem.images.point
+    rays = np.bincount(point[selection.images], minlength=problem.points)
+    fixed = np.zeros(problem.points, bool)
+    fixed[problem.control.point[selection.control.all(axis=1)]] = True
+    images = selection.images & ((rays >= LEAST_RAYS) | fixed)[point]
+    images &= np.isfinite(problem.start.points[point]).all(axis=1)
+    return replace(selection, images=images)
+
+
+def selected(problem: Problem, selection: Selection) -> Problem:
+    """Give the problem with the observations that take part.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem with all observations.
+    selection : Selection
+        What takes part.
+
+    Returns
+    -------
+    Problem
+        Rays taken out are gone; coordinates taken out have an infinite standard deviation.
+    """
+    images, rows = problem.images, selection.images
+    chosen = Images(images.photo[rows], images.point[rows], images.xy[rows], images.sigma[rows])
+    given = (problem.control.sigma, problem.positions.sigma, problem.attitudes.sigma)
+    flags = (selection.control, selection.positions, selection.attitudes)
+    sigma = [np.where(yes, each, np.inf) for each, yes in zip(given, flags, strict=True)]
+    return replace(
+        problem,
+        images=chosen,
+        start=replace(problem.start, points=np.nan_to_num(problem.start.points)),
+        control=replace(problem.control, sigma=sigma[0]),
+        positions=replace(problem.positions, sigma=sigma[1]),
+        attitudes=replace(problem.attitudes, sigma=sigma[2]),
+    )
+
+
+def restarted(problem: Problem, solution: Solution) -> Problem:
+    """Give a problem that starts where another one ended.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem with all observations.
+    solution : Solution
+        A solution of it, or of a selection.
+
+    Returns
+    -------
+    Problem
+        The same problem; a point that took no part keeps its start.
+    """
+    known = np.asarray(np.isfinite(problem.start.points).all(axis=1), bool)
+    points = np.where(known[:, None], solution.points, problem.start.points)
+    return replace(problem, start=Start(solution.centers, solution.rotations, points))

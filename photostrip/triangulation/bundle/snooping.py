@@ -1,0 +1,374 @@
+"""The search for gross errors: test, take the worst out, adjust again; at the end put back what fits after all."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.triangulation.bundle import reliability, robust
+from photostrip.triangulation.bundle.precision import precision as precision_of
+from photostrip.triangulation.bundle.selection import Selection, restarted, selected, supported
+from photostrip.triangulation.bundle.self_calibration import image_shift
+from photostrip.triangulation.bundle.solve import solve
+from photostrip.triangulation.exterior import project
+from photostrip.triangulation.single import derivatives, intersect_points
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from photostrip.triangulation.bundle.problem import Problem
+    from photostrip.triangulation.bundle.settings import Settings
+    from photostrip.triangulation.bundle.solution import Precision, Solution
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+    Flags = NDArray[np.bool_]
+
+ROUNDS = 200  # of testing and taking out; each takes out one error of every neighbourhood
+READMISSIONS = 3
+NEAR = 0.5  # test value of what may go in the same round, in units of the worst of all
+
+
+@dataclass(frozen=True)
+class Rejection:
+    """One observation that was taken out.
+
+    Parameters
+    ----------
+    kind : str
+        ``image``, ``control``, ``position`` or ``attitude``.
+    row : int
+        Its row in the problem.
+    axis : int
+        The coordinate beyond the limit: 0, 1 or 2. A ray goes out as a whole.
+    test : str
+        Name of the test; ``start`` for what the strip method had rejected already and does not fit.
+    value, limit : float
+        Test value and limit.
+    size : float
+        What error would explain the residual: mm, metres or radians.
+    readmitted : bool
+        Whether it came back.
+    """
+
+    kind: str
+    row: int
+    axis: int
+    test: str
+    value: float
+    limit: float
+    size: float
+    readmitted: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Screened:
+    """A solution and how it was cleaned.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem with the observations that took part.
+    selection : Selection
+        Which those are.
+    solution : Solution
+        Its solution.
+    precision : Precision
+        Cofactors.
+    rejections : tuple of Rejection
+        What was taken out, in order; re-admitted ones are marked.
+    rounds : int
+        Adjustments made.
+    """
+
+    problem: Problem
+    selection: Selection
+    solution: Solution
+    precision: Precision
+    rejections: tuple[Rejection, ...]
+    rounds: int
+
+
+def screen(problem: Problem, begin: Selection, settings: Settings, kept: Flags | None = None) -> Screened:
+    """Adjust a problem and take its gross errors out.
+
+    Parameters
+    ----------
+    problem : Problem
+        All observations.
+    begin : Selection
+        What takes part at first; the rest is put in at the end where it fits.
+    settings : Settings
+        Which search, which test, at which level.
+    kept : ndarray of bool, shape (n,), optional
+        Rays that stay in whatever the tests say.
+
+    Returns
+    -------
+    Screened
+        The cleaned solution.
+    """
+    keep = np.zeros(len(problem.images), bool) if kept is None else kept
+    if settings.screening == "none":
+        chosen = supported(problem, Selection.everything(problem))
+        done = _Adjusted.of(problem, chosen)
+        return Screened(done.problem, chosen, done.solution, done.precision, (), 1)
+    search = _Search(problem, settings, keep)
+    chosen = supported(problem, begin)
+    if settings.screening == "robust":
+        chosen = search.robust(chosen)
+    done = search.clean(chosen)
+    for _ in range(READMISSIONS):
+        more = search.fitting(done)
+        if more is None:
+            break
+        done = search.clean(more)
+    log = tuple(search.log(done, begin))
+    return Screened(done.problem, done.selection, done.solution, done.precision, log, search.rounds)
+
+
+@dataclass(frozen=True, eq=False)
+class _Adjusted:
+    """One adjustment on the way."""
+
+    problem: Problem
+    selection: Selection
+    solution: Solution
+    precision: Precision
+
+    @classmethod
+    def of(cls, problem: Problem, selection: Selection) -> _Adjusted:
+        chosen = selected(problem, selection)
+        solution = solve(chosen)
+        return cls(chosen, selection, solution, precision_of(solution))
+
+    def rows(self, kind: str) -> Numbers:
+        """Rows of the whole problem that the observations of a kind have."""
+        if kind == reliability.IMAGE:
+            return np.flatnonzero(self.selection.images)
+        problem = self.problem
+        sizes = {
+            reliability.CONTROL: len(problem.control),
+            reliability.POSITION: len(problem.positions),
+            reliability.ATTITUDE: len(problem.attitudes),
+        }
+        return np.arange(sizes[kind])
+
+
+class _Search:
+    """What is remembered from round to round."""
+
+    def __init__(self, problem: Problem, settings: Settings, kept: Flags) -> None:
+        self.problem, self.settings, self.kept = problem, settings, kept
+        self.out: dict[tuple[str, int, int], Rejection] = {}
+        self.back: set[int] = set()
+        self.rounds = 0
+
+    def adjust(self, selection: Selection) -> _Adjusted:
+        """Adjust a selection, and start from there the next time."""
+        done = _Adjusted.of(self.problem, selection)
+        self.problem = restarted(self.problem, done.solution)
+        self.rounds += 1
+        return done
+
+    def robust(self, selection: Selection) -> Selection:
+        """Take out at once what re-weighting leaves next to no weight."""
+        chosen = selected(self.problem, selection)
+        solution, weight = robust.adjust(chosen)
+        self.problem = restarted(self.problem, solution)
+        self.rounds += robust.ROUNDS
+        rows = np.flatnonzero(selection.images)[weight < robust.NO_WEIGHT]
+        images = selection.images.copy()
+        for row in rows[~self.kept[rows]].tolist():
+            images[row] = False
+            self.out[reliability.IMAGE, row, 0] = Rejection(reliability.IMAGE, row, 0, "robust", np.nan, np.nan, np.nan)
+        return supported(self.problem, replace(selection, images=images))
+
+    def clean(self, selection: Selection) -> _Adjusted:
+        """Test and take out until nothing is beyond the limit."""
+        for _ in range(ROUNDS):
+            done = self.adjust(selection)
+            worst = list(self._worst(done))
+            if not worst:
+                return done
+            for each in worst:
+                self.out[each.kind, each.row, each.axis] = each
+                selection = selection.without(each.kind, each.row, each.axis)
+            selection = supported(self.problem, selection)
+        return self.adjust(selection)
+
+    def _limit(self, solution: Solution) -> tuple[float, float]:
+        """Limit of the standardised residuals, and what they are divided by."""
+        limit = reliability.limit(self.settings.test, self.settings.alpha, solution.redundancy)
+        # never sharper than the stated standard deviations: else a good fit would reject its own best observations
+        unit = max(solution.sigma0, 1.0) if self.settings.test == "tau" and solution.redundancy > 0 else 1.0
+        return limit, unit
+
+    def _worst(self, done: _Adjusted) -> Iterator[Rejection]:
+        """Give the worst observations beyond the limit, no two of which share a point or a photo."""
+        limit, unit = self._limit(done.solution)
+        beyond = []
+        for group in reliability.groups_of(done.problem, done.solution, done.precision):
+            value = np.abs(np.nan_to_num(group.standardised)) / unit
+            rows = done.rows(group.kind)
+            axis = value.argmax(axis=1) if len(value) else np.zeros(0, np.intp)
+            for row in np.flatnonzero(value.max(axis=1, initial=0.0) > limit).tolist():
+                if group.kind == reliability.IMAGE and self.kept[rows[row]]:
+                    continue
+                column = int(axis[row])
+                size = float(group.gross[row, column])
+                test = self.settings.test
+                beyond.append(
+                    Rejection(group.kind, int(rows[row]), column, test, float(value[row, column]), limit, size)
+                )
+        beyond.sort(key=lambda each: (-each.value, each.kind, each.row))
+        touched: set[tuple[str, int]] = set()
+        for each in beyond:
+            places = self._places(each)
+            if each.value < NEAR * beyond[0].value or touched & places:
+                touched |= places
+                continue
+            touched |= places
+            yield each
+
+    def _places(self, each: Rejection) -> set[tuple[str, int]]:
+        """Photo and point that an observation belongs to."""
+        problem = self.problem
+        if each.kind == reliability.IMAGE:
+            images = problem.images
+            return {("photo", int(images.photo[each.row])), ("point", int(images.point[each.row]))}
+        if each.kind == reliability.CONTROL:
+            return {("point", int(problem.control.point[each.row])), ("control", 0)}
+        part = problem.positions if each.kind == reliability.POSITION else problem.attitudes
+        return {("photo", int(part.photo[each.row])), ("control", 0)}
+
+    def fitting(self, done: _Adjusted) -> Selection | None:
+        """Put back the rays that fit the adjusted photos and points; None when there is no new one."""
+        limit, unit = self._limit(done.solution)
+        value = predicted(self.problem, done.selection, (done.solution, done.precision)) / unit
+        fits = ~done.selection.images & (value < limit)
+        fits[list(self.back)] = False  # it was back once, and went again
+        control = self._given(done, limit * unit)
+        if not fits.any() and not (control & ~done.selection.control).any():
+            return None
+        self.back |= set(np.flatnonzero(fits).tolist())
+        chosen = replace(done.selection, images=done.selection.images | fits, control=done.selection.control | control)
+        self._place_points(done, fits)
+        chosen = supported(self.problem, chosen)
+        return None if (chosen.images == done.selection.images).all() and not control.any() else chosen
+
+    def _given(self, done: _Adjusted, limit: float) -> Flags:
+        """Control coordinates that were left out from the start and fit."""
+        control = self.problem.control
+        error = np.abs(done.solution.control_residuals)
+        cofactor = -np.diagonal(done.precision.control_residuals, axis1=1, axis2=2)
+        with np.errstate(invalid="ignore"):
+            fits = error < limit * np.sqrt(control.sigma**2 + np.maximum(cofactor, 0.0))
+        tested = np.zeros(control.sigma.shape, bool)
+        for kind, row, axis in self.out:
+            if kind == reliability.CONTROL:
+                tested[row, axis] = True
+        return fits & np.isfinite(control.sigma) & ~done.selection.control & ~tested
+
+    def _place_points(self, done: _Adjusted, fits: Flags) -> None:
+        """Give points that come back as a whole the place where their rays meet."""
+        images, solution = self.problem.images, done.solution
+        active = np.zeros(self.problem.points, bool)
+        active[images.point[done.selection.images]] = True
+        rows = np.flatnonzero(fits & ~active[images.point])
+        if len(rows):
+            numbers, found = _meeting(self.problem, rows, solution)
+            points = self.problem.start.points.copy()
+            points[numbers] = found
+            self.problem = replace(self.problem, start=replace(self.problem.start, points=points))
+
+    def log(self, done: _Adjusted, begin: Selection) -> Iterator[Rejection]:
+        """Give every observation that was out at some time."""
+        limit, unit = self._limit(done.solution)
+        outside = np.flatnonzero(~done.selection.images)
+        value = predicted(self.problem, done.selection, (done.solution, done.precision)) / unit
+        for (kind, row, axis), each in self.out.items():
+            inside = (
+                done.selection.images[row] if kind == reliability.IMAGE else self._in(done.selection, kind, row, axis)
+            )
+            test = float(value[row]) if np.isnan(each.value) and kind == reliability.IMAGE else each.value
+            bound = limit if np.isnan(each.limit) else each.limit
+            yield replace(each, value=test, limit=bound, readmitted=bool(inside))
+        known = {row for kind, row, _ in self.out if kind == reliability.IMAGE}
+        for row in outside[~begin.images[outside]].tolist():
+            if row not in known:
+                yield Rejection(reliability.IMAGE, row, 0, "start", float(value[row]), limit, np.nan)
+        for row, axis in np.argwhere(~begin.control & np.isfinite(self.problem.control.sigma)).tolist():
+            if not done.selection.control[row, axis]:
+                size = -float(done.solution.control_residuals[row, axis])
+                yield Rejection(reliability.CONTROL, row, axis, "start", np.nan, limit, size)
+
+    @staticmethod
+    def _in(selection: Selection, kind: str, row: int, axis: int) -> bool:
+        part = {"control": selection.control, "position": selection.positions, "attitude": selection.attitudes}[kind]
+        return bool(part[row, axis])
+
+
+def predicted(problem: Problem, selection: Selection, found: tuple[Solution, Precision]) -> Floats:
+    """Test values of rays that take no part, against what the others give.
+
+    Parameters
+    ----------
+    problem : Problem
+        All observations.
+    selection : Selection
+        What takes part.
+    found : tuple of Solution and Precision
+        Its solution.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Larger one of the two standardised differences of each ray outside; infinite where the point has no other
+        rays, NaN for rays inside. Correlations between photo and point are left out, so that the values are rather
+        too small than too large.
+    """
+    solution, precision = found
+    value = np.full(len(problem.images), np.nan)
+    rows = np.flatnonzero(~selection.images)
+    if not len(rows):
+        return value
+    images, focal = problem.images, problem.cameras.focal[problem.cameras.of_photo]
+    active = np.zeros(problem.points, bool)
+    active[images.point[selection.images]] = True
+    points, cofactors = solution.points.copy(), precision.points.copy()
+    lost = rows[~active[images.point[rows]]]
+    if len(lost):
+        numbers, xyz = _meeting(problem, lost, solution)
+        points[numbers], cofactors[numbers] = xyz, 0.0
+    photo, point = images.photo[rows], images.point[rows]
+    by_photo, by_point = derivatives(points[point], solution.centers, solution.rotations, photo, focal)
+    variance = images.sigma[rows] ** 2
+    variance = variance + np.einsum("nki,nij,nkj->nk", by_photo, precision.photos[photo], by_photo)
+    variance = variance + np.einsum("nki,nij,nkj->nk", by_point, cofactors[point], by_point)
+    measured = images.xy[rows] + image_shift(problem, solution.common, images.xy[rows], photo)
+    computed = project(points[point], solution.centers, solution.rotations, photo, focal)
+    with np.errstate(invalid="ignore"):
+        tests = np.abs(measured - computed) / np.sqrt(variance)
+    value[rows] = np.where(np.isfinite(tests).all(axis=1), tests.max(axis=1), np.inf)
+    return value
+
+
+def _meeting(problem: Problem, rows: Numbers, solution: Solution) -> tuple[Numbers, Floats]:
+    """Points that took no part, from their rays and the adjusted photos."""
+    images = problem.images
+    numbers, point = np.unique(images.point[rows], return_inverse=True)
+    focal = problem.cameras.focal[problem.cameras.of_photo]
+    xy = images.xy[rows] + image_shift(problem, solution.common, images.xy[rows], images.photo[rows])
+    found = intersect_points(
+        xy,
+        images.sigma[rows],
+        (images.photo[rows], point),
+        (solution.centers, solution.rotations, focal),
+        len(numbers),
+    )
+    return numbers, found.xyz

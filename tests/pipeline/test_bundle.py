@@ -1,0 +1,220 @@
+"""The bundle adjustment through the whole pipeline: exact without noise, whatever ties the photos to the ground."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from photostrip.errors import GeometryError
+from photostrip.formats.result.document import document_of
+from photostrip.formats.simulation import inputs_of
+from photostrip.pipeline import Strip
+from photostrip.points import PhotoPoints
+from photostrip.simulate import Control, Flight, Ground, Image, Spec, Terrain
+from tests.pipeline.blocks import adjusted, corners, errors, exact, orientations, positions, simulate, with_control
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from photostrip.pipeline import Inputs
+    from photostrip.simulate import Simulation
+
+MICROMETRE = 1e-6  # metres
+BLOCK = exact(flight=Flight(photos=6, strips=3))
+
+EXACT_BLOCKS = {
+    "a strip": exact(flight=Flight(photos=6)),
+    "strips flown both ways": exact(flight=Flight(photos=6, strips=3, alternate=True)),
+    "5 x 20 photos": exact(flight=Flight(photos=20, strips=5)),
+    "plan and height points": exact(
+        flight=Flight(photos=8, strips=2),
+        control=Control(noise=(0, 0, 0), use={"xyz": 0.4, "xy": 0.3, "z": 0.3}, bands=4),
+    ),
+    "two zones": exact(
+        ground=Ground(center_deg=(18.0, 49.2)),
+        flight=Flight(photos=8, strips=2),
+        control=Control(noise=(0, 0, 0), second_crs="EPSG:32634"),
+    ),
+    "geocentric": exact(ground=Ground(crs="geocentric"), flight=Flight(photos=5, strips=2)),
+    "local": exact(ground=Ground(crs="local"), flight=Flight(photos=5, strips=2)),
+    "southern, X north": exact(
+        ground=Ground(crs="EPSG:32733", axes=("north", "east", "up"), center_deg=(15.0, -20.0)),
+        flight=Flight(photos=5, strips=2, heading_deg=200.0),
+    ),
+    "tilted photos": exact(flight=Flight(photos=6, strips=2, end_lap_percent=70, attitude_sigma_deg=(4.0, 4.0, 4.0))),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("title", EXACT_BLOCKS)
+def test_without_noise_the_truth_comes_back(title: str) -> None:
+    simulation = simulate(EXACT_BLOCKS[title])
+    result = adjusted(simulation)
+    assert np.abs(errors(simulation, result)).max() < MICROMETRE
+    assert len(result.points.number) == len(simulation.truth.points.ids)
+    check = result.control_differences[simulation.control.check & (result.control_rows >= 0)]
+    assert np.nanmax(np.abs(check)) < MICROMETRE
+    assert result.bundle is not None
+    assert result.bundle.screened.rejections == ()
+    centers = np.concatenate([s.intermediate.cartesian_from_intermediate(s.resection.centers) for s in result.strips])
+    assert np.abs(centers - simulation.truth.centers).max() < MICROMETRE
+
+
+TIED: dict[str, Callable[[Simulation], Inputs]] = {
+    "corners only": lambda s: with_control(s, corners(s)),
+    "positions only": lambda s: replace(with_control(s, []), positions=positions(s)),
+    "positions and one point": lambda s: replace(with_control(s, corners(s)[:1]), positions=positions(s)),
+    "lever arm": lambda s: replace(with_control(s, corners(s)[:1]), positions=positions(s, lever=(0.3, -0.5, 1.2))),
+    "offset": lambda s: replace(
+        with_control(s, corners(s)), positions=positions(s, shift=np.array([3.0, 2.0, 1.0]), correction="offset")
+    ),
+    "drift": lambda s: replace(
+        with_control(s, corners(s)),
+        positions=positions(s, shift=np.arange(18)[:, None] * np.array([0.1, -0.2, 0.05]), correction="drift"),
+    ),
+    "orientations": lambda s: replace(with_control(s, []), orientations=orientations(s, observed=True)),
+    "orientations, alpha": lambda s: replace(
+        with_control(s, []), orientations=orientations(s, observed=True, system="alpha-omega-kappa")
+    ),
+}
+
+
+@pytest.mark.parametrize("title", TIED)
+def test_whatever_ties_the_photos_to_the_ground(title: str) -> None:
+    simulation = simulate(BLOCK)
+    result = adjusted(simulation, TIED[title](simulation))
+    # three metres of the grid are not three metres everywhere: its scale changes by 1e-6 over the block
+    assert np.abs(errors(simulation, result)).max() < (10 if title in {"offset", "drift"} else 1) * MICROMETRE
+    assert not any(note.code == "free-network" for note in result.notes)
+
+
+def test_offset_and_drift_are_found_as_they_are() -> None:
+    simulation = simulate(BLOCK)
+    step = np.array([0.1, -0.2, 0.05])
+    shift = np.concatenate([np.arange(6)[:, None] * step + [1, 2, 3], np.zeros((12, 3))])
+    inputs = replace(
+        with_control(simulation, corners(simulation)), positions=positions(simulation, shift=shift, correction="drift")
+    )
+    document = document_of(adjusted(simulation, inputs))
+    found = {each["name"]: each["value"] for each in document["bundle"]["corrections"]}
+    for axis in (1, 2, 3):
+        # what is added to the given positions, the offset in mid-strip; metres of the ground, not of the grid
+        assert found[f"positions A: drift {axis}"] == pytest.approx(-step[axis - 1], rel=1e-3)
+        assert found[f"positions A: offset {axis}"] == pytest.approx(-(axis + 2.5 * step[axis - 1]), rel=1e-3)
+        assert abs(found[f"positions B: offset {axis}"]) < 1e-4
+
+
+def test_approximate_orientations_give_the_frame_and_no_more() -> None:
+    simulation = simulate(BLOCK)
+    inputs = replace(with_control(simulation, []), orientations=orientations(simulation, observed=False))
+    result = adjusted(simulation, inputs)
+    assert np.abs(errors(simulation, result)).max() < 1e-4  # true here; inner constraints keep the start
+    assert result.bundle is not None
+    assert result.bundle.screened.solution.free
+    assert [note.code for note in result.notes if note.severity == "warning"] == ["free-network"]
+
+
+def test_a_free_network_has_the_shape_of_the_truth() -> None:
+    simulation = simulate(BLOCK)
+    result = adjusted(simulation, with_control(simulation, []))
+    assert result.output.kind == "local"
+    number = {name: row for row, name in enumerate(simulation.truth.points.ids)}
+    ids = result.refined.observations.point_ids
+    truth = simulation.truth.points.xyz[[number[ids[n]] for n in result.points.number]]
+    found = result.points.cartesian
+    pairs = [(0, 5), (3, 20), (7, 40), (11, 33)]
+    ratios = [np.linalg.norm(found[i] - found[j]) / np.linalg.norm(truth[i] - truth[j]) for i, j in pairs]
+    assert np.ptp(ratios) / ratios[0] < 1e-9
+    assert np.isnan(result.control_differences).all()
+    assert document_of(result)["bundle"]["free_network"] is True
+
+
+def test_single_photos_join_a_strip() -> None:
+    """Every strip but the first is cut into photos of their own."""
+    simulation = simulate(exact(flight=Flight(photos=6, strips=2, side_lap_percent=60.0)))
+    inputs = inputs_of(simulation)
+    first, second = inputs.strips
+    singles = tuple(Strip(photo, second.camera, (photo,)) for photo in second.photos)
+    result = adjusted(simulation, replace(inputs, strips=(first, *singles)))
+    assert np.abs(errors(simulation, result)).max() < MICROMETRE
+    document = document_of(result)
+    assert [photo["id"] for photo in document["photos"]] == [*first.photos, *second.photos]
+    assert {each["photo"] for each in document["residuals"]} == {*first.photos, *second.photos}
+    found = {photo["id"]: (photo["x"], photo["y"], photo["z"]) for photo in document["photos"]}
+    place = [found[photo] for photo in second.photos]
+    np.testing.assert_allclose(place, simulation.truth.centers_ground[6:], atol=1e-4)
+    assert document["counts"]["photos"] == 12
+
+
+UNDETERMINED: dict[str, tuple[Spec, Callable[[Simulation], Inputs]]] = {
+    "roll about the flight line": (
+        exact(flight=Flight(photos=6, position_sigma=(0, 0, 0))),
+        lambda s: replace(with_control(s, []), positions=positions(s)),
+    ),
+    "neither control nor camera positions": (BLOCK, lambda s: with_control(s, corners(s)[:2])),
+    "shift along the flight": (
+        BLOCK,
+        lambda s: replace(with_control(s, []), positions=positions(s, correction="offset")),
+    ),
+}
+
+
+@pytest.mark.parametrize("words", UNDETERMINED)
+def test_what_is_not_determined_is_named(words: str) -> None:
+    spec, given = UNDETERMINED[words]
+    simulation = simulate(spec)
+    with pytest.raises(GeometryError, match=words):
+        adjusted(simulation, given(simulation))
+
+
+def test_a_strip_apart_is_named() -> None:
+    """Two strips that share no point; only the first has control."""
+    simulation = simulate(exact(flight=Flight(photos=6, strips=2)))
+    seen = simulation.observations
+    first = np.array([name in simulation.strips[0][1] for name in seen.photo_ids])[seen.photo]
+    of_first = np.isin(seen.point, seen.point[first])
+    rows = first | ~of_first
+    cut = PhotoPoints(
+        seen.photo_ids, seen.point_ids, seen.photo[rows], seen.point[rows], seen.xy[rows], seen.sigma[rows]
+    )
+    names = [seen.point_ids[n] for n in np.unique(seen.point[first])]
+    with pytest.raises(GeometryError, match="strip B: neither control"):
+        adjusted(simulation, replace(with_control(simulation, names), observations=cut))
+
+
+def test_check_points_do_not_influence_a_bundle() -> None:
+    simulation = simulate(Spec(flight=Flight(photos=6, strips=2)))
+    inputs = inputs_of(simulation)
+    moved = np.where(inputs.control.check[:, None], inputs.control.enu + 100.0, inputs.control.enu)
+    results = [
+        adjusted(simulation, each) for each in (inputs, replace(inputs, control=replace(inputs.control, enu=moved)))
+    ]
+    assert np.array_equal(results[0].points.cartesian, results[1].points.cartesian)
+
+
+def test_sigma0_and_precision_are_those_of_the_noise() -> None:
+    """Errors in units of the stated precision, over blocks of 200 points; limits on both sides."""
+    ratios, sigma0, squares = [], [], []
+    for seed in range(4):
+        simulation = simulate(Spec(seed=seed, flight=Flight(photos=10, strips=3), terrain=Terrain(relief=80.0)))
+        result = adjusted(simulation, screening="none", test="baarda")
+        assert result.precision is not None
+        assert result.bundle is not None
+        error = errors(simulation, result)
+        scale = np.einsum("ni,nij,nj->n", error, np.linalg.inv(result.precision.points), error)
+        ratios.append(scale.mean() / 3)
+        sigma0.append(result.bundle.screened.solution.sigma0)
+        squares.append(len(scale))
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.15)  # errors of neighbouring points go together
+    assert np.mean(sigma0) == pytest.approx(1.0, abs=0.03)
+    assert min(squares) > 150
+
+
+def test_stated_standard_deviations_that_are_wrong_are_told() -> None:
+    simulation = simulate(Spec(flight=Flight(photos=6, strips=2), image=Image(sigma_um=5.0)))
+    inputs = inputs_of(simulation)
+    observations = replace(inputs.observations, sigma=inputs.observations.sigma / 2)
+    result = adjusted(simulation, replace(inputs, observations=observations))
+    assert any(note.code == "unit-weight" and "too small" in note.message for note in result.notes)
