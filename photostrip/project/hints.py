@@ -57,7 +57,8 @@ def hints(project: schema.ProjectFile, tables: Tables, root: Node) -> Iterator[N
         return
     count = rays(observations, photos)
     given = {read.ids[row] for read in control for row in range(len(read.ids)) if read.used[row]}
-    yield from _measured_once(observations, count, given)
+    bundle = project.processing.adjustment == "bundle"
+    yield from _measured_once(observations, count, given, together=bundle)
     for read in control:
         yield from _switched_off(read)
         yield from _never_measured(read, count, given)
@@ -129,12 +130,14 @@ def _photos_in_no_strip(read: Measurements, photos: set[str]) -> Iterator[Note]:
     yield Note("photo-in-no-strip", message, photos=tuple(others), file=file, line=line, key="photo")
 
 
-def _measured_once(read: Measurements, count: dict[str, int], given: set[str]) -> Iterator[Note]:
-    """Name points that one photo alone sees, control apart."""
+def _measured_once(
+    read: Measurements, count: dict[str, int], given: set[str], *, together: bool = False
+) -> Iterator[Note]:
+    """Name points that one photo alone sees, control apart; in a bundle such control helps to orient the photo."""
     once = [name for name, number in count.items() if number == 1]
     control = [name for name in once if name in given]
     new = [name for name in once if name not in given]
-    if control:
+    if control and not together:
         what = (
             f"{counted(len(control), 'control or check point is', 'control or check points are')} measured on one photo"
         )

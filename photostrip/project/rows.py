@@ -89,14 +89,17 @@ def table_rows(project: Project) -> list[Document]:
     tables, inputs = project.tables, project.inputs
     photos = {photo for strip in inputs.strips for photo in strip.photos}
     found = []
+    bundle = project.settings.adjustment == "bundle"
+    apart = set() if bundle else set(gaps_of(inputs))  # a bundle takes points of any two photos
+    control = {name for name, use in zip(inputs.control.ids, inputs.control.use, strict=True) if use.all()}
     if tables.observations is not None:
-        found.append(_measured(tables.observations, photos, set(gaps_of(inputs))))
+        found.append(_measured(tables.observations, photos, apart, control if bundle else set()))
     if tables.fiducials is not None:
         found.append(_marks(tables.fiducials, photos))
     count = {} if tables.observations is None else rays(tables.observations, photos)
-    apart = set(gaps_of(inputs))
+    if bundle:  # and control of a single one
+        count = {name: max(number, 2) for name, number in count.items()}
     found += [_given(read, count, apart) for read in tables.control if read is not None]
-    bundle = project.settings.adjustment == "bundle"
     found += [_cameras(read, photos, bundle) for read in (tables.positions, tables.orientations) if read is not None]
     return found
 
@@ -110,11 +113,11 @@ def _cameras(read: PositionTable | OrientationTable, photos: set[str], bundle: b
     return _block(read.table.file, read.table.lines, reasons)
 
 
-def _measured(read: Measurements, photos: set[str], gaps: set[str]) -> Document:
+def _measured(read: Measurements, photos: set[str], gaps: set[str], whole: set[str]) -> Document:
     """Sort the rows of measured points by what becomes of them."""
     stranger = np.array([name not in photos for name in read.photo_ids], bool)[read.photo]
     count = rays(read, photos)
-    once = np.array([count.get(name) == 1 for name in read.target_ids], bool)[read.target]
+    once = np.array([count.get(name) == 1 and name not in whole for name in read.target_ids], bool)[read.target]
     apart = np.array([name in gaps for name in read.target_ids], bool)[read.target]
     names = np.array(read.target_ids, object)[read.target]
     owners = np.array(read.photo_ids, object)[read.photo]

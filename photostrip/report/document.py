@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from photostrip.errors import Fault, InputError
 from photostrip.report import (
+    bundle_sections,
     covariance_sections,
     decision_sections,
     deformation_sections,
@@ -48,7 +49,7 @@ def sections_of(document: Document, *, everything: bool = False) -> tuple[Sectio
     tuple of Section
         The verdict first, the notes last.
     """
-    several = len(document["strips"]) > 1
+    several, bundle = len(document["strips"]) > 1, "bundle" in document
     found = [
         verdict_section(document, everything=everything),
         *finding_sections.findings_sections(document),
@@ -64,12 +65,13 @@ def sections_of(document: Document, *, everything: bool = False) -> tuple[Sectio
             if "covariance" in document
             else []
         ),
-        decision_sections.weights_section(document, everything=everything),
+        *bundle_sections.bundle_sections(document),
+        *([] if bundle else [decision_sections.weights_section(document, everything=everything)]),
         *([precision_sections.precision_section(document, everything=everything)] if "precision" in document else []),
         *([deformation_sections.deformation_section(document)] if document.get("deformations") else []),
         ground_sections.control_section(document, everything=everything),
         ground_sections.check_section(document, everything=everything),
-        *([ground_sections.ties_section(document, everything=everything)] if several else []),
+        *([ground_sections.ties_section(document, everything=everything)] if several and not bundle else []),
         ground_sections.image_section(document),
         ground_sections.rejected_section(document, everything=everything),
         ground_sections.not_determined_section(document, everything=everything),
@@ -271,6 +273,8 @@ def counts_section(document: Document) -> Section:
 
 def _rejections(counts: Document) -> str:
     text = "{rejected_in_pairs} in pairs, {rejected_in_scale_transfer} in scale transfers".format(**counts)
+    if "rejected_in_bundle" in counts:
+        return f"{counts['rejected_in_bundle']} in the bundle adjustment; while the strips were formed {text}"
     points = counts["rejected_for_rays"]
     return f"{text}, {counted(points, 'point')} with rays that contradict each other" if points else text
 

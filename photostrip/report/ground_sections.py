@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from photostrip.notes import before
 from photostrip.report.figures import counted, listed, metres, micrometres, ratio, signed, unit
-from photostrip.report.parts import Column, Facts, Part, Section, Table, Words
+from photostrip.report.parts import DASH, Column, Facts, Part, Section, Table, Words
 from photostrip.report.strip_sections import WORST_SHOWN, worst_first
 
 if TYPE_CHECKING:
@@ -92,9 +92,8 @@ def _given(document: Document, given: Sequence[Document], role: str, *, everythi
             *blank,
         ),
     )
-    below = (
-        "plan, height: at photo scale; ratio: to the standard deviation of the given point and of a point of one model"
-    )
+    other = "the adjustment" if "bundle" in document else "a point of one model"
+    below = f"plan, height: at photo scale; ratio: to the standard deviation of the given point and of {other}"
     return Table(columns, rows, foot, f"{note}; {below}" if note else below)
 
 
@@ -161,9 +160,11 @@ def image_section(document: Document) -> Section:
     """Photos and points with the largest image residuals under the final orientations."""
     summary = document["summary"]
     text = (
-        "Every photo is oriented anew on its adjusted points, so that orientations and points belong together. "
-        f"rms of the image residuals {micrometres(summary['image_rms_um'])} µm."
+        "Photos and points come out of one adjustment. "
+        if "bundle" in document
+        else "Every photo is oriented anew on its adjusted points, so that orientations and points belong together. "
     )
+    text += f"rms of the image residuals {micrometres(summary['image_rms_um'])} µm."
     photos = sorted(document["photos"], key=lambda p: p["image_rms_um"] or 0.0, reverse=True)[:WORST_POINTS]
     points = sorted(document["points"], key=lambda p: p["image_rms_um"] or 0.0, reverse=True)[:WORST_POINTS]
     rays: dict[int, int] = {}
@@ -198,7 +199,7 @@ def rejected_section(document: Document, *, everything: bool) -> Section:
     )
     rows = tuple(
         (
-            r["point"],
+            r["point"] or DASH,
             " – ".join(photo for photo in (r["photo"], r["other_photo"]) if photo is not None),
             r["test"],
             micrometres(r["value"]) if r["unit"] else ratio(r["value"]),

@@ -34,7 +34,9 @@ UNITS = {
     reliability.POSITION: ("m", 1.0, GROUND),
     reliability.ATTITUDE: ("deg", 180 / np.pi, 6),
 }
-CHI_SQUARE, SHORT = 4, 6  # decimals of sums of squares; of shifts and turns of a step
+SHORT = 6  # digits
+MICROMETRES = 1000.0  # in a millimetre
+RELIABILITY = ("redundancy_x", "redundancy_y", "test_x", "test_y", "detectable_x_um", "detectable_y_um")
 
 
 def bundle_of(result: Result) -> Document:
@@ -124,6 +126,12 @@ def bundle_of(result: Result) -> Document:
         "correlations": [
             {"first": each.first, "second": each.second, "value": rounded(each.value, 4)} for each in found.correlations
         ],
+        "given": [
+            _row(found, group, (row, axis), shift)
+            for group in found.groups
+            if group.kind != reliability.IMAGE
+            for row, axis in np.argwhere(np.isfinite(group.sigma)).tolist()
+        ],
         "positions": list(_positions(found)),
         "corrections": list(_corrections(found)),
     }
@@ -164,26 +172,45 @@ def _group(group: reliability.Group, shift: float) -> Document:
     }
 
 
-def rows_of(result: Result) -> Iterator[Document]:
-    """Give the reliability of every observation that took part, for reliability.csv.
+def with_reliability(result: Result, residuals: list[Document]) -> list[Document]:
+    """Add to the list ``residuals`` how well each ray is checked by the others.
 
     Parameters
     ----------
     result : Result
-        A result with a bundle adjustment.
+        A result.
+    residuals : list of dict
+        Image residuals photo by photo.
 
-    Yields
-    ------
-    dict
-        Kind, photo, point, axis, redundancy, standardised residual, detectable error and its effect.
+    Returns
+    -------
+    list of dict
+        The same, without a bundle adjustment; otherwise with redundancy numbers, standardised residuals and detectable
+        errors of x and y, None for rays that took no part.
     """
     found = result.bundle
     if found is None:
-        return
+        return residuals
     shift = reliability.noncentrality(result.settings.bundle.alpha, result.settings.bundle.power)
-    for group in found.groups:
-        for row, axis in np.argwhere(np.isfinite(group.sigma)).tolist():
-            yield _row(found, group, (row, axis), shift)
+    (group,) = (each for each in found.groups if each.kind == reliability.IMAGE)
+    values = np.column_stack([group.redundancy, group.standardised, group.detectable(shift) * MICROMETRES])
+    rounds = [rounded(values[:, column], decimals) for column, decimals in enumerate((3, 3, 2, 2, 2, 2))]
+    images = found.screened.problem.images
+    problem = found.screened.problem
+    names = [
+        (problem.photo_name(p), problem.point_name(q))
+        for p, q in zip(images.photo.tolist(), images.point.tolist(), strict=True)
+    ]
+    row_of = {name: row for row, name in enumerate(names)}
+    rows = []
+    for each in residuals:
+        at = [row_of.get((each["photo"], point), -1) for point in each["points"]]
+        columns = {
+            name: [None if row < 0 else column[row] for row in at]
+            for name, column in zip(RELIABILITY, rounds, strict=True)
+        }
+        rows.append({**each, **columns})
+    return rows
 
 
 def _named(result: Result, found: Bundle, what: str) -> list[Document]:
@@ -275,21 +302,40 @@ def _corrections(found: Bundle) -> Iterator[Document]:
         yield {"name": names[number], "value": significant(solution.common[number], 6), "sigma": significant(sigma)}
 
 
-def rejected_by_bundle(result: Result) -> list[Document]:
-    """Give what the bundle adjustment took out, for the list ``rejected``.
+def with_bundle(result: Result, rejected: list[Document]) -> list[Document]:
+    """Bring the list ``rejected`` of the strip method up to date with the bundle adjustment.
 
     Parameters
     ----------
     result : Result
         A result.
+    rejected : list of dict
+        What was taken out while the strips were formed and brought to the ground.
 
     Returns
     -------
     list of dict
-        As the other entries of that list; stage ``bundle``.
+        The same, without a bundle adjustment; otherwise what it uses after all is marked as re-admitted, and what it
+        took out itself, of stage ``bundle``, comes last.
     """
     found = result.bundle
-    return [] if found is None else [_rejection(found, each) for each in found.screened.rejections]
+    if found is None:
+        return rejected
+    problem, selection = found.block.problem, found.screened.selection
+    images = problem.images
+    inside = np.flatnonzero(selection.images).tolist()
+    used = {(problem.photo_name(int(images.photo[n])), problem.point_name(int(images.point[n]))) for n in inside}
+    control = {
+        problem.point_name(int(point))
+        for point, yes, sigma in zip(problem.control.point, selection.control, problem.control.sigma, strict=True)
+        if (yes | ~np.isfinite(sigma)).all()
+    }
+    rows = []
+    for each in rejected:
+        photos = [photo for photo in (each["photo"], each["other_photo"]) if photo is not None]
+        back = all((photo, each["point"]) in used for photo in photos) if photos else each["point"] in control
+        rows.append({**each, "readmitted": True, "reason": "used by the bundle adjustment"} if back else each)
+    return rows + [_rejection(found, each) for each in found.screened.rejections]
 
 
 def _rejection(found: Bundle, each: Rejection) -> Document:

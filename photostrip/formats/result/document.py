@@ -70,7 +70,7 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         "control": ground.control_of(result, found),
         "misclosures": ground.misclosures_of(result),
         "ties": ground.ties_of(result, rank),
-        "rejected": [*pairs.rejected_of(result), *bundle.rejected_by_bundle(result)],
+        "rejected": bundle.with_bundle(result, pairs.rejected_of(result)),
         "not_determined": ground.not_determined_of(result),
         "findings": [_finding(each) for each in result.findings],
         "notes": [_note(note) for note in (*notes, *result.notes)],
@@ -79,7 +79,9 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         "junctions": pairs.junctions_of(result),
         "photos": [*photos.photos_of(result, images), *photos.single_photos_of(result, singles)],
         "points": ground.points_of(result, photos.point_rms(result, [*images, *singles]), rank),
-        "residuals": [*photos.residuals_of(result, images), *photos.single_residuals_of(result, singles)],
+        "residuals": bundle.with_reliability(
+            result, [*photos.residuals_of(result, images), *photos.single_residuals_of(result, singles)]
+        ),
         "parallaxes": pairs.parallaxes_of(result, rank),
     }
     verdict = verdict_of(body)

@@ -117,6 +117,8 @@ def result_files(document: Document, resolved: str = "") -> dict[str, str]:
         Content by file name; result.json comes last: when it is there, all are.
     """
     files = {name: table(document) for name, table in TABLES.items()}
+    if "bundle" in document:
+        files["reliability.csv"] = reliability_csv(document)
     if resolved:
         files["project.resolved.yaml"] = resolved
     return {**files, "result.json": to_json(document)}
@@ -231,6 +233,20 @@ def rejected_csv(document: Document) -> str:
             for row in document["rejected"]
         ),
     )
+
+
+def reliability_csv(document: Document) -> str:
+    """Give reliability.csv: how well each ray of a bundle adjustment is checked by the others."""
+    header = "photo,point,redundancy_x,redundancy_y,test_x,test_y,detectable_x_um,detectable_y_um"
+    names = header.split(",")[2:]
+    formats = [_number(3), _number(3), *[_number(2)] * 4]
+    rows = (
+        f"{_cell(group['photo'])},{_cell(point)},{','.join(f(v) for f, v in zip(formats, values, strict=True))}\n"
+        for group in document["residuals"]
+        for point, *values in zip(group["points"], *(group[name] for name in names), strict=True)
+        if values[0] is not None
+    )
+    return _table(header, rows)
 
 
 TABLES: dict[str, Callable[[Document], str]] = {

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
 
+CONTROL = "control"  # kind of observations of a bundle adjustment
 LEAST_SHARE = 0.1  # of its standard deviation that a control point shows of itself at least
 
 
@@ -205,8 +206,8 @@ def _expected_of_bundle(
 ) -> tuple[Floats, Floats, tuple[tuple[str, ...], ...]]:
     """Give the same for a bundle adjustment, which knows the precision of each point.
 
-    A control point has drawn its adjusted position towards itself; the difference there is smaller than that of a check
-    point by twice the variance they share.
+    A control coordinate that took part has drawn its point towards itself: what is left is its residual, whose standard
+    deviation its redundancy number gives.
     """
     control, (held, count) = result.inputs.control, members
     for index, frame in enumerate(result.frames):
@@ -215,10 +216,18 @@ def _expected_of_bundle(
             at = result.control_rows[rows]
             axes = frame.axes_at(result.points.cartesian[at])
             variance[rows] = np.einsum("nij,njk,nik->ni", axes, covariances[at], axes)
-    sign = np.where(control.check, 1.0, -1.0)[:, None]
-    sigma = np.sqrt(np.maximum(control.sigma**2 + sign * variance, (control.sigma * LEAST_SHARE) ** 2))
+    sigma = np.sqrt(control.sigma**2 + variance)
+    if result.bundle is not None:
+        problem, given = result.bundle.screened.problem, result.bundle.groups
+        row_of = {name: row for row, name in enumerate(control.ids)}
+        rows = np.array([row_of[problem.point_name(int(point))] for point in problem.control.point], np.intp)
+        for group in (each for each in given if each.kind == CONTROL):
+            share = np.sqrt(np.clip(group.redundancy, LEAST_SHARE**2, 1.0))
+            residual = group.sigma * share * result.bundle.unit
+            sigma[rows] = np.where(np.isfinite(residual), residual, sigma[rows])
     strips = result.strips
-    scale = (held.T @ np.array([s.scale_number for s in strips])) / count
+    of_strips = np.array([s.scale_number for s in strips])
+    scale = np.where(held.any(axis=0), (held.T @ of_strips) / count, np.mean(of_strips) if len(strips) else np.nan)
     names = tuple(tuple(s.strip.id for s, yes in zip(strips, column, strict=True) if yes) for column in held.T)
     return sigma, np.where(scale > 0, scale, np.nan), names
 

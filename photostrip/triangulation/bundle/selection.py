@@ -65,7 +65,8 @@ def supported(problem: Problem, selection: Selection) -> Selection:
     Returns
     -------
     Selection
-        Without the rays of points that have one ray only and are not given in all three coordinates.
+        Without the rays of points that have one ray only and are not given in all three coordinates, and without the
+        control that no ray is left of.
     """
     point = problem.images.point
     rays = np.bincount(point[selection.images], minlength=problem.points)
@@ -73,7 +74,9 @@ def supported(problem: Problem, selection: Selection) -> Selection:
     fixed[problem.control.point[selection.control.all(axis=1)]] = True
     images = selection.images & ((rays >= LEAST_RAYS) | fixed)[point]
     images &= np.isfinite(problem.start.points[point]).all(axis=1)
-    return replace(selection, images=images)
+    seen = np.zeros(problem.points, bool)
+    seen[point[images]] = True
+    return replace(selection, images=images, control=selection.control & seen[problem.control.point][:, None])
 
 
 def selected(problem: Problem, selection: Selection) -> Problem:
