@@ -27,6 +27,9 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
             metavar="FILE", help="Write every iteration with the symbols of the formulas: .txt, .md or .json."
         ),
     ] = None,
+    methods: Annotated[
+        bool, typer.Option("--compare-methods", help="Adjust in every way there is, side by side at check points.")
+    ] = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> int:
@@ -34,7 +37,8 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
 
     The report goes to stdout. With -o, DIR gets result.json with everything, the tables points.csv, photos.csv,
     residuals.csv, parallaxes.csv and rejected.csv, and project.resolved.yaml. The exit code is 1 when a tolerance of
-    the project is not kept.
+    the project is not kept. A bundle adjustment adds reliability.csv. With --compare-methods and -o, each method gets a
+    folder of its own in DIR.
     """
     from photostrip.cli.talking import Talk, failures_as, no_collector
     from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE
@@ -50,6 +54,13 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
     if trace is not None:
         form_of(trace, "--trace")  # before anything is computed
     talk = Talk(quiet=quiet, verbose=verbose)
+    if methods:
+        from photostrip.cli.methods import compare_methods
+
+        if depfile is not None or trace is not None:
+            message = "a comparison of methods has no --depfile and no --trace"
+            raise typer.BadParameter(message, param_hint="--compare-methods")
+        return compare_methods(project, assignments or [], output, form, width, talk, quiet=quiet)
     with failures_as(form), no_collector(), progress(sys.stderr, quiet=quiet) as waiting:
         waiting.at(f"reading {project}")
         loaded = load_project(project, assignments or [])

@@ -26,7 +26,7 @@ ROUNDS = 6
 TUNING = 3.0  # standardised residuals up to which a ray keeps its weight
 NORMAL_MEDIAN = 1.1774  # median of the length of two standard normal residuals
 NO_WEIGHT = 1e-3  # weight below which a ray is out
-SMALLEST = 1e-12
+SMALLEST = 1e-5  # weight that every ray keeps, so that its point stays determined
 
 
 def adjust(problem: Problem) -> tuple[Solution, Floats]:
@@ -55,7 +55,7 @@ def adjust(problem: Problem) -> tuple[Solution, Floats]:
         solution = solve(replace(problem, images=replace(problem.images, sigma=spread)))
         problem = restarted(problem, solution)
         size = np.linalg.norm(solution.image_residuals / sigma, axis=1)
-        unit = max(float(np.median(size)) / NORMAL_MEDIAN, SMALLEST)
+        unit = max(float(np.median(size)) / NORMAL_MEDIAN, 1e-12)
         excess = size / unit / TUNING
         weight = np.where(excess > 1.0, np.exp(np.maximum(1.0 - excess**2, -50.0)), 1.0)
     return solution, weight

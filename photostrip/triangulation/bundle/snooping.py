@@ -249,7 +249,7 @@ class _Search:
     def fitting(self, done: _Adjusted) -> Selection | None:
         """Put back the rays that fit the adjusted photos and points; None when there is no new one."""
         limit, unit = self._limit(done.solution)
-        value = predicted(self.problem, done.selection, (done.solution, done.precision)) / unit
+        value = predicted(self.problem, done.selection, (done.solution, done.precision))[0] / unit
         fits = ~done.selection.images & (value < limit)
         fits[list(self.back)] = False  # it was back once, and went again
         control = self._given(done, limit * unit)
@@ -290,22 +290,24 @@ class _Search:
         """Give every observation that was out at some time."""
         limit, unit = self._limit(done.solution)
         outside = np.flatnonzero(~done.selection.images)
-        value = predicted(self.problem, done.selection, (done.solution, done.precision)) / unit
+        value, size = predicted(self.problem, done.selection, (done.solution, done.precision))
+        value = value / unit
         for (kind, row, axis), each in self.out.items():
             inside = (
                 done.selection.images[row] if kind == reliability.IMAGE else self._in(done.selection, kind, row, axis)
             )
             test = float(value[row]) if np.isnan(each.value) and kind == reliability.IMAGE else each.value
             bound = limit if np.isnan(each.limit) else each.limit
-            yield replace(each, value=test, limit=bound, readmitted=bool(inside))
+            error = float(size[row]) if np.isnan(each.size) and kind == reliability.IMAGE else each.size
+            yield replace(each, value=test, limit=bound, size=error, readmitted=bool(inside))
         known = {row for kind, row, _ in self.out if kind == reliability.IMAGE}
         for row in outside[~begin.images[outside]].tolist():
             if row not in known:
-                yield Rejection(reliability.IMAGE, row, 0, "start", float(value[row]), limit, np.nan)
+                yield Rejection(reliability.IMAGE, row, 0, "start", float(value[row]), limit, float(size[row]))
         for row, axis in np.argwhere(~begin.control & np.isfinite(self.problem.control.sigma)).tolist():
             if not done.selection.control[row, axis]:
-                size = -float(done.solution.control_residuals[row, axis])
-                yield Rejection(reliability.CONTROL, row, axis, "start", np.nan, limit, size)
+                error = -float(done.solution.control_residuals[row, axis])
+                yield Rejection(reliability.CONTROL, row, axis, "start", np.nan, limit, error)
 
     @staticmethod
     def _in(selection: Selection, kind: str, row: int, axis: int) -> bool:
@@ -313,7 +315,7 @@ class _Search:
         return bool(part[row, axis])
 
 
-def predicted(problem: Problem, selection: Selection, found: tuple[Solution, Precision]) -> Floats:
+def predicted(problem: Problem, selection: Selection, found: tuple[Solution, Precision]) -> tuple[Floats, Floats]:
     """Test values of rays that take no part, against what the others give.
 
     Parameters
@@ -327,16 +329,18 @@ def predicted(problem: Problem, selection: Selection, found: tuple[Solution, Pre
 
     Returns
     -------
-    ndarray, shape (n,)
-        Larger one of the two standardised differences of each ray outside; infinite where the point has no other
-        rays, NaN for rays inside. Correlations between photo and point are left out, so that the values are rather
-        too small than too large.
+    value : ndarray, shape (n,)
+        Larger one of the two standardised differences of each ray outside; infinite where its point has no place, NaN
+        for rays inside. Correlations between photo and point are left out, so that the values are rather too small
+        than too large.
+    size : ndarray, shape (n,)
+        That difference, measured minus predicted, mm; NaN where there is none.
     """
     solution, precision = found
-    value = np.full(len(problem.images), np.nan)
+    value, size = np.full(len(problem.images), np.nan), np.full(len(problem.images), np.nan)
     rows = np.flatnonzero(~selection.images)
     if not len(rows):
-        return value
+        return value, size
     images, focal = problem.images, problem.cameras.focal[problem.cameras.of_photo]
     active = np.zeros(problem.points, bool)
     active[images.point[selection.images]] = True
@@ -354,8 +358,11 @@ def predicted(problem: Problem, selection: Selection, found: tuple[Solution, Pre
     computed = project(points[point], solution.centers, solution.rotations, photo, focal)
     with np.errstate(invalid="ignore"):
         tests = np.abs(measured - computed) / np.sqrt(variance)
-    value[rows] = np.where(np.isfinite(tests).all(axis=1), tests.max(axis=1), np.inf)
-    return value
+    known = np.isfinite(tests).all(axis=1)
+    worst = np.where(known[:, None], tests, 0.0).argmax(axis=1)
+    value[rows] = np.where(known, tests.max(axis=1), np.inf)
+    size[rows] = np.where(known, (measured - computed)[np.arange(len(rows)), worst], np.nan)
+    return value, size
 
 
 def _meeting(problem: Problem, rows: Numbers, solution: Solution) -> tuple[Numbers, Floats]:

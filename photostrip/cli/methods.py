@@ -1,0 +1,97 @@
+"""``photostrip run --compare-methods``: one project adjusted in every way, side by side at its check points."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING
+
+from photostrip.cli.showing import Format
+from photostrip.cli.talking import Talk, failures_as, no_collector
+from photostrip.errors import EXIT_DONE, GeometryError, InputError
+from photostrip.formats.result.document import document_of
+from photostrip.formats.result.files import result_files, to_json
+from photostrip.formats.result.methods import methods_document
+from photostrip.formats.writing import write_files
+from photostrip.pipeline import ADJUSTMENTS, triangulate
+from photostrip.project.loading import load_project
+from photostrip.report import console, layout, text
+from photostrip.report.methods import methods_sections
+from photostrip.report.progress import progress
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from photostrip.errors import PhotostripError
+    from photostrip.formats.result.numbers import Document
+
+
+def compare_methods(
+    project: Path,
+    assignments: Sequence[str],
+    output: Path | None,
+    form: Format,
+    width: int | None,
+    talk: Talk,
+    *,
+    quiet: bool,
+) -> int:
+    """Adjust a project in every way there is and print what is left at its check points.
+
+    Parameters
+    ----------
+    project : Path
+        The project file.
+    assignments : sequence of str
+        Values that replace those of the file.
+    output : Path or None
+        Folder in which each adjustment gets a folder of its own name.
+    form : Format
+        How the comparison is printed.
+    width : int or None
+        Width of the text.
+    talk : Talk
+        What is said on stderr.
+    quiet : bool
+        Whether there is no progress.
+
+    Returns
+    -------
+    int
+        0, or the exit code of the first failure when no adjustment succeeded.
+    """
+    found: dict[str, Document | PhotostripError] = {}
+    name = ""
+    with failures_as(form), no_collector(), progress(sys.stderr, quiet=quiet) as waiting:
+        for adjustment in ADJUSTMENTS:
+            waiting.at(f"adjusting: {adjustment}")
+            loaded = load_project(project, [*assignments, f"processing.adjustment={adjustment}"])
+            name = loaded.inputs.name
+            try:
+                with loaded.places():
+                    result = loaded.result(triangulate(loaded.inputs, loaded.settings, directory=loaded.directory))
+            except (GeometryError, InputError) as error:
+                found[adjustment] = error
+                continue
+            found[adjustment] = document = document_of(result, loaded.remarks)
+            if output is not None:
+                write_files(output / adjustment, result_files(document, loaded.resolved))
+                talk.say(f"wrote the result of {adjustment} to {output / adjustment}")
+        failures = [each for each in found.values() if not isinstance(each, dict)]
+        if len(failures) == len(found):
+            raise failures[0]
+    _print(methods_document(name, found), form, width)
+    return EXIT_DONE
+
+
+def _print(document: Document, form: Format, width: int | None) -> None:
+    """Print the comparison on stdout."""
+    if form is Format.JSON:
+        sys.stdout.write(to_json(document, ascii_only=not console.speaks_unicode(sys.stdout)))
+        return
+    title, sections = f"Methods: {document['name']}", methods_sections(document)
+    if form is Format.TEXT:
+        console.print_report(title, sections, sys.stdout, width)
+        return
+    page = text.to_markdown(title, sections)
+    sys.stdout.write(page if console.speaks_unicode(sys.stdout) else layout.plain_ascii(page))

@@ -1,0 +1,88 @@
+"""``photostrip run --compare-methods`` as a user calls it."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+from photostrip.cli.main import main
+from photostrip.pipeline import ADJUSTMENTS
+from tests.source_tree import ROOT
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import pytest
+
+PROJECT = str(ROOT / "sample_data" / "simulated-20" / "project.yaml")
+BUNDLE = ("--set", "processing.adjustment=bundle")
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
+    code = main(["run", *arguments])
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+def test_all_methods_stand_side_by_side(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = run(capsys, PROJECT, "--compare-methods", "--format", "json")
+    document = json.loads(out)
+    assert code == 0
+    assert [row["adjustment"] for row in document["methods"]] == list(ADJUSTMENTS)
+    by_name = {row["adjustment"]: row for row in document["methods"]}
+    rms = {name: row["check"]["plan"]["rms"] for name, row in by_name.items()}
+    assert rms["bundle"] < rms["polynomial"] < rms["similarity"]
+    assert document["best"] == {"plan": "bundle", "height": "bundle"}
+    single = json.loads(run(capsys, PROJECT, *BUNDLE, "--format", "json")[1])
+    assert single["summary"]["check"]["plan"]["rms"] == rms["bundle"]
+
+
+def test_text_and_files(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    code, out, err = run(capsys, PROJECT, "--compare-methods", "-o", str(tmp_path / "out"))
+    assert code == 0
+    assert out.startswith("Methods: simulated-20\n")
+    assert "Smallest at check points: bundle." in out
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(ADJUSTMENTS)
+    assert "reliability.csv" in {path.name for path in (tmp_path / "out" / "bundle").iterdir()}
+    assert "reliability.csv" not in {path.name for path in (tmp_path / "out" / "polynomial").iterdir()}
+    assert "wrote the result of bundle" in err
+
+
+def test_a_method_that_is_refused_is_told(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """Two control points are too few for any method; one adjustment alone fails with its own exit code."""
+    folder = ROOT / "sample_data" / "simulated-20"
+    lines = (folder / "control.csv").read_text(encoding="utf-8").splitlines(keepends=True)
+    for name in ("project.yaml", "observations.csv"):
+        (tmp_path / name).write_bytes((folder / name).read_bytes())
+    control = [line for line in lines[1:] if ",check" not in line]
+    (tmp_path / "control.csv").write_text("".join([lines[0], *control[:2]]), encoding="utf-8")
+    code, out, err = run(capsys, str(tmp_path / "project.yaml"), "--compare-methods")
+    assert (code, out) == (3, "")
+    assert "control" in err
+
+
+def test_options_that_do_not_go_together(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    arguments = ["--compare-methods", "-o", str(tmp_path), "--depfile", str(tmp_path / "d")]
+    code, _, err = run(capsys, PROJECT, *arguments)
+    assert code == 2
+    assert "no --depfile" in err
+
+
+def test_the_report_of_a_bundle(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    code, out, _ = run(capsys, PROJECT, *BUNDLE, "-o", str(tmp_path))
+    assert code == 0
+    for title in ("Bundle adjustment", "Reliability", "Precision", "Check points"):
+        assert f"── {title} ──" in out
+    assert "Ties between strips" not in out
+    code = main(["report", str(tmp_path / "result.json")])
+    assert capsys.readouterr().out == out
+    header, first, *rest = (tmp_path / "reliability.csv").read_text(encoding="utf-8").splitlines()
+    assert header == "photo,point,redundancy_x,redundancy_y,test_x,test_y,detectable_x_um,detectable_y_um"
+    assert len(first.split(",")) == 8
+    document = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
+    assert len(rest) + 1 == document["counts"]["image_points_used"]
+
+
+def test_the_bundle_is_the_same_every_time(capsys: pytest.CaptureFixture[str]) -> None:
+    first, second = (run(capsys, PROJECT, *BUNDLE, "--format", "json")[1] for _ in range(2))
+    assert first == second

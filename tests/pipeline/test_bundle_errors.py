@@ -1,0 +1,290 @@
+"""Gross errors in a bundle adjustment: found, named, taken out; found as often as theory says; good ones come back."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from photostrip.formats.result.document import document_of
+from photostrip.formats.simulation import inputs_of
+from photostrip.simulate import Control, Flight, GrossError, Image, Points, Spec
+from photostrip.triangulation.bundle import reliability
+from photostrip.triangulation.bundle.solve import solve
+from tests.pipeline.blocks import adjusted, corners, errors, positions, simulate, with_control
+
+if TYPE_CHECKING:
+    from photostrip.pipeline import Result
+    from photostrip.simulate import Simulation
+
+TRIALS = 400
+BLOCK = Spec(flight=Flight(photos=8, strips=2), points=Points(extra_per_model=8))
+
+
+def rays_of(result: Result) -> set[tuple[str, str]]:
+    """Photo and point of every ray that takes part."""
+    assert result.bundle is not None
+    seen = result.inputs.observations
+    rows = result.bundle.block.rows[result.bundle.screened.selection.images]
+    return {(seen.photo_ids[seen.photo[r]], seen.point_ids[seen.point[r]]) for r in rows.tolist()}
+
+
+def test_gross_errors_are_found_and_named() -> None:
+    spec = replace(BLOCK, gross_errors=(GrossError("image", count=12, size_um=150.0, axis="y"),))
+    simulation = simulate(spec)
+    wrong = {(each.photo, each.point) for each in simulation.truth.errors}
+    result = adjusted(simulation)
+    used = rays_of(result)
+    assert not wrong & used
+    told = {each["point"] for each in document_of(result)["rejected"] if not each["readmitted"]}
+    assert {point for _, point in wrong} <= told
+    assert len(told - {point for _, point in wrong}) <= 3
+    clean = adjusted(simulate(BLOCK))
+    assert np.sqrt((errors(simulation, result) ** 2).mean()) < 1.2 * np.sqrt(
+        (errors(simulate(BLOCK), clean) ** 2).mean()
+    )
+
+
+def test_the_size_of_an_error_is_estimated() -> None:
+    simulation = simulate(BLOCK)
+    inputs = inputs_of(simulation)
+    seen = inputs.observations
+    row = 100
+    xy = seen.xy.copy()
+    xy[row, 1] += 0.080
+    result = adjusted(simulation, replace(inputs, observations=replace(seen, xy=xy)))
+    photo, point = seen.photo_ids[seen.photo[row]], seen.point_ids[seen.point[row]]
+    told = [
+        r
+        for r in document_of(result)["rejected"]
+        if (r["photo"], r["point"]) == (photo, point) and r["stage"] == "bundle"
+    ]
+    assert result.bundle is not None
+    assert abs(told[0]["size"]) == pytest.approx(80.0, abs=35.0)
+    assert told[0]["size_unit"] == "um"
+
+
+@pytest.mark.parametrize("method", ["snooping", "robust"])
+def test_many_errors_at_once(method: str) -> None:
+    spec = replace(BLOCK, gross_errors=(GrossError("image", count=30, size_um=400.0, axis="y"),))
+    simulation = simulate(spec)
+    wrong = {(each.photo, each.point) for each in simulation.truth.errors}
+    result = adjusted(simulation, screening=method)
+    assert result.bundle is not None
+    used = rays_of(result)
+    assert not wrong & used
+    assert len(used) > 0.85 * (len(result.inputs.observations) - len(wrong))  # a wrong ray of two takes the other along
+    assert np.sqrt((errors(simulation, result) ** 2).mean()) < 0.15
+
+
+def test_wrong_control_is_named_and_left_out() -> None:
+    simulation = simulate(BLOCK)
+    inputs = inputs_of(simulation)
+    enu = inputs.control.enu.copy()
+    row = int(np.flatnonzero(~inputs.control.check)[4])
+    enu[row, 2] += 1.5
+    result = adjusted(simulation, replace(inputs, control=replace(inputs.control, enu=enu)))
+    name = inputs.control.ids[row]
+    told = [note for note in result.notes if note.code == "control-rejected"]
+    (one,) = [note for note in told if note.points == (name,)]
+    assert "up" in one.message
+    assert len(told) <= 2  # one of a hundred coordinates may go by chance
+    difference = result.control_differences[row]
+    assert difference[2] == pytest.approx(-1.5, abs=0.3)
+    assert np.abs(difference[:2]).max() < 0.2  # the plan still counts
+
+
+def test_a_wrong_camera_position_is_named() -> None:
+    simulation = simulate(BLOCK)
+    noise = np.random.default_rng(1).normal(size=(16, 3)) * 0.05
+    noise[5, 0] += 2.0
+    inputs = replace(with_control(simulation, corners(simulation)), positions=positions(simulation, noise=noise))
+    told = [note for note in adjusted(simulation, inputs).notes if note.code == "position-rejected"]
+    assert [note.photos for note in told] == [(simulation.strips[0][1][5],)]
+    assert "+2." in told[0].message or "+1.9" in told[0].message
+
+
+def test_good_measurements_stay() -> None:
+    """Without gross errors about one ray in five hundred goes, as two tests of level 0.001 each let expect."""
+    out = total = 0
+    for seed in range(6):
+        result = adjusted(simulate(replace(BLOCK, seed=seed)))
+        assert result.bundle is not None
+        out += int((~result.bundle.screened.selection.images).sum())
+        total += len(result.bundle.screened.selection.images)
+    assert out < 0.006 * total
+
+
+def test_what_the_user_keeps_stays() -> None:
+    simulation = simulate(replace(BLOCK, gross_errors=(GrossError("image", count=1, size_um=120.0),)))
+    (error,) = simulation.truth.errors
+    inputs = inputs_of(simulation)
+    from photostrip.formats.simulation import settings_of
+    from photostrip.pipeline import triangulate
+
+    settings = replace(settings_of(simulation), adjustment="bundle")
+    keep = replace(settings, relative=replace(settings.relative, keep=[f"{error.photo}/{error.point}"]))
+    result = triangulate(inputs, keep)
+    assert result.bundle is not None
+    block = result.bundle.block
+    row = np.flatnonzero(block.kept)
+    assert len(row) == 1
+    assert result.bundle.screened.selection.images[row[0]]
+
+
+# ---------------------------------------------------------------------------------------------- what theory says
+
+
+def test_redundancy_numbers_sum_to_the_redundancy() -> None:
+    simulation = simulate(BLOCK)
+    noise = np.random.default_rng(2).normal(size=(16, 3)) * 0.05
+    inputs = replace(inputs_of(simulation), positions=positions(simulation, noise=noise))
+    result = adjusted(simulation, inputs, screening="none")
+    assert result.bundle is not None
+    total = sum(float(np.nansum(group.redundancy)) for group in result.bundle.groups)
+    assert total == pytest.approx(result.bundle.screened.solution.redundancy, abs=1e-6)
+
+
+def test_the_shift_of_the_test_and_its_limits() -> None:
+    """Baarda's table: 4.13 for levels of 0.1 % and 80 %; 2.80 for 5 % and 80 %."""
+    assert reliability.noncentrality(0.001, 0.80) == pytest.approx(4.13, abs=0.005)
+    assert reliability.noncentrality(0.05, 0.80) == pytest.approx(2.80, abs=0.005)
+    assert reliability.limit("baarda", 0.001, 100) == pytest.approx(3.291, abs=0.001)
+    assert reliability.limit("tau", 0.001, 10**6) == pytest.approx(3.291, abs=0.001)
+    assert reliability.limit("tau", 0.05, 10) == pytest.approx(1.904, abs=0.005)  # Pope 1976
+    assert reliability.limit("tau", 0.05, 1) == np.inf
+
+
+@pytest.mark.slow
+def test_errors_of_the_detectable_size_are_found_as_often_as_said() -> None:
+    """Monte Carlo over the noise: the first test of an observation with an error of its detectable size."""
+    noisy = replace(BLOCK, flight=Flight(photos=5))
+    simulation = simulate(replace(noisy, image=Image(sigma_um=0.0), control=Control(noise=(0, 0, 0))))
+    sigma = simulate(noisy).observations.sigma
+    true = inputs_of(simulation)
+    base = replace(true, observations=replace(true.observations, sigma=sigma))
+    clean = adjusted(simulation, base, screening="none", test="baarda")
+    assert clean.bundle is not None
+    image, problem = clean.bundle.groups[0], clean.bundle.screened.problem
+    detectable = image.detectable(reliability.noncentrality(0.001, 0.80))
+    limit, random, found, alarms = reliability.limit("baarda", 0.001, 10), np.random.default_rng(3), 0, 0
+    checked = np.argwhere(image.redundancy > 0.1)
+    given = problem.control
+    for _ in range(TRIALS):
+        xy = problem.images.xy + random.normal(size=sigma.shape) * problem.images.sigma
+        noise = np.einsum("nji,nj->ni", given.axes, random.normal(size=given.sigma.shape) * given.sigma)
+        row, axis = checked[random.integers(len(checked))]
+        xy[row, axis] += detectable[row, axis]
+        spoilt = replace(problem, images=replace(problem.images, xy=xy), control=replace(given, xyz=given.xyz + noise))
+        test = solve(spoilt).image_residuals / (image.sigma * np.sqrt(image.redundancy))
+        found += int(abs(test[row, axis]) > limit)
+        other = checked[random.integers(len(checked), size=20)]
+        other = other[spoilt.images.point[other[:, 0]] != spoilt.images.point[row]]
+        alarms += int((np.abs(test[other[:, 0], other[:, 1]]) > limit).sum())
+    assert found / TRIALS == pytest.approx(0.80, abs=3 * np.sqrt(0.16 / TRIALS))
+    assert alarms < 0.01 * 20 * TRIALS  # an error of one also moves its neighbours a little
+
+
+# --------------------------------------------------------------------------------------------- variance components
+
+
+@pytest.mark.slow
+def test_variance_components_find_what_was_misstated() -> None:
+    """Image 10 um and not 5; control 0.15 m and not 0.05 in plan, 0.08 m in height; positions 0.20 m and not 0.05."""
+    factors: dict[str, list[float]] = {}
+    for seed in range(4):
+        spec = replace(
+            BLOCK,
+            seed=seed,
+            flight=Flight(photos=12, strips=3),
+            image=Image(sigma_um=10.0),
+            control=Control(bands=6, noise=(0.15, 0.15, 0.08)),
+        )
+        simulation = simulate(spec)
+        noise = np.random.default_rng(seed).normal(size=(36, 3)) * 0.2
+        inputs = replace(inputs_of(simulation), positions=positions(simulation, noise=noise))
+        stated = np.full_like(inputs.observations.sigma, 0.005)
+        inputs = replace(inputs, observations=replace(inputs.observations, sigma=stated))
+        result = adjusted(simulation, inputs, variance_components=True)
+        for each in document_of(result)["bundle"]["variance_components"]:
+            factors.setdefault(each["group"], []).append(each["factor"])
+            assert each["estimated"]
+        assert result.bundle is not None
+        assert result.bundle.screened.solution.sigma0 == pytest.approx(1.0, abs=0.05)
+    mean = {name: float(np.sqrt(np.mean(np.square(values)))) for name, values in factors.items()}
+    assert mean["image"] == pytest.approx(2.0, rel=0.03)
+    assert mean["control plan"] == pytest.approx(3.0, rel=0.15)
+    assert mean["control height"] == pytest.approx(1.0, rel=0.25)
+    assert mean["positions plan"] == pytest.approx(4.0, rel=0.15)
+    assert mean["positions height"] == pytest.approx(4.0, rel=0.20)
+
+
+def test_a_group_without_redundancy_is_not_estimated() -> None:
+    simulation = simulate(Spec(flight=Flight(photos=4), control=Control(bands=2, per_band=2)))
+    found = document_of(adjusted(simulation, variance_components=True))["bundle"]["variance_components"]
+    groups = {each["group"]: each for each in found}
+    assert groups["image"]["estimated"]
+    assert not groups["control height"]["estimated"]
+    assert groups["control height"]["factor"] == 1.0
+
+
+# ------------------------------------------------------------------------------------------------ self-calibration
+
+
+def calibrated(
+    spec: Spec, camera: dict[str, object], wanted: tuple[str, ...], **settings: object
+) -> tuple[Simulation, Result]:
+    """Adjust with a camera that is stated wrongly."""
+    simulation = simulate(spec)
+    inputs = inputs_of(simulation)
+    noise = np.random.default_rng(5).normal(size=(len(simulation.truth.centers), 3)) * 0.02
+    strips = tuple(
+        replace(strip, camera=replace(strip.camera, **camera), calibrate=wanted)  # type: ignore[arg-type]
+        for strip in inputs.strips
+    )
+    given = positions(simulation, sigma=0.02, noise=noise)
+    return simulation, adjusted(simulation, replace(inputs, strips=strips, positions=given), **settings)
+
+
+CROSSED = Spec(
+    flight=Flight(photos=8, strips=3, alternate=True, side_lap_percent=50.0), points=Points(extra_per_model=12)
+)
+
+
+@pytest.mark.slow
+def test_a_wrong_calibration_is_found() -> None:
+    wrong = {"principal_distance": 153.0 + 0.08, "principal_point": (0.03, -0.02)}
+    simulation, result = calibrated(CROSSED, wrong, ("principal_distance", "principal_point"))
+    assert result.bundle is not None
+    found = {each.name: each for each in result.bundle.parameters}
+    expected = {"principal_distance": -0.08, "principal_point x": -0.03, "principal_point y": 0.02}
+    for name, value in expected.items():
+        assert abs(found[name].value - value) < 3.5 * found[name].sigma, name
+        assert found[name].sigma < 0.01
+        assert found[name].significant
+    assert np.sqrt((errors(simulation, result) ** 2).mean()) < 0.08
+    _, without = calibrated(CROSSED, wrong, ())
+    assert np.sqrt((errors(simulation, without) ** 2).mean()) > np.sqrt((errors(simulation, result) ** 2).mean())
+
+
+def test_parameters_that_are_nothing_are_told() -> None:
+    _, result = calibrated(CROSSED, {}, ("k1", "p1", "affinity"))
+    assert result.bundle is not None
+    dull = [each for each in result.bundle.parameters if not each.significant]
+    assert len(dull) >= 2
+    assert sum(note.code == "calibration-insignificant" for note in result.notes) == len(dull)
+
+
+def test_a_priori_values_hold_what_is_not_determined() -> None:
+    """Without camera positions and relief the principal distance goes with the flying height."""
+    spec = replace(CROSSED, flight=Flight(photos=5))
+    simulation = simulate(spec)
+    inputs = inputs_of(simulation)
+    strips = tuple(replace(strip, calibrate=("principal_distance",)) for strip in inputs.strips)
+    result = adjusted(simulation, replace(inputs, strips=strips), calibration_sigma={"principal_distance": 0.001})
+    assert result.bundle is not None
+    (found,) = result.bundle.parameters
+    assert found.redundancy < 0.05  # the measurements say next to nothing
+    assert found.sigma == pytest.approx(0.001 * result.bundle.unit, rel=0.05)
