@@ -12,6 +12,7 @@ from photostrip.notes import Note
 from photostrip.pipeline import block_problem, block_start
 from photostrip.pipeline.results import Adjusted, Bundle, Precision, SinglePhoto
 from photostrip.triangulation.bundle import reliability, self_calibration, snooping, variance_components
+from photostrip.triangulation.bundle.correlations import correlations
 from photostrip.triangulation.bundle.selection import restarted, selected, supported
 from photostrip.triangulation.bundle.solve import solve
 from photostrip.triangulation.exterior import Resection, project
@@ -25,13 +26,17 @@ if TYPE_CHECKING:
     from photostrip.pipeline.inputs import Inputs, Settings
     from photostrip.pipeline.results import BlockProblem, BlockStart, StripResult
     from photostrip.points import ControlPoints, PhotoPoints
+    from photostrip.triangulation.bundle.correlations import Correlation
     from photostrip.triangulation.bundle.snooping import Screened
+    from photostrip.triangulation.bundle.solution import Precision as Cofactors
+    from photostrip.triangulation.bundle.solution import Solution
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
 
 REFILLED = 1e-9  # metres by which targets of plan or height points may still move
 REFILLS = 3
+WITHIN_PHOTOS = 10  # correlations within photos that are kept
 OF_THE_STRIP_METHOD = ("degree-reduced", "extrapolation", "little-redundancy", "long-strip", "little-control",
                        "weak-control", "control-rejected", "not-resected")  # fmt: skip
 """Notes on strips that say nothing of a bundle adjustment."""
@@ -163,8 +168,8 @@ def _bundle(
     """Collect what is told of the adjustment."""
     problem, solution, precision = screened.problem, screened.solution, screened.precision
     parameters = self_calibration.parameters_of(problem, solution, precision)
-    correlations = self_calibration.correlations_of(problem, precision)
-    _refuse_inseparable(correlations)
+    correlations = _correlations(solution, precision)
+    _refuse_inseparable(correlations, set(problem.common_names()))
     unit = solution.sigma0 if settings.bundle.test == "tau" and solution.redundancy > 0 else 1.0
     number = {photo: row for row, photo in enumerate(start.photos)}
     singles = tuple(
@@ -180,10 +185,25 @@ def _bundle(
     )  # fmt: skip
 
 
-def _refuse_inseparable(correlations: Sequence[self_calibration.Correlation]) -> None:
+def _correlations(solution: Solution, cofactors: Cofactors) -> tuple[Correlation, ...]:
+    """Correlations of common parameters, with photos only the largest of each kind; and the largest within photos."""
+    common = set(solution.model.problem.common_names())
+    found: dict[tuple[str, str], Correlation] = {}
+    within: list[Correlation] = []
+    for each in correlations(solution, cofactors):
+        if not {each.first, each.second} & common:
+            within.append(each)
+            continue
+        kind = [name if name in common else name.partition(": ")[2] for name in (each.first, each.second)]
+        found.setdefault((kind[0], kind[1]), each)
+    within.sort(key=lambda each: -abs(each.value))
+    return (*found.values(), *within[:WITHIN_PHOTOS])
+
+
+def _refuse_inseparable(found: Sequence[Correlation], common: set[str]) -> None:
     """Refuse parameters that cannot be told apart from others."""
-    for each in correlations:
-        if abs(each.value) > self_calibration.INSEPARABLE:
+    for each in found:
+        if {each.first, each.second} & common and abs(each.value) > self_calibration.INSEPARABLE:
             message = (
                 f"{each.first} cannot be told apart from {each.second} (correlation {each.value:.6f}): take it out of "
                 "self_calibration, or give it a calibration_sigma"
@@ -304,7 +324,10 @@ def _notes(bundle: Bundle) -> list[Note]:
                 "zero; leave it out of self_calibration"
             )
             notes.append(Note("calibration-insignificant", text))
+    common = set(bundle.screened.problem.common_names())
     for correlation in bundle.correlations:
+        if not {correlation.first, correlation.second} & common:
+            continue  # within a photo: shift and rotation replace each other in every aerial photo
         text = f"{correlation.first} and {correlation.second} are correlated by {correlation.value:+.3f}"
         notes.append(Note("correlated", text, severity="note"))
     return notes

@@ -102,7 +102,7 @@ def rows(entries: Sequence[str], observations: PhotoPoints) -> Numbers:
     ndarray of int
         Their rows, ascending.
     """
-    return np.array(sorted(_rows(entries, observations).values()), np.intp)
+    return np.array(sorted(rows_of(entries, observations).values()), np.intp)
 
 
 def touched(entries: Sequence[str], observations: PhotoPoints, rows: Numbers) -> Flags:

@@ -158,8 +158,10 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     """
     inputs, settings = result.inputs, result.settings
     examined = replace(before(inputs, settings), observations=result.refined.observations)
-    formed = [evidence.Formed(each.strip, each.orientation, each.formed) for each in result.strips]
-    told = [*examined.findings, *_of_control(inputs, examined, inputs.strips, formed, directory)]
+    stages = result.strips if result.bundle is None else result.bundle.start.strips  # as they were formed
+    formed = [evidence.Formed(each.strip, each.orientation, each.formed) for each in stages]
+    strips = tuple(each.strip for each in stages)  # a photo that is a strip of its own forms nothing
+    told = [*examined.findings, *_of_control(inputs, examined, strips, formed, directory)]
     for each in formed:
         told += _of_strip(each, result.refined.observations)
     told += _of_rotations(result)

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
         strip_screening,
     )
     from photostrip.triangulation.bundle import reliability, self_calibration, variance_components
+    from photostrip.triangulation.bundle.correlations import Correlation
     from photostrip.triangulation.bundle.problem import Problem
     from photostrip.triangulation.bundle.selection import Selection
     from photostrip.triangulation.bundle.snooping import Screened
@@ -282,8 +283,9 @@ class Bundle:
         Variance components; empty when none were asked for.
     parameters : tuple of self_calibration.Parameter
         Calibration parameters.
-    correlations : tuple of self_calibration.Correlation
-        High correlations.
+    correlations : tuple of correlations.Correlation
+        Correlations above 0.95: of parameters that photos share with each other and with the photo where it is largest,
+        and the largest within photos.
     singles : tuple of SinglePhoto
         Photos that are strips of their own.
     photo_covariances : ndarray, shape (m, 6, 6)
@@ -299,7 +301,7 @@ class Bundle:
     sigma0: reliability.Sigma0Test
     components: tuple[variance_components.Component, ...]
     parameters: tuple[self_calibration.Parameter, ...]
-    correlations: tuple[self_calibration.Correlation, ...]
+    correlations: tuple[Correlation, ...]
     singles: tuple[SinglePhoto, ...]
     photo_covariances: Floats
     unit: float

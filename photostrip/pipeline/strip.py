@@ -90,7 +90,7 @@ class Formed:
         Relative orientation of the pairs, as the strip was formed.
     formed : formation.FormedStrip
         The formed strip.
-    contradictions : rays.Contradictions
+    contradictions : strip_screening.Verdict
         Points whose rays contradict each other from model to model.
     """
 
@@ -99,7 +99,7 @@ class Formed:
     screened: screening.Screened
     oriented: relative.Orientation
     formed: formation.FormedStrip
-    contradictions: rays.Contradictions
+    contradictions: strip_screening.Verdict
 
 
 def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> Formed:

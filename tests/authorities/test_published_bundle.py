@@ -109,7 +109,7 @@ def test_a_joint_fit_of_the_apollo_camera(wanted: tuple[str, ...], expected: tup
     result = triangulate(replace(loaded.inputs, control=every, strips=strips), loaded.settings)
     assert result.bundle is not None
     found = result.bundle.parameters[:3]
-    value = (*np.array([each.value for each in found]), 76.054, 0.0, 0.0)
+    value = np.array([each.value for each in found]) + np.array([76.054, 0.0, 0.0])
     sigma = np.array([each.sigma for each in found])
     assert (np.abs(value - np.array(expected)) < sigma).all()
     assert (sigma < 0.12).all()

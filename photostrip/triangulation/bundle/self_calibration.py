@@ -42,7 +42,6 @@ TITLES = {
 }
 UNITS = {"c": "mm", "x0": "mm", "y0": "mm", "k1": "mm^-2", "k2": "mm^-4", "k3": "mm^-6", "p1": "mm^-1", "p2": "mm^-1"}
 SIGNIFICANCE = 0.05
-HIGH = 0.95  # correlations that are told
 INSEPARABLE = 0.9999  # correlations of what cannot be told apart
 
 
@@ -77,23 +76,6 @@ class Parameter:
     def significant(self) -> bool:
         """Whether the parameter differs from zero."""
         return self.p < SIGNIFICANCE
-
-
-@dataclass(frozen=True)
-class Correlation:
-    """Two parameters that are hard to tell apart.
-
-    Parameters
-    ----------
-    first, second : str
-        Their names.
-    value : float
-        Correlation, -1 to 1.
-    """
-
-    first: str
-    second: str
-    value: float
 
 
 def sigmas(asked: Sequence[Sequence[str]], prior: dict[str, float]) -> Floats | None:
@@ -223,43 +205,3 @@ def parameters_of(problem: Problem, solution: Solution, precision: Precision) ->
         title = TITLES.get(name, name)
         found.append(Parameter(camera_id, title, UNITS.get(name, "1"), value, deviation, p, prior, share))
     return tuple(found)
-
-
-def correlations_of(problem: Problem, precision: Precision, least: float = HIGH) -> tuple[Correlation, ...]:
-    """Give the high correlations of common parameters, with each other and with the photos.
-
-    Parameters
-    ----------
-    problem : Problem
-        The problem.
-    precision : Precision
-        Cofactors.
-    least : float
-        Correlations from which on they are told.
-
-    Returns
-    -------
-    tuple of Correlation
-        The highest first. Of a common parameter and the photos only the worst photo for each element.
-    """
-    names = problem.common_names()
-    if not names:
-        return ()
-    size = np.sqrt(np.diag(precision.common))
-    common = precision.common / np.outer(size, size)
-    rows, others = np.nonzero(np.triu(np.abs(common) >= least, 1))
-    found = [Correlation(names[i], names[j], float(common[i, j])) for i, j in zip(rows, others, strict=True)]
-    of_photo = np.sqrt(np.diagonal(precision.photos, axis1=1, axis2=2))
-    with np.errstate(invalid="ignore"):
-        mixed = precision.photo_common / of_photo[:, :, None] / size
-    for element in range(6):
-        for number, name in enumerate(names):
-            photo = int(np.nanargmax(np.abs(mixed[:, element, number])))
-            value = float(mixed[photo, element, number])
-            if abs(value) >= least:
-                found.append(Correlation(name, f"photo {problem.photo_name(photo)}: {ELEMENTS[element]}", value))
-    return tuple(sorted(found, key=lambda each: -abs(each.value)))
-
-
-ELEMENTS = ("X", "Y", "Z", "rotation about X", "rotation about Y", "rotation about Z")
-"""Elements of a photo, along and about the axes of the frame of the adjustment."""
