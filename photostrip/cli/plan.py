@@ -131,6 +131,12 @@ def strip(  # noqa: PLR0913, PLR0917 (an argument for each option)
         typer.Option("--control", metavar="LAYOUT", help="corners, corners+centre, bands=N, every=N; may be repeated."),
     ] = None,
     control_sigma: ControlSigma = None,
+    gnss: Annotated[
+        str | None,
+        typer.Option(
+            "--gnss", metavar="X,Y,Z", help="Compare with measured perspective centres, too; their sigmas, metres."
+        ),
+    ] = None,
     methods: Annotated[
         str | None, typer.Option("--methods", metavar="A,B", help="Methods of adjustment; default: all.")
     ] = None,
@@ -158,7 +164,8 @@ def strip(  # noqa: PLR0913, PLR0917 (an argument for each option)
             "camera.preset": camera, "camera.principal_distance": principal_distance,
             "camera.format": listed(photo_format), "models": models, "end_lap_percent": overlap, "scale": scale,
             "flying_height": flying_height, "image_sigma_um": sigma_um, "control_sigma": listed(control_sigma),
-            "methods": listed(methods), "place.points": place, "place.into": into, **_required(required),
+            "gnss": listed(gnss), "methods": listed(methods), "place.points": place, "place.into": into,
+            **_required(required),
         }  # fmt: skip
         _is_picture(output)  # refused before anything is computed
         layouts = [layout_assignment(word) for word in control or []]

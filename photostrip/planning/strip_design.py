@@ -11,7 +11,7 @@ from photostrip.errors import GeometryError
 from photostrip.planning.control_layout import Layout, Spot, spots_of
 from photostrip.planning.ideal_strip import IdealStrip, StripGeometry, ideal_strip
 from photostrip.planning.placement import Placed, Placement, Required, best_places, worst
-from photostrip.planning.strip_methods import METHODS, Accuracy, accuracy
+from photostrip.planning.strip_methods import BUNDLE, METHODS, Accuracy, accuracy
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -135,7 +135,9 @@ def plan_strip(design: Design) -> Report:
         When there can be no such strip, or a layout does not fit it.
     """
     strip = ideal_strip(design.geometry)
-    outcomes = tuple(outcome(strip, layout, method) for layout in design.layouts for method in design.methods)
+    outcomes = tuple(
+        outcome(strip, layout, method) for layout in design.layouts for method in methods_of(design, layout)
+    )
     wanted = design.required != ANYTHING
     bands = next((layout for layout in design.layouts if layout.kind == "bands"), design.layouts[0])
     needed = tuple(bands_needed(strip, bands, each, design.required) for each in design.methods) if wanted else ()
@@ -144,6 +146,24 @@ def plan_strip(design: Design) -> Report:
         into = next(layout for layout in design.layouts if layout.name == design.placement.into)
         placed = best_places(strip, into, design.placement, design.required)
     return Report(design, strip, outcomes, needed, placed)
+
+
+def methods_of(design: Design, layout: Layout) -> tuple[str, ...]:
+    """Give the methods that a layout is adjusted by: with perspective centres the bundle, which alone uses them.
+
+    Parameters
+    ----------
+    design : Design
+        Methods that are compared.
+    layout : Layout
+        The layout.
+
+    Returns
+    -------
+    tuple of str
+        All of them, or the bundle alone.
+    """
+    return (BUNDLE,) if layout.gnss is not None and BUNDLE in design.methods else design.methods
 
 
 def outcome(strip: IdealStrip, layout: Layout, method: str) -> Outcome:

@@ -16,7 +16,15 @@ from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.local_frame import IntermediateFrame
 from photostrip.planning.control_layout import USES, Layout, Spot, numbers_of
 from photostrip.points import ControlPoints
-from photostrip.triangulation import absolute, control_errors, polynomial, precision
+from photostrip.triangulation import (
+    absolute,
+    control_errors,
+    polynomial,
+    precision,
+    strip_conditions,
+    strip_covariance,
+    strip_system,
+)
 from photostrip.triangulation.bundle import problem as bundle
 from photostrip.triangulation.bundle.precision import precision as bundle_precision
 from photostrip.triangulation.bundle.solve import solve
@@ -30,9 +38,9 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
 
-SIMILARITY, BUNDLE = "similarity", "bundle"
+SIMILARITY, COVARIANCE, BUNDLE = "similarity", "covariance", "bundle"
 DEGREES = {"degree 1": "1", "degree 2": "2", "degree 3": "3"}
-METHODS = (SIMILARITY, *DEGREES, BUNDLE)
+METHODS = (SIMILARITY, *DEGREES, COVARIANCE, BUNDLE)
 TINY = 1e-9  # redundancy number of a control coordinate that nothing checks
 
 
@@ -130,6 +138,8 @@ def accuracy(strip: IdealStrip, layout: Layout, spots: tuple[Spot, ...], method:
     if method == BUNDLE:
         return _bundle(strip, layout, spots, control)
     _require_control(control)
+    if method == COVARIANCE:
+        return _predicted(strip, spots, control)
     return _fitted(strip, spots, control, method)
 
 
@@ -191,6 +201,31 @@ def _precision(strip: IdealStrip) -> tuple[float, float]:
     plan = geometry.image_sigma * geometry.scale / 1000.0
     depth = float(strip.centers[:, 2].mean())
     return plan, plan * float(np.sqrt(2.0)) * depth / geometry.base
+
+
+# ---------------------------------------------------------------------------------------------------- covariance
+
+
+def _predicted(strip: IdealStrip, spots: tuple[Spot, ...], control: ControlPoints) -> Accuracy:
+    """Misclosures distributed by the strip's own covariance, with the distances of the pass points at the joints."""
+    numbers = np.array(numbers_of(strip, spots), np.intp)
+    errors = strip.errors
+    axes = np.broadcast_to(np.eye(3), (len(numbers), 3, 3))
+    found = control_errors.misclosures(errors.points, control, numbers, axes)
+    length = float(np.linalg.norm(errors.pairs.reach, axis=1).mean())
+    local = strip_conditions.Local.about(strip_conditions.centers_of(errors)[:-1], length)
+    given = np.zeros(len(found.point))
+    wanted = strip_conditions.conditions(errors, (strip.orientation, strip.formed), (found, given), local)
+    solved = strip_system.system(errors, wanted, 1.0)
+    (points,), cofactors = strip_covariance.predict(errors, wanted, local, solved, [errors.points])
+    rows = np.flatnonzero(wanted.kind == strip_conditions.CONTROL)
+    redundant = cofactors[rows] * wanted.noise[rows]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        size = np.where(redundant > TINY, DETECTABLE / np.sqrt(cofactors[rows]), np.inf)
+    detectable = np.full((len(numbers), 3), np.nan)
+    source = wanted.source[rows]
+    detectable[found.point[source], found.axis[source]] = size
+    return Accuracy(COVARIANCE, COVARIANCE, points.covariance, numbers, detectable)
 
 
 # -------------------------------------------------------------------------------------------------------- bundle

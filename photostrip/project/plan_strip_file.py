@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
@@ -144,6 +144,11 @@ class StripPlanFile(Section):
     points: StripPoints = key("Pass points", StripPoints.model_construct())
     image_sigma_um: SigmaUm = key("Standard deviation of an image coordinate", 5.0, unit="um")
     control_sigma: Sigmas = key("Standard deviations along, across and in height", USUAL_LAYOUT.sigma, unit="m")
+    gnss: Sigmas | None = key(
+        "Standard deviations of measured perspective centres: each layout is compared with and without them",
+        None,
+        unit="m",
+    )
     layouts: Annotated[dict[Id, Annotated[StripLayout, BeforeValidator(_layout)]], Field(min_length=1)] | None = key(
         f"Layouts by name; a word may stand for one. Default: {', '.join(DEFAULT_LAYOUTS)}", None
     )
@@ -240,6 +245,9 @@ def load_strip_plan(path: Path | None, assignments: Sequence[str]) -> StripPlan:
     usual = {name: StripLayout.model_validate(_layout(word)) for name, word in DEFAULT_LAYOUTS.items()}
     chosen = (given.layouts or usual).items()
     layouts = tuple(_of_layout(str(name), each, given.control_sigma) for name, each in chosen)
+    if given.gnss is not None:
+        plain = [layout for layout in layouts if layout.gnss is None]
+        layouts += tuple(replace(each, name=f"{each.name} + GNSS", gnss=given.gnss) for each in plain)
     placement = None
     if given.place is not None:
         into = str(given.place.into) if given.place.into is not None else layouts[0].name

@@ -210,13 +210,14 @@ def test_the_report_of_a_strip(capsys: pytest.CaptureFixture[str], tmp_path: Pat
         assert words in text
     document = json.loads(answer(capsys, "plan", "strip", str(file), "--format", "json"))
     by = {(row["layout"], row["method"]): row for row in document["accuracy"]}
-    assert by["gnss", "bundle"]["worst_z_m"] < by["gnss", "similarity"]["worst_z_m"]
+    assert ("gnss", "similarity") not in by  # only the bundle uses perspective centres
+    assert by["gnss", "bundle"]["worst_z_m"] < by["ends", "bundle"]["worst_z_m"]
     for row in by.values():
         along = row["along"]
         assert max(each["z_m"] for each in along) == pytest.approx(row["worst_z_m"], abs=0.05)
         assert row["meets"] == (row["worst_z_m"] <= 0.5)
     rows = list(csv.DictReader(io.StringIO(answer(capsys, "plan", "strip", str(file), "--format", "csv"))))
-    assert len(rows) == 6 * 6
+    assert len(rows) == 5 * 6
     assert list(rows[0]) == ["layout", "method", "photo", "plan_m", "z_m"]
 
 
@@ -236,6 +237,14 @@ def test_a_wrong_strip_is_refused(change: str, code: int, message: str, capsys: 
     name, _, value = change.partition("=")
     assert main(["plan", "strip", name, value]) == code
     assert message in capsys.readouterr().err
+
+
+def test_every_layout_with_and_without_perspective_centres(capsys: pytest.CaptureFixture[str]) -> None:
+    options = ("--models", "8", "--control", "corners", "--methods", "similarity,bundle", "--gnss", "0.05,0.05,0.08")
+    document = json.loads(answer(capsys, "plan", "strip", *options, "--format", "json"))
+    rows = {(row["layout"], row["method"]): row["worst_z_m"] for row in document["accuracy"]}
+    assert list(rows) == [("corners", "similarity"), ("corners", "bundle"), ("corners + GNSS", "bundle")]
+    assert rows["corners + GNSS", "bundle"] < 0.5 * rows["corners", "bundle"]
 
 
 def test_too_little_control_stands_in_the_table(capsys: pytest.CaptureFixture[str]) -> None:

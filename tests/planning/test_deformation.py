@@ -106,6 +106,17 @@ def test_the_paraboloid_is_what_the_exact_intersection_does(elements: tuple[floa
     assert surface == pytest.approx(found, abs=1e-7)  # mm, of up to 3e-3: what is left is of second order
 
 
+def test_the_printed_sign_of_kappa_in_eq_10_9_bends_heights_the_wrong_way() -> None:
+    elements = np.array([0.0, 1e-6, 0.0, 0.0, 4e-6])
+    focal, base = 100.0, 70.0
+    exact = heights(SIX, elements, focal, base) + focal
+    c = parallax_error(SIX, elements, focal, base)
+    printed = SIX[:, 1] * (elements[4] - elements[1])  # + y (dkappa2 - dkappa1)
+    assert ground_errors(SIX, c, 1.0, focal, base)[:, 2] == pytest.approx(exact, abs=1e-8)
+    wrong = ground_errors(SIX, printed, 1.0, focal, base)[:, 2] - exact
+    assert np.abs(wrong).max() > 1.9 * np.abs(exact).max() > 1e-4
+
+
 def test_rigorous_factors_are_the_scatter_of_exact_orientations() -> None:
     f, a, b = 100.0, 65.0, 70.0
     rng = np.random.default_rng(2)

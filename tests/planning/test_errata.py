@@ -149,6 +149,17 @@ def test_eq_11_needs_the_measurement_of_each_control_point_in_the_sum() -> None:
     assert printed == pytest.approx(0.0)  # as if the point were free of error
 
 
+def test_x_y_z_of_eq_6_are_not_the_centred_ones_of_eq_5() -> None:
+    # W = dx1 + dx2 - dX_geo: a model without any errors has no misclosures
+    centred = XY - XY.mean(axis=0)
+    errors = np.zeros((len(XY), 3))
+    as_eq_5_names_them = errors.copy()
+    as_eq_5_names_them[:, :2] -= centred
+    operator = orientation_operator([[*POINT, DEPTH]], control())
+    assert np.einsum("qanb,nb->qa", operator, errors) == pytest.approx(np.zeros((1, 3)))
+    assert np.abs(np.einsum("qanb,nb->qa", operator, as_eq_5_names_them)).max() > 10  # mm
+
+
 def test_dv0_is_dy0() -> None:
     # eq. 4: the mean of the misclosures in y moves y, and no parameter is called V
     misclosure = np.zeros((len(XY), 3))

@@ -15,7 +15,7 @@ from photostrip.planning.control_layout import Layout, Spot, across, spots_of
 from photostrip.planning.ideal_strip import StripGeometry, ideal_strip
 from photostrip.planning.placement import Placement, Required, best_places, equal_ways, worst
 from photostrip.planning.strip_design import Design, along_the_strip, bands_needed, outcome, plan_strip
-from photostrip.planning.strip_methods import BUNDLE, METHODS, SIMILARITY, accuracy
+from photostrip.planning.strip_methods import BUNDLE, COVARIANCE, METHODS, SIMILARITY, accuracy
 from photostrip.simulate import FILM, Points
 from photostrip.triangulation.screening import DETECTABLE
 
@@ -108,18 +108,18 @@ def test_expected_precision_is_the_scatter_of_whole_runs() -> None:
     layout = Layout("mixed", kind="corners", spots=single, sigma=(0.03, 0.03, 0.05))
     geometry = StripGeometry(FILM, 8)
     strip = ideal_strip(geometry)
-    methods = (SIMILARITY, "degree 2")
-    count = 250
+    methods = (SIMILARITY, "degree 2", COVARIANCE)
+    count = 100
     found = repetitions(Task(geometry, layout, methods, 0, count))
     for method in methods:
         expected = accuracy(strip, layout, spots_of(layout, 8, 5), method)
         total, squares = found[method]
         scatter = np.sqrt(squares / count - (total / count) ** 2)[expected.new]
         ratio = expected.sigmas[expected.new] / scatter
-        # 250 repetitions know the rms over all points to about 4 %, single coordinates to 5 %
-        assert np.sqrt((ratio**2).mean()) == pytest.approx(1.0, abs=0.08)
-        assert ratio.min() > 0.8
-        assert ratio.max() < 1.25
+        # 100 repetitions know the rms over all points to about 5 %, single coordinates to 7 %
+        assert np.sqrt((ratio**2).mean()) == pytest.approx(1.0, abs=0.1)
+        assert ratio.min() > 0.75
+        assert ratio.max() < 1.35
 
 
 def test_better_methods_are_better_and_symmetric() -> None:
@@ -134,7 +134,9 @@ def test_better_methods_are_better_and_symmetric() -> None:
         assert len(ends) == 9
         # the formed strip begins at one end, but what it knows hardly depends on which
         assert ends == pytest.approx(ends[::-1], rel=0.25)
-    assert np.all(rms[BUNDLE] < rms["degree 2"])
+    assert np.all(rms[BUNDLE] <= rms[COVARIANCE])
+    assert np.all(rms[COVARIANCE] < 1.05 * rms[BUNDLE])
+    assert np.all(rms[COVARIANCE] < rms["degree 2"])
     assert np.all(rms["degree 2"] < rms[SIMILARITY])
 
 
@@ -188,10 +190,11 @@ def test_errors_go_with_the_image_coordinates_when_control_is_good() -> None:
 # --------------------------------------------------------------------------------------------------- reliability
 
 
-def test_detectable_errors_of_the_bundle_follow_from_its_sigmas() -> None:
+@pytest.mark.parametrize("method", [COVARIANCE, BUNDLE])
+def test_detectable_errors_of_best_estimates_follow_from_their_sigmas(method: str) -> None:
     strip = strip_of(9)
     layout = Layout("", bands=3, sigma=(0.2, 0.2, 0.3))
-    found = accuracy(strip, layout, spots_of(layout, 9, 3), BUNDLE)
+    found = accuracy(strip, layout, spots_of(layout, 9, 3), method)
     adjusted = np.diagonal(found.covariance[found.control], axis1=1, axis2=2)
     given = np.array(layout.sigma) ** 2
     # a coordinate predicted by all others: variance given^2 / (given - adjusted)
