@@ -35,7 +35,7 @@ FORMATS = {
         "manual pages: photostrip man; completion of shells: photostrip completion",
     ],
 }
-OWN = ("test", "dev")  # extras for those who work on photostrip itself
+OWN = ("test", "dev", "peer")  # extras for those who work on photostrip itself
 
 
 def installation() -> dict[str, Any]:

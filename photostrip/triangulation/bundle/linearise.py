@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 PHOTO = 6  # parameters of a photo
+SMALL_GROUP = 24  # points: up to here it pays to bring the numbers of a group together before they are multiplied
 SIGNS = np.array([1.0, 1.0, 1.0, -1.0, 1.0, 1.0])  # of a photo's parameters, see above
 
 
@@ -333,17 +334,35 @@ def squares(batch: Batch, partials: Floats, rows: Floats) -> tuple[Floats, Float
     added, taken = np.empty((k, groups, p, p)), np.empty((groups, q, q))
     done = 0
     for first, last, count, size in batch.runs:
-        own = partials[..., first:last].reshape(p, 2, k, count, size).transpose(1, 2, 3, 0, 4)
-        joint = rows[..., first:last].reshape(q, 3, count, size).transpose(1, 2, 0, 3)
-        # Without its last column: numpy would take a whole square to BLAS as symmetric, which is slower when small.
-        both = own @ own[..., :-1, :].swapaxes(-1, -2)
-        np.add(both[0], both[1], out=added[:, done : done + count, :, :-1])
-        three = joint @ joint[..., :-1, :].swapaxes(-1, -2)
-        three[0] += three[1]
-        np.add(three[0], three[2], out=taken[done : done + count, :, :-1])
+        run = (partials[..., first:last], rows[..., first:last])
+        to = (added[:, done : done + count, :, :-1], taken[done : done + count, :, :-1])
+        (_small_squares if size <= SMALL_GROUP else _large_squares)(run, to, count, size)
         done += count
     added[..., :-1, -1], taken[:, :-1, -1] = added[..., -1, :-1], taken[:, -1, :-1]
     added[..., -1, -1] = taken[:, -1, -1] = 0.0
     added[0, 0, -1, -1] = np.einsum("akr,akr->", partials[-1], partials[-1])
     taken[0, -1, -1] = np.einsum("cr,cr->", rows[-1], rows[-1])
     return added, taken
+
+
+# Both leave out the last column: numpy would take a whole square to BLAS as symmetric, which is slower when small.
+
+
+def _small_squares(run: tuple[Floats, Floats], to: tuple[Floats, Floats], count: int, size: int) -> None:
+    """Bring the numbers of each group together, and multiply."""
+    own = np.ascontiguousarray(run[0].transpose(2, 3, 1, 0)).reshape(-1, count, 2 * size, len(run[0]))
+    np.matmul(own.swapaxes(-1, -2), own[..., :-1], out=to[0])
+    joint = np.ascontiguousarray(run[1].transpose(2, 1, 0)).reshape(count, 3 * size, len(run[1]))
+    np.matmul(joint.swapaxes(-1, -2), joint[..., :-1], out=to[1])
+
+
+def _large_squares(run: tuple[Floats, Floats], to: tuple[Floats, Floats], count: int, size: int) -> None:
+    """Multiply where the numbers are."""
+    p, _, k, _ = run[0].shape
+    own = run[0].reshape(p, 2, k, count, size).transpose(1, 2, 3, 0, 4)
+    both = own @ own[..., :-1, :].swapaxes(-1, -2)
+    np.add(both[0], both[1], out=to[0])
+    joint = run[1].reshape(-1, 3, count, size).transpose(1, 2, 0, 3)
+    three = joint @ joint[..., :-1, :].swapaxes(-1, -2)
+    three[0] += three[1]
+    np.add(three[0], three[2], out=to[1])

@@ -1,0 +1,276 @@
+"""How fast the bundle adjustment is, side by side with Ceres (pyceres) and COLMAP (pycolmap) on the very same problems.
+
+Every program gets the same arrays and the same start in the same process, one thread each, one after the other in each
+round; times are those of the processor, medians of the rounds. Without the two packages only our own times are printed.
+
+Usage: python benchmarks/bundle.py [--rounds N] [--cases strip large block corridor memory]
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import time
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from anywhere, installed or not
+
+from photostrip.threads import limit_threads
+
+limit_threads()  # before numpy is imported, also in the processes that are started here
+
+import numpy as np  # noqa: E402
+
+from benchmarks import peers  # noqa: E402
+from photostrip.simulate import Control, Flight, Ground, Points, Spec, Terrain, simulate  # noqa: E402
+from photostrip.simulate.bundle import problem_of  # noqa: E402
+from photostrip.triangulation.bundle.precision import precision  # noqa: E402
+from photostrip.triangulation.bundle.solve import solve  # noqa: E402
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from photostrip.triangulation.bundle.problem import Problem
+    from photostrip.triangulation.bundle.solution import Precision, Solution
+
+LIMITS = {"whole": 0.5, "block": 1.0, "solver": 0.8, "colmap": 0.25, "covariances": 1.0}
+LARGEST_MEMORY = 350.0  # MB, at 1000 photos with 300 points each
+EXTRA = {False: 0.41, True: 0.256}  # points of a model for each point of a photo, in a strip and in a block
+MEGABYTE = 1024.0
+SHIFT, TURN = 0.5, 1e-3  # metres and radians, of all start values
+
+
+@dataclass(frozen=True)
+class Case:
+    """Photos to adjust: strips, photos of a strip, measured points of a photo (about)."""
+
+    strips: int
+    photos: int
+    each: int
+
+    @property
+    def title(self) -> str:
+        """Its name."""
+        shape = f"{self.strips} x {self.photos}" if self.strips > 1 else f"{self.photos}"
+        return f"{shape} x {self.each}"
+
+
+STRIPS = [Case(1, photos, each) for photos in (100, 300, 1000) for each in (40, 300)]
+CASES = {
+    "strip": STRIPS[:-1],
+    "large": STRIPS[-1:],
+    "block": [Case(20, 50, 40)],
+}
+LONG = [Case(1, photos, 40) for photos in (1000, 3000, 10_000)]
+
+
+def problem(case: Case) -> Problem:
+    """Make the problem: the real Earth, 5 micrometres, control every five photos, a start off the truth.
+
+    Parameters
+    ----------
+    case : Case
+        Its size.
+
+    Returns
+    -------
+    Problem
+        All points with two rays and more.
+    """
+    extra = max(round(EXTRA[case.strips > 1] * case.each) - 5, 0)
+    spec = Spec(
+        ground=Ground(crs="geocentric", axes=("x", "y", "z")),
+        flight=Flight(photos=case.photos, strips=case.strips, scale=2500.0),
+        terrain=Terrain(relief=20.0),
+        points=Points(rows=5, reach_percent=85.0, extra_per_model=extra),
+        control=Control(every=5, per_band=3, sigma=(0.05, 0.05, 0.05)),
+    )
+    return problem_of(simulate(spec), shift=SHIFT, turn=TURN)
+
+
+def timed(given: Problem) -> tuple[float, float, Solution, Precision]:
+    """Adjust and find all covariances: seconds of the processor for each, and the results."""
+    began = time.process_time()
+    solution = solve(given)
+    solved = time.process_time()
+    cofactors = precision(solution)
+    return solved - began, time.process_time() - solved, solution, cofactors
+
+
+# ------------------------------------------------------------------------------------------------- side by side
+
+
+@dataclass(frozen=True)
+class Times:
+    """Medians of one case, seconds; largest difference of a coordinate to Ceres in standard deviations."""
+
+    solve: float
+    covariances: float
+    ceres: float
+    solver: float
+    colmap: float
+    difference: float
+    steps: tuple[int, int, int]
+
+
+def measure(given: Problem, rounds: int) -> Times:
+    """Adjust a problem with all programs, several times."""
+    solve(given)  # imports and warms up
+    rows = []
+    for _ in range(rounds):
+        own, more, solution, cofactors = timed(given)
+        if not peers.available():
+            rows.append((own, more, np.nan, np.nan, np.nan))
+            difference, steps = np.nan, (len(solution.steps), 0, 0)
+            continue
+        ceres, colmap = peers.by_ceres(given), peers.by_colmap(given)
+        rows.append((own, more, ceres.whole, ceres.solving, colmap.whole))
+        deviation = np.sqrt(np.einsum("nii->ni", cofactors.points))
+        difference = float(np.nanmax(np.abs(ceres.points - solution.points) / deviation))
+        steps = (len(solution.steps), ceres.steps, colmap.steps)
+    own, more, whole, solver, colmap_whole = np.median(rows, axis=0).tolist()
+    return Times(own, more, whole, solver, colmap_whole, difference, steps)
+
+
+def side_by_side(cases: Iterable[Case], rounds: int) -> None:
+    """Print times and ratios."""
+    head = ("photos", "rays", "points", "solve", "covariances", "Ceres", "its solver", "COLMAP", "steps", "difference")
+    lines, ratios = [], []
+    for case in cases:
+        given = problem(case)
+        found = measure(given, rounds)
+        lines.append(
+            (
+                case.title,
+                str(len(given.images)),
+                str(given.points),
+                *(
+                    f"{1000.0 * value:.0f}" if np.isfinite(value) else "-"
+                    for value in (found.solve, found.covariances, found.ceres, found.solver, found.colmap)
+                ),
+                "/".join(map(str, found.steps)),
+                f"{found.difference:.0e}" if np.isfinite(found.difference) else "-",
+            )
+        )
+        ratios.append((case, found))
+    print(
+        f"milliseconds of the processor, medians of {rounds}, one thread; steps of photostrip/Ceres/COLMAP;\n"
+        "difference of coordinates to Ceres, in standard deviations"
+    )
+    table(head, lines)
+    _print_ratios(ratios)
+
+
+def _print_ratios(ratios: Sequence[tuple[Case, Times]]) -> None:
+    """Print ratios with their limits."""
+    lines = []
+    for case, found in ratios:
+        whole = LIMITS["block" if case.strips > 1 else "whole"]
+        pairs: list[tuple[float, float | None]] = [(found.solve / found.ceres, whole)]
+        pairs += [
+            (found.solve / found.solver, LIMITS["solver"] if case.strips == 1 else None),
+            (found.solve / found.colmap, LIMITS["colmap"] if case.strips == 1 else None),
+            (found.covariances / found.solve, LIMITS["covariances"]),
+        ]
+        limits = [f" of {limit:.2f}" if limit else "" for _, limit in pairs]
+        values = ["-" if np.isnan(value) else f"{value:.2f}" for value, _ in pairs]
+        cells = [value + limit for value, limit in zip(values, limits, strict=True)]
+        good = all(limit is None or value <= limit for value, limit in pairs if np.isfinite(value))
+        lines.append((case.title, *cells, "yes" if good else "no"))
+    print(
+        "ratios with their limits: our solution to the whole call of Ceres, to its solver alone, to the whole call of"
+    )
+    print("COLMAP; our covariances of all points and photos to our solution")
+    table(("photos", "to Ceres", "to its solver", "to COLMAP", "covariances", "within"), lines)
+
+
+# --------------------------------------------------------------------------------------------- growth and memory
+
+
+def corridor(rounds: int) -> None:
+    """Print how time grows with the length of a strip."""
+    lines: list[tuple[str, ...]] = []
+    shortest = 0.0
+    for case in LONG:
+        given = problem(case)
+        solve(given)
+        own, more = np.median([timed(given)[:2] for _ in range(rounds)], axis=0).tolist()
+        per = 1e6 * own / len(given.images)
+        shortest = per if not lines else shortest
+        lines.append(
+            (
+                case.title,
+                str(len(given.images)),
+                f"{1000.0 * own:.0f}",
+                f"{1000.0 * more:.0f}",
+                f"{per:.2f}",
+                f"{per / shortest:.2f}",
+            )
+        )
+    print("long corridors: milliseconds, and microseconds for each ray")
+    table(("photos", "rays", "solve", "covariances", "per ray", "to the first"), lines)
+
+
+def _peak(case: Case) -> tuple[float, float]:
+    """Peak memory of a process that adjusts a case, MB: all of it, and what it had before."""
+    import resource
+
+    import scipy.linalg.lapack  # noqa: F401  what the adjustment needs
+
+    given = problem(case)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / MEGABYTE
+    precision(solve(given))
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / MEGABYTE, before
+
+
+def memory() -> None:
+    """Print the peak memory of a process of its own."""
+    case = STRIPS[-1]
+    with get_context("spawn").Pool(1) as pool:
+        peak, before = pool.apply(_peak, (case,))
+    verdict = "yes" if peak <= LARGEST_MEMORY else "no"
+    print(f"peak memory of a process that adjusts {case.title} with all covariances, MB (limit {LARGEST_MEMORY:.0f})")
+    table(("before", "peak", "within"), [(f"{before:.0f}", f"{peak:.0f}", verdict)])
+
+
+# ------------------------------------------------------------------------------------------------------ printing
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    """Print columns, the first to the left, the others to the right."""
+    lines = [tuple(head), *map(tuple, rows)]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    lines.insert(1, tuple("-" * width for width in widths))
+    for first, *others in lines:
+        cells = [cell.rjust(width) for cell, width in zip(others, widths[1:], strict=True)]
+        print("  ".join([first.ljust(widths[0]), *cells]).rstrip())
+    print(flush=True)
+
+
+def main() -> None:
+    """Run the benchmark."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rounds", type=int, default=5, help="rounds of which medians are taken")
+    names = [*CASES, "corridor", "memory"]
+    parser.add_argument("--cases", nargs="*", choices=names, default=names, help="which tables to print")
+    wanted = parser.parse_args()
+    if not peers.available():
+        print("pyceres and pycolmap are not installed (pip install 'photostrip[peer]'): only our own times\n")
+    for name, cases in CASES.items():
+        if name in wanted.cases:
+            side_by_side(cases, wanted.rounds)
+    if "corridor" in wanted.cases:
+        corridor(wanted.rounds)
+    if "memory" in wanted.cases:
+        memory()
+    sys.stdout.flush()
+    if peers.KEPT:
+        os._exit(0)  # what two libraries own together cannot be freed
+
+
+if __name__ == "__main__":
+    main()
