@@ -40,6 +40,7 @@ def test_the_wheel_holds_the_package_and_nothing_else(tmp_path: Path) -> None:
         entry_points = wheel.read(f"{info}/entry_points.txt").decode()
     assert {name.partition("/")[0] for name in names} == {"photostrip", info}
     assert "photostrip/py.typed" in names
+    assert {"photostrip/report/templates/report.html", "photostrip/report/templates/report.css"} <= set(names)
     source = {path.relative_to(ROOT).as_posix() for path in (ROOT / "photostrip").rglob("*.py")}
     assert source == {name for name in names if name.endswith(".py")}
     assert entry_points.split() == ["[console_scripts]", "photostrip", "=", "photostrip.cli.main:main"]

@@ -26,7 +26,7 @@ FORMATS = {
     "written": [
         "result.json, points.csv, photos.csv, residuals.csv, parallaxes.csv, rejected.csv: photostrip run -o, batch -o",
         "summary of a batch (text, CSV, JSON, JUnit, Markdown, annotations): photostrip batch",
-        "accuracy report (text, Markdown, JSON, annotations): photostrip run, report",
+        "accuracy report (text, Markdown, JSON, annotations; HTML with pictures): photostrip run, report",
         "comparison (text, Markdown, JSON, JUnit, annotations), baseline.json: photostrip compare",
         "project with tables and truth.json: photostrip simulate -o",
         "trace of every iteration (text, Markdown, JSON): photostrip run --trace",

@@ -10,6 +10,8 @@ import typer
 from photostrip.cli.options import Quiet, Verbose, Width
 from photostrip.cli.showing import Format, show
 
+HTML = ".html"
+
 
 def report(
     result: Annotated[Path, typer.Argument(metavar="RESULT", help="A result.json, or the folder that holds it.")],
@@ -25,8 +27,8 @@ def report(
 ) -> None:
     """Print the accuracy report of a saved result again.
 
-    It is the report that `photostrip run` printed. FILE may end in .txt, .md or .json. The exit code does not depend on
-    the tolerances: the report of a failed result is a report.
+    It is the report that `photostrip run` printed. FILE may end in .txt, .md, .html or .json. The exit code does not
+    depend on the tolerances: the report of a failed result is a report.
     """
     from photostrip.cli.showing import form_of, rendered
     from photostrip.formats.result.files import read_result
@@ -38,5 +40,11 @@ def report(
     require_complete(document, file)
     if output is None:
         show(document, form or Format.TEXT, width, quiet=quiet, verbose=verbose)
+        return
+    if form is None and output.suffix.lower() == HTML:
+        from photostrip.report.html import check_html, to_html
+
+        check_html("--output")
+        write_text(output, to_html(document, everything=verbose))
         return
     write_text(output, rendered(document, form or form_of(output), width, quiet=quiet, verbose=verbose))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -30,6 +30,7 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
     methods: Annotated[
         bool, typer.Option("--compare-methods", help="Adjust in every way there is, side by side at check points.")
     ] = False,
+    html: Annotated[bool, typer.Option("--html", help="Write report.html into DIR, too.")] = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> int:
@@ -49,19 +50,22 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
     from photostrip.project.loading import load_project
     from photostrip.report.progress import progress
 
-    if depfile is not None and output is None:
-        raise typer.BadParameter("a rule for make needs a target: give --output as well", param_hint="--depfile")
+    _require_folder(output, depfile=depfile, html=html)
     if trace is not None:
         form_of(trace, "--trace")  # before anything is computed
     talk = Talk(quiet=quiet, verbose=verbose)
     if methods:
         from photostrip.cli.methods import compare_methods
 
-        if depfile is not None or trace is not None:
-            message = "a comparison of methods has no --depfile and no --trace"
+        if depfile is not None or trace is not None or html:
+            message = "a comparison of methods has no --depfile, no --trace and no --html"
             raise typer.BadParameter(message, param_hint="--compare-methods")
         return compare_methods(project, assignments or [], output, form, width, talk, quiet=quiet)
     with failures_as(form), no_collector(), progress(sys.stderr, quiet=quiet) as waiting:
+        if html:
+            from photostrip.report.html import check_html
+
+            check_html()
         waiting.at(f"reading {project}")
         loaded = load_project(project, assignments or [])
         talk.step(f"read {len(loaded.files)} files, {len(loaded.inputs.observations)} image points")
@@ -71,13 +75,29 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
         talk.step(f"adjusted {len(result.points.number)} points")
         document = document_of(result, loaded.remarks)
         waiting.at("writing the result")
-        if depfile is not None and output is not None:  # before the result: it must not be the newer of the two
-            write_text(depfile, make_rule(output / "result.json", loaded.files_read(result)))
         if trace is not None:
             write_text(trace, traced(result, form_of(trace, "--trace")))
         if output is not None:
-            files = result_files(document, loaded.resolved)
+            if depfile is not None:  # before the result: it must not be the newer of the two
+                write_text(depfile, make_rule(output / "result.json", loaded.files_read(result)))
+            files = _page(document, everything=verbose) if html else {}
+            files |= result_files(document, loaded.resolved)
             write_files(output, files)
             talk.say(f"wrote {len(files)} files to {output}")
     show(document, form, width, quiet=quiet, verbose=verbose)
     return EXIT_TOLERANCE if document["status"] == "failed" else EXIT_DONE
+
+
+def _require_folder(output: Path | None, *, depfile: Path | None, html: bool) -> None:
+    """Refuse what makes no sense without a folder, and HTML that cannot be written."""
+    if output is None and depfile is not None:
+        raise typer.BadParameter("a rule for make needs a target: give --output as well", param_hint="--depfile")
+    if output is None and html:
+        raise typer.BadParameter("report.html needs a folder: give --output as well", param_hint="--html")
+
+
+def _page(document: dict[str, Any], *, everything: bool) -> dict[str, str]:
+    """Give report.html."""
+    from photostrip.report.html import to_html
+
+    return {"report.html": to_html(document, everything=everything)}

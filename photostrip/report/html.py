@@ -1,0 +1,114 @@
+"""The report as one HTML file: the sections of the text report and pictures, nothing loaded from elsewhere.
+
+Looks stand in ``templates/report.html`` and ``templates/report.css``.
+"""
+
+from __future__ import annotations
+
+import re
+from importlib import resources
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
+
+from photostrip.errors import Fault, InputError
+from photostrip.report.document import sections_of, title_of
+from photostrip.report.parts import Facts, Table, Words
+from photostrip.report.plots_strip import strip_pictures
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from photostrip.report.parts import Part, Section
+
+Document = dict[str, Any]
+
+INSTALL = "pip install 'photostrip[report]'"
+
+
+def check_html(key: str = "--html") -> None:
+    """Make sure that HTML can be written, before anything is computed.
+
+    Parameters
+    ----------
+    key : str
+        The option that asks for it.
+
+    Raises
+    ------
+    InputError
+        When jinja2 is missing.
+    """
+    try:
+        found = find_spec("jinja2") is not None
+    except ValueError:  # put out of action: sys.modules["jinja2"] is None
+        found = False
+    if not found:
+        message = "a report as HTML needs jinja2, which is not installed"
+        raise InputError(Fault(message, "extra", key=key, fix=INSTALL))
+
+
+def to_html(document: Document, *, everything: bool = False) -> str:
+    """Give the report of a result as one HTML file.
+
+    Parameters
+    ----------
+    document : dict
+        The document of a result.
+    everything : bool
+        Whether all rows of all tables are wanted, not only the worst of long ones.
+
+    Returns
+    -------
+    str
+        The page, the same for the same document: style and pictures are in it, no script, no link to elsewhere.
+    """
+    from jinja2 import Environment, StrictUndefined
+    from markupsafe import Markup
+
+    folder = resources.files("photostrip.report") / "templates"
+    environment = Environment(autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True)
+    template = environment.from_string((folder / "report.html").read_text(encoding="utf-8"))
+    pictures = [each._replace(svg=Markup(each.svg)) for each in strip_pictures(document)]  # noqa: S704 (escaped there)
+    return template.render(
+        title=title_of(document),
+        version=document["version"],
+        style=Markup((folder / "report.css").read_text(encoding="utf-8").strip()),  # noqa: S704 (ours)
+        sections=list(_sections(sections_of(document, everything=everything))),
+        pictures=pictures,
+    )
+
+
+def _sections(sections: Iterable[Section]) -> Iterator[Document]:
+    """Give the sections as the template takes them; ids are made from their titles."""
+    taken = {"pictures"}
+    for number, section in enumerate(sections):
+        name = re.sub(r"[^a-z0-9]+", "-", section.title.lower()).strip("-") or f"section-{number}"
+        while name in taken:
+            name = f"{name}-{number}"
+        taken.add(name)
+        yield {"id": name, "title": section.title, "parts": list(_parts(section.parts))}
+
+
+def _parts(parts: Iterable[Part]) -> Iterator[Document]:
+    """Give parts as the template takes them; words with a mark that follow each other are one list."""
+    waiting: list[Words] = []
+    for part in parts:
+        if isinstance(part, Words) and part.mark:
+            waiting.append(part)
+            continue
+        yield from _list(waiting)
+        waiting = []
+        if isinstance(part, Words):
+            yield {"kind": "words", "text": part.text, "style": part.style}
+        elif isinstance(part, Facts):
+            yield {"kind": "facts", "rows": part.rows}
+        elif isinstance(part, Table):
+            table = {"columns": part.columns, "rows": part.rows, "foot": part.foot, "note": part.note}
+            yield {"kind": "table", **table}
+    yield from _list(waiting)
+
+
+def _list(items: list[Words]) -> Iterator[Document]:
+    if items:
+        tag = "ol" if items[0].mark.strip()[0].isdigit() else "ul"
+        yield {"kind": "list", "tag": tag, "items_": [item.text for item in items]}

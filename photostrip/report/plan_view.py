@@ -1,0 +1,166 @@
+"""Ground coordinates of a result as a plan in metres, whatever their frame: for pictures, not for measuring."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+Document = dict[str, Any]
+Pair = tuple[float, float]
+EARTH = 6_371_000.0  # m, for degrees of a body whose size is not said
+
+
+class Spot(NamedTuple):
+    """A thing on the plan.
+
+    Parameters
+    ----------
+    id : str
+        Its id.
+    role : str
+        ``photo``, ``new``, ``control`` or ``check``.
+    along, across : float
+        Place along the first strip, from its first photo, and to the left of it, metres.
+    shift : tuple of float or None
+        Adjusted minus given, along and across, metres.
+    up : float or None
+        Adjusted minus given in height, metres.
+    ellipse : tuple of float or None
+        Axes a and b of the standard ellipse in metres, and the direction of a counter-clockwise from along, radians.
+    """
+
+    id: str
+    role: str
+    along: float
+    across: float
+    shift: Pair | None = None
+    up: float | None = None
+    ellipse: tuple[float, float, float] | None = None
+
+
+class Plan(NamedTuple):
+    """The plan of a result.
+
+    Parameters
+    ----------
+    spots : list of Spot
+        Points, new ones first.
+    strips : list of list of Spot
+        Photos of each strip in flight order.
+    north : tuple of float
+        Direction of north, along and across.
+    """
+
+    spots: list[Spot]
+    strips: list[list[Spot]]
+    north: Pair
+
+
+def plan_of(document: Document) -> Plan:
+    """Give the plan of a result, turned so that its first strip runs to the right.
+
+    Parameters
+    ----------
+    document : dict
+        The document of a result.
+
+    Returns
+    -------
+    Plan
+        Places and differences in metres.
+    """
+    grid = _Grid(document)
+    photos = document["photos"]
+    first = [photo for photo in photos if photo["strip"] == document["strips"][0]["id"]]
+    start, end = grid.place(first[0]), grid.place(first[-1])
+    length = math.hypot(end[0] - start[0], end[1] - start[1]) or 1.0
+    along = ((end[0] - start[0]) / length, (end[1] - start[1]) / length)
+
+    def turned(east: float, north: float) -> Pair:
+        return east * along[0] + north * along[1], north * along[0] - east * along[1]
+
+    def spot(row: Document, role: str, given: Document | None = None) -> Spot:
+        east, north = grid.place(row)
+        shift, up = grid.difference(given) if given else (None, None)
+        return Spot(
+            row["id"],
+            role,
+            *turned(east - start[0], north - start[1]),
+            None if shift is None else turned(*shift),
+            up,
+            _ellipse(row, turned),
+        )
+
+    given = {row["id"]: row for row in document["control"] if row["measured"]}
+    spots = [spot(row, row["role"], given.get(row["id"])) for row in document["points"]]
+    spots.sort(key=lambda each: ("new", "check", "control").index(each.role))
+    strips = [
+        [spot(photo, "photo") for photo in photos if photo["strip"] == strip["id"]] for strip in document["strips"]
+    ]
+    return Plan(spots, strips, turned(0.0, 1.0))
+
+
+def _ellipse(row: Document, turned: Any) -> tuple[float, float, float] | None:  # noqa: ANN401 (a function)
+    """Give the ellipse of a point, where the result has one."""
+    a, b, azimuth = (row.get(key) for key in ("ellipse_a", "ellipse_b", "ellipse_azimuth_deg"))
+    if a is None or b is None or azimuth is None:
+        return None
+    x, y = turned(math.sin(math.radians(azimuth)), math.cos(math.radians(azimuth)))
+    return a, b, math.atan2(y, x)
+
+
+class _Grid:
+    """Metres to the east and to the north in the frame of a result."""
+
+    def __init__(self, document: Document) -> None:
+        frame = document["frame"]
+        self._kind = frame["kind"]
+        self._axes: list[str] = list(frame["axes"])
+        self._factor = frame.get("plan_factor", 1.0)
+        rows = document["points"]
+        self._ellipsoid: list[float] = frame.get("ellipsoid") or [EARTH, EARTH]
+        self._middle = [math.fsum(row[axis] for row in rows) / max(len(rows), 1) for axis in "xyz"]
+        if self._kind == "geographic":
+            self._factor = frame.get("plan_factor", math.radians(1.0))
+        if self._kind == "geocentric":
+            self._turn = self._east_north_up()
+
+    def _named(self, values: Any) -> tuple[float, float, float]:  # noqa: ANN401 (three numbers)
+        """Bring three numbers from the order of the axes to east, north, up, or X, Y, Z."""
+        names = ("east", "north", "up") if "east" in self._axes else ("x", "y", "z")
+        first, second, third = (values[self._axes.index(name)] for name in names)
+        return first, second, third
+
+    def _east_north_up(self) -> list[tuple[float, float, float]]:
+        """Give the axes at the middle of the points, up along the normal of the ellipsoid."""
+        x, y, z = self._named(self._middle)
+        a, b = self._ellipsoid
+        latitude, longitude = math.atan2(z * a * a, math.hypot(x, y) * b * b), math.atan2(y, x)
+        sine, cosine = math.sin(latitude), math.cos(latitude)
+        east = (-math.sin(longitude), math.cos(longitude), 0.0)
+        north = (-sine * math.cos(longitude), -sine * math.sin(longitude), cosine)
+        return [east, north, (cosine * math.cos(longitude), cosine * math.sin(longitude), sine)]
+
+    def place(self, row: Document) -> Pair:
+        """Give metres to the east and north of the middle of the points."""
+        x, y, z = self._named([row[axis] - middle for axis, middle in zip("xyz", self._middle, strict=True)])
+        if self._kind == "geocentric":
+            east, north = self._turn[:2]
+            return x * east[0] + y * east[1] + z * east[2], x * north[0] + y * north[1] + z * north[2]
+        if self._kind == "geographic":
+            latitude = self._named(self._middle)[1] * self._factor
+            radius = self._factor * self._ellipsoid[0]
+            return x * radius * math.cos(latitude), y * radius
+        return x * self._factor, y * self._factor
+
+    def difference(self, row: Document) -> tuple[Pair | None, float | None]:
+        """Give a difference in metres: to the east and north, and in height."""
+        values = [row[key] for key in ("dx", "dy", "dz")]
+        if self._kind != "geocentric":
+            east, north = (values[self._axes.index(name)] for name in ("east", "north"))
+            return (None if east is None or north is None else (east, north)), row["height"]
+        if any(value is None for value in values):
+            return None, row["height"]
+        x, y, z = self._named(values)
+        parts = [x * axis[0] + y * axis[1] + z * axis[2] for axis in self._turn]
+        return (parts[0], parts[1]), row["height"]

@@ -1,0 +1,162 @@
+"""Pictures as SVG, written by hand: the same bytes everywhere, colours from the style sheet of the page around them."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+from xml.sax.saxutils import escape, quoteattr
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+Point = tuple[float, float]
+
+TICKS = 6  # about so many on an axis
+
+
+class Picture(NamedTuple):
+    """A picture with the words that go with it.
+
+    Parameters
+    ----------
+    name : str
+        Its id in the page.
+    title : str
+        What it is, in a few words.
+    caption : str
+        How to read it.
+    svg : str
+        The picture; its title and description are those for readers who cannot see it.
+    """
+
+    name: str
+    title: str
+    caption: str
+    svg: str
+
+
+class Axis(NamedTuple):
+    """A scale from numbers to places on the picture.
+
+    Parameters
+    ----------
+    low, high : float
+        Numbers at its ends.
+    start, end : float
+        Their places.
+    """
+
+    low: float
+    high: float
+    start: float
+    end: float
+
+    def __call__(self, value: float) -> float:
+        """Give the place of a number."""
+        return self.start + (value - self.low) / (self.high - self.low) * (self.end - self.start)
+
+    def ticks(self) -> list[float]:
+        """Give round numbers along the axis."""
+        step = nice((self.high - self.low) / TICKS)
+        first = math.ceil(self.low / step - 1e-9)
+        last = math.floor(self.high / step + 1e-9)
+        return [number * step for number in range(first, last + 1)]
+
+
+def nice(size: float) -> float:
+    """Give the next round number, 1, 2 or 5 times a power of ten, that is not smaller."""
+    if size <= 0:
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(size))
+    return next(step * power for step in (1.0, 2.0, 5.0, 10.0) if step * power >= size * (1 - 1e-9))
+
+
+def number(value: float) -> str:
+    """Give a coordinate of the picture with one decimal, never -0."""
+    text = f"{value:z.1f}"
+    return text.removesuffix(".0")
+
+
+def element(name: str, content: str = "", **attributes: str | float) -> str:
+    """Give one element; underscores in names of attributes stand for hyphens, ``kind`` for ``class``."""
+    names = {"kind": "class"}
+    words = {key: number(value) if isinstance(value, float) else str(value) for key, value in attributes.items()}
+    parts = [f" {names.get(key, key).replace('_', '-')}={quoteattr(value)}" for key, value in words.items()]
+    inside = f">{content}</{name}>" if content else "/>"
+    return f"<{name}{''.join(parts)}{inside}"
+
+
+def text(place: Point, words: str, kind: str = "", anchor: str = "start") -> str:
+    """Give words at a place."""
+    x, y = place
+    return element("text", escape(words), x=x, y=y, kind=f"label {kind}".strip(), text_anchor=anchor)
+
+
+def line(start: Point, end: Point, kind: str) -> str:
+    """Give a straight line."""
+    return element("line", x1=start[0], y1=start[1], x2=end[0], y2=end[1], kind=kind)
+
+
+def path(points: Iterable[Point], kind: str) -> str:
+    """Give a line through points."""
+    steps = " ".join(f"{number(x)},{number(y)}" for x, y in points)
+    return element("polyline", points=steps, kind=kind)
+
+
+def mark(place: Point, shape: str, kind: str, hint: str, size: float = 5.0) -> str:
+    """Give a mark: a triangle, a square, a diamond or a dot; the hint is what a pointer over it shows."""
+    x, y = place
+    title = element("title", escape(hint)) if hint else ""
+    if shape == "dot":
+        return element("circle", title, cx=x, cy=y, r=size * 0.6, kind=kind)
+    corners: dict[str, Sequence[Point]] = {
+        "triangle": ((0, -1.2), (1.1, 0.8), (-1.1, 0.8)),
+        "square": ((-0.85, -0.85), (0.85, -0.85), (0.85, 0.85), (-0.85, 0.85)),
+        "diamond": ((0, -1.2), (1.2, 0), (0, 1.2), (-1.2, 0)),
+    }
+    place_of = " ".join(f"{number(x + dx * size)},{number(y + dy * size)}" for dx, dy in corners[shape])
+    return element("polygon", title, points=place_of, kind=kind)
+
+
+def picture(name: str, size: Point, words: tuple[str, str, str], content: Iterable[str]) -> Picture:
+    """Put a picture together.
+
+    Parameters
+    ----------
+    name : str
+        Its id.
+    size : tuple of float
+        Width and height of its coordinates; on the page it is as wide as there is room.
+    words : tuple of str
+        Title, caption, and a description for readers who cannot see it.
+    content : iterable of str
+        Elements.
+    """
+    title, caption, description = words
+    head = element("title", escape(title), id=f"picture-{name}-title") + element(
+        "desc", escape(description), id=f"picture-{name}-desc"
+    )
+    svg = element(
+        "svg",
+        f"{head}\n" + "\n".join(content) + "\n",
+        xmlns="http://www.w3.org/2000/svg",
+        viewBox=f"0 0 {number(size[0])} {number(size[1])}",
+        role="img",
+        aria_labelledby=f"picture-{name}-title picture-{name}-desc",
+    )
+    return Picture(name, title, caption, svg)
+
+
+def frame(x: Axis, y: Axis, labels: tuple[str, str]) -> list[str]:
+    """Give grid lines, numbers and names of two axes."""
+    found = []
+    for value in x.ticks():
+        found.append(line((x(value), y.start), (x(value), y.end), "grid"))
+        found.append(text((x(value), y.start + 18.0), f"{value:.10g}", "tick", "middle"))
+    for value in y.ticks():
+        kind = "zero" if abs(value) < 1e-12 * max(abs(y.high), abs(y.low), 1e-300) else "grid"
+        found.append(line((x.start, y(value)), (x.end, y(value)), kind))
+        found.append(text((x.start - 8.0, y(value) + 4.0), f"{value:.10g}", "tick", "end"))
+    found.append(text(((x.start + x.end) / 2, y.start + 38.0), labels[0], "axis", "middle"))
+    found.append(text((x.start - 8.0, y.end - 12.0), labels[1], "axis", "end"))
+    return found

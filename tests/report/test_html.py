@@ -1,0 +1,291 @@
+"""The report as HTML: everything the text report says, whole, safe, reachable, and pictures whose numbers are right."""
+
+from __future__ import annotations
+
+import copy
+import json
+import math
+import re
+import sys
+from functools import cache
+from html.parser import HTMLParser
+from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree as ET
+
+import pytest
+
+from photostrip.cli.main import main
+from photostrip.formats.result.files import to_json
+from photostrip.report import sections_of
+from photostrip.report.html import to_html
+from photostrip.report.parts import Facts, Table, Words
+from photostrip.report.plan_view import plan_of
+from photostrip.report.plots_strip import LONGEST, strip_pictures
+from photostrip.report.svg import Axis, nice
+from tests.reports import saved
+from tests.results import FRAMES, case, spec, write_project
+from tests.source_tree import ROOT
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    Document = dict[str, Any]
+
+VOID = {"meta", "link", "br", "hr", "img", "input"}
+SVG = "{http://www.w3.org/2000/svg}"
+CSS = (ROOT / "photostrip/report/templates/report.css").read_text(encoding="utf-8")
+
+
+class Page(HTMLParser):
+    """A page, taken apart: its elements, its words; every element must be closed."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.elements: list[tuple[str, dict[str, str]]] = []
+        self.words: list[str] = []
+        self._open: list[str] = []
+        self.feed(text)
+        self.close()
+        assert self._open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, {name: value or "" for name, value in attrs}))
+        if tag not in VOID:
+            self._open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, {name: value or "" for name, value in attrs}))
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self._open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if self._open and self._open[-1] not in {"style", "title", "desc"}:
+            self.words.append(" ".join(data.split()))
+
+    def of(self, tag: str) -> list[dict[str, str]]:
+        return [attributes for name, attributes in self.elements if name == tag]
+
+
+@cache
+def page() -> Page:
+    return Page(to_html(saved()))
+
+
+def texts(document: Document) -> Iterator[str]:
+    """Give everything that the sections say."""
+    for section in sections_of(document):
+        yield section.title
+        for part in section.parts:
+            if isinstance(part, Words):
+                yield part.text
+            elif isinstance(part, Facts):
+                yield from (word for row in part.rows for word in row)
+            elif isinstance(part, Table):
+                yield part.note
+                yield from (word for column in part.columns for word in (column.name, column.unit))
+                yield from (cell for row in (*part.rows, *part.foot) for cell in row)
+
+
+def test_the_page_says_everything_that_the_sections_say() -> None:
+    words = set(page().words)
+    assert [text for text in texts(saved()) if " ".join(text.split()) not in words and text] == []
+
+
+def test_nothing_is_loaded_from_elsewhere() -> None:
+    assert {tag for tag, _ in page().elements} & {"script", "link", "img", "iframe", "object"} == set()
+    for tag, attributes in page().elements:
+        assert not {"src", "srcset", "onclick"} & attributes.keys()
+        for name, value in attributes.items():
+            assert "//" not in value or (tag, name) == ("svg", "xmlns")
+    assert "url(" not in CSS
+    assert "@import" not in CSS
+
+
+def test_ids_are_there_once_and_links_lead_to_them() -> None:
+    ids = [attributes["id"] for _, attributes in page().elements if "id" in attributes]
+    assert len(ids) == len(set(ids))
+    assert [link["href"] for link in page().of("a") if link["href"].removeprefix("#") not in ids] == []
+    for attributes in (each for _, each in page().elements if "aria-labelledby" in each):
+        assert set(attributes["aria-labelledby"].split()) <= set(ids)
+
+
+def test_readers_that_do_not_see_have_words_for_everything() -> None:
+    found = page()
+    assert found.of("html") == [{"lang": "en"}]
+    assert len(found.of("h1")) == len(found.of("main")) == 1
+    assert all(each["scope"] in {"col", "row"} for each in found.of("th"))
+    assert all(each["role"] == "img" for each in found.of("svg"))
+    assert len(found.of("svg")) == 3
+    scrolled = [each for each in found.of("div") if each.get("role") == "region"]
+    assert all(each["tabindex"] == "0" and each["aria-label"] for each in scrolled)
+
+
+def luminance(colour: str) -> float:
+    """Relative luminance of a colour as WCAG 2 defines it."""
+    parts = [int(colour[n : n + 2], 16) / 255 for n in (1, 3, 5)]
+    red, green, blue = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts)
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+
+@pytest.mark.parametrize("scheme", range(3), ids=["light", "dark", "paper"])
+def test_letters_and_marks_stand_out(scheme: int) -> None:
+    block = re.findall(r":root \{(.*?)\}", CSS, re.DOTALL)[scheme]
+    colours = dict(re.findall(r"--(\w+): (#[0-9a-f]{6});", block))
+    assert len(colours) == 18
+
+    def contrast(one: str, other: str) -> float:
+        high, low = sorted((luminance(colours[one]), luminance(colours[other])), reverse=True)
+        return (high + 0.05) / (low + 0.05)
+
+    for name in ("ink", "soft", "link", "good", "look", "failed"):
+        assert contrast(name, "paper") >= 4.5
+        assert name == "link" or contrast(name, "band") >= 4.5
+    for name in ("control", "check", "new", "photo", "ellipse", "c1", "c2", "c3", "c4"):
+        assert contrast(name, "paper") >= 3.0
+
+
+def test_ids_cannot_become_elements() -> None:
+    document = copy.deepcopy(case().document)
+    name = "<b>&\"'</script>"
+    for block in ("points", "control"):
+        for row in document[block]:
+            row["id"] = name if row["id"] == "K01" else row["id"]
+    document["name"] = "<i>strip</i>"
+    text = to_html(document)
+    assert "<b>" not in text
+    assert "<i>" not in text
+    assert "&lt;i&gt;strip" in text
+    assert name in " ".join(Page(text).words)
+
+
+def test_the_same_result_gives_the_same_page() -> None:
+    document = case().document
+    assert to_html(document) == to_html(json.loads(to_json(document)))
+
+
+# ----------------------------------------------------------------------------------------------------- pictures
+
+
+@pytest.mark.parametrize("frame", sorted(FRAMES))
+def test_the_plan_has_the_distances_of_the_ground(frame: str) -> None:
+    document = case(frame).document
+    plan = plan_of(document)
+    for left, right, model in zip(plan.strips[0], plan.strips[0][1:], document["models"], strict=False):
+        distance = math.hypot(right.along - left.along, right.across - left.across)
+        assert distance == pytest.approx(model["base"], rel=6e-3)  # a level flight; flattening, scale of the map
+        assert right.along > left.along
+    assert plan.strips[0][0].along == pytest.approx(0.0, abs=1e-6)
+    assert plan.strips[0][-1].across == pytest.approx(0.0, abs=1e-6)
+    # the flight goes to azimuth 70 degrees: north lies 70 degrees to its left
+    assert math.degrees(math.atan2(plan.north[1], plan.north[0])) == pytest.approx(70.0, abs=2.5)
+
+
+@pytest.mark.parametrize("frame", sorted(FRAMES))
+def test_vectors_and_heights_are_the_differences(frame: str) -> None:
+    document = case(frame).document
+    rows = {row["id"]: row for row in document["control"]}
+    spots = [spot for spot in plan_of(document).spots if spot.shift is not None]
+    assert len(spots) >= 9
+    for spot in spots:
+        assert spot.shift is not None
+        assert math.hypot(*spot.shift) == pytest.approx(rows[spot.id]["plan"], abs=2e-4)
+        assert spot.up == rows[spot.id]["height"]
+
+
+def test_vectors_are_drawn_to_the_scale_of_their_bar() -> None:
+    document = case().document
+    picture = ET.fromstring(strip_pictures(document)[0].svg)  # noqa: S314 (we wrote it)
+    lines = {str(each.get("class")): each for each in picture.iter(f"{SVG}line")}
+    words = " ".join(each.text or "" for each in picture.iter(f"{SVG}text"))
+    said = re.search(r"residuals (\d+) (mm|m)\b", words)
+    assert said is not None
+    bar = float(said[1]) / (1000 if said[2] == "mm" else 1)
+    vectors = sorted(
+        math.hypot(
+            float(line.get("x2", 0)) - float(line.get("x1", 0)), float(line.get("y2", 0)) - float(line.get("y1", 0))
+        )
+        for line in picture.iter(f"{SVG}line")
+        if str(line.get("class")).startswith("vector")
+    )
+    scale = (float(lines["bar vector"].get("x2", 0)) - float(lines["bar vector"].get("x1", 0))) / bar
+    given = sorted(math.hypot(*spot.shift) for spot in plan_of(document).spots if spot.shift is not None)
+    assert vectors == pytest.approx([size * scale for size in given], abs=0.2)
+    assert max(vectors) <= LONGEST + 0.1
+
+
+def test_every_picture_is_sound_and_stays_inside() -> None:
+    for frame, strips in (("projected", 1), ("north first", 2)):
+        for each in strip_pictures(case(frame, strips).document):
+            root = ET.fromstring(each.svg)  # noqa: S314 (we wrote it)
+            _, _, width, height = (float(value) for value in root.get("viewBox", "").split())
+            assert root.find(f"{SVG}title") is not None
+            assert root.find(f"{SVG}desc") is not None
+            for element in root.iter():
+                for names, limit in ((("x1", "x2", "cx", "x"), width), (("y1", "y2", "cy", "y"), height)):
+                    for name in names:
+                        assert 0 <= float(element.get(name, 0)) <= limit, ET.tostring(element)
+
+
+def test_a_result_without_control_and_precision_has_a_plan() -> None:
+    document = copy.deepcopy(case().document)
+    document.pop("precision", None)
+    document["control"] = []
+    for row in document["points"]:
+        row.update(role="new", ellipse_a=None)
+    assert [each.name for each in strip_pictures(document)] == ["plan"]
+
+
+@pytest.mark.parametrize(("size", "expected"), [(0.03, 0.05), (1.0, 1.0), (1.01, 2.0), (7.0, 10.0), (0.0, 1.0)])
+def test_round_numbers(size: float, expected: float) -> None:
+    assert nice(size) == pytest.approx(expected)
+
+
+def test_ticks_are_round_and_inside() -> None:
+    axis = Axis(-0.37, 1.21, 300.0, 20.0)
+    assert axis.ticks() == pytest.approx([0.0, 0.5, 1.0])
+    assert axis(-0.37) == 300.0
+    assert axis(1.21) == 20.0
+
+
+# ----------------------------------------------------------------------------------------------------- commands
+
+
+def test_run_and_report_write_the_same_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    project = write_project(tmp_path, spec())
+    assert main(["run", str(project), "-o", str(tmp_path / "out"), "--html", "--quiet"]) == 0
+    assert main(["report", str(tmp_path / "out"), "-o", str(tmp_path / "again.html")]) == 0
+    page = (tmp_path / "out/report.html").read_bytes()
+    assert page == (tmp_path / "again.html").read_bytes()
+    assert page.startswith(b"<!DOCTYPE html>")
+    assert capsys.readouterr().err == ""
+
+
+def test_long_tables_are_whole_when_everything_is_wanted() -> None:
+    document = copy.deepcopy(saved())
+    document["control"] = [row | {"id": f"{row['id']} {n}"} for n in range(9) for row in document["control"]]
+    names = {f"{saved()['control'][0]['id']} {n}" for n in range(9)}
+    assert names <= set(Page(to_html(document, everything=True)).words)
+    assert not names <= set(Page(to_html(document)).words)
+
+
+def test_html_needs_a_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", str(write_project(tmp_path, spec())), "--html"]) == 2
+    assert "--output" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["run", "report"])
+def test_without_the_extra_the_way_to_it_is_told_before_anything_is_done(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    project = write_project(tmp_path, spec())
+    assert main(["run", str(project), "-o", str(tmp_path / "out"), "--quiet"]) == 0
+    monkeypatch.setitem(sys.modules, "jinja2", None)
+    if command == "run":
+        code = main(["run", str(project), "-o", str(tmp_path / "new"), "--html"])
+    else:
+        code = main(["report", str(tmp_path / "out"), "-o", str(tmp_path / "new/report.html")])
+    assert code == 2
+    assert "jinja2, which is not installed; pip install 'photostrip[report]'" in capsys.readouterr().err
+    assert not (tmp_path / "new").exists()
