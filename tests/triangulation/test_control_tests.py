@@ -71,13 +71,15 @@ def test_redundancy_numbers_add_up_to_the_redundancy() -> None:
     assert found.redundancy.sum() == pytest.approx(24 - 7, rel=1e-6)
 
 
-def test_good_control_is_called_wrong_no_more_often_than_the_level_says() -> None:
+@pytest.mark.parametrize(("worse", "fewest", "most"), [(1.0, 0, 8), (3.0, 10, 32)])
+def test_good_control_is_called_wrong_no_more_often_than_the_level_says(worse: float, fewest: int, most: int) -> None:
+    """One in a hundred where the variance is estimated; fewer where it is as stated, for it is never taken as less."""
     alarms = 0
-    for seed in range(3000):
+    for seed in range(2000):
         joint, misclosures = drawn(seed)
-        found = control_tests.judge(joint, misclosures, np.ones(misclosures.shape, bool), ALPHA)
+        found = control_tests.judge(joint, worse * misclosures, np.ones(misclosures.shape, bool), ALPHA)
         alarms += bool((found.value > found.limit).any())
-    assert 1 <= alarms <= 40  # 1 % of them with a variance estimated; fewer, as that is never below the stated one
+    assert fewest <= alarms <= most
 
 
 def test_too_little_control_judges_nothing() -> None:
