@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from photostrip.triangulation import (
         absolute,
         control_screening,
+        control_tests,
         exterior,
         formation,
         interior,
@@ -87,6 +88,8 @@ class StripResult:
         Control coordinates that were not used; ``control`` says so in its ``use``.
     covariance : CovarianceAdjustment or None
         The adjustment with the strip's own covariance; None with other adjustments.
+    judged_control : control_tests.Judged or None
+        What the covariance of the strip says of each coordinate of ``control``; None without.
     """
 
     strip: Strip
@@ -109,6 +112,7 @@ class StripResult:
     contradictions: strip_screening.Verdict
     wrong_control: tuple[control_screening.ControlRejection, ...]
     covariance: CovarianceAdjustment | None = None
+    judged_control: control_tests.Judged | None = None
 
     @property
     def scale_number(self) -> float:

@@ -164,11 +164,14 @@ def adjust_formed(
     here, rows = _control_of(formed, control, observations)
     intermediate, orientation, spread = _to_ground(strip, formed, here, rows, frames, oriented, sigma)
     wrong: tuple[control_screening.ControlRejection, ...] = ()
+    judged = None
     if settings.relative.screening != "none":
         extent = _extent(formed, orientation)
         joint = _joint(strip, observations, screened, formed, (here, rows, frames), intermediate, orientation, sigma)
         place = control_screening.Setting(formed.xyz[rows], frames, intermediate, spread, *extent, joint)
-        here, wrong = control_screening.screen(here, place)
+        given = here
+        here, wrong = control_screening.screen(given, place)
+        judged = place.judged(given, here)
     if wrong:
         intermediate, orientation, spread = _to_ground(strip, formed, here, rows, frames, oriented, sigma)
     xyz = orientation.similarity(formed.xyz)
@@ -212,6 +215,7 @@ def adjust_formed(
         contradictions,
         wrong,
         own,
+        judged,
     )
 
 

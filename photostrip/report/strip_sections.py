@@ -14,6 +14,7 @@ Document = dict[str, Any]
 
 ALL_SHOWN = 24  # rows up to which a table is printed whole
 SMALL = 0.001  # probabilities below it are not told apart
+HIGH_LEVERAGE = 0.7  # share of a control point in the polynomial at its own place
 STRIPS_SHOWN = 3  # strips up to which every polynomial is shown with its evidence
 WORST_SHOWN = 12  # rows shown of a longer one
 ELEMENTS = (("alpha1", "α1"), ("kappa1", "κ1"), ("alpha2", "α2"), ("omega2", "ω2"), ("kappa2", "κ2"))
@@ -222,10 +223,29 @@ def polynomial_section(document: Document, *, everything: bool) -> Section:
         return Section("Polynomial adjustment", (_by_strip(blocks),))
     parts: list[Part] = []
     for block in blocks:
-        parts += [Words(_choice(document, block)), _evidence(block)]
+        parts += [Words(_choice(document, block) + _leverage(document, block)), _evidence(block)]
         if block["degree"]:
             parts.append(_coefficients(block))
     return Section("Polynomial adjustment", tuple(parts))
+
+
+def _leverage(document: Document, block: Document) -> str:
+    """Say which control points hold the polynomial almost alone: their own errors hardly show in it."""
+    found = []
+    for row in document.get("misclosures", ()):
+        shares = {axis: row.get("leverage", {}).get(axis) for axis in "xyz"}
+        known = {axis: share for axis, share in shares.items() if share is not None}
+        if row["strip"] == block["strip"] and known:
+            axis = max(known, key=lambda name: known[name])
+            found.append((known[axis], row["id"], axis))
+    if not found:
+        return ""
+    share, point, axis = max(found, key=lambda each: each[0])
+    high = sum(each[0] > HIGH_LEVERAGE for each in found)
+    text = f" The largest leverage is {share:.2f}, of control point {point} in {axis.upper()}"
+    if high:
+        text += f"; {counted(high, 'point')} above {HIGH_LEVERAGE}, where an error hardly shows in the residual"
+    return text + "."
 
 
 def _by_strip(blocks: Sequence[Document]) -> Table:

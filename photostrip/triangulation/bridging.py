@@ -70,6 +70,7 @@ def bridge(
         point=every[order],
         xyz=np.concatenate([formed.xyz, xyz[found]])[order],
         models=np.concatenate([formed.models, np.zeros(len(found), np.intp)])[order],
+        home=np.concatenate([np.full(len(formed.point), -1), at[found, 0]])[order],
         bridging=np.sort(rows[np.isin(observations.point[rows], numbers[found])]),
     )
 

@@ -126,6 +126,12 @@ class Setting:
         whole = Targets(control or kept, self.frames, self.intermediate)
         return whole.misclosures(first.similarity(self.strip))
 
+    def judged(self, control: ControlPoints, kept: ControlPoints) -> control_tests.Judged | None:
+        """Judge all control by what is kept with the covariance of the strip; None without one."""
+        if self.joint is None or len(self.joint.point) != int(control.use.sum()):
+            return None
+        return control_tests.judge(self.joint, self.misclosures(kept, control), kept.use, ALPHA)
+
 
 def screen(control: ControlPoints, setting: Setting) -> tuple[ControlPoints, tuple[ControlRejection, ...]]:
     """Take wrong coordinates out of the control.
@@ -374,9 +380,8 @@ def _log(control: ControlPoints, kept: ControlPoints, setting: Setting) -> tuple
 
 def _detectable(control: ControlPoints, kept: ControlPoints, setting: Setting) -> Floats:
     """Smallest errors that are found in 80 % of cases, metres; NaN without the strip's covariance."""
-    if setting.joint is None:
-        return np.full(control.use.shape, np.nan)
-    return control_tests.judge(setting.joint, setting.misclosures(kept, control), kept.use, ALPHA).detectable
+    found = setting.judged(control, kept)
+    return np.full(control.use.shape, np.nan) if found is None else found.detectable
 
 
 def _exchanges(control: ControlPoints, kept: ControlPoints, setting: Setting, size: Floats) -> dict[int, str]:

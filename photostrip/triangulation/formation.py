@@ -115,6 +115,8 @@ class FormedStrip:
         Scale transfer.
     bridging : ndarray of int, shape (b,)
         Rows of the observations that place points without a model: of photos that are not neighbours.
+    home : ndarray of int, shape (q,)
+        Model with which such a point moves, -1 for all others; empty when there is none.
     """
 
     centers: Floats
@@ -129,6 +131,7 @@ class FormedStrip:
     models: Numbers
     junctions: Junctions
     bridging: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))
+    home: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))
 
 
 def hand_on(rotations: Floats) -> Floats:

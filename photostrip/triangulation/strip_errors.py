@@ -224,6 +224,8 @@ def _point_rows(
     model, count = orientation.pairs.pair[rows], len(formed.point)
     first = np.full(count, len(steps))
     np.minimum.at(first, item, model)
+    if len(formed.home):
+        first = np.where(formed.models == 0, formed.home, first)
     slot = model - first[item]
     slots = int(slot.max()) + 1
     share = 1 / formed.models[item]

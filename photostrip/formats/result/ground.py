@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.pipeline import Result
+    from photostrip.pipeline import Result, StripResult
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -316,11 +316,43 @@ def not_determined_of(result: Result) -> list[Document]:
 
 
 def misclosures_of(result: Result) -> list[Document]:
-    """Give the list ``misclosures``: strip minus control after the similarity, before any polynomial."""
+    """Give the list ``misclosures``: strip minus control after the similarity, before any polynomial.
+
+    Beside them, how far each coordinate is checked by all others, and its share in its own polynomial.
+    """
     rows = []
     for strip in result.strips:
         values = rounded(np.where(strip.control.use, strip.absolute.misclosures, np.nan), GROUND)
+        redundancy, detectable = _checked(strip)
+        leverage = _leverage(strip)
         for row in np.argsort(natural_rank(strip.control.ids)):
             parts = dict(zip(GROUND_AXES, values[row], strict=True))
-            rows.append({"strip": strip.strip.id, "id": strip.control.ids[row], **parts})
+            rows.append(
+                {
+                    "strip": strip.strip.id,
+                    "id": strip.control.ids[row],
+                    **parts,
+                    "redundancy": dict(zip(GROUND_AXES, redundancy[row], strict=True)),
+                    "detectable": dict(zip(GROUND_AXES, detectable[row], strict=True)),
+                    "leverage": dict(zip("xyz", leverage[row], strict=True)),
+                }
+            )
     return rows
+
+
+def _checked(strip: StripResult) -> tuple[Plain, Plain]:
+    """Redundancy numbers of the control, and the smallest errors that would be found, metres."""
+    found, nothing = strip.judged_control, np.full(strip.control.use.shape, np.nan)
+    if found is None:
+        return rounded(nothing, 3), rounded(nothing, 3)
+    known = np.isfinite(found.detectable)
+    return rounded(np.where(known, found.redundancy, np.nan), 3), rounded(found.detectable, 3)
+
+
+def _leverage(strip: StripResult) -> Plain:
+    """Share of each control point in the polynomials of X, Y, Z at its own place, 0 to 1."""
+    nothing = np.full(strip.control.use.shape, np.nan)
+    if strip.polynomial is None:
+        return rounded(nothing, 3)
+    columns = [axis.leverage if axis.terms else nothing[:, k] for k, axis in enumerate(strip.polynomial.axes)]
+    return rounded(np.column_stack(columns), 3)

@@ -149,6 +149,8 @@ def parallaxes_of(result: Result, rank: Numbers) -> list[Document]:
         order = np.lexsort((rank[oriented.point], oriented.pairs.pair))
         names = [ids[number] for number in oriented.point[order]]
         values, used = micrometres(oriented.parallax[order]), oriented.used[order].tolist()
+        redundancy = rounded(np.where(oriented.used, oriented.redundancy, np.nan)[order], 3)
+        detectable = rounded(1000 * strip.screened.detectable[order], 1)
         ends = [*oriented.pairs.starts.tolist(), len(names)]
         found += [
             {
@@ -158,6 +160,8 @@ def parallaxes_of(result: Result, rank: Numbers) -> list[Document]:
                 "points": names[ends[n] : ends[n + 1]],
                 "q_um": values[ends[n] : ends[n + 1]],
                 "used": used[ends[n] : ends[n + 1]],
+                "redundancy": redundancy[ends[n] : ends[n + 1]],
+                "detectable_um": detectable[ends[n] : ends[n + 1]],
             }
             for n in range(len(photos) - 1)
         ]
