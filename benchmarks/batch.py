@@ -191,7 +191,6 @@ def print_found(rounds: list[dict[str, Spent]], strips: int) -> None:
     line("unchanged, on the clock", f"{again * 1000:.1f} ms")
     line("memory of the largest process", f"{max(found['two'].megabytes for found in rounds):.0f} MB")
     if "dask" in rounds[0]:
-        line("batch --executor dask:local -j 2, all processes, to bare", to_bare("dask"))
         line("batch --executor dask:local -j 2 to -j 1, on the clock", speed_up("one", "dask"))
     two = middle(lambda found: found["two"].wall) / part
     line("strips an hour with -j 2", f"{3600 / two:.0f}")
@@ -205,7 +204,9 @@ def main() -> None:
     parser.add_argument("--strips", type=int, default=200, help="number of strips")
     parser.add_argument("--rounds", type=int, default=4, help="parts in which they are computed")
     parser.add_argument("--photos", type=int, default=20, help="photos of a strip")
-    parser.add_argument("--dask", action="store_true", help="also a Dask cluster of two processes on this machine")
+    parser.add_argument(
+        "--dask", action="store_true", help="also a Dask cluster of two workers on this machine, by the clock"
+    )
     parser.add_argument("--loop", nargs="+", help=argparse.SUPPRESS)
     asked = parser.parse_args()
     if asked.loop:

@@ -37,6 +37,10 @@ PARTING = 1.0  # seconds that an orderly end may take
 COUNTED_EVERY = 1.0  # seconds between two looks at how many workers there are
 
 
+def unsaid(_: str) -> None:
+    """Say nothing."""
+
+
 def _dask() -> Any:  # noqa: ANN401 (a module without types)
     """Load Dask at first need."""
     try:
@@ -62,13 +66,20 @@ class Cluster:
         What a worker does with a task, as ``module:function``.
     begun : callable
         Is told every task that is sent.
+    say : callable
+        Takes what the user should know meanwhile.
     """
 
     def __init__(
-        self, client: object, limits: Limits, work: str = WORK, begun: Callable[[Task], None] = ignored
+        self,
+        client: object,
+        limits: Limits,
+        work: str = WORK,
+        begun: Callable[[Task], None] = ignored,
+        say: Callable[[str], None] = unsaid,
     ) -> None:
         self.client: Any = client
-        self.limits, self.work, self.begun = limits, work, begun
+        self.limits, self.work, self.begun, self.say = limits, work, begun, say
         self._sent: dict[str, tuple[Any, Task]] = {}
         self._room, self._counted = LEAST_AHEAD, -COUNTED_EVERY
         self._done: queue.SimpleQueue[str] = queue.SimpleQueue()
@@ -100,6 +111,8 @@ class Cluster:
         now = time.monotonic()
         if now - self._counted > COUNTED_EVERY:
             workers = self.client.scheduler_info(n_workers=-1)["workers"].values()
+            if not workers and self._counted < 0.0:
+                self.say("the cluster has no workers yet; waiting for them")
             self._room, self._counted = max(AHEAD * sum(each["nthreads"] for each in workers), LEAST_AHEAD), now
         return self._room
 
@@ -184,7 +197,12 @@ def lost(reason: str) -> InputError:
 
 @contextmanager
 def cluster(
-    address: str, jobs: int, limits: Limits, begun: Callable[[Task], None] = ignored, work: str = WORK
+    address: str,
+    jobs: int,
+    limits: Limits,
+    begun: Callable[[Task], None] = ignored,
+    work: str = WORK,
+    say: Callable[[str], None] = unsaid,
 ) -> Iterator[Cluster]:
     """Connect to a cluster, or start one on this machine.
 
@@ -200,6 +218,8 @@ def cluster(
         Is told every task that is sent.
     work : str
         What a worker does with a task, as ``module:function``.
+    say : callable
+        Takes what the user should know meanwhile.
 
     Yields
     ------
@@ -227,7 +247,7 @@ def cluster(
             reason = str(error).partition("\n")[0]
             raise _unreachable(address, reason) from None
         stack.callback(client.close, timeout=PARTING)
-        yield Cluster(client, limits, work, begun)
+        yield Cluster(client, limits, work, begun, say)
 
 
 def _require_scheduler(address: str) -> None:

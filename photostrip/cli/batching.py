@@ -122,7 +122,7 @@ def executor_of(asked: Asked, number: int, table: BatchTable) -> Iterator[Execut
         return
     from photostrip.batch.cluster import cluster
 
-    with cluster(asked.executor.removeprefix("dask:"), jobs, asked.limits, begun) as found:
+    with cluster(asked.executor.removeprefix("dask:"), jobs, asked.limits, begun, say=table.say) as found:
         yield found
 
 

@@ -216,6 +216,30 @@ def _listening(port: int) -> Iterator[int]:
             yield int(place.parent.name)
 
 
+@pytest.mark.slow
+def test_a_cluster_without_workers_is_waited_for_aloud(tmp_path: Path) -> None:
+    """As on a busy queue: the scheduler is there, the machines come later."""
+    write_projects(tmp_path / "strips", 2)
+    port = str(free_port())
+    address, options = f"tcp://127.0.0.1:{port}", ("--host", "127.0.0.1", "--port", port, "--no-dashboard")
+    with started(tmp_path / "scheduler", "dask_scheduler", *options):
+        wait_for(tmp_path / "scheduler" / "log.txt", "Scheduler at", 1)
+        with subprocess.Popen(
+            [sys.executable, "-m", "photostrip", "batch", "strips", "--executor", f"dask:{address}"],
+            cwd=tmp_path,
+            env=environment(),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        ) as process:
+            assert process.stderr is not None
+            assert process.stderr.readline() == "the cluster has no workers yet; waiting for them\n"
+            with started(tmp_path / "late", "dask_worker", address, "--nthreads", "1", "--no-dashboard"):
+                out, _ = process.communicate(timeout=60.0)
+    assert process.returncode == 0
+    assert "2 projects: 2 good" in out
+
+
 # ----------------------------------------------------------------------------------------------- no cluster
 
 
