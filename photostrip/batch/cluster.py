@@ -6,8 +6,11 @@ packs the one and writes the other, some tasks ahead of the cluster and no more,
 
 from __future__ import annotations
 
+import os
 import queue
+import signal
 import socket
+import threading
 import time
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
@@ -235,10 +238,11 @@ def cluster(
     with ExitStack() as stack:
         where: Any = address
         if address == LOCAL:
-            where = distributed.LocalCluster(
-                n_workers=jobs, threads_per_worker=1, dashboard_address=None, silence_logs="CRITICAL"
-            )
-            stack.callback(where.close, timeout=PARTING)
+            with _deaf_children():
+                where = distributed.LocalCluster(
+                    n_workers=jobs, threads_per_worker=1, dashboard_address=None, silence_logs="CRITICAL"
+                )
+            stack.callback(_end, where)
         else:
             _require_scheduler(address)
         try:
@@ -246,8 +250,37 @@ def cluster(
         except (OSError, TimeoutError, ValueError) as error:
             reason = str(error).partition("\n")[0]
             raise _unreachable(address, reason) from None
-        stack.callback(client.close, timeout=PARTING)
+        stack.callback(_part, client)
         yield Cluster(client, limits, work, begun, say)
+
+
+def _part(client: Any) -> None:  # noqa: ANN401 (without types)
+    """Take leave of a scheduler, which may be gone."""
+    with suppress(TimeoutError, OSError):
+        client.close(timeout=PARTING)
+
+
+def _end(local: Any) -> None:  # noqa: ANN401 (without types)
+    """End a cluster of this machine at once: nothing that its workers still compute is wanted."""
+    for nanny in local.workers.values():
+        nanny.auto_restart = False
+        with suppress(OSError, TypeError):  # it is gone already
+            os.kill(nanny.pid, signal.SIGKILL)
+    with suppress(TimeoutError):
+        local.close(timeout=PARTING)
+
+
+@contextmanager
+def _deaf_children() -> Iterator[None]:
+    """Start processes that do not hear Ctrl-C, which reaches every process of the terminal: this one ends them."""
+    if threading.current_thread() is not threading.main_thread():  # only there can it be said
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # what a process starts with, its children start with
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _require_scheduler(address: str) -> None:

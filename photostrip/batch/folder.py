@@ -220,11 +220,10 @@ def opened(path: Path, overrides: Sequence[str] = ()) -> Iterator[Folder]:
 
 def _sweep(folder: Path) -> None:
     """Remove temporary files that a batch left behind when it was killed."""
-    with suppress(FileNotFoundError, NotADirectoryError), os.scandir(folder) as entries:
+    with suppress(OSError), os.scandir(folder) as entries:  # what cannot be removed does no harm
         for entry in entries:
             if _TEMPORARY.fullmatch(entry.name):
-                with suppress(FileNotFoundError):
-                    Path(entry.path).unlink()
+                Path(entry.path).unlink()
 
 
 def _is(file: Path, content: str | None) -> bool:

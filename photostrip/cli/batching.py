@@ -12,8 +12,8 @@ from photostrip.batch.crew import Crew
 from photostrip.batch.folder import opened
 from photostrip.batch.run import Run, Stop, on_signals
 from photostrip.batch.selection import choose
-from photostrip.cli.showing import BatchFormat
-from photostrip.cli.talking import as_fault
+from photostrip.cli.showing import BatchFormat, Format
+from photostrip.cli.talking import as_fault, failures_as
 from photostrip.errors import InputError
 from photostrip.formats import batch as formats
 from photostrip.formats.writing import make_rule, write_text
@@ -78,13 +78,13 @@ def run_asked(asked: Asked, form: BatchFormat, width: int | None, *, quiet: bool
     int
         The exit code.
     """
-    projects = choose(asked.projects)
-    stop = Stop()
+    stop, folder = Stop(), None
     with ExitStack() as stack:
         stack.enter_context(on_signals(stop))
-        folder = None
-        if asked.output is not None:
-            folder = stack.enter_context(opened(asked.output, asked.overrides))
+        with failures_as(Format(form.value) if form.value in set(Format) else Format.TEXT):
+            projects = choose(asked.projects)
+            if asked.output is not None:
+                folder = stack.enter_context(opened(asked.output, asked.overrides))
         table = stack.enter_context(batch_table(sys.stderr, len(projects), quiet=quiet))
         run = Run(projects, asked.overrides, folder, force=asked.force)
         trouble: list[InputError] = []

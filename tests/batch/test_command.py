@@ -254,6 +254,17 @@ def test_wrong_usage_is_told(
     assert message in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("here")
+def test_wrong_usage_is_told_in_the_form_that_was_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["batch", "nowhere/*", "--format", "json"]) == 2
+    answer = json.loads(capsys.readouterr().out)
+    assert (answer["exit_code"], answer["findings"][0]["code"]) == (2, "no-project")
+    assert main(["batch", "nowhere/*", "--format", "csv"]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert "no project fits this pattern" in captured.err
+
+
 def test_a_project_that_is_not_there_is_a_fault_among_others(here: Path) -> None:
     done = run(here, "strips/s1", "strips/s9/project.yaml", "--format", "csv", "--quiet")
     assert done.returncode == 2

@@ -181,15 +181,17 @@ def gone(mark: str) -> bool:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_interrupted_in_good_order(tmp_path: Path, number: signal.Signals) -> None:
+@pytest.mark.parametrize(
+    ("number", "executor"), [(signal.SIGINT, "local"), (signal.SIGTERM, "local"), (signal.SIGINT, "dask:local")]
+)
+def test_interrupted_in_good_order(tmp_path: Path, number: signal.Signals, executor: str) -> None:
     """As a terminal does on Ctrl-C: every process of the group gets the signal."""
     import json
 
     write_projects(tmp_path / "strips", 40)
     mark = f"PHOTOSTRIP_TEST_{os.getpid()}"
     with subprocess.Popen(
-        command("strips", "-o", "out", "-j", "2"),
+        command("strips", "-o", "out", "-j", "2", "--executor", executor),
         cwd=tmp_path,
         env={**environment(), mark: "1"},
         stdout=subprocess.PIPE,
