@@ -6,6 +6,7 @@ packs the one and writes the other, some tasks ahead of the cluster and no more,
 
 from __future__ import annotations
 
+import logging
 import os
 import queue
 import signal
@@ -85,6 +86,7 @@ class Cluster:
         self.limits, self.work, self.begun, self.say = limits, work, begun, say
         self._sent: dict[str, tuple[Any, Task]] = {}
         self._room, self._counted = LEAST_AHEAD, -COUNTED_EVERY
+        self._heard_of = time.monotonic()
         self._done: queue.SimpleQueue[str] = queue.SimpleQueue()
 
     def answers(self, tasks: Iterator[Task | None], stopped: Callable[[], bool]) -> Iterator[Answer]:
@@ -159,7 +161,10 @@ class Cluster:
         return result
 
     def _require_connection(self) -> None:
-        if self.client.status not in {"running", "connecting"}:
+        now = time.monotonic()
+        if self.client.status == "running":
+            self._heard_of = now
+        elif now - self._heard_of > PATIENCE:
             raise lost(self.client.status)
 
 
@@ -236,6 +241,7 @@ def cluster(
     """
     distributed = _dask()
     with ExitStack() as stack:
+        stack.enter_context(_quiet())
         where: Any = address
         if address == LOCAL:
             with _deaf_children():
@@ -252,6 +258,20 @@ def cluster(
             raise _unreachable(address, reason) from None
         stack.callback(_part, client)
         yield Cluster(client, limits, work, begun, say)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep the library from telling with a traceback what is told here in a sentence."""
+    logs = [logging.getLogger(name) for name in ("distributed", "distributed.client")]  # each has a level of its own
+    before = [log.level for log in logs]
+    for log in logs:
+        log.setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        for log, level in zip(logs, before, strict=True):
+            log.setLevel(level)
 
 
 def _part(client: Any) -> None:  # noqa: ANN401 (without types)

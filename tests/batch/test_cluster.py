@@ -181,7 +181,7 @@ def test_a_project_that_crashes_or_hangs_leaves_the_machine_alone(
 def test_a_scheduler_that_goes_away_ends_the_batch_in_good_order(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    write_projects(tmp_path / "strips", 40)
+    write_projects(tmp_path / "strips", 20)
     monkeypatch.chdir(tmp_path)
     with (
         two_workers(tmp_path / "machines") as (address, _),
@@ -201,7 +201,7 @@ def test_a_scheduler_that_goes_away_ends_the_batch_in_good_order(
     assert process.returncode == 2
     assert "the connection to the cluster is lost" in err
     assert "Traceback" not in err
-    found = re.search(r"40 projects: (\d+) not run, (\d+) good", out)
+    found = re.search(r"20 projects: (\d+) not run, (\d+) good", out)
     assert found is not None
     done = [path for path in (tmp_path / "out").iterdir() if (path / "batch.json").exists()]
     assert len(done) == int(found[2])
