@@ -43,7 +43,7 @@ def test_strip_prints_seconds_memory_parts_and_growth() -> None:
 
 @pytest.mark.slow
 def test_batch_prints_overhead_and_speed_up() -> None:
-    out = printed("batch.py", "--strips", "4", "--rounds", "1", "--photos", "5")
+    out = printed("batch.py", "--strips", "4", "--rounds", "1", "--photos", "8")
     for words in (
         "batch -j 1, all processes, to the bare computation",
         "batch -j 2 to batch -j 1, speed-up on the clock",
