@@ -42,6 +42,14 @@ def test_strip_prints_seconds_memory_parts_and_growth() -> None:
 
 
 @pytest.mark.slow
+def test_methods_prints_errors_and_ratios() -> None:
+    out = printed("methods.py", "--seeds", "1", "--models", "6", "--bands", "3")
+    (row,) = re.findall(r"^\| 6 \| 3 \|((?: \d+\.\d \|){6}) (\d\.\d\d) / (\d\.\d\d) \|", out, re.MULTILINE)
+    assert all(1.0 < float(value) < 100.0 for value in row[0].split("|")[:-1])
+    assert re.search(r"times the errors of the bundle: 3 bands: (up to 6 models|never)$", out, re.MULTILINE)
+
+
+@pytest.mark.slow
 def test_batch_prints_overhead_and_speed_up() -> None:
     out = printed("batch.py", "--strips", "4", "--rounds", "1", "--photos", "8")
     for words in (

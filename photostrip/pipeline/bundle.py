@@ -37,8 +37,19 @@ if TYPE_CHECKING:
 REFILLED = 1e-9  # metres by which targets of plan or height points may still move
 REFILLS = 3
 WITHIN_PHOTOS = 10  # correlations within photos that are kept
-OF_THE_STRIP_METHOD = ("degree-reduced", "extrapolation", "little-redundancy", "long-strip", "little-control",
-                       "weak-control", "control-rejected", "not-resected")  # fmt: skip
+OF_THE_STRIP_METHOD = {
+    "control-doubtful",
+    "control-rejected",
+    "covariance-proposed",
+    "degree-reduced",
+    "extrapolation",
+    "little-control",
+    "little-redundancy",
+    "long-strip",
+    "not-resected",
+    "strip-contradicted",
+    "weak-control",
+}
 """Notes on strips that say nothing of a bundle adjustment."""
 
 

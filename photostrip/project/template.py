@@ -57,7 +57,7 @@ output:
 
 # What follows has defaults that suit most strips.
 # processing:
-#   adjustment: polynomial          # polynomial | similarity
+#   adjustment: polynomial          # polynomial | similarity | covariance | bundle
 #   polynomial: {{degree: auto}}      # auto | 1 | 2 | 3
 #   earth_curvature: auto           # auto | model | none
 #   refraction: false

@@ -235,7 +235,8 @@ def _row(found: Bundle, group: reliability.Group, at: tuple[int, int], shift: fl
     """Tell everything about one observed coordinate."""
     unit, factor, decimals = UNITS[group.kind]
     photo, point = _names(found, group.kind, at[0])
-    external = group.external(shift)[at]
+    checked = group.redundancy[at] >= reliability.UNCONTROLLED
+    external = group.external(shift)[at] if checked else np.nan
     return {
         "kind": group.kind,
         "photo": photo,
@@ -244,7 +245,7 @@ def _row(found: Bundle, group: reliability.Group, at: tuple[int, int], shift: fl
         "redundancy": rounded(group.redundancy[at], 3),
         "error": rounded(group.error[at] * factor, decimals),
         "standardised": rounded(group.standardised[at], 2),
-        "detectable": rounded(group.detectable(shift)[at] * factor, decimals),
+        "detectable": rounded(group.detectable(shift)[at] * factor, decimals) if checked else None,
         "unit": unit,
         "external": rounded(external, 2),
         "effect": _effect(found, group.kind, at[0], float(external)),
@@ -254,6 +255,8 @@ def _row(found: Bundle, group: reliability.Group, at: tuple[int, int], shift: fl
 def _effect(found: Bundle, kind: str, row: int, external: float) -> Plain:
     """Give the largest shift of its own point or camera by an error that is just not found, metres."""
     problem, precision = found.screened.problem, found.screened.precision
+    if not np.isfinite(external):
+        return None
     if kind == reliability.IMAGE:
         block = precision.points[problem.images.point[row]]
     elif kind == reliability.CONTROL:
