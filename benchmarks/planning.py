@@ -3,9 +3,10 @@
 For each layout of control and each method the standard deviations that `photostrip plan strip` predicts stand beside
 the scatter of adjusted points over all repetitions of whole runs (the bundle: over repetitions of its adjustment). The
 part on one model does the same for `photostrip plan model`, with the exact relative orientation, intersection and
-absolute orientation of every repetition.
+absolute orientation of every repetition. The part
+on flown strips tells how well the ideal geometry of a plan speaks for strips with tilts, relief and scattered points.
 
-Usage: python benchmarks/planning.py [--part model strip] [--repeat N] [--models N] [--layouts NAME ...]
+Usage: python benchmarks/planning.py [--part model strip flown] [--repeat N] [--models N] [--layouts NAME ...]
        [--methods NAME ...] [--workers N]
 """
 
@@ -26,6 +27,7 @@ limit_threads()  # before numpy is imported, also in the processes that are star
 
 import numpy as np  # noqa: E402
 
+from photostrip.formats.simulation import inputs_of  # noqa: E402
 from photostrip.geodesy.frame_spec import FrameSpec  # noqa: E402
 from photostrip.pipeline import Inputs, Settings, Strip, triangulate  # noqa: E402
 from photostrip.planning.control_layout import Layout, Spot, numbers_of, spots_of  # noqa: E402
@@ -50,6 +52,8 @@ from photostrip.planning.strip_methods import (  # noqa: E402
     control_of,
 )
 from photostrip.points import ControlPoints  # noqa: E402
+from photostrip.simulate import Control as SimulatedControl  # noqa: E402
+from photostrip.simulate import Flight, Ground, Image, Spec, simulate  # noqa: E402
 from photostrip.simulate.spec import FILM  # noqa: E402
 from photostrip.triangulation import formation, gruber, polynomial, relative  # noqa: E402
 from photostrip.triangulation.bundle.solve import solve  # noqa: E402
@@ -68,6 +72,7 @@ SEED = 20_240
 FEWEST = 2  # repetitions that give a scatter
 FOCAL = 153.0
 MODEL_REPETITIONS = 4000
+FLOWN_SHARE = 10  # repetitions for each strip that is flown differently
 SIGMA = (0.05, 0.05, 0.05)
 LAYOUTS = {
     "bands every 4": Layout("bands every 4", every=4, sigma=SIGMA),
@@ -131,15 +136,19 @@ def measured(strip: IdealStrip, spots: tuple[ControlSpot, ...], layout: Layout, 
 
 def adjusted(strip: IdealStrip, inputs: Inputs, method: str) -> Floats:
     """Coordinates of the points of the strip by a whole run."""
-    settings = Settings(
+    result = triangulate(inputs, run_settings(method))
+    order = np.searchsorted(result.points.number, strip.formed.point)
+    xyz: Floats = result.points.cartesian[order]
+    return xyz
+
+
+def run_settings(method: str) -> Settings:
+    """Give settings of a run by one of the methods, without a search for gross errors."""
+    return Settings(
         relative=relative.Settings(screening="none"),
         polynomial=polynomial.Settings(DEGREES.get(method, "auto")),
         adjustment="polynomial" if method in DEGREES else method,
     )
-    result = triangulate(inputs, settings)
-    order = np.searchsorted(result.points.number, strip.formed.point)
-    xyz: Floats = result.points.cartesian[order]
-    return xyz
 
 
 def bundled(strip: IdealStrip, layout: Layout, inputs: Inputs) -> Floats:
@@ -201,6 +210,49 @@ def strips(options: argparse.Namespace) -> None:
         compare(geometry, LAYOUTS[name], options.methods, options)
 
 
+# -------------------------------------------------------------------------------------------------- flown strips
+
+
+def flown(options: argparse.Namespace) -> None:
+    """Print how well the ideal geometry speaks for strips as they are flown: tilts, relief, scattered points."""
+    count = max(options.repeat // FLOWN_SHARE, FEWEST)
+    geometry = StripGeometry(replace(FILM, principal_distance=FOCAL, fiducials={}), options.models + 1)
+    strip = ideal_strip(geometry)
+    print(f"{options.models} models flown {count} times: tilts 1 deg, relief 60 m, scattered points; metres")
+    print(f"{'control':<16} {'method':<11} {HEAD.removesuffix('   single')}")
+    for bands in (3, 4):
+        layout = Layout(f"{bands} bands", bands=bands, sigma=SIGMA)
+        spots = spots_of(layout, geometry.photos, geometry.points.rows)
+        for method in [each for each in options.methods if each != BUNDLE]:
+            errors = np.vstack([flown_errors(geometry, layout, method, seed) for seed in range(1, count + 1)])
+            expected = accuracy(strip, layout, spots, method)
+            parts = [f"{layout.name:<16} {method:<11}"]
+            for columns in ((0, 1), (2,)):
+                predicted, actual = _rms(expected.sigmas[expected.new][:, columns]), _rms(errors[:, columns])
+                parts.append(f"{predicted:8.3f} {actual:8.3f} {predicted / actual:7.3f}")
+            print(" ".join(parts))
+
+
+def flown_errors(geometry: StripGeometry, layout: Layout, method: str, seed: int) -> Floats:
+    """Errors along, across and up of the new points of one simulated strip."""
+    spec = Spec(
+        seed=seed,
+        camera=geometry.camera,
+        ground=Ground(crs="local"),
+        flight=Flight(photos=geometry.photos, end_lap_percent=geometry.end_lap_percent, scale=geometry.scale),
+        points=replace(geometry.points, scatter_percent=25.0),
+        control=SimulatedControl(bands=layout.bands, per_band=layout.per_band, sigma=layout.sigma, check=0),
+        image=Image(sigma_um=geometry.image_sigma * 1000),
+    )
+    simulation = simulate(spec)
+    result = triangulate(inputs_of(simulation), run_settings(method))
+    number = result.points.number
+    fixed = set(simulation.control.ids)
+    new = np.array([simulation.observations.point_ids[n] not in fixed for n in number])
+    errors: Floats = (result.points.cartesian - simulation.truth.points.xyz[number])[new]
+    return errors
+
+
 # ---------------------------------------------------------------------------------------------------- one model
 
 HEAD = " ".join(f"{name:>8} {'actual':>8} {'ratio':>7}" for name in ("plan", "height")) + "   single"
@@ -258,7 +310,7 @@ def measured_models(spec: ModelSpec, places: Floats, count: int) -> Floats:
     return scatter
 
 
-PARTS = {"model": models, "strip": strips}
+PARTS = {"model": models, "strip": strips, "flown": flown}
 
 
 def main() -> None:

@@ -41,6 +41,7 @@ Output = Annotated[
     Path | None,
     typer.Option("--output", "-o", metavar="FILE", help="Write .svg or .png (a picture), .json, .csv, .md or .txt."),
 ]
+Depfile = Annotated[Path | None, typer.Option(metavar="FILE", help="Write a rule for make; needs -o.")]
 Shape = Annotated[Form, typer.Option("--format", help="How to print it.")]
 Preset = Annotated[str | None, typer.Option("--camera", metavar="NAME", help="Preset: film or digital.")]
 Distance = Annotated[str | None, typer.Option("--principal-distance", metavar="MM", help="Principal distance.")]
@@ -91,6 +92,7 @@ def model(  # noqa: PLR0913, PLR0917 (an argument for each option)
     assignments: Assignments = None,
     form: Shape = "text",
     output: Output = None,
+    depfile: Depfile = None,
     quiet: Silent = False,
 ) -> None:
     """Compute the expected errors all over one model, and what each source of errors does alone."""
@@ -107,12 +109,14 @@ def model(  # noqa: PLR0913, PLR0917 (an argument for each option)
             "flying_height": flying_height, "image_sigma_um": sigma_um, "control.layout": control,
             "control.sigma": listed(control_sigma),
         }  # fmt: skip
+        _require_output(depfile, output)
         given = load_model_plan(file, as_assignments(options, assignments))
         document = model_document(given.name, given.camera, plan_model(given.spec))
         fine = document
         if _is_picture(output):
             fine = model_document(given.name, given.camera, plan_model(replace(given.spec, grid=(FINE, FINE))))
         deliver(document, form, output, fine, quiet=quiet)
+        _tell_make(depfile, output, given.files)
 
 
 @_command("strip", "--models 15 --control bands=3 --control every=5", "strip.yaml -o strip.svg")
@@ -153,6 +157,7 @@ def strip(  # noqa: PLR0913, PLR0917 (an argument for each option)
     assignments: Assignments = None,
     form: Shape = "text",
     output: Output = None,
+    depfile: Depfile = None,
     quiet: Silent = False,
 ) -> None:
     """Compute the expected accuracy along a strip, for layouts of control and methods of adjustment."""
@@ -168,10 +173,12 @@ def strip(  # noqa: PLR0913, PLR0917 (an argument for each option)
             **_required(required),
         }  # fmt: skip
         _is_picture(output)  # refused before anything is computed
+        _require_output(depfile, output)
         layouts = [layout_assignment(word) for word in control or []]
         given = load_strip_plan(file, [*layouts, *as_assignments(options, assignments)])
         document = strip_document(given.name, given.worked_out())
         deliver(document, form, output, document, quiet=quiet)
+        _tell_make(depfile, output, given.files)
 
 
 def _required(text: str | None) -> dict[str, str | None]:
@@ -189,6 +196,7 @@ def camera(
     assignments: Assignments = None,
     form: Shape = "text",
     output: Output = None,
+    depfile: Depfile = None,
     quiet: Silent = False,
 ) -> None:
     """Compare cameras by their efficiency coefficient K = f m_p: the smaller, the fewer photos."""
@@ -200,12 +208,15 @@ def camera(
         if source_table == (file is not None):
             message = "a list of cameras and --source-table exclude each other" if file else "no cameras are given"
             raise InputError(Fault(message, "plan-cameras", fix="name a YAML file, or use --source-table"))
+        _require_output(depfile, output)
+        files: tuple[str, ...] = ()
         if file is None:
             document = source_document()
         else:
             given = load_camera_plan(file, assignments or [])
-            document = camera_document(given.name, given.cameras, given.reference)
+            document, files = camera_document(given.name, given.cameras, given.reference), given.files
         deliver(document, form, output, document, quiet=quiet)
+        _tell_make(depfile, output, files)
 
 
 # -------------------------------------------------------------------------------------------------------- output
@@ -223,6 +234,20 @@ def _is_picture(output: Path | None) -> bool:
         message = f"no plan is written as '{output.suffix}': the name may end in .svg, .png, {', '.join(FORMS)}"
         raise typer.BadParameter(message, param_hint="--output")
     return False
+
+
+def _require_output(depfile: Path | None, output: Path | None) -> None:
+    if depfile is not None and output is None:
+        message = "a rule for make needs a target: give --output as well"
+        raise typer.BadParameter(message, param_hint="--depfile")
+
+
+def _tell_make(depfile: Path | None, output: Path | None, files: tuple[str, ...]) -> None:
+    """Write the rule for make."""
+    if depfile is not None and output is not None:
+        from photostrip.formats.writing import make_rule, write_text
+
+        write_text(depfile, make_rule(str(output), files))
 
 
 def deliver(document: Document, form: Form, output: Path | None, drawn: Document, *, quiet: bool) -> None:

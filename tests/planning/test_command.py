@@ -252,6 +252,15 @@ def test_too_little_control_stands_in_the_table(capsys: pytest.CaptureFixture[st
     assert "do not orient a strip" in answer(capsys, "plan", "strip", *options)
 
 
+def test_a_rule_for_make(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file, target, rule = tmp_path / "s.yaml", tmp_path / "s.json", tmp_path / "s.d"
+    file.write_text(STRIP)
+    assert answer(capsys, "plan", "strip", str(file), "-q", "-o", str(target), "--depfile", str(rule)) == ""
+    assert rule.read_text() == f"{target}: {file}\n\n{file}:\n"
+    assert main(["plan", "model", "--depfile", str(rule)]) == 2
+    assert "needs a target" in capsys.readouterr().err
+
+
 @pytest.mark.slow
 def test_pictures_of_strips_are_the_same_every_time(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     file = tmp_path / "s.yaml"
