@@ -46,6 +46,16 @@ class Band:
         """Places of elements (row >= column) in the flat storage."""
         return row + column * self.width
 
+    def holds(self, row: Numbers, column: Numbers) -> NDArray[np.bool_]:
+        """Whether elements (row >= column) lie within the band."""
+        near: NDArray[np.bool_] = row - column <= self.width
+        return near
+
+    def at(self, row: Numbers, column: Numbers) -> Floats:
+        """Give elements within the band (row >= column)."""
+        found: Floats = self.flat[self.place(row, column)]
+        return found
+
     def look(self, row: int, column: int, rows: int, columns: int) -> Floats:
         """Look at a block; only what lies in the band's lower half belongs to the matrix."""
         stride = self.flat.itemsize
@@ -68,7 +78,7 @@ class Band:
         found: Floats = solution
         return found
 
-    def inverse_in_band(self) -> Band:
+    def inverse(self) -> Band:
         """Give the elements of the inverse within the band.
 
         Returns

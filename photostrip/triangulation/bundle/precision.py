@@ -22,12 +22,11 @@ from photostrip.triangulation.bundle.solution import Precision
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.bundle.band import Band
     from photostrip.triangulation.bundle.given import Linear
     from photostrip.triangulation.bundle.layout import Batch
     from photostrip.triangulation.bundle.linearise import Eliminated
     from photostrip.triangulation.bundle.model import Model, State
-    from photostrip.triangulation.bundle.reduced import Reduced
+    from photostrip.triangulation.bundle.reduced import Factor, Reduced
     from photostrip.triangulation.bundle.solution import Solution
 
     Floats = NDArray[np.float64]
@@ -40,20 +39,20 @@ class Inverse:
 
     Parameters
     ----------
-    band : Band
-        Elements within the band of the inverse of the photos' part alone.
+    band : Band or Sparse
+        Elements within the band, or at pairs, of the inverse of the photos' part alone.
     cross : ndarray, shape (m, 6, p)
         That inverse times the border.
     common : ndarray, shape (p, p)
         Cofactors of the common parameters.
-    factor : Band
-        Cholesky factor of the photos' part: for photos farther apart than the band is wide.
+    factor : Band or Sparse
+        Factor of the photos' part: for photos farther apart than the band is wide.
     """
 
-    band: Band
+    band: Factor
     cross: Floats
     common: Floats
-    factor: Band
+    factor: Factor
 
     def joint(self, sets: Numbers, more: int) -> Floats:
         """Joint cofactors of sets of photos and the first common parameters.
@@ -74,12 +73,14 @@ class Inverse:
         number = (PHOTO * sets[:, :, None] + np.arange(PHOTO)).reshape(groups, n)
         row, column = number[:, :, None], number[:, None, :]
         whole = np.empty((groups, n + more, n + more))
-        near = np.abs(row - column) <= self.band.width
-        late, early = np.where(near, np.maximum(row, column), 0), np.where(near, np.minimum(row, column), 0)
-        whole[:, :n, :n] = self.band.flat[self.band.place(late, early)]
-        if not near.all():
+        late, early = np.maximum(row, column), np.minimum(row, column)
+        near = self.band.holds(late, early)
+        if near.all():
+            whole[:, :n, :n] = self.band.at(late, early)
+        else:
+            whole[:, :n, :n][near] = self.band.at(late[near], early[near])
             far = np.unique(number[~near.all(axis=(1, 2))])
-            columns = self.factor.solve(np.eye(self.band.size)[:, far])
+            columns = self.factor.solve(np.eye(self.factor.size)[:, far])
             row, column = np.broadcast_arrays(row, column)
             whole[:, :n, :n][~near] = columns[row[~near], np.searchsorted(far, column[~near])]
         if len(self.common):
@@ -156,7 +157,7 @@ def inverse_of(solution: Solution) -> Inverse:
     return _inverse(reduced, band)
 
 
-def _at(solution: Solution) -> tuple[State, Reduced, Band]:
+def _at(solution: Solution) -> tuple[State, Reduced, Factor]:
     """Linearise and factor at a solution."""
     model = solution.model
     state = state_of(model, solution.centers, solution.rotations, solution.points, solution.common)
@@ -168,14 +169,14 @@ def _at(solution: Solution) -> tuple[State, Reduced, Band]:
     return state, reduced, band
 
 
-def _inverse(reduced: Reduced, band: Band) -> Inverse:
+def _inverse(reduced: Reduced, band: Factor) -> Inverse:
     """Invert photos and common parameters."""
     p = len(reduced.corner) - 1
     border = reduced.border.reshape(-1, p + 1)[:, :p]
     cross = band.solve(border) if p else np.zeros_like(border)
     common = np.linalg.inv(reduced.corner[:p, :p] - border.T @ cross)
     cross = cross.reshape(len(reduced.border), PHOTO, p)
-    return Inverse(band.inverse_in_band(), cross, 0.5 * (common + common.T), band)
+    return Inverse(band.inverse(), cross, 0.5 * (common + common.T), band)
 
 
 def _batch(
@@ -286,7 +287,7 @@ def _turned(model: Model, state: State, joint: Floats) -> tuple[Floats, Floats]:
 
 
 def _inner(
-    model: Model, state: State, system: tuple[Band, Reduced], points: Floats, joint: Floats
+    model: Model, state: State, system: tuple[Factor, Reduced], points: Floats, joint: Floats
 ) -> tuple[Floats, Floats]:
     """Carry cofactors of points and photos over to inner constraints on the points.
 
@@ -347,7 +348,7 @@ def _push(batch: Batch, eliminated: Eliminated, pushed: Floats, right: Floats, c
     corner[:calibrated] -= np.einsum("pcs,cds->pd", eliminated.rows[n:-1], pushed)
 
 
-def _solved(reduced: Reduced, band: Band, right: Floats, corner: Floats) -> tuple[Floats, Floats]:
+def _solved(reduced: Reduced, band: Factor, right: Floats, corner: Floats) -> tuple[Floats, Floats]:
     """Solve for right-hand sides of photos (m, 6, c) and common parameters (p, c)."""
     p = len(corner)
     border = reduced.border.reshape(-1, p + 1)[:, :p]

@@ -10,6 +10,7 @@ import numpy as np
 from photostrip.triangulation.bundle import given
 from photostrip.triangulation.bundle.band import Band
 from photostrip.triangulation.bundle.linearise import PHOTO, by_photo, eliminate, squares
+from photostrip.triangulation.bundle.sparse import Sparse
 from photostrip.triangulation.bundle.structure import blocks_of
 
 if TYPE_CHECKING:
@@ -19,6 +20,9 @@ if TYPE_CHECKING:
     from photostrip.triangulation.bundle.model import Model, State
 
     Floats = NDArray[np.float64]
+
+Factor = Band | Sparse
+WIDE = 1e11  # multiplications for the factor of a band, some seconds: from there a sparse factor is tried
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,8 +156,8 @@ def control_squares(model: Model, state: State) -> float:
     return float(((control_residuals(model, state) / control.sigma) ** 2).sum())
 
 
-def factored(model: Model, reduced: Reduced, add: Floats | None = None) -> Band | None:
-    """Assemble the band of the photos and factor it.
+def factored(model: Model, reduced: Reduced, add: Floats | None = None) -> Factor | None:
+    """Assemble the matrix of the photos and factor it: in a band, or sparse where the band is wide.
 
     Parameters
     ----------
@@ -166,7 +170,7 @@ def factored(model: Model, reduced: Reduced, add: Floats | None = None) -> Band 
 
     Returns
     -------
-    Band or None
+    Band, Sparse or None
         The factor; None when the matrix is not positive definite.
     """
     structure = model.structure
@@ -174,6 +178,9 @@ def factored(model: Model, reduced: Reduced, add: Floats | None = None) -> Band 
     if add is not None:
         blocks = blocks.copy()
         blocks[structure.own] += add
+    if PHOTO * len(structure.order) * (PHOTO * structure.width) ** 2 > WIDE:
+        matrix = Sparse(len(structure.order), structure.rows, structure.columns, blocks)
+        return matrix if matrix.factor() else None
     band = Band(PHOTO * len(structure.order), PHOTO * (structure.width + 1) - 1)
     element = np.arange(PHOTO)
     row = (PHOTO * structure.rows)[:, None, None] + element[:, None]
