@@ -178,11 +178,12 @@ def _judged(row: Document, size: float, allowed: float, tolerances: Tolerances) 
     return row | {"difference": known, "allowed": allowed, "differs": too_large}
 
 
-def _rank(row: Document) -> tuple[float, str, str]:
-    """Worst first: what is gone or appeared, then by how often it exceeds what is allowed."""
-    if row["difference"] is None:
-        return -math.inf, row["block"], row["id"]
-    return -(row["difference"] / row["allowed"] if row["allowed"] else 1e9 * row["difference"]), row["block"], row["id"]
+def _rank(row: Document) -> tuple[int, float, str, str]:
+    """Worst first: what is gone or appeared, then by how often it exceeds what is allowed, then where nothing is."""
+    size, place = row["difference"], (row["block"], row["id"])
+    if size is None:
+        return 0, 0.0, *place
+    return (1, -size / row["allowed"], *place) if row["allowed"] else (2, -size, *place)
 
 
 def _kind(kind: str, rows: list[Document], tolerances: Tolerances) -> Document:

@@ -21,6 +21,7 @@ WIDTH, LOWEST, HIGHEST = 960.0, 220.0, 560.0  # of a picture
 LEFT, RIGHT, TOP, BOTTOM = 70.0, 24.0, 64.0, 54.0  # margins
 LONGEST = 70.0  # the longest vector or half axis on the plan
 MOST_ELLIPSES = 90  # more of them are a grey cloud: new points go without
+CROWDED = 12.0  # photos nearer to each other on the plan are drawn smaller
 SHAPES = {"control": "triangle", "check": "square", "new": "dot", "photo": "diamond"}
 WORDS = {"control": "control point", "check": "check point", "new": "new point", "photo": "photo"}
 
@@ -69,7 +70,8 @@ def _plan_picture(document: Document, plan: Plan) -> Picture:
     drawn = [svg.path((place(spot.along, spot.across) for spot in strip), "flight") for strip in plan.strips]
     drawn += _ellipses(plan.spots, place, factor)
     drawn += [_vector(spot, place, factor) for spot in plan.spots if spot.shift is not None]
-    drawn += [_spot(spot, place) for spot in everything]
+    spacing = (high[0] - low[0]) * scale / max(len(plan.strips[0]), 1)
+    drawn += [_spot(spot, place, min(1.0, spacing / CROWDED)) for spot in everything]
     drawn += _legend([role for role in WORDS if any(spot.role == role for spot in everything)], TOP - 40.0)
     drawn += _bars(scale, (bar, factor), plan.north, height)
     enlarged = f"{float(f'{factor / scale:.2g}'):.0f}" if factor > scale else short(factor / scale, 2)
@@ -114,8 +116,8 @@ def _vector(spot: Spot, place: Any, factor: float) -> str:  # noqa: ANN401 (a fu
     return svg.line((x, y), (x + along * factor, y - across * factor), f"vector {spot.role}")
 
 
-def _spot(spot: Spot, place: Any) -> str:  # noqa: ANN401 (a function)
-    """Draw the mark of a spot; its hint has its id and numbers."""
+def _spot(spot: Spot, place: Any, share: float) -> str:  # noqa: ANN401 (a function)
+    """Draw the mark of a spot, smaller in a long strip; its hint has its id and numbers."""
     hint = f"{WORDS[spot.role]} {spot.id}"
     if spot.shift is not None:
         hint += f", plan {short(math.hypot(*spot.shift), 3)} m"
@@ -123,7 +125,7 @@ def _spot(spot: Spot, place: Any) -> str:  # noqa: ANN401 (a function)
         hint += f", height {spot.up:+.3g} m"
     if spot.ellipse is not None:
         hint += f", ellipse {short(spot.ellipse[0], 3)} x {short(spot.ellipse[1], 3)} m"
-    size = {"new": 3.0, "photo": 4.0}.get(spot.role, 5.0)
+    size = {"new": 3.0 * share, "photo": 4.0 * share}.get(spot.role, 5.0)
     return svg.mark(place(spot.along, spot.across), SHAPES[spot.role], f"mark {spot.role}", hint, size)
 
 
