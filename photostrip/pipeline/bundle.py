@@ -13,6 +13,7 @@ from photostrip.pipeline import block_problem, block_start
 from photostrip.pipeline.results import Adjusted, Bundle, Precision, SinglePhoto
 from photostrip.triangulation.bundle import reliability, self_calibration, snooping, variance_components
 from photostrip.triangulation.bundle.correlations import correlations
+from photostrip.triangulation.bundle.precision import precision as precision_of
 from photostrip.triangulation.bundle.selection import restarted, selected, supported
 from photostrip.triangulation.bundle.solve import solve
 from photostrip.triangulation.exterior import Resection, project
@@ -118,8 +119,12 @@ def adjust_block(
     start = block_start.start(inputs, settings, observations, known)
     places = (of_control, of_positions, of_orientations)
     block = block_problem.build(inputs, settings, observations, control, places, start)
-    block = _settled(block, control, of_control)
-    screened = snooping.screen(block.problem, block.begin, settings.bundle, block.kept)
+    try:
+        block = _settled(block, control, of_control)
+        screened = snooping.screen(block.problem, block.begin, settings.bundle, block.kept)
+    except GeometryError as error:
+        _name_undetermined(block, error)
+        raise
     sigma0 = reliability.sigma0_test(screened.solution)
     components: tuple[variance_components.Component, ...] = ()
     if settings.bundle.variance_components:
@@ -141,6 +146,39 @@ def _settled(block: BlockProblem, control: ControlPoints, frames: Sequence[Groun
         if moved < REFILLED:
             break
     return block
+
+
+def _name_undetermined(block: BlockProblem, error: GeometryError) -> None:
+    """Refuse by name the calibration parameters that kept an adjustment from ending, if it was they.
+
+    With a millimetre at the edge of the photo as their a-priori standard deviation the adjustment ends; parameters
+    that the measurements then hardly improve are those.
+    """
+    problem = block.problem
+    sigma = problem.cameras.sigma
+    if sigma is None or not np.isinf(sigma).any():
+        return
+    loose = np.where(np.isinf(sigma), self_calibration.millimetre(problem.images.xy), sigma)
+    held = replace(problem, cameras=replace(problem.cameras, sigma=loose))
+    try:
+        solution = solve(selected(held, supported(held, block.begin)))
+        cofactors = precision_of(solution)
+    except GeometryError:
+        return  # it is not they, or not they alone
+    prior = loose[loose > 0.0]
+    kept = np.sqrt(np.diag(cofactors.common)[: len(prior)]) / prior
+    free = np.isinf(sigma)[sigma > 0.0]
+    names = held.common_names()
+    lost = [names[row] for row in np.flatnonzero(free & (kept > self_calibration.KEPT))]
+    if not lost:
+        return
+    partner = next((each for each in correlations(solution, cofactors) if lost[0] in {each.first, each.second}), None)
+    message = f"{', '.join(lost)} cannot be determined"
+    if partner is not None:
+        other = partner.second if partner.first == lost[0] else partner.first
+        message += f": {lost[0]} cannot be told apart from {other} (correlation {partner.value:+.4f})"
+    message += "; take it out of self_calibration, or give it a calibration_sigma"
+    raise GeometryError(message, code="not-determinable") from error
 
 
 def _components(

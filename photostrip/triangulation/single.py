@@ -161,7 +161,7 @@ def approximate(xy: Floats, points: Floats, focal: float) -> tuple[Floats, Float
 
     Notes
     -----
-    Source: Grunert 1841 in the form of Haralick et al. 1994.
+    Source: Grunert 1841 in the form of Haralick 1994.
     """
     if len(xy) < LEAST_POINTS:
         raise GeometryError(f"{len(xy)} known points do not orient a photo; it needs four", code="resection")

@@ -86,3 +86,58 @@ def test_the_report_of_a_bundle(capsys: pytest.CaptureFixture[str], tmp_path: Pa
 def test_the_bundle_is_the_same_every_time(capsys: pytest.CaptureFixture[str]) -> None:
     first, second = (run(capsys, PROJECT, *BUNDLE, "--format", "json")[1] for _ in range(2))
     assert first == second
+
+
+# ------------------------------------------------------------------------------------ what is wrong, by its exit code
+
+
+def small(folder: Path, control: str, more: str = "") -> str:
+    """Write the simulated sample with other control, and something more in the project file; give its path."""
+    source = ROOT / "sample_data" / "simulated-20"
+    text = (source / "project.yaml").read_text(encoding="utf-8")
+    text = "\n".join(line for line in text.splitlines() if not line.startswith("tolerances"))
+    (folder / "project.yaml").write_text(f"{text}\n{more}", encoding="utf-8")
+    (folder / "observations.csv").write_bytes((source / "observations.csv").read_bytes())
+    (folder / "control.csv").write_text(control, encoding="utf-8")
+    return str(folder / "project.yaml")
+
+
+def given(rows: int) -> str:
+    """Give the first control points of the sample."""
+    lines = (ROOT / "sample_data" / "simulated-20" / "control.csv").read_text(encoding="utf-8").splitlines()
+    return "\n".join([lines[0], *[line for line in lines[1:] if ",check" not in line][:rows]]) + "\n"
+
+
+def test_too_little_control_is_the_geometry(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    code, out, err = run(capsys, small(tmp_path, given(2)), *BUNDLE)
+    assert (code, out) == (3, "")
+    assert "neither control nor camera positions" in err
+
+
+def test_an_unknown_parameter_is_the_project(capsys: pytest.CaptureFixture[str]) -> None:
+    code, _, err = run(capsys, PROJECT, *BUNDLE, "--set", "processing.bundle.self_calibration=[k4]")
+    assert code == 2
+    assert "`k4` is not known" in err
+
+
+def test_a_missing_table_of_positions_is_the_project(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    section = "camera_positions: {file: gnss.csv, crs: EPSG:32633, axes: [east, north, up], sigma: [1, 1, 1]}\n"
+    code, _, err = run(capsys, small(tmp_path, given(20), section), *BUNDLE)
+    assert code == 2
+    assert "camera_positions.file" in err
+
+
+def test_a_tolerance_that_is_not_kept(capsys: pytest.CaptureFixture[str]) -> None:
+    code, out, _ = run(capsys, PROJECT, *BUNDLE, "--set", "tolerances.check_rms_xy=0.01", "--quiet")
+    assert code == 1
+    assert out.startswith("FAILED")
+
+
+def test_a_free_network_from_the_command_line(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    path = small(tmp_path, given(20).replace(",control", ",check") if ",control" in given(20) else given(0))
+    code, out, _ = run(capsys, path, *BUNDLE, "--format", "json")
+    document = json.loads(out)
+    assert code == 0
+    assert document["bundle"]["free_network"] is True
+    assert document["frame"]["crs"] == "local"
+    assert any(note["code"] == "free-network" for note in document["notes"])

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from photostrip.errors import GeometryError
 from photostrip.formats.result.document import document_of
 from photostrip.formats.simulation import inputs_of
-from photostrip.simulate import Control, Flight, GrossError, Image, Points, Spec
+from photostrip.simulate import Control, Flight, GrossError, Ground, Image, Points, Spec, Terrain
 from photostrip.triangulation.bundle import reliability
 from photostrip.triangulation.bundle.solve import solve
 from tests.pipeline.blocks import adjusted, corners, errors, positions, simulate, with_control
@@ -288,3 +289,18 @@ def test_a_priori_values_hold_what_is_not_determined() -> None:
     (found,) = result.bundle.parameters
     assert found.redundancy < 0.05  # the measurements say next to nothing
     assert found.sigma == pytest.approx(0.001 * result.bundle.unit, rel=0.05)
+
+
+@pytest.mark.parametrize("wanted", ["principal_distance", "principal_point"])
+def test_what_cannot_be_told_apart_is_refused_by_name(wanted: str) -> None:
+    """Vertical photos over a plane: the principal distance goes with the flying height, the point with the shift."""
+    flat = Spec(
+        flight=Flight(photos=6, attitude_sigma_deg=(0.0, 0.0, 0.0), position_sigma=(0.0, 0.0, 0.0)),
+        terrain=Terrain(relief=0.0),
+        ground=Ground(crs="local"),
+    )
+    simulation = simulate(flat)
+    inputs = inputs_of(simulation)
+    strips = tuple(replace(strip, calibrate=(wanted,)) for strip in inputs.strips)
+    with pytest.raises(GeometryError, match=r"camera film: (c|x0|y0)"):
+        adjusted(simulation, replace(inputs, strips=strips))

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import csv
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from photostrip.errors import GeometryError
-from photostrip.geometry.rotation import from_vector
+from photostrip.geometry.rotation import from_alpha_omega_kappa, from_vector
 from photostrip.triangulation.exterior import project
 from photostrip.triangulation.single import derivatives, intersect_points, space_resection
+from tests.source_tree import ROOT
 
 FOCAL = 153.0
 MICROMETRE = 1e-3  # mm
@@ -139,3 +142,39 @@ def test_rays_that_do_not_meet_give_no_point() -> None:
     found = intersect_points(flipped[only], np.full((only.sum(), 2), 0.005), (photo[only], point[only]), known, 20)
     assert np.isnan(found.xyz[[1, 2]]).all()
     assert np.isfinite(np.delete(found.xyz, [1, 2], axis=0)).all()
+
+
+def published_pair() -> tuple[np.ndarray, ...]:
+    """The published pair of variant 56: image points, ground points, stations and rotations, published angles."""
+    folder = ROOT / "tests" / "data" / "authorities" / "pair-variant-56"
+    tables = []
+    for name in ("image_points", "ground_points", "exterior_orientation"):
+        with (folder / f"{name}.csv").open(encoding="utf-8", newline="") as file:
+            tables.append(list(csv.DictReader(file)))
+    images, ground, photos = tables
+    x1 = np.array([[float(row["x1_mm"]), float(row["y1_mm"])] for row in images])
+    x2 = x1 - np.array([[float(row["p_mm"]), float(row["q_mm"])] for row in images])
+    points = np.array([[float(row["X_m"]), float(row["Y_m"]), float(row["Z_m"])] for row in ground])
+    stations = np.array([[float(row[f"{axis}s_m"]) for axis in "XYZ"] for row in photos])
+
+    def radians(text: str) -> float:
+        sign = -1.0 if text.startswith("-") else 1.0
+        degrees, minutes, seconds = (float(part) for part in text.lstrip("+-").split())
+        return float(np.radians(sign * (degrees + minutes / 60 + seconds / 3600)))
+
+    angles = np.array([[radians(row[f"{name}_dms"]) for name in ("alpha", "omega", "kappa")] for row in photos])
+    return x1, x2, points, stations, angles
+
+
+def test_a_published_pair_comes_back_from_its_points_and_its_points_from_the_pair() -> None:
+    x1, x2, points, stations, angles = published_pair()
+    rotations = from_alpha_omega_kappa(*angles.T)
+    for number, xy in enumerate((x1, x2)):
+        found = space_resection(xy, np.full(xy.shape, 0.0005), points, 75.0)
+        assert np.abs(found.center - stations[number]).max() < 0.02  # image coordinates have three decimals
+        assert np.abs(found.rotation - rotations[number]).max() < 3e-5
+    count = len(points)
+    rows = np.repeat([0, 1], count), np.tile(np.arange(count), 2)
+    known = (stations, rotations, np.full(2, 75.0))
+    met = intersect_points(np.concatenate([x1, x2]), np.full((2 * count, 2), 0.0005), rows, known, count)
+    assert np.abs(met.xyz - points).max() < 0.006

@@ -46,7 +46,7 @@ def adjust(problem: Problem) -> tuple[Solution, Floats]:
 
     Notes
     -----
-    Source: Krarup, Juhl and Kubik 1980, with the scale of the residuals taken from their median.
+    Source: Krarup 1980, with the scale of the residuals taken from their median.
     """
     weight = np.ones(len(problem.images))
     sigma = problem.images.sigma

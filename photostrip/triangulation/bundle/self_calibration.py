@@ -42,6 +42,7 @@ TITLES = {
 }
 UNITS = {"c": "mm", "x0": "mm", "y0": "mm", "k1": "mm^-2", "k2": "mm^-4", "k3": "mm^-6", "p1": "mm^-1", "p2": "mm^-1"}
 SIGNIFICANCE = 0.05
+KEPT = 0.3  # of a loose a-priori standard deviation that a parameter keeps which is not determined
 INSEPARABLE = 0.9999  # correlations of what cannot be told apart
 
 
@@ -99,6 +100,24 @@ def sigmas(asked: Sequence[Sequence[str]], prior: dict[str, float]) -> Floats | 
             for column in COLUMNS[name]:
                 found[row, CALIBRATION.index(column)] = prior.get(name, np.inf)
     return found if found.any() else None
+
+
+def millimetre(xy: Floats) -> Floats:
+    """Give the values of the parameters that move a point at the edge of the measured part of a photo by 1 mm.
+
+    Parameters
+    ----------
+    xy : ndarray, shape (n, 2)
+        Image coordinates, mm.
+
+    Returns
+    -------
+    ndarray, shape (10,)
+        In the order of :data:`CALIBRATION`.
+    """
+    edge = max(float(np.hypot(xy[:, 0], xy[:, 1]).max(initial=1.0)), 1e-3)
+    powers = np.array([0, 0, 0, 3, 5, 7, 2, 2, 1, 1])
+    return np.asarray(edge ** -powers.astype(float), float)
 
 
 def columns(xy: Floats) -> Floats:
