@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 FOOT = 0.3048
 GROSS_SHARE = 0.2  # of the strips without a mistake have two gross errors of image coordinates, which are none of these
-THIRD, HALF, LINE = 0.3, 0.55, 0.3  # of the length of the strip; of a base
+THIRD, HALF, LINE = 0.3, 0.55, 0.03  # of the length of the strip; of its half breadth
 EVEN = 0.5
 WIDE = replace(FILM, name="wide", principal_distance=88.0)
 LONG = replace(FILM, name="long", principal_distance=305.0)
@@ -351,7 +351,10 @@ def another_crs(case: Case) -> Planted | None:
     """Name a coordinate reference system of another country."""
     if kind_of(case) != "EPSG":
         return None
-    spec = replace(case.inputs.frames[0], crs=str(case.rng.choice(["EPSG:2154", "EPSG:31468", "EPSG:27700"])))
+    crs = str(case.rng.choice(["EPSG:2154", "EPSG:31468", "EPSG:27700", "EPSG:21781", "EPSG:32650"]))
+    if lies_there(case, crs):
+        return None
+    spec = replace(case.inputs.frames[0], crs=crs)
     return replace(case.inputs, frames=(spec,)), NOBODY
 
 
@@ -484,6 +487,21 @@ def two_ids(case: Case) -> Planted | None:
     return replace(case.inputs, observations=copy), frozenset({o.point_ids[number], "again"})
 
 
+def lies_there(case: Case, crs: str) -> bool:
+    """Whether the control lies in the area of a coordinate reference system, or less than half of it away."""
+    from pyproj import CRS, Transformer
+
+    area = CRS(crs).area_of_use
+    control = case.inputs.control
+    plan = control.enu[control.use[:, 0], :2]
+    lon, lat = Transformer.from_crs(crs, CRS(crs).geodetic_crs, always_xy=True).transform(*plan.T)
+    if area is None:
+        return False
+    wide, high = (area.east - area.west) / 2, (area.north - area.south) / 2
+    inside = (lon > area.west - wide) & (lon < area.east + wide) & (lat > area.south - high) & (lat < area.north + high)
+    return bool(inside.any())
+
+
 def kept(case: Case, wanted: Callable[[Floats, Floats], NDArray[np.bool_]]) -> Planted | None:
     """Keep control where it is wanted, by its place along the strip (0 to 1) and across it (in bases)."""
     o, control = case.inputs.observations, case.inputs.control
@@ -509,8 +527,10 @@ def at_one_end(case: Case) -> Planted | None:
 
 
 def on_one_line(case: Case) -> Planted | None:
-    """Keep control along the flight only."""
-    return kept(case, lambda _, across: np.abs(across) < LINE)
+    """Keep control along the flight only, within a twentieth of the half breadth of the strip."""
+    format_ = case.spec.camera.format or (230.0, 230.0)
+    half = 0.5 * format_[1] / 1000 * case.spec.scale / case.spec.base  # in bases
+    return kept(case, lambda _, across: np.abs(across) < LINE * half)
 
 
 def half_of_the_strip(case: Case) -> Planted | None:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     Numbers = NDArray[np.intp]
 
 WINDOW = 10  # photos of a mosaic that is laid on control: a longer one curls
+BREADTH = 0.95  # of the image points lie within the half breadth of a strip
 SEEN_BY = 2  # photos that must show a given point
 MOSAIC_SIGMA = 0.02  # of the flying height: what relief and tilts leave in a mosaic
 
@@ -239,7 +240,7 @@ def _richest(strip: Strip, observations: PhotoPoints, control: ControlPoints) ->
     return strip.photos[first : first + WINDOW]
 
 
-def stations(strip: Strip, observations: PhotoPoints, control: ControlPoints) -> tuple[Numbers, Floats]:
+def stations(strip: Strip, observations: PhotoPoints, control: ControlPoints) -> tuple[Numbers, Floats, Floats]:
     """Give where along a strip given points lie.
 
     Parameters
@@ -257,6 +258,8 @@ def stations(strip: Strip, observations: PhotoPoints, control: ControlPoints) ->
         Rows of the given points that at least two of its photos show.
     place : ndarray, shape (m,)
         Mean number of those photos, from 0.
+    side : ndarray, shape (m,)
+        Mean distance from the middle of those photos, square to the bases, in half breadths of the strip.
     """
     order = {photo: number for number, photo in enumerate(strip.photos)}
     position = np.array([order.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo]
@@ -267,4 +270,9 @@ def stations(strip: Strip, observations: PhotoPoints, control: ControlPoints) ->
     number = {name: n for n, name in enumerate(observations.point_ids)}
     points = np.array([number.get(name, -1) for name in control.ids], np.intp)
     seen = np.flatnonzero((points >= 0) & (count[points] >= SEEN_BY))
-    return seen, total[points[seen]] / count[points[seen]]
+    angle = _base_angle(observations, strip.photos)
+    across = observations.xy[rows] @ [-np.sin(angle), np.cos(angle)]
+    breadth = max(float(np.quantile(np.abs(across), BREADTH)), 1e-12) if len(across) else 1.0
+    side = np.bincount(observations.point[rows], across, size)
+    chosen = points[seen]
+    return seen, total[chosen] / count[chosen], side[chosen] / count[chosen] / breadth

@@ -7,13 +7,14 @@ copy that serves the evidence alone, so that one mistake does not hide the next;
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import PhotostripError
 from photostrip.geodesy.crs import area_of_use, tie_frames
-from photostrip.pipeline import evidence
+from photostrip.pipeline import distance_trial, evidence
 from photostrip.triangulation import interior
 from photostrip.triangulation.plausibility import (
     accepted,
@@ -32,8 +33,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
     from photostrip.geodesy.crs import GroundFrame
     from photostrip.notes import Finding
     from photostrip.pipeline.inputs import Inputs, Settings, Strip
@@ -41,8 +40,6 @@ if TYPE_CHECKING:
     from photostrip.points import ControlPoints, PhotoPoints
     from photostrip.triangulation.plausibility.control_reading import Given
     from photostrip.triangulation.plausibility.flight_order import Arranged
-
-    Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,11 +54,17 @@ class Examined:
         Image points with what was found put right, for further evidence only; mm, y up.
     arranged : tuple of Arranged
         Each strip as its photos lie.
+    settings : Settings
+        What is to be done.
+    light : bool
+        Whether no strip may be formed, as in ``photostrip check``.
     """
 
     findings: tuple[Finding, ...]
     observations: PhotoPoints
     arranged: tuple[Arranged, ...]
+    settings: Settings
+    light: bool = False
 
 
 def before(inputs: Inputs, settings: Settings) -> Examined:
@@ -94,7 +97,7 @@ def before(inputs: Inputs, settings: Settings) -> Examined:
         photo: factors.get(name_of.get(photo, ""), 1.0) / size.get(photo, 1.0) for photo in observations.photo_ids
     }
     mirrored = frozenset(name for each in arranged for name in each.mirrored)
-    return Examined(tuple(told), _put_right(observations, factor, mirrored), tuple(arranged))
+    return Examined(tuple(told), _put_right(observations, factor, mirrored), tuple(arranged), settings)
 
 
 def _photo_coordinates(inputs: Inputs, settings: Settings) -> tuple[PhotoPoints, list[Finding]]:
@@ -135,7 +138,7 @@ def of_inputs(inputs: Inputs, settings: Settings, directory: Path | None = None)
     tuple of Finding
         By code.
     """
-    examined = before(inputs, settings)
+    examined = replace(before(inputs, settings), light=True)
     strips = _as_they_lie(inputs, examined)
     told = [*examined.findings, *_of_control(inputs, examined, strips, [None] * len(strips), directory)]
     return accepted(told, settings.accept)
@@ -232,8 +235,16 @@ def _of_control(
         nowhere |= not place.inside
     axes_are_right = sure[0] if len(set(sure)) == 1 else None
     for strip, each in zip(strips, formed, strict=True):
-        told += _on_strip(strip, each, examined, control, frames, as_written=nowhere, axes_are_right=axes_are_right)
-        told += _held(strip, examined, control, frames)
+        here = _on_strip(strip, each, examined, control, frames, as_written=nowhere, axes_are_right=axes_are_right)
+        if not here and not examined.light:
+            read = partial(_by_heights, examined=examined, control=control, frames=frames)
+            points, settings = examined.observations, examined.settings
+            if each is not None:
+                here = distance_trial.examine(each, points, settings, read)
+            elif not examined.findings:
+                here = distance_trial.without_pairs(strip, points, settings, read)
+        told += here
+        told += _held(strip, examined, control)
     return told
 
 
@@ -267,16 +278,21 @@ def _on_strip(
     return control_reading.examine(given, seen, axes_are_right=axes_are_right, exchanged=exchanged)
 
 
-def _held(strip: Strip, examined: Examined, control: ControlPoints, frames: Sequence[GroundFrame]) -> list[Finding]:
+def _by_heights(
+    formed: evidence.Formed, examined: Examined, control: ControlPoints, frames: Sequence[GroundFrame]
+) -> control_reading.Stretched | None:
+    """Compare a formed strip with the heights of its control."""
+    rows, seen = evidence.sighted(formed, examined.observations, control)
+    given = given_points.level(control.take(rows), frames)
+    return None if given is None else control_reading.stretched(given, seen)
+
+
+def _held(strip: Strip, examined: Examined, control: ControlPoints) -> list[Finding]:
     """Judge where the control of a strip lies."""
-    rows, place = evidence.stations(strip, examined.observations, control)
+    rows, place, side = evidence.stations(strip, examined.observations, control)
     counts = control.use[rows, 0] & ~control.check[rows]
-    rows, place = rows[counts], place[counts]
-    here = control.take(rows)
-    given = given_points.level(here, frames)
-    if given is None:
-        return []
-    return list(layout.examine(place, given.level[:, :2], strip.photos, strip.id, here.ids))
+    ids = [control.ids[row] for row in rows[counts]]
+    return list(layout.examine(place[counts], side[counts], strip.photos, strip.id, ids))
 
 
 # --------------------------------------------------------------------------------------------- after forming

@@ -417,7 +417,13 @@ def _orient_photos(
     shift = [np.bincount(position, moved[:, axis], len(strip.photos)) / count for axis in range(3)]
     start = similarity(formed.centers) + np.column_stack(shift), similarity.rotation @ formed.rotations
     focal = np.full(len(strip.photos), strip.camera.principal_distance)
-    return exterior.resect(observations.xy[used], points, position, focal, start), used
+    resection = exterior.resect(observations.xy[used], points, position, focal, start)
+    if not resection.solved.any():
+        msg = (
+            f"strip {strip.id}: no photo can be oriented on its adjusted points: strip and control belong to two worlds"
+        )
+        raise GeometryError(msg, photos=strip.photos, code="no-photo-oriented")
+    return resection, used
 
 
 def _depth(

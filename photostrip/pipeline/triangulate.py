@@ -69,6 +69,11 @@ def triangulate(inputs: Inputs, settings: Settings, *, directory: Path | None = 
     except (InputError, GeometryError) as error:
         error.findings = plausibility.of_failure(inputs, settings, directory)
         raise
+    except np.linalg.LinAlgError as error:
+        msg = f"the data contradict themselves so much that an equation cannot be solved ({str(error).lower()})"
+        told = GeometryError(msg, code="singular")
+        told.findings = plausibility.of_failure(inputs, settings, directory)
+        raise told from error
     return replace(result, findings=plausibility.of_result(result, directory))
 
 

@@ -27,6 +27,8 @@ LEAST = 3  # points in plan; two always fit
 MOST_PAIRS = 1500  # tried
 MOST_POINTS = 400  # from which the middle misclosure is taken
 FAR = 0.25  # of the largest distance: two points that give a similarity
+DRAWS = 400  # of as many points as unknowns, for a start that wrong points do not disturb
+WORST = 1e6  # condition number of such a draw
 NORMAL = 1.4826
 STEPS, ROBUST_STEPS = 12, 8
 KEPT = 5.0  # robust standard deviations within which a point goes with the others
@@ -146,6 +148,36 @@ def _refined(z: Complex, plan: Complex, turn: complex, shift: complex, *, mirror
     return Laid(turn, shift, mirrored, float(np.partition(size, place)[place]))
 
 
+def _least_median(columns: NDArray[Any], values: NDArray[Any], rows: NDArray[np.intp]) -> Floats | None:
+    """Sizes of the residuals of the fit through as many points as unknowns whose middle residual is smallest."""
+    unknowns = columns.shape[1]
+    if len(rows) <= unknowns:
+        return None
+    draw = np.random.default_rng(len(rows)).random((DRAWS, len(rows)))  # the same for the same number of points
+    chosen = rows[np.argpartition(draw, unknowns - 1, axis=1)[:, :unknowns]]
+    with np.errstate(all="ignore"):
+        design = columns[chosen]
+        sound = np.linalg.cond(design) < WORST
+        if not sound.any():
+            return None
+        coefficient = np.linalg.solve(design[sound], values[chosen[sound]][:, :, None])[:, :, 0]
+    some = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MOST_POINTS)).astype(np.intp))]
+    size = np.abs(values[some] - coefficient @ columns[some].T)
+    place = min((len(some) + unknowns + 1) // 2, len(some)) - 1
+    best = int(np.partition(size, place, axis=1)[:, place].argmin())
+    result: Floats = np.abs(values - columns @ coefficient[best])
+    return result
+
+
+def _robust(size: Floats, unknowns: int) -> float:
+    """Robust standard deviation of residuals of a fit; some of them are zero only because it is one."""
+    count = len(size)
+    place = min((count + unknowns + 1) // 2, count) - 1
+    if place < 0:
+        return 0.0
+    return NORMAL * float(np.partition(size, place)[place]) * (1.0 + 2.0 / max(count - unknowns, 1))
+
+
 @dataclass(frozen=True, eq=False)
 class Bent:
     """What is left at given points after a strip was laid on them and its bending taken out.
@@ -210,12 +242,15 @@ def bend(columns: NDArray[Any], values: NDArray[Any], took_part: Flags, floor: f
     size = np.maximum(np.abs(columns[took_part]).max(axis=0, initial=SMALL), SMALL)
     scaled = columns / size
     weight = took_part.astype(float)
+    first = _least_median(scaled, values, np.flatnonzero(took_part))
+    if first is not None:
+        weight = took_part / np.maximum(first / max(_robust(first[took_part], columns.shape[1]), floor), 0.5) ** 2
     coefficient, residual = np.zeros(columns.shape[1], values.dtype), values
     for step in range(STEPS):
         root = np.sqrt(weight)
         coefficient = np.linalg.lstsq(scaled * root[:, None], values * root, rcond=1e-9)[0]
         residual = values - scaled @ coefficient
-        middle = max(NORMAL * float(np.median(np.abs(residual[took_part]))), floor)
+        middle = max(_robust(np.abs(residual[took_part]), columns.shape[1]), floor)
         if step < ROBUST_STEPS:  # first by absolute residuals, then without what is far away
             weight = took_part / np.maximum(np.abs(residual) / middle, 0.5)
         else:

@@ -9,12 +9,12 @@ point ever takes part in a fit.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from photostrip.statistics import t_quantile
-from photostrip.triangulation.plausibility.control_fit import LEAST, SMALL, Bent, Laid, bend, lay, upright
+from photostrip.triangulation.plausibility.control_fit import KEPT, LEAST, SMALL, Bent, Laid, bend, lay, upright
 from photostrip.triangulation.plausibility.digits import slip
 from photostrip.triangulation.plausibility.finding import found
 
@@ -288,7 +288,11 @@ def _fit(laid: Laid, w: Complex, z: Floats, given: Given, seen: Seen, took_part:
 
 
 def _simplest(
-    columns: list[NDArray[Any]], least: int, values: NDArray[Any], took_part: Flags, floor: float
+    columns: list[NDArray[Any]],
+    least: int,
+    values: NDArray[Any],
+    took_part: Flags,
+    floor: float,
 ) -> tuple[NDArray[Any], Bent]:
     """Fit as few columns as leave no more than makes sense, at least some of them."""
     number = least
@@ -455,13 +459,42 @@ def _slips(
 # ---------------------------------------------------------------------------------------------- the heights
 
 
-def _in_height(given: Given, seen: Seen, fitted: Fitted, judged: Flags) -> Iterator[Finding]:
-    """Examine the heights: their unit and sense, groups that are off by a constant, slips."""
+@dataclass(frozen=True, eq=False)
+class Heights:
+    """Given heights against those of a strip.
+
+    Parameters
+    ----------
+    usable, took_part : ndarray of bool, shape (n,)
+        Heights that can be judged, and those that take part in the fit.
+    value : ndarray, shape (n,)
+        Given minus height in the strip, metres.
+    columns : ndarray, shape (n, c)
+        Tilt and bending.
+    scaled : Bent
+        Fit with the scale of the heights free; its last coefficient is that scale minus one.
+    """
+
+    usable: Flags
+    took_part: Flags
+    value: Floats
+    columns: Floats
+    scaled: Bent
+
+    @property
+    def ratio(self) -> tuple[float, float]:
+        """Heights given over heights in the strip, and its standard deviation."""
+        return 1.0 + float(self.scaled.coefficient[-1]), float(self.scaled.sigma[-1])
+
+
+def _heights(given: Given, fitted: Fitted, judged: Flags) -> Heights | None:
+    """Compare given heights with those of a strip; None when too few are given."""
     usable = given.use[:, 2] & np.isfinite(given.level[:, 2]) & np.isfinite(fitted.height)
     took_part = usable & ~given.check & judged
-    count = int(took_part.sum())
-    if count <= LEAST:
-        return
+    agreeing = took_part & ~(np.isfinite(fitted.plan.residual) & fitted.plan.odd)
+    took_part = agreeing if agreeing.sum() > LEAST else took_part
+    if took_part.sum() <= LEAST:
+        return None
     x, y = fitted.along, fitted.across
     whole = [np.where(usable, each, 0.0) for each in (np.ones(len(x)), x, y, x**2, x * y)]
     height = np.where(usable, fitted.height, 0.0)
@@ -471,19 +504,75 @@ def _in_height(given: Given, seen: Seen, fitted: Fitted, judged: Flags) -> Itera
     base, _ = _simplest([deviation, *whole], 4, value, took_part, fitted.floor[1])
     base = base[:, 1:]
     scaled = bend(np.column_stack([base, deviation]), value, took_part, fitted.floor[1])
-    ratio, sigma = 1.0 + float(scaled.coefficient[-1]), float(scaled.sigma[-1])
-    if _significant(ratio - 1.0, sigma, scaled.freedom, SCALE_LEAST):
+    return Heights(usable, took_part, value, base, scaled)
+
+
+class Stretched(NamedTuple):
+    """How a strip fits the heights of its control.
+
+    Parameters
+    ----------
+    ratio : float
+        Heights given over heights in the strip.
+    misfit : float
+        What is left of the heights as they are, in units of what makes sense.
+    """
+
+    ratio: float
+    misfit: float
+
+
+def stretched(given: Given, seen: Seen) -> Stretched | None:
+    """Estimate by how much the heights of a strip are stretched, for a trial with another principal distance.
+
+    Parameters
+    ----------
+    given : Given
+        Given points.
+    seen : Seen
+        The same points in the strip.
+
+    Returns
+    -------
+    Stretched or None
+        None when that cannot be told.
+    """
+    turn = upright(seen.axes)
+    s = seen.xyz @ turn.T
+    w = s[:, 0] + 1j * s[:, 1]
+    took_part = given.use[:, 0] & ~given.check & np.isfinite(given.plan) & np.isfinite(w)
+    laid = lay(w[took_part], given.plan[took_part])
+    if laid is None:
+        return None
+    fitted = _fit(laid, w, s[:, 2], given, seen, took_part)
+    heights = _heights(given, fitted, np.ones(len(w), bool))
+    if heights is None or heights.scaled.freedom < 1:
+        return None
+    plain = bend(heights.columns, heights.value, heights.took_part, fitted.floor[1])
+    size = np.abs(plain.residual[heights.took_part])
+    freedom = max(int(heights.took_part.sum()) - heights.columns.shape[1], 1)
+    misfit = float(np.sqrt((np.minimum(size, KEPT * np.median(size)) ** 2).sum() / freedom)) / fitted.floor[1]
+    return Stretched(heights.ratio[0], max(misfit, 1.0))
+
+
+def _in_height(given: Given, seen: Seen, fitted: Fitted, judged: Flags) -> Iterator[Finding]:
+    """Examine the heights: their unit and sense, groups that are off by a constant, slips."""
+    heights = _heights(given, fitted, judged)
+    if heights is None:
+        return
+    took_part, floor = heights.took_part, fitted.floor[1]
+    ratio, sigma = heights.ratio
+    if _significant(ratio - 1.0, sigma, heights.scaled.freedom, SCALE_LEAST):
         yield _other_scale(seen, ratio, sigma, took_part)
         return
-    groups = list(_groups(given, took_part))
-    for names, inside, key in groups:
-        offset = bend(np.column_stack([base, inside.astype(float)]), value, took_part, fitted.floor[1])
+    for names, inside, key in _groups(given, took_part):
+        offset = bend(np.column_stack([heights.columns, inside.astype(float)]), heights.value, took_part, floor)
         size, sigma = float(offset.coefficient[-1]), float(offset.sigma[-1])
-        if _significant(size, sigma, offset.freedom, OFFSET_LEAST * fitted.floor[1]):
+        if _significant(size, sigma, offset.freedom, OFFSET_LEAST * floor):
             yield _other_heights(given, seen, names, key, size, sigma, inside & took_part)
             return
-    fit = bend(base, value, took_part, fitted.floor[1])
-    for row in np.flatnonzero(usable & judged & fit.odd).tolist():
+    fit = bend(heights.columns, heights.value, took_part, floor)
+    for row in np.flatnonzero(heights.usable & judged & fit.odd).tolist():
         difference = np.array([0.0, 0.0, fit.residual[row]])
         yield from _slips(given, seen, row, difference, (float(fit.spread[row]), float(fit.limit[row])), (2,))
 

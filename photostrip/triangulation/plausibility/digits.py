@@ -8,7 +8,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
-CLEAR = 6.0  # scatters that the value of the digit must have: below, any error looks like a slip
+SURE = 6.0  # scatters that a slip must have at least
+CLEAR = 2.0  # scatters that a unit of the digit must have: below, any error looks like a slip of it
+LONGEST = 8  # digits of the largest coordinate
 NEAR = 0.3  # of the correction, within which the corrected coordinate must lie at most
 MOST_DECIMALS = 4
 
@@ -47,7 +49,7 @@ def slip(given: float, predicted: float, scatter: float, tolerance: float) -> Sl
     Slip or None
         The slip that brings the coordinate nearest to the prediction; None when none brings it near.
     """
-    if abs(given - predicted) < CLEAR * scatter:
+    if abs(given - predicted) < SURE * scatter:
         return None
     fits = [
         each
@@ -61,15 +63,16 @@ def _slips(given: float, scatter: float) -> Iterator[Slip]:
     """Give every coordinate that one slip of the pen turns into the one given."""
     text = f"{abs(given):.{MOST_DECIMALS}f}"
     sign = -1.0 if given < 0 else 1.0
+    yield Slip(-given, "the sign is wrong")
+    yield from _lost(given, sign, text.index("."))
     point = text.index(".")
     digits = [(place, int(sign_)) for place, sign_ in enumerate(text) if sign_ != "."]
-    yield Slip(-given, "the sign is wrong")
     for number, (place, digit) in enumerate(digits):
         worth = 10.0 ** (point - place - (1 if place < point else 0))
         if worth < CLEAR * scatter:
             break
         for other in range(10):
-            if other != digit:
+            if other != digit and abs(other - digit) * worth > SURE * scatter:
                 change = sign * (other - digit) * worth
                 what = f"a typing error in the {_ordinal(number)} digit ({digit} for {other})"
                 yield Slip(given + change, what)
@@ -82,6 +85,16 @@ def _slips(given: float, scatter: float) -> Iterator[Slip]:
         if abs(given) / times > scatter:
             yield Slip(given / times, f"the decimal point is {len(str(int(times))) - 1} places too far right")
             yield Slip(given * times, f"the decimal point is {len(str(int(times))) - 1} places too far left")
+
+
+def _lost(given: float, sign: float, length: int) -> Iterator[Slip]:
+    """Give coordinates that had one digit more in front, or zeros after it."""
+    for power in range(length, LONGEST):
+        for digit in range(1, 10):
+            what = (
+                f"a leading {digit} is missing" if power == length else f"a leading {digit} with its zeros is missing"
+            )
+            yield Slip(given + sign * digit * 10.0**power, what)
 
 
 def _ordinal(number: int) -> str:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 GOOD_PARALLAX = 6.0  # standard deviations of a y parallax
 APART = 0.05  # of the distance from camera to ground: no bending of a strip moves a point by it
-SAME_PLACE = 12.0  # standard deviations of an image coordinate, at photo scale, in plan
+SAME_PLACE = 8.0  # standard deviations of an image coordinate, at photo scale, in plan
 SAME_DEPTH = 3.0  # times that in height, times height over base
 CHANCE = 0.01  # points that may stand at one place by chance in the whole strip; else nothing is said
 SAME_IMAGE = 3.5  # standard deviations of the mean difference of image coordinates on common photos
@@ -113,7 +113,8 @@ def two_ids(observations: PhotoPoints, formed: FormedStrip, focal: float, strip:
     reach = SAME_PLACE * sigma / focal * depth
     tall = SAME_DEPTH * reach * depth / max(float(np.median(bases)), 1e-12)
     one, two = _near(formed.xyz, reach)
-    expected = len(formed.xyz) ** 2 * reach**2 * np.pi / 2.0 / max(_area(formed.xyz), 1e-12)
+    near = SAME_IMAGE / SAME_PLACE * reach  # two points farther apart are seen as two on their photos
+    expected = len(formed.xyz) ** 2 * near**2 * np.pi / 2.0 / max(_area(formed.xyz), 1e-12)
     if expected > CHANCE:
         return
     for a, b in zip(one.tolist(), two.tolist(), strict=True):

@@ -16,25 +16,25 @@ if TYPE_CHECKING:
     from photostrip.notes import Finding
 
     Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 ONE_END = 0.4  # of the strip's length: control that spans less, all in one half, is at one end
 HALF = 0.55
 BEYOND = 0.5  # of the control's length: what lies farther out is extrapolated by more than half of it
-NARROW = 0.02  # breadth over length of the control
+NARROW = 0.12  # rms distance of the control from a line, in half breadths of the strip: errors grow 8-fold at its edge
+LEAST_LENGTH = 0.5  # bases: shorter control is a band across, which has no line along the strip
 FEWEST = 4  # photos of a strip that has ends
 LEAST = 2
 
 
-def examine(place: Floats, plan: Floats, photos: Sequence[str], strip: str, ids: Sequence[str]) -> Iterator[Finding]:
-    """Judge where the control of a strip lies.
+def examine(place: Floats, side: Floats, photos: Sequence[str], strip: str, ids: Sequence[str]) -> Iterator[Finding]:
+    """Judge where the control of a strip lies, as its photos show it; that needs no coordinates of it.
 
     Parameters
     ----------
     place : ndarray, shape (n,)
         Place of each control point along the strip: the mean number of the photos that show it, from 0.
-    plan : ndarray, shape (n, 2)
-        Its given plan coordinates in metres; NaN where it has none.
+    side : ndarray, shape (n,)
+        Its distance from the flight line in half breadths of the strip.
     photos : sequence of str
         Photos of the strip in order.
     strip : str
@@ -47,15 +47,13 @@ def examine(place: Floats, plan: Floats, photos: Sequence[str], strip: str, ids:
     Finding
         P501, P502, P503.
     """
-    known = np.asarray(np.isfinite(plan).all(axis=1), bool)
-    if known.sum() < LEAST:
+    if len(ids) < LEAST:
         return
-    yield from _on_a_line(plan[known], [name for name, each in zip(ids, known, strict=True) if each], strip)
+    yield from _on_a_line(place, side, ids, strip)
     last = len(photos) - 1
     if len(photos) < FEWEST:
         return
-    low, high = float(place[known].min()), float(place[known].max())
-    names = tuple(name for name, each in zip(ids, known, strict=True) if each)
+    low, high = float(place.min()), float(place.max())
     evidence: dict[str, float | int | str] = {
         "first_control_at_photo": low + 1,
         "last_control_at_photo": high + 1,
@@ -69,7 +67,7 @@ def examine(place: Floats, plan: Floats, photos: Sequence[str], strip: str, ids:
             "strip hangs free, its errors grow with the 1.5th power of the length"
         )
         fix = "add control at the other end"
-        yield found("P501", message, fix, evidence, points=names, strips=(strip,))
+        yield found("P501", message, fix, evidence, points=ids, strips=(strip,))
         return
     for gap, end in ((low, photos[0]), (last - high, photos[-1])):
         if gap > max(BEYOND * (high - low), 1.0):
@@ -81,12 +79,18 @@ def examine(place: Floats, plan: Floats, photos: Sequence[str], strip: str, ids:
             yield found("P503", message, fix, evidence, photos=(end,), strips=(strip,))
 
 
-def _on_a_line(plan: Floats, ids: Sequence[str], strip: str) -> Iterator[Finding]:
-    """Tell control whose breadth is a small part of its length: nothing holds the rotation about that line."""
-    values = np.linalg.svd(plan - plan.mean(axis=0), compute_uv=False)
-    if len(plan) < LEAST + 1 or values[0] <= 0 or values[-1] > NARROW * values[0]:
+def _on_a_line(place: Floats, side: Floats, ids: Sequence[str], strip: str) -> Iterator[Finding]:
+    """Tell control that stands on one line along the strip: nothing holds the rotation about it."""
+    if len(ids) <= LEAST or np.ptp(place) < LEAST_LENGTH:
         return
-    share = float(values[-1] / values[0])
-    message = f"strip {strip}: its control stands on one line, its breadth is {100 * share:.2g} % of its length"
-    fix = "add a control point at some distance from that line: the strip turns about it"
-    yield found("P502", message, fix, {"breadth_over_length": share}, points=ids, strips=(strip,))
+    columns = np.column_stack([np.ones(len(place)), place])
+    left = side - columns @ np.linalg.lstsq(columns, side, rcond=None)[0]
+    breadth = float(np.sqrt((left**2).sum() / (len(side) - LEAST)))
+    if breadth > NARROW:
+        return
+    message = (
+        f"strip {strip}: its control stands on one line, {100 * breadth:.2g} % of half the breadth of the strip to "
+        "either side: an error of a height turns the strip about it"
+    )
+    fix = "add a control point at some distance from that line"
+    yield found("P502", message, fix, {"rms_distance_over_half_breadth": breadth}, points=ids, strips=(strip,))
