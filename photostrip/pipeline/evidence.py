@@ -240,7 +240,7 @@ def _richest(strip: Strip, observations: PhotoPoints, control: ControlPoints) ->
     return strip.photos[first : first + WINDOW]
 
 
-def stations(strip: Strip, observations: PhotoPoints, control: ControlPoints) -> tuple[Numbers, Floats, Floats]:
+def stations(strip: Strip, observations: PhotoPoints, control: ControlPoints) -> tuple[Numbers, Floats]:
     """Give where along a strip given points lie.
 
     Parameters
@@ -258,8 +258,6 @@ def stations(strip: Strip, observations: PhotoPoints, control: ControlPoints) ->
         Rows of the given points that at least two of its photos show.
     place : ndarray, shape (m,)
         Mean number of those photos, from 0.
-    side : ndarray, shape (m,)
-        Mean distance from the middle of those photos, square to the bases, in half breadths of the strip.
     """
     order = {photo: number for number, photo in enumerate(strip.photos)}
     position = np.array([order.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo]
@@ -270,9 +268,42 @@ def stations(strip: Strip, observations: PhotoPoints, control: ControlPoints) ->
     number = {name: n for n, name in enumerate(observations.point_ids)}
     points = np.array([number.get(name, -1) for name in control.ids], np.intp)
     seen = np.flatnonzero((points >= 0) & (count[points] >= SEEN_BY))
-    angle = _base_angle(observations, strip.photos)
-    across = observations.xy[rows] @ [-np.sin(angle), np.cos(angle)]
-    breadth = max(float(np.quantile(np.abs(across), BREADTH)), 1e-12) if len(across) else 1.0
-    side = np.bincount(observations.point[rows], across, size)
     chosen = points[seen]
-    return seen, total[chosen] / count[chosen], side[chosen] / count[chosen] / breadth
+    return seen, total[chosen] / count[chosen]
+
+
+def half_breadth(strip: Strip, observations: PhotoPoints, ids: Sequence[str], plan: Floats) -> float:
+    """Give half the breadth of a strip.
+
+    Parameters
+    ----------
+    strip : Strip
+        The strip.
+    observations : PhotoPoints
+        Image points, mm.
+    ids : sequence of str
+        Ids of given points.
+    plan : ndarray, shape (n, 2)
+        Their plan coordinates in metres.
+
+    Returns
+    -------
+    float
+        Metres, with the scale of photos that show two given points or more; infinite when there is none.
+    """
+    inside = np.array([name in set(strip.photos) for name in observations.photo_ids], bool)[observations.photo]
+    angle = _base_angle(observations, strip.photos)
+    across = observations.xy[inside] @ [-np.sin(angle), np.cos(angle)]
+    row_of = {name: row for row, name in enumerate(ids)}
+    given = np.array([row_of.get(name, -1) for name in observations.point_ids], np.intp)[observations.point]
+    rows = np.flatnonzero(inside & (given >= 0))
+    rows = rows[np.argsort(observations.photo[rows], kind="stable")]
+    one, other = rows[:-1], rows[1:]
+    same = (observations.photo[one] == observations.photo[other]) & (given[one] != given[other])
+    one, other = one[same], other[same]
+    image = np.linalg.norm(observations.xy[one] - observations.xy[other], axis=1)
+    ground = np.linalg.norm(plan[given[one]] - plan[given[other]], axis=1)
+    good = image > 0
+    if not good.any():
+        return float("inf")
+    return float(np.median(ground[good] / image[good]) * np.quantile(np.abs(across), BREADTH))

@@ -236,15 +236,15 @@ def _of_control(
     axes_are_right = sure[0] if len(set(sure)) == 1 else None
     for strip, each in zip(strips, formed, strict=True):
         here = _on_strip(strip, each, examined, control, frames, as_written=nowhere, axes_are_right=axes_are_right)
-        if not here and not examined.light:
+        if not any(finding.is_error for finding in here) and not examined.light:
             read = partial(_by_heights, examined=examined, control=control, frames=frames)
             points, settings = examined.observations, examined.settings
             if each is not None:
-                here = distance_trial.examine(each, points, settings, read)
+                here = distance_trial.examine(each, points, settings, read) or here  # then single points prove nothing
             elif not examined.findings:
-                here = distance_trial.without_pairs(strip, points, settings, read)
+                here = distance_trial.without_pairs(strip, points, settings, read) or here
         told += here
-        told += _held(strip, examined, control)
+        told += _held(strip, examined, control, frames)
     return told
 
 
@@ -287,12 +287,17 @@ def _by_heights(
     return None if given is None else control_reading.stretched(given, seen)
 
 
-def _held(strip: Strip, examined: Examined, control: ControlPoints) -> list[Finding]:
+def _held(strip: Strip, examined: Examined, control: ControlPoints, frames: Sequence[GroundFrame]) -> list[Finding]:
     """Judge where the control of a strip lies."""
-    rows, place, side = evidence.stations(strip, examined.observations, control)
+    rows, place = evidence.stations(strip, examined.observations, control)
     counts = control.use[rows, 0] & ~control.check[rows]
-    ids = [control.ids[row] for row in rows[counts]]
-    return list(layout.examine(place[counts], side[counts], strip.photos, strip.id, ids))
+    here = control.take(rows[counts])
+    given = given_points.level(here, frames)
+    if given is None:
+        return []
+    plan = given.level[:, :2]
+    breadth = evidence.half_breadth(strip, examined.observations, here.ids, plan)
+    return list(layout.examine(place[counts], plan, breadth, strip.photos, strip.id, here.ids))
 
 
 # --------------------------------------------------------------------------------------------- after forming

@@ -186,7 +186,8 @@ def examine(
         told.append(_mirror(seen, normal, mirror, extent, axes_are_right=axes_are_right))
     elif normal.middle > FITS * extent:
         return _columns(given, exchanged(), seen, w, took_part, normal)
-    fitted = _fit(best, w, s[:, 2], given, seen, took_part)
+    seen, w, z, best = _levelled(given, seen, w, s[:, 2], best, took_part)
+    fitted = _fit(best, w, z, given, seen, took_part)
     wrong_lists, lists = _lists(given, seen, w, fitted, took_part)
     told += lists
     if wrong_lists:
@@ -194,7 +195,7 @@ def examine(
         again = lay(w[took_part], given.plan[took_part], mirrored=best.mirrored)
         if again is None:
             return told
-        fitted = _fit(again, w, s[:, 2], given, seen, took_part)
+        fitted = _fit(again, w, z, given, seen, took_part)
     judged = ~np.isin(given.group, wrong_lists)
     told += _in_plan(given, seen, fitted, judged)
     told += _in_height(given, seen, fitted, judged)
@@ -266,6 +267,34 @@ def _columns(
             fix = "put `control.axes` into the order of the columns"
             return [found("P401", message, fix, evidence, strips=(seen.strip,), key="control")]
     return []
+
+
+def _levelled(
+    given: Given, seen: Seen, w: Complex, z: Floats, laid: Laid, took_part: Flags
+) -> tuple[Seen, Complex, Floats, Laid]:
+    """Turn a strip by the tilt that the heights of its control show; the cameras look down within degrees only.
+
+    Relief times that tilt is a displacement in plan. Where the heights do not help, all stays as it is.
+    """
+    unchanged = seen, w, z, laid
+    scale = abs(laid.turn)
+    place, height = laid(w), scale * z
+    usable = given.use[:, 2] & ~given.check & np.isfinite(given.level[:, 2]) & np.isfinite(height) & np.isfinite(place)
+    if usable.sum() <= LEAST:
+        return unchanged
+    mean = float(height[usable].mean())
+    columns = [np.ones(len(w)), place.real, place.imag]
+    columns += [height - mean] if usable.sum() >= LEAST + 2 * SPARE else []  # a wrong unit of the heights is no tilt
+    design = np.where(usable[:, None], np.column_stack(columns), 0.0)
+    value = np.where(usable, given.level[:, 2] - height, 0.0)
+    floor = max(seen.floor[1] * seen.depth * scale, given.sigma[1], SMALL)
+    tilt = bend(design, value, usable, floor).coefficient[1:3]
+    turned = np.column_stack([place.real, place.imag, height]) @ upright(np.array([[tilt[0], tilt[1], 1.0]])).T
+    level = turned[:, 0] + 1j * turned[:, 1]
+    again = lay(level[took_part], given.plan[took_part])
+    if again is None or again.middle > laid.middle:
+        return unchanged
+    return replace(seen, depth=seen.depth * scale), level, turned[:, 2], again
 
 
 def _fit(laid: Laid, w: Complex, z: Floats, given: Given, seen: Seen, took_part: Flags) -> Fitted:
@@ -470,7 +499,11 @@ class Heights:
     value : ndarray, shape (n,)
         Given minus height in the strip, metres.
     columns : ndarray, shape (n, c)
-        Tilt and bending.
+        Tilt and, where it is needed, bending.
+    whole : list of ndarray, shape (n,)
+        All columns of tilt and bending.
+    deviation : ndarray, shape (n,)
+        Heights in the strip, against their mean.
     scaled : Bent
         Fit with the scale of the heights free; its last coefficient is that scale minus one.
     """
@@ -479,6 +512,8 @@ class Heights:
     took_part: Flags
     value: Floats
     columns: Floats
+    whole: list[Floats]
+    deviation: Floats
     scaled: Bent
 
     @property
@@ -504,7 +539,7 @@ def _heights(given: Given, fitted: Fitted, judged: Flags) -> Heights | None:
     base, _ = _simplest([deviation, *whole], 4, value, took_part, fitted.floor[1])
     base = base[:, 1:]
     scaled = bend(np.column_stack([base, deviation]), value, took_part, fitted.floor[1])
-    return Heights(usable, took_part, value, base, scaled)
+    return Heights(usable, took_part, value, base, whole, deviation, scaled)
 
 
 class Stretched(NamedTuple):
@@ -544,15 +579,18 @@ def stretched(given: Given, seen: Seen) -> Stretched | None:
     laid = lay(w[took_part], given.plan[took_part])
     if laid is None:
         return None
-    fitted = _fit(laid, w, s[:, 2], given, seen, took_part)
+    seen, w, z, laid = _levelled(given, seen, w, s[:, 2], laid, took_part)
+    fitted = _fit(laid, w, z, given, seen, took_part)
     heights = _heights(given, fitted, np.ones(len(w), bool))
-    if heights is None or heights.scaled.freedom < 1:
+    if heights is None or heights.took_part.sum() < LEAST + SPARE:
         return None
-    plain = bend(heights.columns, heights.value, heights.took_part, fitted.floor[1])
+    tilt = np.column_stack(heights.whole[:LEAST])
+    plain = bend(tilt, heights.value, heights.took_part, fitted.floor[1])
+    free = bend(np.column_stack([tilt, heights.deviation]), heights.value, heights.took_part, fitted.floor[1])
     size = np.abs(plain.residual[heights.took_part])
-    freedom = max(int(heights.took_part.sum()) - heights.columns.shape[1], 1)
+    freedom = max(int(heights.took_part.sum()) - LEAST, 1)
     misfit = float(np.sqrt((np.minimum(size, KEPT * np.median(size)) ** 2).sum() / freedom)) / fitted.floor[1]
-    return Stretched(heights.ratio[0], max(misfit, 1.0))
+    return Stretched(1.0 + float(free.coefficient[-1]), max(misfit, 1.0))
 
 
 def _in_height(given: Given, seen: Seen, fitted: Fitted, judged: Flags) -> Iterator[Finding]:
@@ -566,8 +604,8 @@ def _in_height(given: Given, seen: Seen, fitted: Fitted, judged: Flags) -> Itera
         yield _other_scale(seen, ratio, sigma, took_part)
         return
     for names, inside, key in _groups(given, took_part):
-        offset = bend(np.column_stack([heights.columns, inside.astype(float)]), heights.value, took_part, floor)
-        size, sigma = float(offset.coefficient[-1]), float(offset.sigma[-1])
+        _, offset = _simplest([inside.astype(float), *heights.whole], 4, heights.value, took_part, floor)
+        size, sigma = float(offset.coefficient[0]), float(offset.sigma[0])
         if _significant(size, sigma, offset.freedom, OFFSET_LEAST * floor):
             yield _other_heights(given, seen, names, key, size, sigma, inside & took_part)
             return

@@ -21,20 +21,23 @@ ONE_END = 0.4  # of the strip's length: control that spans less, all in one half
 HALF = 0.55
 BEYOND = 0.5  # of the control's length: what lies farther out is extrapolated by more than half of it
 NARROW = 0.12  # rms distance of the control from a line, in half breadths of the strip: errors grow 8-fold at its edge
-LEAST_LENGTH = 0.5  # bases: shorter control is a band across, which has no line along the strip
 FEWEST = 4  # photos of a strip that has ends
 LEAST = 2
 
 
-def examine(place: Floats, side: Floats, photos: Sequence[str], strip: str, ids: Sequence[str]) -> Iterator[Finding]:
-    """Judge where the control of a strip lies, as its photos show it; that needs no coordinates of it.
+def examine(
+    place: Floats, plan: Floats, half_breadth: float, photos: Sequence[str], strip: str, ids: Sequence[str]
+) -> Iterator[Finding]:
+    """Judge where the control of a strip lies.
 
     Parameters
     ----------
     place : ndarray, shape (n,)
         Place of each control point along the strip: the mean number of the photos that show it, from 0.
-    side : ndarray, shape (n,)
-        Its distance from the flight line in half breadths of the strip.
+    plan : ndarray, shape (n, 2)
+        Its given plan coordinates, metres.
+    half_breadth : float
+        Half the breadth of the strip, metres.
     photos : sequence of str
         Photos of the strip in order.
     strip : str
@@ -49,7 +52,7 @@ def examine(place: Floats, side: Floats, photos: Sequence[str], strip: str, ids:
     """
     if len(ids) < LEAST:
         return
-    yield from _on_a_line(place, side, ids, strip)
+    yield from _on_a_line(plan, half_breadth, ids, strip)
     last = len(photos) - 1
     if len(photos) < FEWEST:
         return
@@ -79,13 +82,12 @@ def examine(place: Floats, side: Floats, photos: Sequence[str], strip: str, ids:
             yield found("P503", message, fix, evidence, photos=(end,), strips=(strip,))
 
 
-def _on_a_line(place: Floats, side: Floats, ids: Sequence[str], strip: str) -> Iterator[Finding]:
-    """Tell control that stands on one line along the strip: nothing holds the rotation about it."""
-    if len(ids) <= LEAST or np.ptp(place) < LEAST_LENGTH:
+def _on_a_line(plan: Floats, half_breadth: float, ids: Sequence[str], strip: str) -> Iterator[Finding]:
+    """Tell control that stands on one line: nothing holds the rotation about it."""
+    if len(ids) <= LEAST:
         return
-    columns = np.column_stack([np.ones(len(place)), place])
-    left = side - columns @ np.linalg.lstsq(columns, side, rcond=None)[0]
-    breadth = float(np.sqrt((left**2).sum() / (len(side) - LEAST)))
+    values = np.linalg.svd(plan - plan.mean(axis=0), compute_uv=False)
+    breadth = float(values[-1] / np.sqrt(len(ids) - LEAST) / half_breadth)
     if breadth > NARROW:
         return
     message = (
