@@ -30,6 +30,8 @@ MISFIT = 2.5  # times what makes sense: heights that fit better need no other pr
 BETTER = 0.4  # of that misfit, left with another principal distance that is told
 NO_WORSE = 1.1  # times the sigma0 of the pairs
 TRIALS = 3  # of forming a strip anew
+GIVEN_UP = 60.0  # misfit after two of them
+LONGEST = 40  # photos: a longer strip would take too long
 TRIED = (0.2, 5.0)  # of the principal distance given
 FIRST = (1.4, 0.7, 2.0, 0.5)  # tried when the pairs cannot be oriented at all
 
@@ -53,11 +55,14 @@ def examine(formed: Formed, observations: PhotoPoints, settings: Settings, read:
     list of Finding
         P105, at most one.
     """
-    first = read(formed)
+    first = read(formed) if len(formed.strip.photos) <= LONGEST else None
     if first is None or first.misfit < MISFIT or abs(first.ratio - 1.0) < control_reading.SCALE_LEAST:
         return []
-    ratio, last, pairs = _settled(formed.strip, observations, settings, read, first, 1.0)
-    if last is None or last.misfit > BETTER * first.misfit or pairs > NO_WORSE * _pairs(formed):
+    for start in (first.ratio, *FIRST):
+        ratio, last, pairs = _settled(formed.strip, observations, settings, read, start)
+        if last is not None and last.misfit < BETTER * first.misfit and pairs < NO_WORSE * _pairs(formed):
+            break
+    else:
         return []
     numbers: dict[str, float | int | str] = {
         "heights_given_over_strip": first.ratio, "misfit_as_given": first.misfit, "misfit_then": last.misfit,
@@ -80,12 +85,8 @@ def without_pairs(strip: Strip, observations: PhotoPoints, settings: Settings, r
     list of Finding
         P105, at most one.
     """
-    for factor in FIRST:
-        formed = evidence.form(_changed(strip, factor), observations, settings)
-        first = read(formed) if formed is not None else None
-        if first is None:
-            continue
-        ratio, last, pairs = _settled(strip, observations, settings, read, first, factor)
+    for start in FIRST if len(strip.photos) <= LONGEST else ():
+        ratio, last, pairs = _settled(strip, observations, settings, read, start)
         if last is not None and last.misfit < MISFIT:
             numbers: dict[str, float | int | str] = {"misfit_then": last.misfit, "pairs_sigma0_then_mm": pairs}
             return _told(strip, ratio, "can be formed and fits the heights of its control only", numbers)
@@ -105,19 +106,22 @@ def _pairs(formed: Formed) -> float:
 
 
 def _settled(
-    strip: Strip, observations: PhotoPoints, settings: Settings, read: Read, first: Stretched, ratio: float
+    strip: Strip, observations: PhotoPoints, settings: Settings, read: Read, ratio: float
 ) -> tuple[float, Stretched | None, float]:
     """Follow the stretch of the heights until it is gone: factor of the principal distance, fit, sigma0 of pairs."""
     last, pairs = None, 0.0
-    for _ in range(TRIALS):
-        ratio *= first.ratio
+    for trial in range(TRIALS):
+        if last is not None:
+            ratio *= last.ratio
         if not TRIED[0] < ratio < TRIED[1]:
             return ratio, None, 0.0
         again = evidence.form(_changed(strip, ratio), observations, settings)
         last = read(again) if again is not None else None
         if again is None or last is None:
             return ratio, None, 0.0
-        first, pairs = last, _pairs(again)
+        pairs = _pairs(again)
+        if trial and last.misfit > GIVEN_UP:
+            break
     return ratio, last, pairs
 
 

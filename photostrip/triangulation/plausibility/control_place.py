@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 Area = tuple[float, float, float, float]
-MARGIN = 0.25  # of the width and height of the area: strips reach beyond a zone
-LEAST_MARGIN = 1.0  # degrees
+MARGIN = (0.6, 0.25)  # of the width and the height of the area: a neighbouring zone is used on purpose at times
+MARGIN_LIMITS = (1.0, 4.0)  # degrees
 ROUND = 360.0  # degrees
 MOST = 0.5  # of the points that may lie outside: single points are slips
 MILLION = 1e6
@@ -125,8 +125,9 @@ def _inside(frame: GroundFrame, area: Area, enu: Floats) -> bool:
         return False
     west, south, east, north = area
     width = (east - west) % ROUND or ROUND
-    beside = max(MARGIN * width, LEAST_MARGIN)
-    above = max(MARGIN * (north - south), LEAST_MARGIN)
+    beside, above = (
+        float(np.clip(part * size, *MARGIN_LIMITS)) for part, size in zip(MARGIN, (width, north - south), strict=True)
+    )
     lon = (degrees[:, 0] - west + beside) % ROUND
     within = (lon <= width + 2.0 * beside) | (width + 2.0 * beside >= ROUND)
     within &= (degrees[:, 1] >= south - above) & (degrees[:, 1] <= north + above)

@@ -40,6 +40,7 @@ SURE = 1e-5  # probability of a finding where there is nothing to find
 SCALE_LEAST = 0.03  # of the ratio of heights to plan: a smaller one harms nobody and may be a bent strip
 OFFSET_LEAST = 8.0  # a-priori standard deviations of a height: a smaller constant does no harm
 GROUP_LEAST = 3
+SCALE_CHANGE = 3e-4  # of a large error: the scale of a map is not the same where the point came to lie
 MOST_ODD = 0.6  # of the points of a list: beyond it the list is wrong, not its points
 AXES = ("east", "north", "up")
 
@@ -466,7 +467,8 @@ def _slips(
         written = float(given.written[row, axis])
         if not np.isfinite(written):
             continue
-        fits = slip(written, written - off / unit, spread[0] / unit, spread[1] / unit)
+        near = spread[1] + SCALE_CHANGE * abs(off)
+        fits = slip(written, written - off / unit, spread[0] / unit, near / unit)
         if fits is None:
             continue
         role = "check" if given.check[row] else "control"

@@ -113,9 +113,10 @@ def _decoded(
 
 
 def _metres(frame: GroundFrame, enu: Floats) -> Floats:
-    """Metres in a unit of each coordinate."""
-    if frame.kind != "geographic":
+    """Metres on the ground in a unit of each coordinate: a map has a scale of its own."""
+    if frame.kind in {"local", "geocentric"}:
         return np.broadcast_to([frame.plan_factor, frame.plan_factor, frame.height_factor], enu.shape)
-    step = 1e-5
-    columns = [frame.difference(enu + step * np.eye(3)[axis], enu)[:, axis] / step for axis in range(3)]
-    return np.column_stack(columns)
+    step = 1e-5 if frame.kind == "geographic" else 1.0
+    here = frame.cartesian_from_ground(enu)
+    there = [frame.cartesian_from_ground(enu + step * np.eye(3)[axis]) for axis in range(3)]
+    return np.column_stack([np.linalg.norm(each - here, axis=1) / step for each in there])

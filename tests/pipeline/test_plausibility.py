@@ -1,0 +1,369 @@
+"""Mistakes in whole projects: told in `check` and `run`, one and several at once, and none where there is none."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from photostrip.cli.main import main
+from photostrip.errors import PhotostripError
+from photostrip.formats.simulation import inputs_of, project_files, settings_of
+from photostrip.geometry.rotation import angles
+from photostrip.pipeline import Settings, plausibility, triangulate
+from photostrip.pipeline.inputs import GivenOrientations
+from photostrip.simulate import DIGITAL, Control, Film, Flight, GrossError, Ground, Image, Spec, Terrain, simulate
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from photostrip.notes import Finding
+    from photostrip.pipeline import Inputs
+    from photostrip.simulate import Simulation
+
+    Floats = NDArray[np.float64]
+
+FOOT = 0.3048  # m
+FRAMES = {
+    "utm": Ground("EPSG:32633"),
+    "south": Ground("EPSG:32719", ("north", "east", "up"), center_deg=(-68.0, -33.0)),
+    "degrees": Ground("EPSG:4326"),
+    "geocentric": Ground("geocentric", ("x", "y", "z")),
+    "local": Ground("local"),
+}
+BANDS = Control(bands=4, per_band=3, check=6)
+
+
+def strip(frame: str = "utm") -> Spec:
+    """Describe a strip over hills."""
+    return Spec(
+        seed=5,
+        ground=FRAMES[frame],
+        flight=Flight(photos=7, heading_deg=40.0, end_lap_percent=62.0),
+        terrain=Terrain(relief=120.0),
+        control=BANDS,
+    )
+
+
+@cache
+def simulation(frame: str = "utm") -> Simulation:
+    """Simulate a strip over hills."""
+    return simulate(strip(frame))
+
+
+def told(inputs: Inputs, settings: Settings | None = None) -> tuple[Finding, ...]:
+    """Give what a run tells, whether it succeeds or not."""
+    try:
+        return triangulate(inputs, settings or Settings()).findings
+    except PhotostripError as error:
+        return error.findings
+
+
+def codes(findings: tuple[Finding, ...]) -> list[str]:
+    """Give the codes of findings."""
+    return sorted({each.code for each in findings})
+
+
+def with_control(inputs: Inputs, change: Callable[[Floats], Floats]) -> Inputs:
+    """Change the given coordinates east, north, up."""
+    return replace(inputs, control=replace(inputs.control, enu=change(inputs.control.enu.copy())))
+
+
+def control_rows(inputs: Inputs) -> Floats:
+    """Give the rows of control points that are measured."""
+    control = inputs.control
+    return np.flatnonzero(~control.check & np.isin(control.ids, inputs.observations.point_ids))
+
+
+# -------------------------------------------------------------------------------------------------- nothing wrong
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+def test_a_sound_project_has_no_finding(frame: str) -> None:
+    made = simulation(frame)
+    assert told(inputs_of(made), settings_of(made)) == ()
+    assert plausibility.of_inputs(inputs_of(made), settings_of(made)) == ()
+
+
+@pytest.mark.parametrize(
+    "spec",
+    [
+        replace(strip(), camera=DIGITAL, image=Image(unit="px", y_axis="down")),
+        replace(strip(), film=Film()),
+        replace(strip(), gross_errors=(GrossError("image", count=4),)),
+        replace(strip(), control=Control(bands=3, per_band=3, use={"xyz": 0.6, "xy": 0.2, "z": 0.2})),
+        replace(strip(), control=replace(BANDS, second_crs="EPSG:32632", boundary_longitude_deg=15.3)),
+        replace(
+            strip(),
+            ground=replace(FRAMES["utm"], center_deg=(18.0, 49.2)),
+            control=replace(BANDS, second_crs="EPSG:32634", boundary_longitude_deg=18.0),
+        ),
+    ],
+    ids=["pixels", "film", "gross errors of the image", "plan and height apart", "far beyond a zone", "two zones"],
+)
+def test_other_sound_projects_have_none_either(spec: Spec) -> None:
+    made = simulate(spec)
+    assert told(inputs_of(made), settings_of(made)) == ()
+    assert plausibility.of_inputs(inputs_of(made), settings_of(made)) == ()
+
+
+# ------------------------------------------------------------------------------------------------------- one mistake
+
+
+def test_control_with_exchanged_axes_is_told_by_its_place() -> None:
+    made = simulation("utm")
+    wrong = with_control(inputs_of(made), lambda enu: enu[:, [1, 0, 2]])
+    assert codes(plausibility.of_inputs(wrong, Settings())) == ["P401"]
+    findings = told(wrong)
+    assert codes(findings) == ["P401"]
+    assert any("with east and north exchanged it would lie there" in each.message for each in findings)
+
+
+@pytest.mark.parametrize("flip", [[1.0, -1.0], [-1.0, 1.0]])
+def test_mirrored_images_are_told_apart_from_control_where_the_place_is_known(flip: list[float]) -> None:
+    made = simulation("utm")
+    inputs = inputs_of(made)
+    wrong = replace(inputs, observations=replace(inputs.observations, xy=inputs.observations.xy * flip))
+    (finding,) = told(wrong)
+    assert finding.code == "P103"
+    expected = "y counted the other way" if flip[1] < 0 else "negatives read as positives"
+    assert expected in finding.message
+    assert codes(plausibility.of_inputs(wrong, Settings())) == ["P103"]
+    local = inputs_of(simulation("local"))
+    both = replace(local, observations=replace(local.observations, xy=local.observations.xy * flip))
+    (finding,) = told(both)
+    assert finding.code == "P401"
+    assert "or else the image coordinates are mirrored" in finding.message
+
+
+def test_latitude_and_longitude_exchanged() -> None:
+    wrong = with_control(inputs_of(simulation("degrees")), lambda enu: enu[:, [1, 0, 2]])
+    (finding,) = told(wrong)
+    assert finding.code == "P401"
+
+
+@pytest.mark.parametrize("foot", [FOOT, 1200 / 3937])
+def test_projected_control_in_feet(foot: float) -> None:
+    (finding,) = told(with_control(inputs_of(simulation("utm")), lambda enu: enu / foot))
+    assert finding.code == "P403"
+    assert "US survey feet" in finding.fix
+
+
+def test_control_of_another_country() -> None:
+    inputs = inputs_of(simulation("utm"))
+    (finding,) = told(replace(inputs, frames=(replace(inputs.frames[0], crs="EPSG:27700"),)))
+    assert finding.code == "P402"
+    assert finding.key == "control[0].crs"
+
+
+def test_heights_in_feet_and_plan_in_metres() -> None:
+    (finding,) = told(with_control(inputs_of(simulation("local")), lambda enu: enu * [1, 1, 1 / FOOT]))
+    assert finding.code == "P405"
+    assert finding.evidence["heights_given_over_strip"] == pytest.approx(1 / FOOT, rel=0.03)
+
+
+def test_heights_that_count_downwards() -> None:
+    (finding,) = told(with_control(inputs_of(simulation("local")), lambda enu: enu * [1, 1, -1]))
+    assert finding.code == "P401"
+    assert "downwards" in finding.message
+
+
+@pytest.mark.parametrize("factor", [1.37, 0.73])
+def test_the_principal_distance_of_another_lens(factor: float) -> None:
+    inputs = inputs_of(simulation("utm"))
+    strip = inputs.strips[0]
+    camera = replace(strip.camera, principal_distance=153.0 * factor)
+    (finding,) = [
+        each for each in told(replace(inputs, strips=(replace(strip, camera=camera),))) if each.severity == "error"
+    ]
+    assert finding.code == "P105"
+    if "would_fit_mm" in finding.evidence:
+        assert finding.evidence["would_fit_mm"] == pytest.approx(153.0, abs=1.0)
+
+
+def second_list(inputs: Inputs, change: Callable[[Floats], Floats]) -> tuple[Inputs, tuple[str, ...]]:
+    """Put every third control point into a list of its own and change it."""
+    rows = control_rows(inputs)[::3]
+    frame, enu = np.zeros(len(inputs.control), int), inputs.control.enu.copy()
+    frame[rows] = 1
+    enu[rows] = change(enu[rows])
+    control = replace(inputs.control, frame=frame, enu=enu)
+    names = tuple(inputs.control.ids[row] for row in rows)
+    return replace(inputs, control=control, frames=inputs.frames * 2), names
+
+
+def test_heights_of_two_kinds() -> None:
+    wrong, names = second_list(inputs_of(simulation("utm")), lambda enu: enu + np.array([0.0, 0.0, 47.3]))
+    (finding,) = told(wrong)
+    assert (finding.code, set(finding.points)) == ("P404", set(names))
+    assert finding.evidence["constant_m"] == pytest.approx(47.3, abs=1.0)
+
+
+@pytest.mark.parametrize("before", [False, True])
+def test_one_of_two_lists_in_feet_or_elsewhere(before: bool) -> None:
+    ask = (lambda wrong: plausibility.of_inputs(wrong, Settings())) if before else told
+    feet, _ = second_list(inputs_of(simulation("local")), lambda enu: enu / FOOT)
+    assert "P403" in codes(ask(feet))
+    away, names = second_list(inputs_of(simulation("local")), lambda enu: enu + np.array([5000.0, -3000.0, 0.0]))
+    (finding,) = [each for each in ask(away) if each.code == "P407"]
+    assert set(finding.points) == set(names)
+    assert finding.evidence["offset_east_m"] == pytest.approx(5000.0, abs=30.0 if before else 5.0)
+
+
+@pytest.mark.parametrize(("axis", "step"), [(0, 1000.0), (1, -20.0), (2, 30.0), (1, 5.0)])
+@pytest.mark.parametrize("role", ["control", "check"])
+def test_a_slip_of_a_digit_is_named_with_the_digit(axis: int, step: float, role: str) -> None:
+    inputs = inputs_of(simulation("utm"))
+    row = int(control_rows(inputs)[4] if role == "control" else np.flatnonzero(inputs.control.check)[1])
+    name = inputs.control.ids[row]
+    text = f"{inputs.control.enu[row, axis]:.3f}"
+    place = text.index(".") - 1 - int(np.log10(abs(step)))
+    if not 0 <= int(text[place]) + np.sign(step) * int(str(abs(step))[0]) <= 9:
+        step = -step  # a digit that would carry over is no single wrong digit
+
+    def slip(enu: Floats) -> Floats:
+        enu[row, axis] += step
+        return enu
+
+    (finding,) = told(with_control(inputs, slip))
+    assert (finding.code, finding.points, finding.severity) == ("P406", (name,), "warning")
+    assert "typing error" in finding.message
+    assert finding.evidence["would_fit"] == pytest.approx(inputs.control.enu[row, axis], abs=1e-6)
+
+
+def test_two_control_points_exchanged() -> None:
+    inputs = inputs_of(simulation("utm"))
+    one, other = control_rows(inputs)[[1, 7]]
+
+    def exchange(enu: Floats) -> Floats:
+        enu[[one, other]] = enu[[other, one]]
+        return enu
+
+    findings = told(with_control(inputs, exchange))
+    assert codes(findings) == ["P408"]
+    assert set(findings[0].points) == {inputs.control.ids[one], inputs.control.ids[other]}
+
+
+def test_start_angles_in_gons_and_in_another_system() -> None:
+    made = simulation("utm")
+    truth, inputs = made.truth, inputs_of(made)
+    values, nan = angles(truth.rotations_local, "omega-phi-kappa"), np.full((len(truth.photo_ids), 3), np.nan)
+
+    def given(read: Floats) -> Inputs:
+        frame = inputs.frames[0]
+        start = GivenOrientations(
+            truth.photo_ids, frame, truth.centers_ground, read, "omega-phi-kappa", nan, nan, observed=False
+        )
+        return replace(inputs, orientations=start)
+
+    assert told(given(values)) == ()
+    assert codes(told(given(values * 200 / 180))) == ["P601"]
+    (finding,) = told(given(values * [1, 1, -1]))
+    assert finding.code == "P602"
+    assert "kappa of the other sign" in finding.message
+
+
+# ------------------------------------------------------------------------------------------------ several at once
+
+
+def four_faults(folder: Path, frame: str) -> tuple[Path, str]:
+    """Write a project with a wrong unit, an exchanged pair, left-handed control and a slip of a digit."""
+    made = simulation(frame)
+    files = project_files(made)
+    project = files["project.yaml"]
+    photos = made.strips[0][1]
+    assert "unit: mm" in project
+    project = project.replace("unit: mm", "unit: um").replace("sigma: 0.005", "sigma: 5")
+    listed = project.index(f'"{photos[2]}"'), project.index(f'"{photos[3]}"')
+    project = project[: listed[0]] + f'"{photos[3]}", "{photos[2]}"' + project[listed[1] + len(photos[3]) + 2 :]
+    files["project.yaml"] = project.replace("axes: [east, north, up]", "axes: [north, east, up]")
+    rows = files["control.csv"].splitlines()
+    name, x, *rest = rows[5].split(",")
+    digit = x.index(".") - 3
+    wrong = f"{x[:digit]}{(int(x[digit]) + 4) % 10}{x[digit + 1 :]}"
+    rows[5] = ",".join([name, wrong, *rest])
+    files["control.csv"] = "\n".join(rows) + "\n"
+    for path, text in files.items():
+        (folder / path).write_text(text, encoding="utf-8")
+    return folder / "project.yaml", name
+
+
+@pytest.mark.parametrize("frame", ["local", "utm"])
+def test_four_mistakes_at_once_are_all_told(frame: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    project, name = four_faults(tmp_path, frame)
+    assert main(["run", str(project), "--format", "json"]) in {2, 3}
+    findings = json.loads(capsys.readouterr().out)["findings"]
+    by_code = {each["code"]: each for each in findings}
+    assert {"P101", "P201", "P401", "P406"} <= set(by_code)
+    assert set(by_code["P201"]["photos"]) == {"1003", "1004"}
+    assert by_code["P406"]["points"] == [name]
+    assert (by_code["P406"]["file"], by_code["P406"]["line"]) == (str(tmp_path / "control.csv"), 6)
+    assert by_code["P101"]["key"] == "observations.unit"
+    assert main(["check", str(project), "--format", "json"]) == 2
+    checked = {each["code"] for each in json.loads(capsys.readouterr().out)["projects"][0]["findings"]}
+    assert {"P101", "P201", "P401", "P406"} <= checked
+
+
+def test_findings_are_told_in_every_form(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    project, _ = four_faults(tmp_path, "utm")
+    assert main(["run", str(project), "--format", "github"]) in {2, 3}
+    lines = capsys.readouterr().out.splitlines()
+    assert any(line.startswith("::error") and "title=photostrip P101::" in line for line in lines)
+    assert any(line.startswith("::warning") and "title=photostrip P406::" in line for line in lines)
+    assert main(["run", str(project)]) in {2, 3}
+    assert "P201" in capsys.readouterr().err
+
+
+def test_what_is_accepted_is_told_and_no_longer_counts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    made = simulation("utm")
+    for path, text in project_files(made).items():
+        (tmp_path / path).write_text(text, encoding="utf-8")
+    rows = (tmp_path / "control.csv").read_text(encoding="utf-8").splitlines()
+    gone = [row for row in rows if not row.startswith("G") or made.control.ids.index(row.split(",")[0]) < 4]
+    (tmp_path / "control.csv").write_text("\n".join(gone) + "\n", encoding="utf-8")
+    project = tmp_path / "project.yaml"
+    assert main(["check", str(project), "--quiet"]) == 0
+    first = capsys.readouterr().out
+    assert "warning: " in first
+    assert "P501" in first
+    with project.open("a", encoding="utf-8") as file:
+        file.write("accept: [P501/A, P502]\n")
+    assert main(["check", str(project), "--quiet"]) == 0
+    assert "P501 accepted: " in capsys.readouterr().out
+    assert main(["run", str(project), "-o", str(tmp_path / "out"), "--quiet"]) == 0
+    result = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))
+    (finding,) = result["findings"]
+    assert (finding["code"], finding["accepted"]) == ("P501", True)
+    assert not any("P501" in text for text in result["verdict"]["look_at"])
+
+
+def test_a_finding_that_does_not_exist_cannot_be_accepted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for path, text in project_files(simulation("utm")).items():
+        (tmp_path / path).write_text(text, encoding="utf-8")
+    with (tmp_path / "project.yaml").open("a", encoding="utf-8") as file:
+        file.write("accept: [P999]\n")
+    assert main(["check", str(tmp_path / "project.yaml"), "--quiet"]) == 2
+    assert "there is no finding `P999`" in capsys.readouterr().out
+
+
+def test_an_error_fails_a_run_that_is_done(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    made = simulation("local")
+    files = project_files(made)
+    strips = files["project.yaml"].replace("principal_distance: 153", "principal_distance: 1530")
+    for path, text in (files | {"project.yaml": strips}).items():
+        (tmp_path / path).write_text(text, encoding="utf-8")
+    code = main(["run", str(tmp_path / "project.yaml"), "--format", "json"])
+    document = json.loads(capsys.readouterr().out)
+    if code == 1:
+        assert document["status"] == "failed"
+        assert document["verdict"]["look_at"][0].startswith("P105 ")
+    else:  # so wrong that nothing can be adjusted
+        assert code == 3
+        assert "P105" in {each["code"] for each in document["findings"]}
