@@ -76,7 +76,7 @@ def with_control(inputs: Inputs, change: Callable[[Floats], Floats]) -> Inputs:
     return replace(inputs, control=replace(inputs.control, enu=change(inputs.control.enu.copy())))
 
 
-def control_rows(inputs: Inputs) -> Floats:
+def control_rows(inputs: Inputs) -> NDArray[np.intp]:
     """Give the rows of control points that are measured."""
     control = inputs.control
     return np.flatnonzero(~control.check & np.isin(control.ids, inputs.observations.point_ids))
