@@ -113,6 +113,7 @@ def two_ids(observations: PhotoPoints, formed: FormedStrip, focal: float, strip:
     reach = SAME_PLACE * sigma / focal * depth
     tall = SAME_DEPTH * reach * depth / max(float(np.median(bases)), 1e-12)
     one, two = _near(formed.xyz, reach)
+    apart = len(formed.xyz) ** 2 * reach**2 * np.pi / 2.0 / max(_area(formed.xyz), 1e-12)
     near = SAME_IMAGE / SAME_PLACE * reach  # two points farther apart are seen as two on their photos
     expected = len(formed.xyz) ** 2 * near**2 * np.pi / 2.0 / max(_area(formed.xyz), 1e-12)
     if expected > CHANCE:
@@ -121,7 +122,8 @@ def two_ids(observations: PhotoPoints, formed: FormedStrip, focal: float, strip:
         if abs(formed.xyz[a, 2] - formed.xyz[b, 2]) > tall:
             continue
         numbers = (int(formed.point[a]), int(formed.point[b]))
-        if _two_on_a_photo(observations, numbers, strip):
+        together = _together(observations, numbers, strip)
+        if together is False or (together is None and apart > CHANCE):
             continue
         names = tuple(observations.point_ids[number] for number in numbers)
         gap = float(np.linalg.norm(formed.xyz[a, :2] - formed.xyz[b, :2]) / depth * focal)
@@ -164,14 +166,14 @@ def _near(xyz: Floats, reach: float) -> tuple[Numbers, Numbers]:
     return np.concatenate(ones), np.concatenate(twos)
 
 
-def _two_on_a_photo(observations: PhotoPoints, numbers: tuple[int, int], strip: Sequence[str]) -> bool:
-    """Whether a photo shows two points at two places."""
+def _together(observations: PhotoPoints, numbers: tuple[int, int], strip: Sequence[str]) -> bool | None:
+    """Whether two points stand at one place on the photos that show both; None when there is no such photo."""
     inside = np.array([name in set(strip) for name in observations.photo_ids], bool)[observations.photo]
     rows = [np.flatnonzero((observations.point == number) & inside) for number in numbers]
     _, one, two = np.intersect1d(observations.photo[rows[0]], observations.photo[rows[1]], return_indices=True)
     if not len(one):
-        return False
+        return None
     a, b = rows[0][one], rows[1][two]
     difference = (observations.xy[a] - observations.xy[b]).mean(axis=0)
     variance = (observations.sigma[a] ** 2 + observations.sigma[b] ** 2).sum(axis=0) / len(a) ** 2
-    return bool((np.abs(difference) > SAME_IMAGE * np.sqrt(variance)).any())
+    return bool((np.abs(difference) <= SAME_IMAGE * np.sqrt(variance)).all())

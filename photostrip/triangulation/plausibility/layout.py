@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 ONE_END = 0.4  # of the strip's length: control that spans less, all in one half, is at one end
 HALF = 0.55
 BEYOND = 0.5  # of the control's length: what lies farther out is extrapolated by more than half of it
-NARROW = 0.12  # rms distance of the control from a line, in half breadths of the strip: errors grow 8-fold at its edge
+NARROW = 0.08  # rms distance of the control from a line, in half breadths of the strip: errors grow 12-fold
 FEWEST = 4  # photos of a strip that has ends
 LEAST = 2
 
