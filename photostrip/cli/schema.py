@@ -16,6 +16,9 @@ def schema(
         Literal["model", "strip", "camera"] | None,
         typer.Option("--plan", help="The file of this command of `photostrip plan` instead."),
     ] = None,
+    tolerances: Annotated[
+        bool, typer.Option("--tolerances", help="The tolerance profile of `photostrip compare` instead.")
+    ] = False,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="FILE", help="File to write; default: stdout.")
     ] = None,
@@ -32,7 +35,12 @@ def schema(
     from photostrip.project.schema import json_schema
     from photostrip.project.simulation_spec import simulation_schema
 
-    found = plan_schema(plan) if plan else simulation_schema() if simulation else json_schema()
+    if tolerances:
+        from photostrip.project.tolerance_profile import tolerance_schema
+
+        found = tolerance_schema()
+    else:
+        found = plan_schema(plan) if plan else simulation_schema() if simulation else json_schema()
     text = json.dumps(found, indent=2, ensure_ascii=True) + "\n"
     if output is None:
         typer.echo(text, nl=False)

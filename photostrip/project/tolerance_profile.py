@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
-from pydantic import PlainValidator
+from pydantic import PlainValidator, WithJsonSchema
 
 from photostrip.compare import SetTolerance, Tolerance, Tolerances
 from photostrip.errors import InputError
@@ -13,7 +13,7 @@ from photostrip.formats.findings import Findings
 from photostrip.formats.numbers import NotANumber, shown
 from photostrip.formats.numbers import number as read_number
 from photostrip.project.merging import read_tree
-from photostrip.project.schema import Flag, Section, Words, key, wrong
+from photostrip.project.schema import Flag, Section, Words, described, key, wrong
 from photostrip.project.validation import checked
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 SCHEMA_NUMBER = 1
 USUAL = Tolerances()
+T = TypeVar("T", bound=Section)
 
 
 def _size(value: object) -> float:
@@ -49,8 +50,9 @@ def _schema_number(value: object) -> int:
     return SCHEMA_NUMBER
 
 
-Size = Annotated[float, PlainValidator(_size)]
-Whole = Annotated[int, PlainValidator(_whole)]
+Size = Annotated[float, PlainValidator(_size), WithJsonSchema({"type": "number", "minimum": 0})]
+Whole = Annotated[int, PlainValidator(_whole), WithJsonSchema({"type": "integer", "minimum": 0})]
+SchemaNumber = Annotated[int, PlainValidator(_schema_number), WithJsonSchema({"const": SCHEMA_NUMBER})]
 
 
 class Absolute(Section):
@@ -80,23 +82,42 @@ class Members(Section):
     ignore: Flag = key("Do not compare this set", default=False)
 
 
+def _usual(kind: type[T], usual: Tolerance | SetTolerance) -> T:
+    """Give a section that holds the defaults."""
+    return kind.model_construct(**{name: getattr(usual, name) for name in kind.model_fields})
+
+
 class ToleranceFile(Section):
     """A tolerance profile. What is not named keeps its default."""
 
-    photostrip_tolerances: Annotated[int, PlainValidator(_schema_number)] = key("Number of this schema")
+    photostrip_tolerances: SchemaNumber = key("Number of this schema")
     extends: Words | None = key("Another profile whose keys are taken where this one has none", None)
-    plan: Absolute = key("Places in plan", Absolute.model_construct(), unit="m")
-    height: Absolute = key("Heights", Absolute.model_construct(), unit="m")
-    rotation: Absolute = key("Angles of rotations", Absolute.model_construct(), unit="deg")
-    sigma0: Both = key("Standard deviation of unit weight", Both.model_construct(), unit="um")
-    scale: Both = key("Scale factors", Both.model_construct())
-    precision: Both = key("Standard deviations of points and photos", Both.model_construct(), unit="m")
-    statistics: Statistics = key("Rms values, means, test values", Statistics.model_construct(), unit="m")
-    counts: Both = key("Numbers of points, redundancies", Both.model_construct())
-    ids: Members = key("Photos, points, models, given points", Members.model_construct())
-    choices: Members = key("Degrees, terms, roles, verdicts", Members.model_construct())
-    rejected: Members = key("Measurements taken out", Members.model_construct())
-    findings: Members = key("Notes, points without coordinates", Members.model_construct())
+    plan: Absolute = key("Places in plan", _usual(Absolute, USUAL.plan), unit="m")
+    height: Absolute = key("Heights", _usual(Absolute, USUAL.height), unit="m")
+    rotation: Absolute = key("Angles of rotations", _usual(Absolute, USUAL.rotation), unit="deg")
+    sigma0: Both = key("Standard deviation of unit weight", _usual(Both, USUAL.sigma0), unit="um")
+    scale: Both = key("Scale factors", _usual(Both, USUAL.scale))
+    precision: Both = key("Standard deviations of points and photos", _usual(Both, USUAL.precision), unit="m")
+    statistics: Statistics = key("Rms values, means, test values", _usual(Statistics, USUAL.statistics), unit="m")
+    counts: Both = key("Numbers of points, redundancies", _usual(Both, USUAL.counts))
+    ids: Members = key("Photos, points, models, given points", _usual(Members, USUAL.ids))
+    choices: Members = key("Degrees, terms, roles, verdicts", _usual(Members, USUAL.choices))
+    rejected: Members = key("Measurements taken out", _usual(Members, USUAL.rejected))
+    findings: Members = key("Notes, points without coordinates", _usual(Members, USUAL.findings))
+
+
+def tolerance_schema() -> dict[str, Any]:
+    """JSON Schema of a tolerance profile.
+
+    Returns
+    -------
+    dict
+        JSON Schema, draft 2020-12.
+    """
+    for field in ToleranceFile.model_fields.values():
+        if isinstance(field.annotation, type) and issubclass(field.annotation, Section):
+            field.annotation.model_rebuild()  # as for the project file
+    return described(ToleranceFile, "photostrip tolerance profile")
 
 
 def load_tolerances(path: Path) -> tuple[Tolerances, tuple[str, ...]]:

@@ -13,6 +13,7 @@ import pytest
 
 from photostrip.cli.main import main
 from photostrip.compare import Tolerances, baseline_of
+from photostrip.compare.tolerances import SETS, UNITS
 from photostrip.errors import InputError
 from photostrip.formats.result.files import to_json
 from photostrip.formats.result.places import line_finder
@@ -269,3 +270,15 @@ def test_a_faulty_profile_is_told_by_line(tmp_path: Path) -> None:
         (5, "scale.relative", "number"),
     ]
     assert "did you mean `absolute`?" in str(refused.value)
+
+
+def test_the_schema_of_profiles_has_their_defaults(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["schema", "--tolerances"]) == 0
+    schema = json.loads(capsys.readouterr().out)
+    usual = Tolerances()
+    for name in (*UNITS, *SETS):
+        default = schema["properties"][name]["default"]
+        assert {key: getattr(getattr(usual, name), key) for key in default} == default
+        assert schema["properties"][name]["description"]
+    assert schema["additionalProperties"] is False
+    assert schema["required"] == ["photostrip_tolerances"]
