@@ -14,6 +14,8 @@ from photostrip.planning.placement import Placed, Placement, Required, best_plac
 from photostrip.planning.strip_methods import BUNDLE, METHODS, Accuracy, accuracy
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
@@ -227,17 +229,32 @@ def bands_needed(strip: IdealStrip, layout: Layout, method: str, required: Requi
     Returns
     -------
     Needed
-        The number; bands are tried one more at a time, to a band at every photo.
+        The number. Up to 20 bands are tried one more at a time, more in steps of a tenth, to a band at every photo;
+        when a step meets the requirement the numbers that it went over are tried too.
     """
-    photos, rows = strip.geometry.photos, strip.geometry.points.rows
     last = (float("inf"), float("inf"))
-    for bands in range(2, photos + 1):
-        tried = replace(layout, kind="bands", bands=bands, every=None, spots=())
-        spots = spots_of(tried, photos, rows)
-        found = outcome(strip, tried, method).accuracy
-        if found is None or not len(found.new):
-            continue
-        last = worst(found)
-        if required.met(last):
-            return Needed(method, bands, len(spots), last)
+    failed = 1
+    for bands in _steps(strip.geometry.photos):
+        tried = _with_bands(strip, layout, method, bands)
+        if required.met(tried):
+            between = ((each, _with_bands(strip, layout, method, each)) for each in range(failed + 1, bands))
+            least, found = next(((n, found) for n, found in between if required.met(found)), (bands, tried))
+            return Needed(method, least, least * layout.per_band, found)
+        last = tried if np.isfinite(tried).all() else last
+        failed = bands
     return Needed(method, None, None, last)
+
+
+def _steps(photos: int) -> Iterator[int]:
+    """Numbers of bands that are tried: all up to 20, then in steps of a tenth, and last a band at every photo."""
+    bands = 2
+    while bands < photos:
+        yield bands
+        bands += max(1, bands // 10)
+    yield photos
+
+
+def _with_bands(strip: IdealStrip, layout: Layout, method: str, bands: int) -> tuple[float, float]:
+    """Worst standard deviations with evenly spread bands; infinite where they do not determine the strip."""
+    found = outcome(strip, replace(layout, kind="bands", bands=bands, every=None, spots=()), method).accuracy
+    return worst(found) if found is not None and len(found.new) else (float("inf"), float("inf"))

@@ -138,9 +138,8 @@ def accuracy(strip: IdealStrip, layout: Layout, spots: tuple[Spot, ...], method:
     if method == BUNDLE:
         return _bundle(strip, layout, spots, control)
     _require_control(control)
-    if method == COVARIANCE:
-        return _predicted(strip, spots, control)
-    return _fitted(strip, spots, control, method)
+    fit = _oriented(strip, np.array(numbers_of(strip, spots), np.intp), control)
+    return _predicted(strip, fit) if method == COVARIANCE else _fitted(strip, fit, method)
 
 
 def _require_control(control: ControlPoints) -> None:
@@ -150,25 +149,60 @@ def _require_control(control: ControlPoints) -> None:
         raise GeometryError(message, code="plan-control")
 
 
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """Absolute orientation of the strip as a run would do it.
+
+    Parameters
+    ----------
+    numbers : ndarray of int, shape (c,)
+        Points that are control.
+    control : ControlPoints
+        The control.
+    targets : Targets
+        The same from the intermediate frame.
+    weight : ndarray, shape (c, 3)
+        Weights of its coordinates.
+    xyz : ndarray, shape (q, 3)
+        All points in the intermediate frame, metres.
+    """
+
+    numbers: Numbers
+    control: ControlPoints
+    targets: absolute.Targets
+    weight: Floats
+    xyz: Floats
+
+
+def _oriented(strip: IdealStrip, numbers: Numbers, control: ControlPoints) -> _Fit:
+    """Orient the strip on its control, which refuses control that leaves it a motion."""
+    frames, _ = tie_frames([FrameSpec("local", ("east", "north", "up"))])
+    intermediate = IntermediateFrame.at_local_centre(strip.xyz[numbers[control.use[:, 0]]], np.pi / 2)
+    targets = absolute.Targets(control, frames, intermediate)
+    weight = absolute.weights(control, _precision(strip))
+    absolute.orient(strip.formed.xyz[numbers], targets, weight, strip.formed.xyz)
+    return _Fit(numbers, control, targets, weight, intermediate.intermediate_from_cartesian(strip.xyz))
+
+
 # --------------------------------------------------------------------------------------- similarity, polynomials
 
 
-def _fitted(strip: IdealStrip, spots: tuple[Spot, ...], control: ControlPoints, method: str) -> Accuracy:
+def _fitted(strip: IdealStrip, ground: _Fit, method: str) -> Accuracy:
     """Similarity, and polynomials of a fixed degree as far as the control carries them."""
-    numbers = np.array(numbers_of(strip, spots), np.intp)
-    frames, _ = tie_frames([FrameSpec("local", ("east", "north", "up"))])
-    plan = control.use[:, 0]
-    intermediate = IntermediateFrame.at_local_centre(strip.xyz[numbers[plan]], np.pi / 2)
-    xyz = intermediate.intermediate_from_cartesian(strip.xyz)
-    targets = absolute.Targets(control, frames, intermediate)
-    weight = absolute.weights(control, _precision(strip))
+    numbers, control, targets, weight, xyz = (
+        ground.numbers,
+        ground.control,
+        ground.targets,
+        ground.weight,
+        ground.xyz,
+    )
     terms: list[tuple[str, ...]] = [(), (), ()]
     if method in DEGREES:
         problem = polynomial.Problem(xyz[numbers], targets, weight, strip.geometry.base, _breadth(xyz))
         terms = [axis.terms for axis in polynomial.fit(problem, polynomial.Settings(DEGREES[method])).axes]
     axes = targets.axes(xyz[numbers])
     found = control_errors.misclosures(strip.errors.points, control, numbers, axes)
-    shift = intermediate.intermediate_from_cartesian(strip.errors.origin[None])[0]
+    shift = targets.intermediate.intermediate_from_cartesian(strip.errors.origin[None])[0]
     fit = control_errors.correction(found, weight, xyz[numbers], terms, shift)
     parameters = precision.fitted(strip.errors, found, fit.operator)
     influence = fit.influence(xyz)
@@ -206,12 +240,11 @@ def _precision(strip: IdealStrip) -> tuple[float, float]:
 # ---------------------------------------------------------------------------------------------------- covariance
 
 
-def _predicted(strip: IdealStrip, spots: tuple[Spot, ...], control: ControlPoints) -> Accuracy:
+def _predicted(strip: IdealStrip, ground: _Fit) -> Accuracy:
     """Misclosures distributed by the strip's own covariance, with the distances of the pass points at the joints."""
-    numbers = np.array(numbers_of(strip, spots), np.intp)
-    errors = strip.errors
+    numbers, errors = ground.numbers, strip.errors
     axes = np.broadcast_to(np.eye(3), (len(numbers), 3, 3))
-    found = control_errors.misclosures(errors.points, control, numbers, axes)
+    found = control_errors.misclosures(errors.points, ground.control, numbers, axes)
     length = float(np.linalg.norm(errors.pairs.reach, axis=1).mean())
     local = strip_conditions.Local.about(strip_conditions.centers_of(errors)[:-1], length)
     given = np.zeros(len(found.point))

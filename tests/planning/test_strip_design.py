@@ -179,6 +179,13 @@ def test_too_little_control_is_told_and_not_raised() -> None:
         accuracy(strip_of(5), Layout(""), (Spot(1, 1),), SIMILARITY)
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_control_on_the_line_of_flight_levels_no_strip(method: str) -> None:
+    found = outcome(strip_of(6), Layout("", bands=6, per_band=1), method)
+    assert found.accuracy is None
+    assert found.reason
+
+
 def test_errors_go_with_the_image_coordinates_when_control_is_good() -> None:
     layout = Layout("", bands=3, sigma=(1e-4, 1e-4, 1e-4))
     one, two = (
@@ -239,6 +246,17 @@ def test_the_number_of_bands_is_the_least(method: str) -> None:
     for bands in range(2, needed.bands):
         found = outcome(strip, Layout("", bands=bands, per_band=2), method).accuracy
         assert found is None or not required.met(worst(found))
+
+
+def test_steps_over_many_bands_leave_none_out() -> None:
+    strip = strip_of(40)
+    required = Required(0.0945)
+    needed = bands_needed(strip, Layout("", per_band=2), COVARIANCE, required)
+    assert needed.bands is not None
+    assert needed.bands > 21
+    before = outcome(strip, Layout("", bands=needed.bands - 1, per_band=2), COVARIANCE).accuracy
+    assert before is not None
+    assert not required.met(worst(before))
 
 
 def test_an_accuracy_that_no_control_gives() -> None:
