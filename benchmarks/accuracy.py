@@ -179,15 +179,15 @@ def run(task: Task) -> Outcome:
             polynomial=polynomial.Settings(AUTO if simple else choice),
         )
         result = triangulate(inputs, wanted)
-        squares[choice] = _mean_squares(simulation, result, result.points.cartesian)
+        squares[choice] = mean_squares(simulation, result, result.points.cartesian)
         degrees[choice] = _degrees(result)
     if BUNDLE in task.choices:
-        squares[BUNDLE] = _mean_squares(simulation, result, bundle(simulation)[result.points.number])
+        squares[BUNDLE] = mean_squares(simulation, result, bundle(simulation)[result.points.number])
     pairs = result.strips[0].orientation.pairs
     return Outcome(squares, degrees, len(pairs.pair) / pairs.size)
 
 
-def _mean_squares(simulation: Simulation, result: Result, found: Floats) -> Floats:
+def mean_squares(simulation: Simulation, result: Result, found: Floats) -> Floats:
     """Give the mean square error of the points that are not control, along, across and up, in square metres."""
     number = result.points.number
     fixed = {name for name, check in zip(simulation.control.ids, simulation.control.check, strict=True) if not check}

@@ -68,6 +68,8 @@ class CovarianceAdjustment:
         Where it comes from.
     sigma : float
         Standard deviation of an image coordinate of weight one, mm.
+    errors, conditions, local, system
+        Rows of the strip, conditions, unknowns and the solved system.
     """
 
     xyz: Floats
@@ -80,6 +82,10 @@ class CovarianceAdjustment:
     factor: float
     basis: str
     sigma: float
+    errors: strip_errors.StripErrors
+    conditions: strip_conditions.Conditions
+    local: strip_conditions.Local
+    system: strip_system.System
 
 
 def adjust(
@@ -140,6 +146,10 @@ def adjust(
         factor,
         basis,
         stated * float(np.sqrt(factor)),
+        errors,
+        wanted,
+        local,
+        solved,
     )
 
 

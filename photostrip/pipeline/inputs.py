@@ -160,6 +160,8 @@ class Settings:
         One of :data:`ADJUSTMENTS`.
     relative, formation, absolute, polynomial, bundle, interior, refinement
         Settings of the operations.
+    precision : bool
+        Whether standard deviations and covariances of points and photos are computed.
     angle_system, angle_unit : str
         System (``geometry.rotation.SYSTEMS``) and unit (``"deg"``, ``"gon"``, ``"rad"``) of exported angles.
     tolerances : dict of str to float
@@ -176,6 +178,7 @@ class Settings:
     bundle: bundle.Settings = field(default_factory=bundle.Settings)
     interior: interior.Settings = field(default_factory=interior.Settings)
     refinement: refinement.Settings = field(default_factory=refinement.Settings)
+    precision: bool = True
     angle_system: str = "alpha-omega-kappa"
     angle_unit: str = "deg"
     tolerances: dict[str, float] = field(default_factory=dict)

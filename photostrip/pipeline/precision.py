@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.pipeline import check_test
 from photostrip.pipeline.covariance import measured
 from photostrip.pipeline.results import Precision
 from photostrip.triangulation import absolute, control_errors, photo_errors, precision, strip_errors
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from photostrip.geodesy.crs import GroundFrame
     from photostrip.pipeline.covariance import CovarianceAdjustment
     from photostrip.pipeline.results import Adjusted, StripResult
-    from photostrip.points import PhotoPoints
+    from photostrip.points import ControlPoints, PhotoPoints
     from photostrip.triangulation.error_rows import Rows
 
     Floats = NDArray[np.float64]
@@ -49,6 +50,8 @@ class StripPrecision:
         Standard deviation of an image coordinate of weight one, mm.
     basis : str
         Where that comes from.
+    check : CheckTest or None
+        Test of the strip's check points together.
     """
 
     points: Floats
@@ -59,6 +62,7 @@ class StripPrecision:
     variance: Floats
     sigma: float
     basis: str
+    check: check_test.CheckTest | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,8 +131,10 @@ def sightings(strip: StripResult, observations: PhotoPoints) -> photo_errors.Sig
     return photo_errors.Sightings(photo, point, strip.rows, strip.xyz[point], focal)
 
 
-def of_strip(strip: StripResult, observations: PhotoPoints, frames: Sequence[GroundFrame]) -> StripPrecision:
-    """Covariances of one strip by similarity or polynomial.
+def of_strip(
+    strip: StripResult, observations: PhotoPoints, frames: Sequence[GroundFrame], given: ControlPoints
+) -> StripPrecision:
+    """Covariances of one strip.
 
     Parameters
     ----------
@@ -137,15 +143,18 @@ def of_strip(strip: StripResult, observations: PhotoPoints, frames: Sequence[Gro
     observations : PhotoPoints
         Ideal image coordinates of the project.
     frames : sequence of GroundFrame
-        Ground frames of the control.
+        Ground frames of the given points.
+    given : ControlPoints
+        All given points; the check points among them are compared with what is found.
 
     Returns
     -------
     StripPrecision
-        Covariances of points and photos.
+        Covariances of points and photos, test of the check points.
     """
+    checks = check_test.check_points(strip, given, observations)
     if strip.covariance is not None:
-        return _of_covariance(strip, strip.covariance)
+        return _of_covariance(strip, strip.covariance, checks, frames)
     found = propagation(strip, observations, frames)
     errors, operator = found.errors, found.fit.operator
     stated = float(np.median(observations.sigma[measured(strip.strip, observations) >= 0]))
@@ -164,10 +173,18 @@ def of_strip(strip: StripResult, observations: PhotoPoints, frames: Sequence[Gro
         found.control.variance,
         stated * float(np.sqrt(factor)),
         basis,
+        check_test.by_fit(found, check_test.given_at(strip, errors, checks, frames), checks[1], factor)
+        if len(checks[1])
+        else None,
     )
 
 
-def _of_covariance(strip: StripResult, adjusted: CovarianceAdjustment) -> StripPrecision:
+def _of_covariance(
+    strip: StripResult,
+    adjusted: CovarianceAdjustment,
+    checks: tuple[ControlPoints, Numbers],
+    frames: Sequence[GroundFrame],
+) -> StripPrecision:
     """Covariances that the adjustment with the strip's own covariance has found already."""
     numbers = strip.formed.point[strip.control_rows][adjusted.control.point]
     return StripPrecision(
@@ -178,6 +195,9 @@ def _of_covariance(strip: StripResult, adjusted: CovarianceAdjustment) -> StripP
         adjusted.control.variance,
         adjusted.sigma,
         adjusted.basis,
+        check_test.by_covariance(adjusted, check_test.given_at(strip, adjusted.errors, checks, frames))
+        if len(checks[1])
+        else None,
     )
 
 
@@ -236,6 +256,7 @@ def joined(strips: Sequence[StripPrecision], results: Sequence[StripResult], poi
         tuple(strip.photos for strip in strips),
         tuple(strip.sigma for strip in strips),
         tuple(strip.basis for strip in strips),
+        tuple(strip.check for strip in strips),
     )
 
 

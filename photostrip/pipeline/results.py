@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from photostrip.geodesy.crs import GroundFrame
     from photostrip.geodesy.local_frame import IntermediateFrame
     from photostrip.notes import Finding, Note
+    from photostrip.pipeline.check_test import CheckTest
     from photostrip.pipeline.covariance import CovarianceAdjustment
     from photostrip.pipeline.inputs import Inputs, Settings, Strip
     from photostrip.points import ControlPoints
@@ -185,12 +186,15 @@ class Precision:
     basis : tuple of str
         For each strip: ``"a-priori"`` when that is the stated one, ``"a-posteriori"`` when it was found by the
         adjustment.
+    checks : tuple of CheckTest or None
+        For each strip the test of its check points together; None without any, empty when no strip was tested.
     """
 
     points: Floats
     photos: tuple[Floats, ...]
     sigma: tuple[float, ...]
     basis: tuple[str, ...]
+    checks: tuple[CheckTest | None, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -100,11 +100,10 @@ def _triangulated(inputs: Inputs, settings: Settings, directory: Path | None) ->
         points, ties = _join(strips, refined.observations, output)
     rows, differences = _at_given_points(inputs, frames, points, refined.observations)
     missing = _not_determined(refined.observations, points, inputs, strips)
-    if block is None:
-        precise = [precision.of_strip(strip, refined.observations, frames) for strip in strips]
-        covariances = precision.joined(precise, strips, points)
-    else:
-        covariances = block.precision
+    covariances = block.precision if block is not None and settings.precision else None
+    if block is None and settings.precision:
+        each = [precision.of_strip(strip, refined.observations, frames, inputs.control) for strip in strips]
+        covariances = precision.joined(each, strips, points)
     found = block.notes if block is not None else tuple(note for strip in strips for note in strip.notes)
     notes = _notes(inputs, settings, found, fiducial)
     return Result(

@@ -422,6 +422,7 @@ def settings(project: schema.ProjectFile) -> Settings:
     wanted, usual = project.processing, Settings()
     return Settings(
         adjustment=wanted.adjustment,
+        precision=wanted.precision,
         relative=replace(usual.relative, **wanted.relative.model_dump()),
         formation=replace(usual.formation, scale_transfer=wanted.scale_transfer),
         absolute=replace(usual.absolute, earth_curvature=wanted.earth_curvature, earth_radius=wanted.earth_radius),

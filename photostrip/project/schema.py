@@ -589,6 +589,7 @@ class Processing(Section):
     earth_radius: Positive = key(
         "Radius of the Earth for `earth_curvature: model` and `image`", DEFAULTS.absolute.earth_radius, unit="m"
     )
+    precision: Flag = key("Compute standard deviations and covariances of points and photos", DEFAULTS.precision)
     refraction: Flag = key("Correct for atmospheric refraction", DEFAULTS.refinement.refraction)
     flying_height: NumberOrAuto = key(
         "Mean height of the cameras above sea level, for refraction and curvature; `auto`: derived",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from photostrip.report.figures import fixed, metres, micrometres
+from photostrip.report.figures import counted, fixed, metres, micrometres, ratio
 from photostrip.report.parts import Column, Facts, Section, Table, Words
 from photostrip.report.strip_sections import ALL_SHOWN
 
@@ -43,6 +43,7 @@ def precision_section(document: Document, *, everything: bool) -> Section:
                 f"rms {metres(part['rms'])} m ({meaning}), largest {metres(part['max'])} m at point {part['worst']}",
             )
         )
+    facts += _check(block.get("check"))
     tables = (_worst(document), _along(document, block["along"], everything=everything))
     return Section("Precision", (Words(text), Facts(tuple(facts)), *tables))
 
@@ -51,6 +52,26 @@ def _basis(rows: Sequence[Document]) -> str:
     if len(rows) == 1:
         return f"{micrometres(rows[0]['sigma_um'])} µm, {BASES[rows[0]['basis']]}"
     return ", ".join(f"strip {r['strip']} {micrometres(r['sigma_um'])} µm, {BASES[r['basis']]}" for r in rows)
+
+
+def _check(check: Document | None) -> list[tuple[str, str]]:
+    """Say how the errors at check points go with the standard deviations."""
+    if not check:
+        return []
+    parts = [
+        f"{check[name]['inside_95']} of {check[name]['count']} inside the 95 % {what}, rms {ratio(check[name]['rms'])}"
+        for name, what in (("plan", "ellipse in plan"), ("height", "interval in height"))
+        if check[name]["count"]
+    ]
+    rows = [("check points", f"{'; '.join(parts)} in units of their standard deviations")]
+    for test in check["tests"]:
+        name = "all of them together" if len(check["tests"]) == 1 else f"together, strip {test['strip']}"
+        text = (
+            f"sum of squares {fixed(test['squares'], 1)} of {counted(test['coordinates'], 'coordinate')}, probability "
+            f"of a larger one by chance {fixed(100 * test['p'], 1)} %"
+        )
+        rows.append((name, text))
+    return rows
 
 
 def _worst(document: Document) -> Table:

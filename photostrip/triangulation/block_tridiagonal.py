@@ -34,22 +34,22 @@ class Factors:
     shares: Floats
 
     def solve(self, right: Floats) -> Floats:
-        """Solve for one right side.
+        """Solve for right sides.
 
         Parameters
         ----------
-        right : ndarray, shape (n, b)
-            Right side by blocks.
+        right : ndarray, shape (n, b, k)
+            Right sides by blocks.
 
         Returns
         -------
-        ndarray, shape (n, b)
-            Solution by blocks.
+        ndarray, shape (n, b, k)
+            Solutions by blocks.
         """
         reduced = right.copy()
         for number in range(1, len(right)):
             reduced[number] -= self.shares[number - 1].T @ reduced[number - 1]
-        result: Floats = np.einsum("nij,nj->ni", self.inverses, reduced)
+        result: Floats = self.inverses @ reduced
         for number in range(len(right) - 2, -1, -1):
             result[number] -= self.shares[number] @ result[number + 1]
         return result

@@ -145,23 +145,53 @@ def fitted(errors: StripErrors, found: Misclosures, operator: Floats, factor: fl
     Fitted
         Covariances in units of the image coordinates' variance factor.
     """
-    rows, steps, images = found.rows, errors.steps, errors.images
-    count = len(operator)
+    steps, images = errors.steps, errors.images
+    core, units, near, own = _sums(errors, found.rows, operator)
+    with_images = _by_photo(errors, core, np.arange(len(images.row)))
+    with_images[near] += own
+    frames = np.zeros((errors.models + 1, PARAMETERS, len(operator)))
+    frames[1:] = np.cumsum(steps @ units, axis=0)
+    parameters = np.einsum("kit,kis->ts", core, units) + np.einsum("nit,nis->ts", own, with_images[near])
+    parameters += (operator * (found.variance / factor)) @ operator.T
+    return Fitted(frames, units, with_images, (parameters + parameters.T) / 2)
+
+
+def sums_of(errors: StripErrors, rows: Rows, operator: Floats) -> Floats:
+    """Covariances of sums of rows among themselves.
+
+    Parameters
+    ----------
+    errors : StripErrors
+        The strip.
+    rows : Rows
+        Rows with d = 1.
+    operator : ndarray, shape (t, n)
+        What is summed.
+
+    Returns
+    -------
+    ndarray, shape (t, t)
+        Covariances, for a variance factor of 1 of the image coordinates.
+    """
+    core, units, near, own = _sums(errors, rows, operator)
+    with_images = own + _by_photo(errors, core, near)
+    found = np.einsum("kit,kis->ts", core, units) + np.einsum("nit,nis->ts", own, with_images)
+    return np.asarray((found + found.T) / 2, float)
+
+
+def _sums(errors: StripErrors, rows: Rows, operator: Floats) -> tuple[Floats, Floats, Numbers, Floats]:
+    """Sum rows: coefficients of units, covariances with units; image points of their own and coefficients."""
+    images = errors.images
     core = _summed_units(errors, rows, operator.T)
-    own = np.zeros((len(images.row), 2, count))
-    np.add.at(own, rows.image, rows.own[:, 0, :, None] * operator.T[rows.item][:, None, :])
-    with_images = own + _by_photo(errors, core)
+    near, entry = np.unique(rows.image, return_inverse=True)
+    own = np.zeros((len(near), 2, len(operator)))
+    np.add.at(own, entry, rows.own[:, 0, :, None] * operator.T[rows.item][:, None, :])
     units = _times_covariances(errors, core)
-    near = np.unique(rows.image)
     for slot in range(SPAN):
         model = images.photo[near] - REACH + slot
         inside = (model >= 0) & (model < errors.models)
-        np.add.at(units, model[inside], images.units[near[inside], slot] @ own[near[inside]])
-    frames = np.zeros((errors.models + 1, PARAMETERS, count))
-    frames[1:] = np.cumsum(steps @ units, axis=0)
-    parameters = np.einsum("kit,kis->ts", core, units) + np.einsum("nit,nis->ts", own[near], with_images[near])
-    parameters += (operator * (found.variance / factor)) @ operator.T
-    return Fitted(frames, units, with_images, (parameters + parameters.T) / 2)
+        np.add.at(units, model[inside], images.units[near[inside], slot] @ own[inside])
+    return core, units, near, own
 
 
 def _summed_units(errors: StripErrors, rows: Rows, weights: Floats) -> Floats:
@@ -179,13 +209,13 @@ def _summed_units(errors: StripErrors, rows: Rows, weights: Floats) -> Floats:
     return core
 
 
-def _by_photo(errors: StripErrors, core: Floats) -> Floats:
+def _by_photo(errors: StripErrors, core: Floats, images: Numbers) -> Floats:
     """Image coordinates' coefficients in sums of units, shape (n, 2, t)."""
     padded = np.concatenate([np.zeros((REACH, *core.shape[1:])), core, np.zeros((1, *core.shape[1:]))])
-    photo = errors.images.photo
+    photo = errors.images.photo[images]
     result = np.zeros((len(photo), 2, core.shape[2]))
     for slot in range(SPAN):
-        result += errors.images.units[:, slot].transpose(0, 2, 1) @ padded[photo + slot]
+        result += errors.images.units[images, slot].transpose(0, 2, 1) @ padded[photo + slot]
     return result
 
 

@@ -203,19 +203,29 @@ class _Job:
             np.zeros((n, size, size)),
         )
 
+    def columns(self, number: int, found: System) -> tuple[int, int, Floats]:
+        """Covariances of the things of one block with the conditions around, and coefficients of their unknowns.
+
+        Returns the first thing of the block, the first after it, and an array of three blocks of rows.
+        """
+        layout, size = found.layout, self.rows.frame.shape[1]
+        low, high = np.searchsorted(self.rows.first, [number * layout.width, (number + 1) * layout.width]).tolist()
+        mixed = np.zeros((3, layout.height, (high - low) * size))
+        if low < high:
+            self._with_conditions(mixed, number, low, found)
+            begin, end = np.searchsorted(self.shared[0], [low, high])
+            thing, condition, value = (column[begin:end] for column in self.shared)
+            block, position = layout.block[condition] - number + 1, layout.position[condition]
+            columns = (thing - low)[:, None] * size + np.arange(size)
+            np.add.at(mixed, (block[:, None], position[:, None], columns), value)
+        return low, high, mixed
+
     def visit(self, number: int, around: Floats, found: System) -> None:
         """Finish the things of one block, given the inverse of it and its neighbours."""
         layout, size = found.layout, self.rows.frame.shape[1]
-        low, high = np.searchsorted(self.rows.first, [number * layout.width, (number + 1) * layout.width])
+        low, high, mixed = self.columns(number, found)
         if low == high:
             return
-        mixed = np.zeros((3, layout.height, (high - low) * size))
-        self._with_conditions(mixed, number, low, found)
-        begin, end = np.searchsorted(self.shared[0], [low, high])
-        thing, condition, value = (column[begin:end] for column in self.shared)
-        block, position = layout.block[condition] - number + 1, layout.position[condition]
-        columns = (thing - low)[:, None] * size + np.arange(size)
-        np.add.at(mixed, (block[:, None], position[:, None], columns), value)
         inside = slice(max(number - 1, 0), number + 2)
         window = np.zeros((3, layout.height))
         window[inside.start - number + 1 :][: len(found.solution[inside])] = found.solution[inside]
@@ -245,6 +255,38 @@ class _Job:
             top, left, right = layout.unknown[model], (ends[place] - low) * size, (ends[place + 1] - low) * size
             frame = self.frame[ends[place] : ends[place + 1]].reshape(-1, PARAMETERS)
             mixed[1, top : top + PARAMETERS, left:right] = frame.T
+
+
+def influence(errors: StripErrors, wanted: Conditions, local: Local, found: System, rows: Rows) -> Floats:
+    """Predicted errors of a few things by the misclosures of all conditions.
+
+    Parameters
+    ----------
+    errors : StripErrors
+        The formed strip.
+    wanted : Conditions
+        The conditions.
+    local : Local
+        Unknowns of the models.
+    found : System
+        The solved system.
+    rows : Rows
+        The things, d = 1, in any order.
+
+    Returns
+    -------
+    ndarray, shape (n, c)
+        One row for each thing.
+    """
+    order = np.argsort(rows.first, kind="stable")
+    job = _Job.of(errors, wanted, local, found, rows.taken(order))
+    layout = found.layout
+    right = np.zeros((layout.blocks + 2, layout.height, len(order)))
+    for number in range(layout.blocks):
+        low, high, mixed = job.columns(number, found)
+        right[number : number + 3, :, order[low:high]] = mixed
+    solved = found.factors.solve(right[1:-1])
+    return np.asarray(solved[layout.block, layout.position].T, float)
 
 
 def tested(wanted: Conditions, found: System, cofactors: Floats, count: int) -> Tested:

@@ -295,10 +295,10 @@ def system(errors: StripErrors, wanted: Conditions, factor: float) -> System:
     matrix.diagonal[layout.block, layout.position, layout.position] += wanted.noise / factor
     blocks, places = layout.empty()
     matrix.diagonal[blocks, places, places] = 1.0
-    right = np.zeros((layout.blocks, layout.height))
-    right[layout.block, layout.position] = wanted.value
+    right = np.zeros((layout.blocks, layout.height, 1))
+    right[layout.block, layout.position, 0] = wanted.value
     factors = block_tridiagonal.eliminate(matrix.diagonal, matrix.beside)
-    return System(layout, padded, factors, factors.solve(right))
+    return System(layout, padded, factors, factors.solve(right)[:, :, 0])
 
 
 def _add_covariances(matrix: Matrix, layout: Layout, padded: Padded, rows: Rows) -> None:

@@ -14,10 +14,10 @@ from photostrip.formats.result.document import document_of
 from photostrip.formats.result.files import result_files
 from photostrip.formats.result.precision import ellipses
 from photostrip.geometry.rotation import SYSTEMS, angle_rates, angles, from_angles, from_vector
-from photostrip.pipeline import Precision
+from photostrip.pipeline import Precision, Settings
 from photostrip.report import sections_of, title_of
 from photostrip.report.text import to_text
-from tests.results import FRAMES, Case, case
+from tests.results import FRAMES, Case, case, solved
 
 SAMPLES = 200_000
 
@@ -163,3 +163,23 @@ def test_nothing_is_said_where_nothing_is_known() -> None:
     files = result_files(document)
     assert {row["sigma_x"] for row in csv.DictReader(StringIO(files["points.csv"]))} == {""}
     assert {row["sigma_kappa_deg"] for row in csv.DictReader(StringIO(files["photos.csv"]))} == {""}
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+@pytest.mark.parametrize("adjustment", ["similarity", "polynomial", "covariance"])
+def test_check_points_go_with_their_standard_deviations(frame: str, adjustment: str) -> None:
+    """Four check points of a simulated strip: neither far beyond what is stated nor without any error."""
+    inputs = case(frame).inputs
+    document = solved(inputs, Settings(adjustment=adjustment)).document
+    check = document["precision"]["check"]
+    (test,) = check["tests"]
+    assert test["points"] == check["plan"]["count"] == check["height"]["count"] == 4
+    assert test["coordinates"] == 12
+    assert 1e-3 < test["p"] < 0.999
+    assert check["plan"]["inside_95"] >= 3
+    assert check["height"]["inside_95"] >= 3
+    for name, rows in (("plan", 2), ("height", 1)):
+        values = np.array([row[name] for row in check["points"]])
+        assert check[name]["rms"] == pytest.approx(np.sqrt(np.mean(values**2) / rows), abs=0.01)
+    text = " ".join(to_text(title_of(document), sections_of(document), 100).split())
+    assert "inside the 95 % ellipse in plan" in text

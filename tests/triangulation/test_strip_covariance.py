@@ -96,8 +96,8 @@ def test_blocks_are_eliminated_like_any_system() -> None:
             after = slice(4 * number + 4, 4 * number + 8)
             dense[rows, after], dense[after, rows] = beside[number], beside[number].T
     factors = block_tridiagonal.eliminate(diagonal, beside)
-    right = rng.normal(size=(5, 4))
-    assert factors.solve(right).ravel() == pytest.approx(np.linalg.solve(dense, right.ravel()), rel=1e-9)
+    right = rng.normal(size=(5, 4, 3))
+    assert factors.solve(right).reshape(20, 3) == pytest.approx(np.linalg.solve(dense, right.reshape(20, 3)), rel=1e-9)
     inverse = np.linalg.inv(dense)
     for number, blocks in factors.inverse():
         for apart, block in enumerate(blocks):
@@ -168,3 +168,27 @@ def test_coordinates_worse_than_stated_are_told() -> None:
     tested = strip.covariance.tested
     assert tested.probability < 1e-3
     assert {note.code for note in strip.notes} & {"control-doubtful", "strip-contradicted"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("adjustment", ["similarity", "covariance"])
+def test_check_points_together_follow_chi_square(adjustment: str) -> None:
+    """Joint test of twelve check points over 60 repetitions: mean and scatter as chi-square has them."""
+    wanted = spec(10)
+    base = without_noise(replace(wanted, control=replace(wanted.control, check=12)))
+    rng = np.random.default_rng(6)
+    squares, coordinates = [], 0
+    for _ in range(60):
+        xy = base.observations.xy + rng.normal(0, 0.005, base.observations.xy.shape)
+        errors = rng.normal(0, 1, base.control.enu.shape) * np.where(base.control.use, base.control.sigma, 0.0)
+        control = replace(base.control, enu=base.control.enu + errors)
+        again = replace(base, observations=replace(base.observations, xy=xy), control=control)
+        precision = triangulate(again, Settings(adjustment=adjustment, relative=UNSCREENED)).precision
+        assert precision is not None
+        test = precision.checks[0]
+        assert test is not None
+        squares.append(test.squares)
+        coordinates = test.coordinates
+    scatter = np.sqrt(2.0 * coordinates)
+    assert np.mean(squares) == pytest.approx(coordinates, abs=3.5 * scatter / np.sqrt(60))
+    assert np.std(squares, ddof=1) == pytest.approx(scatter, rel=0.35)

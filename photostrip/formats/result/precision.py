@@ -9,6 +9,7 @@ import numpy as np
 from photostrip.errors import GeometryError
 from photostrip.formats.result.numbers import GROUND, Document, micrometres, rms, rounded, significant
 from photostrip.geometry.rotation import angle_rates, angles
+from photostrip.statistics import chi2_quantile, normal_quantile
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -16,11 +17,13 @@ if TYPE_CHECKING:
     from photostrip.pipeline import Result, StripResult
 
     Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
 
 COVARIANCE = 8  # decimals of metres^2: a tenth of a millimetre squared
 DIRECTION = 1  # decimals of degrees of the axes of an ellipse
 UNITS = {"deg": 180 / np.pi, "gon": 200 / np.pi, "rad": 1.0}
 UPPER = np.triu_indices(6)
+INSIDE = {"plan": float(np.sqrt(chi2_quantile(0.95, 2))), "height": normal_quantile(0.975)}
 EMPTY_POINT: Document = {"sigma_x": None, "sigma_y": None, "sigma_z": None}
 
 
@@ -218,7 +221,71 @@ def precision_of(result: Result) -> Document:
             for row in _along(result, strip, sigma, photos)
         ],
     }
-    return {"precision": block}
+    check = _check(result)
+    return {"precision": block | ({"check": check} if check else {})}
+
+
+def _check(result: Result) -> Document:
+    """Compare the differences at check points with what the covariances let expect; empty without check points.
+
+    The covariance of a difference is that of the point and that of the given coordinate. Point by point the differences
+    are counted; their errors go together along a strip, so the test of all of them is made with their joint covariance.
+    """
+    rows, values = _normalised(result)
+    known = ~np.isnan(values)
+    if result.precision is None or not known.any():
+        return {}
+    ids = result.inputs.control.ids
+    tests = [
+        {
+            "strip": strip.strip.id,
+            "points": test.points,
+            "coordinates": test.coordinates,
+            "squares": significant(test.squares),
+            "p": significant(test.probability),
+        }
+        for strip, test in zip(result.strips, result.precision.checks, strict=False)
+        if test is not None
+    ]
+    return {
+        **{name: _inside(values[:, k], INSIDE[name], k) for k, name in enumerate(("plan", "height"))},
+        "points": [
+            {"id": ids[row], "plan": plan, "height": height}
+            for row, (plan, height) in zip(rows.tolist(), rounded(values, 2), strict=True)
+        ],
+        "tests": tests,
+    }
+
+
+def _inside(values: Floats, limit: float, height: int) -> Document:
+    """Count the differences within their 95 % ellipse or interval."""
+    known = values[~np.isnan(values)]
+    size = np.sqrt(np.mean(known**2) / (1 if height else 2)) if len(known) else float("nan")
+    return {"count": len(known), "inside_95": int((np.abs(known) <= limit).sum()), "rms": rounded(size, 2)}
+
+
+def _normalised(result: Result) -> tuple[Numbers, Floats]:
+    """Check points with coordinates, and their differences in units of their standard deviations.
+
+    In plan the length of the difference in the metric of its covariance, in height the difference with its sign.
+    """
+    control = result.inputs.control
+    rows = np.flatnonzero(control.check & (result.control_rows >= 0))
+    values = np.full((len(rows), 2), np.nan)
+    if result.precision is None or not len(rows):
+        return rows, values
+    for place, row in enumerate(rows.tolist()):
+        frame, point = result.frames[control.frame[row]], result.control_rows[row]
+        axes = frame.axes_at(result.points.cartesian[[point]])
+        covariance = turned(result.precision.points[[point]], axes)[0] + np.diag(np.nan_to_num(control.sigma[row]) ** 2)
+        difference = result.control_differences[row]
+        if frame.kind == "geocentric":
+            level = frame.level_axes_at(result.points.cartesian[[point]])[0] @ axes[0].T
+            difference, covariance = level @ difference, level @ covariance @ level.T
+        if not np.isnan(difference[:2]).any():
+            values[place, 0] = np.sqrt(difference[:2] @ np.linalg.solve(covariance[:2, :2], difference[:2]))
+        values[place, 1] = difference[2] / np.sqrt(covariance[2, 2])
+    return rows, values
 
 
 def _summed(sigma: Floats, names: list[str]) -> Document:

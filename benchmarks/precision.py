@@ -1,0 +1,299 @@
+"""Stated precision against what repetitions scatter, and the strip adjusted with its covariance against a bundle.
+
+scatter: one geometry, its image coordinates and control drawn anew many times. Printed is the stated standard deviation
+divided by the scatter, rms over all points, to the east, to the north and up; then the same of the photos' centres and
+rotations, and the smallest and largest ratio of any single coordinate of a point.
+
+bundle: many strips with their own geometry; errors of all points that are not control, divided by those of a rigorous
+bundle adjustment of the same measurements (that of benchmarks/accuracy.py, written apart from the program), plan and
+height; stated divided by actual errors; the mean of the test of the whole, which is to be 1; the share of strips in
+which a right control point is called doubtful.
+
+Usage: python benchmarks/precision.py [scatter] [bundle] [--repetitions N] [--seeds N] [--workers N] [--only NAME ...]
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import dataclass, replace
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from anywhere, installed or not
+
+from photostrip.threads import limit_threads
+
+limit_threads()  # before numpy is imported, also in the processes that are started here
+
+import numpy as np  # noqa: E402
+
+from benchmarks import accuracy  # noqa: E402
+from photostrip.camera import Camera  # noqa: E402
+from photostrip.formats.simulation import inputs_of  # noqa: E402
+from photostrip.pipeline import Settings, triangulate  # noqa: E402
+from photostrip.simulate.simulation import simulate  # noqa: E402
+from photostrip.simulate.spec import FILM, Control, Flight, Image, Points, Spec, Terrain  # noqa: E402
+from photostrip.triangulation import polynomial, relative  # noqa: E402
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from multiprocessing.pool import Pool
+
+    from numpy.typing import NDArray
+
+    from photostrip.geodesy.local_frame import IntermediateFrame
+    from photostrip.pipeline import Inputs, Result
+
+    Floats = NDArray[np.float64]
+
+METHODS = ("similarity", "1", "2", "3", "covariance")
+SIGMA_UM = 5.0
+CHUNKS = 20
+UAV = Camera("uav", 8.8, format=(13.2, 8.8))
+
+
+@dataclass(frozen=True)
+class Case:
+    """A kind of strip."""
+
+    name: str
+    photos: int
+    bands: int = 4
+    every: int | None = None
+    per_band: int = 3
+    lap: float = 62.0
+    use: tuple[tuple[str, float], ...] = ()
+    sigma: tuple[float, float, float] = (0.05, 0.05, 0.05)
+    relief: float = 60.0
+    uav: bool = False
+
+    @property
+    def spec(self) -> Spec:
+        """The same for the simulation."""
+        return Spec(
+            camera=replace(UAV) if self.uav else replace(FILM, principal_distance=153.0),
+            flight=Flight(photos=self.photos, end_lap_percent=self.lap),
+            terrain=Terrain(relief=self.relief),
+            points=Points(rows=5, reach_percent=75.0, extra_per_model=2),
+            control=Control(
+                bands=self.bands,
+                every=self.every,
+                per_band=self.per_band,
+                use=dict(self.use) or {"xyz": 1.0},
+                sigma=self.sigma,
+            ),
+            image=Image(1.0 if self.uav else SIGMA_UM),
+        )
+
+
+MIXED = (("xyz", 0.4), ("xy", 0.3), ("z", 0.3))
+SCATTER = (
+    Case("5 models, 4 bands", 6),
+    Case("10 models, 4 bands", 11),
+    Case("10 models, mixed", 11, bands=5, use=MIXED),
+    Case("20 models, 5 bands", 21, bands=5),
+    Case("20 models, 2 per band", 21, bands=5, per_band=2),
+    Case("30 models, 7 bands", 31, bands=7),
+    Case("10 models, 80 %", 11, lap=80.0),
+)
+GOOD = (0.02, 0.02, 0.02)
+BUNDLE = (
+    Case("6 photos, 3 bands", 6, bands=3, sigma=GOOD),
+    Case("10 photos, 4 bands", 10, sigma=GOOD),
+    Case("20 photos, every 4", 20, every=4, sigma=GOOD),
+    Case("20 photos, every 5", 20, every=5, sigma=GOOD),
+    Case("20 photos, 3 bands", 20, bands=3, sigma=GOOD),
+    Case("20 photos, 2 per band", 20, bands=3, per_band=2, sigma=GOOD),
+    Case("30 photos, every 5", 30, every=5, sigma=GOOD),
+    Case("30 photos, 3 bands", 30, bands=3, sigma=GOOD),
+    Case("14 photos, 70 %, hills", 14, every=4, lap=70.0, relief=300.0, sigma=GOOD),
+    Case("16 photos, 80 %", 16, every=5, lap=80.0, sigma=GOOD),
+    Case("16 photos, 80 %, 8.8 mm", 16, every=5, lap=80.0, uav=True, sigma=(0.005, 0.005, 0.005)),
+    Case("60 photos, every 5", 60, every=5, sigma=GOOD),
+    Case("100 photos, every 5", 100, every=5, sigma=GOOD),
+)
+
+
+def settings(method: str, *, screening: str = "none", precision: bool = True) -> Settings:
+    """Give what is asked for: a method by its name, or a degree."""
+    degree = method if method in {"1", "2", "3"} else "auto"
+    return Settings(
+        adjustment=method if method in {"similarity", "covariance"} else "polynomial",
+        relative=relative.Settings(screening=screening),
+        polynomial=polynomial.Settings(degree),
+        precision=precision,
+    )
+
+
+# ----------------------------------------------------------------------------------------------- scatter
+
+
+def true_inputs(spec: Spec) -> Inputs:
+    """Give true coordinates with the standard deviations they would have."""
+    inputs = inputs_of(simulate(replace(spec, image=Image(0.0), control=replace(spec.control, noise=(0.0, 0.0, 0.0)))))
+    sigma = np.full((len(inputs.observations), 2), spec.image.sigma_um / 1000)
+    return replace(inputs, observations=replace(inputs.observations, sigma=sigma))
+
+
+def placed(result: Result, frame: IntermediateFrame) -> tuple[Floats, Floats, Floats]:
+    """Points, centres and rotations in the axes of a frame."""
+    (strip,) = result.strips
+    there = strip.intermediate
+    centers = frame.intermediate_from_cartesian(there.cartesian_from_intermediate(strip.resection.centers))
+    rotations = frame.intermediate_rotations(there.cartesian_rotations(strip.resection.rotations))
+    return frame.intermediate_from_cartesian(strip.cartesian), centers, rotations
+
+
+def drawn(inputs: Inputs, rng: np.random.Generator) -> Inputs:
+    """Measure image points and control anew."""
+    observations, control = inputs.observations, inputs.control
+    xy = observations.xy + rng.normal(size=observations.xy.shape) * observations.sigma
+    enu = control.enu + rng.normal(size=control.enu.shape) * np.where(control.use, control.sigma, 0.0)
+    return replace(inputs, observations=replace(observations, xy=xy), control=replace(control, enu=enu))
+
+
+def repeated(task: tuple[Case, str, int, int]) -> tuple[Floats, Floats, Floats, Floats]:
+    """Add up displacements and their squares of points and photos over some repetitions."""
+    case, method, number, seed = task
+    inputs, wanted = true_inputs(case.spec), settings(method, precision=False)
+    truth = triangulate(inputs, wanted)
+    frame = truth.strips[0].intermediate
+    true_points, true_centers, true_rotations = placed(truth, frame)
+    rng = np.random.default_rng([seed, 7])
+    sums = [np.zeros((len(true_points), 3)) for _ in range(2)] + [np.zeros((len(true_centers), 6)) for _ in range(2)]
+    for _ in range(number):
+        points, centers, rotations = placed(triangulate(drawn(inputs, rng), wanted), frame)
+        turn = rotations @ true_rotations.transpose(0, 2, 1)
+        vector = np.column_stack([turn[:, 2, 1] - turn[:, 1, 2], turn[:, 0, 2] - turn[:, 2, 0],
+                                  turn[:, 1, 0] - turn[:, 0, 1]]) / 2  # fmt: skip
+        moved, photo = points - true_points, np.column_stack([centers - true_centers, vector])
+        for place, value in enumerate((moved, moved**2, photo, photo**2)):
+            sums[place] += value
+    return sums[0], sums[1], sums[2], sums[3]
+
+
+def stated(case: Case, method: str) -> tuple[Floats, Floats]:
+    """Stated variances of points and photos, along the axes of the intermediate frame."""
+    inputs = drawn(true_inputs(case.spec), np.random.default_rng(5))
+    (strip,), precision = (result := triangulate(inputs, settings(method))).strips, result.precision
+    assert precision is not None  # noqa: S101
+    factor = (inputs.observations.sigma[0, 0] / precision.sigma[0]) ** 2  # chance contradicts one strip in a hundred
+    axes, both = strip.intermediate.axes, np.zeros((6, 6))
+    both[:3, :3] = both[3:, 3:] = axes
+    points = axes.T @ precision.points @ axes
+    photos = both.T @ precision.photos[0] @ both
+    return factor * np.diagonal(points, axis1=1, axis2=2), factor * np.diagonal(photos, axis1=1, axis2=2)
+
+
+def scatter(pool: Pool, case: Case, repetitions: int) -> None:
+    """Print one kind of strip."""
+    for method in METHODS:
+        tasks = [(case, method, repetitions // CHUNKS, seed) for seed in range(CHUNKS)]
+        first, squares, photo_first, photo_squares = (
+            sum(part) for part in zip(*pool.map(repeated, tasks), strict=True)
+        )
+        number = repetitions // CHUNKS * CHUNKS
+        points, photos = stated(case, method)
+        actual = squares / number - (first / number) ** 2
+        actual_photos = photo_squares / number - (photo_first / number) ** 2
+        ratio = np.sqrt(points.mean(axis=0) / actual.mean(axis=0))
+        of_photos = np.sqrt(photos.mean(axis=0) / actual_photos.mean(axis=0))
+        single = np.sqrt(points / actual)
+        name = method if len(method) > 1 else f"degree {method}"
+        cells = [" ".join(f"{value:.3f}" for value in ratio), " ".join(f"{value:.3f}" for value in of_photos)]
+        print(
+            f"{case.name:24} {name:11} {cells[0]}   {cells[1]}   {single.min():.2f} {single.max():.2f}   "
+            f"{np.sqrt(actual[:, :2].sum(axis=1).mean()):.3f} {np.sqrt(actual[:, 2].mean()):.3f}",
+            flush=True,
+        )
+
+
+# ------------------------------------------------------------------------------------------------ bundle
+
+
+def compared(case: Case, seed: int) -> dict[str, Floats]:
+    """Mean squares of one strip by the polynomial, the covariance and the bundle, and what the covariance says."""
+    simulation = simulate(replace(case.spec, seed=seed + 1))
+    inputs = inputs_of(simulation)
+    found: dict[str, Floats] = {}
+    for method in ("auto", "covariance"):
+        result = triangulate(inputs, settings(method, screening="auto", precision=method == "covariance"))
+        found[method] = accuracy.mean_squares(simulation, result, result.points.cartesian)
+    bundle = accuracy.bundle(simulation)[result.points.number]
+    found["bundle"] = accuracy.mean_squares(simulation, result, bundle)
+    (strip,), precision = result.strips, result.precision
+    assert precision is not None  # noqa: S101
+    assert strip.covariance is not None  # noqa: S101
+    fixed = {name for name, check in zip(inputs.control.ids, inputs.control.check, strict=True) if not check}
+    free = np.array([inputs.observations.point_ids[n] not in fixed for n in result.points.number])
+    axes = strip.intermediate.axes
+    found["stated"] = np.diagonal(axes.T @ precision.points[free] @ axes, axis1=1, axis2=2).mean(axis=0)
+    tested = strip.covariance.tested
+    found["test"] = np.array([tested.squares / tested.redundancy, float(len(tested.doubtful) > 0)])
+    found["rejected"] = np.array([float(len(strip.wrong_control) > 0)])
+    return found
+
+
+def plan_height(squares: Floats) -> Floats:
+    """Root mean squares in plan and height from those along, across and up."""
+    return np.asarray(np.sqrt([squares[0] + squares[1], squares[2]]), float)
+
+
+def against_bundle(pool: Pool, case: Case, seeds: int) -> None:
+    """Print one kind of strip."""
+    found = pool.map(partial(compared, case), range(seeds), chunksize=1)
+    mean = {key: np.mean([each[key] for each in found], axis=0) for key in found[0]}
+    bundle = plan_height(mean["bundle"])
+    cells = [
+        "/".join(f"{value:.{digits}f}" for value in values)
+        for values, digits in (
+            (plan_height(mean["auto"]) / bundle, 2),
+            (plan_height(mean["covariance"]) / bundle, 3),
+            (bundle, 3),
+            (plan_height(mean["stated"]) / plan_height(mean["covariance"]), 2),
+        )
+    ]
+    print(
+        f"{case.name:24} {cells[0]:11} {cells[1]:13} {cells[2]:13} {cells[3]:11} {mean['test'][0]:.3f}  "
+        f"{100 * mean['test'][1]:5.1f} %  {100 * mean['rejected'][0]:5.1f} %",
+        flush=True,
+    )
+
+
+def main() -> None:
+    """Print the tables that are asked for."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("tables", nargs="*", help="scatter, bundle; both by default")
+    parser.add_argument("--repetitions", type=int, default=2000)
+    parser.add_argument("--seeds", type=int, default=100)
+    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--only", nargs="*", help="words of the names of the strips wanted")
+    wanted = parser.parse_args()
+    tables: dict[str, tuple[str, Sequence[Case], Callable[[Pool, Case, int], None], int]] = {
+        "scatter": (
+            f"{'strip':24} {'method':11} {'points: along, across, up':19} {'photos: centre, rotation':44} single",
+            SCATTER,
+            scatter,
+            wanted.repetitions,
+        ),
+        "bundle": (
+            "strip                    polynomial  covariance    bundle, m     stated      test   doubtful rejected",
+            BUNDLE,
+            against_bundle,
+            wanted.seeds,
+        ),
+    }
+    with get_context("spawn").Pool(wanted.workers) as pool:
+        for name in wanted.tables or tables:
+            head, cases, measure, number = tables[name]
+            print(head)
+            for case in cases:
+                if not wanted.only or any(word in case.name for word in wanted.only):
+                    measure(pool, case, number)
+
+
+if __name__ == "__main__":
+    main()
