@@ -9,7 +9,7 @@ import numpy as np
 
 from photostrip.formats.simulation import inputs_of
 from photostrip.pipeline import Settings, triangulate
-from photostrip.pipeline import precision as pipeline_precision
+from photostrip.pipeline.propagation import Propagation, propagation
 from photostrip.simulate.simulation import simulate
 from photostrip.simulate.spec import Control, Flight, Image, Points, Spec
 from photostrip.triangulation import relative
@@ -46,9 +46,9 @@ def without_noise(wanted: Spec) -> Inputs:
     return replace(inputs, observations=replace(inputs.observations, sigma=sigma))
 
 
-def errors_of(result: Result, number: int = 0) -> pipeline_precision.Propagation:
+def errors_of(result: Result, number: int = 0) -> Propagation:
     """Rows and operators of a strip of a result."""
-    return pipeline_precision.propagation(result.strips[number], result.refined.observations, result.frames)
+    return propagation(result.strips[number], result.refined.observations, result.frames)
 
 
 def written_out(rows: Rows, errors: StripErrors) -> Floats:

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.distributions import gamma_cdf
 from photostrip.triangulation import absolute, control_errors, precision, strip_covariance
 from photostrip.triangulation.error_rows import Rows
 
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
 
     from photostrip.geodesy.crs import GroundFrame
     from photostrip.pipeline.covariance import CovarianceAdjustment
-    from photostrip.pipeline.precision import Propagation
+    from photostrip.pipeline.propagation import Propagation
     from photostrip.pipeline.results import StripResult
     from photostrip.points import ControlPoints, PhotoPoints
     from photostrip.triangulation.control_errors import Misclosures
@@ -28,30 +27,6 @@ if TYPE_CHECKING:
     Numbers = NDArray[np.intp]
 
 LARGEST = 100  # check points of a strip that are tested together, spread over it
-
-
-@dataclass(frozen=True, eq=False)
-class CheckTest:
-    """Test of the check points of a strip together; their errors are correlated along the strip.
-
-    Parameters
-    ----------
-    points : int
-        Check points.
-    coordinates : int
-        Their coordinates, the expectation of the sum of squares.
-    squares : float
-        e^T C^-1 e with the joint covariance C of the differences, that of the given coordinates included.
-    """
-
-    points: int
-    coordinates: int
-    squares: float
-
-    @property
-    def probability(self) -> float:
-        """Probability of a larger sum by chance."""
-        return 1 - gamma_cdf(self.squares / 2, self.coordinates / 2)
 
 
 def check_points(
@@ -85,7 +60,7 @@ def check_points(
     return control.take(found), rows[found]
 
 
-def by_fit(found: Propagation, given: Given, rows: Numbers, factor: float) -> CheckTest:
+def by_fit(found: Propagation, given: Given, rows: Numbers, factor: float) -> precision.CheckTest:
     """Test the check points of a strip that was fitted to the control.
 
     Parameters
@@ -111,7 +86,7 @@ def by_fit(found: Propagation, given: Given, rows: Numbers, factor: float) -> Ch
     return _tested(given, joint)
 
 
-def by_covariance(own: CovarianceAdjustment, given: Given) -> CheckTest:
+def by_covariance(own: CovarianceAdjustment, given: Given) -> precision.CheckTest:
     """Test the check points of a strip that was adjusted with its own covariance.
 
     Parameters
@@ -180,10 +155,10 @@ def given_at(
     return Given(len(points), seen, targets.misclosures(xyz)[seen.point, seen.axis])
 
 
-def _tested(given: Given, joint: Floats) -> CheckTest:
+def _tested(given: Given, joint: Floats) -> precision.CheckTest:
     joint = joint + np.diag(given.seen.variance)
     squares = float(given.difference @ np.linalg.solve(joint, given.difference))
-    return CheckTest(given.points, len(given.difference), squares)
+    return precision.CheckTest(given.points, len(given.difference), squares)
 
 
 def without_frame(rows: Rows) -> Rows:

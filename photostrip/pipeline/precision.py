@@ -10,8 +10,9 @@ import numpy as np
 
 from photostrip.pipeline import check_test
 from photostrip.pipeline.covariance import measured
+from photostrip.pipeline.propagation import propagation
 from photostrip.pipeline.results import Precision
-from photostrip.triangulation import absolute, control_errors, photo_errors, precision, strip_errors
+from photostrip.triangulation import precision
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from photostrip.pipeline.covariance import CovarianceAdjustment
     from photostrip.pipeline.results import Adjusted, StripResult
     from photostrip.points import ControlPoints, PhotoPoints
-    from photostrip.triangulation.error_rows import Rows
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -62,73 +62,7 @@ class StripPrecision:
     variance: Floats
     sigma: float
     basis: str
-    check: check_test.CheckTest | None
-
-
-@dataclass(frozen=True, eq=False)
-class Propagation:
-    """Rows of derivatives of one strip in its intermediate frame, and what the fit to the control takes away.
-
-    Parameters
-    ----------
-    errors : strip_errors.StripErrors
-        The formed strip.
-    control : control_errors.Misclosures
-        Control coordinates that count.
-    fit : control_errors.Correction
-        Similarity and polynomials.
-    influence : ndarray, shape (q, 3, t)
-        Points by the parameters of the fit.
-    photos : Rows
-        Photos that could be oriented.
-    photo_influence : ndarray, shape (k, 6, t)
-        The same of them.
-    oriented : ndarray of int, shape (k,)
-        Their places in the strip.
-    """
-
-    errors: strip_errors.StripErrors
-    control: control_errors.Misclosures
-    fit: control_errors.Correction
-    influence: Floats
-    photos: Rows
-    photo_influence: Floats
-    oriented: Numbers
-
-
-def propagation(strip: StripResult, observations: PhotoPoints, frames: Sequence[GroundFrame]) -> Propagation:
-    """Differentiate the strip method for one strip.
-
-    Parameters
-    ----------
-    strip : StripResult
-        The strip with all its stages.
-    observations : PhotoPoints
-        Ideal image coordinates of the project.
-    frames : sequence of GroundFrame
-        Ground frames of the control.
-
-    Returns
-    -------
-    Propagation
-        Everything that covariances are made of.
-    """
-    position = measured(strip.strip, observations)
-    similarity = strip.absolute.similarity
-    errors = strip_errors.strip_errors(strip.orientation, strip.formed, similarity, position, observations.sigma)
-    xyz = similarity(strip.formed.xyz)
-    found, fit = _fit_to_control(strip, errors, xyz, frames)
-    influence = fit.influence(xyz)
-    rows = photo_errors.photo_rows(errors, sightings(strip, observations), strip.resection, influence)
-    return Propagation(errors, found, fit, influence, *rows)
-
-
-def sightings(strip: StripResult, observations: PhotoPoints) -> photo_errors.Sightings:
-    """Collect the image points on which the photos of a strip were oriented."""
-    point = np.searchsorted(strip.formed.point, observations.point[strip.rows])
-    focal = strip.strip.camera.principal_distance
-    photo = measured(strip.strip, observations)[strip.rows]
-    return photo_errors.Sightings(photo, point, strip.rows, strip.xyz[point], focal)
+    check: precision.CheckTest | None
 
 
 def of_strip(
@@ -161,7 +95,6 @@ def of_strip(
     factor, basis = precision.image_variance(strip.orientation, stated)
     parameters = precision.fitted(errors, found.control, operator, factor)
     points = precision.covariances(errors, errors.points, parameters, found.influence) * factor
-    points[strip.formed.models == 0] = np.nan  # placed by photos that are no neighbours: they have no row
     photos = np.full((len(strip.strip.photos), 6, 6), np.nan)
     photos[found.oriented] = precision.covariances(errors, found.photos, parameters, found.photo_influence) * factor
     numbers = strip.formed.point[strip.control_rows][found.control.point]
@@ -206,19 +139,6 @@ def _turned(strip: StripResult, points: Floats, photos: Floats) -> tuple[Floats,
     axes, both = strip.intermediate.axes, np.zeros((6, 6))
     both[:3, :3] = both[3:, 3:] = axes
     return axes @ points @ axes.T, both @ photos @ both.T
-
-
-def _fit_to_control(
-    strip: StripResult, errors: strip_errors.StripErrors, xyz: Floats, frames: Sequence[GroundFrame]
-) -> tuple[control_errors.Misclosures, control_errors.Correction]:
-    """Misclosures at the control and the operator of the fit, with the weights that were in force."""
-    targets = absolute.Targets(strip.control, frames, strip.intermediate)
-    at_control = xyz[strip.control_rows]
-    control = targets.turned(at_control)
-    found = control_errors.misclosures(errors.points, control, strip.control_rows, targets.axes(at_control))
-    terms = [axis.terms for axis in strip.polynomial.axes] if strip.polynomial else [(), (), ()]
-    weight = absolute.weights(control, strip.precision)
-    return found, control_errors.correction(found, weight, at_control, terms, errors.origin)
 
 
 def joined(strips: Sequence[StripPrecision], results: Sequence[StripResult], points: Adjusted) -> Precision:

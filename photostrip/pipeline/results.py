@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from photostrip.geodesy.crs import GroundFrame
     from photostrip.geodesy.local_frame import IntermediateFrame
     from photostrip.notes import Finding, Note
-    from photostrip.pipeline.check_test import CheckTest
     from photostrip.pipeline.covariance import CovarianceAdjustment
     from photostrip.pipeline.inputs import Inputs, Settings, Strip
     from photostrip.points import ControlPoints
@@ -35,6 +34,7 @@ if TYPE_CHECKING:
     from photostrip.triangulation.bundle.problem import Problem
     from photostrip.triangulation.bundle.selection import Selection
     from photostrip.triangulation.bundle.snooping import Screened
+    from photostrip.triangulation.precision import CheckTest
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]

@@ -160,5 +160,6 @@ def test_points_without_a_model_have_rows_too(adjustment: str) -> None:
     precise = triangulate(inputs, Settings(adjustment=adjustment)).precision
     assert precise is not None
     sigma = np.sqrt(np.diagonal(precise.points, axis1=1, axis2=2))
-    assert (sigma > 0.01).all()
-    assert (sigma < 0.6).all()
+    ratio = sigma[place] / np.median(sigma, axis=0)
+    assert (ratio > 0.5).all()
+    assert (ratio < 3.0).all()
