@@ -139,7 +139,7 @@ def adjust(
         xyz - points.error,
         similarity(strip.centers) - photos.error[:, :3],
         from_vector(-photos.error[:, 3:]) @ similarity.rotation @ strip.rotations,
-        np.where(strip.models[:, None, None] > 0, points.covariance * factor, np.nan),
+        points.covariance * factor,
         photos.covariance * factor,
         found,
         tested,
