@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
@@ -125,6 +126,8 @@ def traced(result: Result, form: Format) -> str:
     from photostrip.report import layout, text
     from photostrip.report.trace_sections import trace_sections, trace_title
 
+    if result.bundle is not None:  # what has stages to be traced is the strip method that started it
+        result = replace(result, strips=result.bundle.start.strips, frames=(*result.frames, result.output))
     document = trace_of(result)
     if form is Format.JSON:
         from photostrip.formats.result.files import to_json

@@ -5,14 +5,14 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING
 
+import pytest
+
 from photostrip.cli.main import main
 from photostrip.pipeline import ADJUSTMENTS
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
     from pathlib import Path
-
-    import pytest
 
 PROJECT = str(ROOT / "sample_data" / "simulated-20" / "project.yaml")
 BUNDLE = ("--set", "processing.adjustment=bundle")
@@ -141,3 +141,64 @@ def test_a_free_network_from_the_command_line(capsys: pytest.CaptureFixture[str]
     assert document["bundle"]["free_network"] is True
     assert document["frame"]["crs"] == "local"
     assert any(note["code"] == "free-network" for note in document["notes"])
+
+
+SPEC = """\
+photostrip_simulation: 1
+name: block
+flight: {photos: 6, strips: 2}
+gnss: {use: true}
+"""
+
+
+@pytest.fixture(scope="module")
+def simulated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("simulated")
+    (folder / "spec.yaml").write_text(SPEC, encoding="utf-8")
+    assert main(["simulate", str(folder / "spec.yaml"), "-o", str(folder / "project"), "--quiet"]) == 0
+    return folder / "project" / "project.yaml"
+
+
+def test_a_simulated_project_with_positions_from_end_to_end(
+    simulated: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """Everything a run can write, of a bundle; the positions take part and the project checks clean."""
+    assert main(["check", str(simulated), *BUNDLE]) == 0
+    capsys.readouterr()
+    arguments = (str(simulated), *BUNDLE, "-o", str(tmp_path / "out"), "--trace", str(tmp_path / "trace.txt"))
+    code, _, _ = run(capsys, *arguments)
+    assert code == 0
+    document = json.loads((tmp_path / "out" / "result.json").read_text(encoding="utf-8"))
+    assert document["bundle"]["observations"]["position"] == 3 * 12
+    assert len(document["bundle"]["positions"]) == 12
+    assert all(photo["sigma"]["z"] > 0 for photo in document["photos"])
+    assert (tmp_path / "trace.txt").read_text(encoding="utf-8").startswith("Trace: block\n")
+    resolved = tmp_path / "out" / "project.resolved.yaml"
+    (simulated.parent / "again.yaml").write_bytes(resolved.read_bytes())
+    again = json.loads(run(capsys, str(simulated.parent / "again.yaml"), "--format", "json")[1])
+    assert again["points"] == document["points"]
+
+
+def test_the_photos_of_a_result_are_orientations(
+    simulated: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """photos.csv read again as approximate orientations gives the frame of a network without control."""
+    assert run(capsys, str(simulated), "-o", str(tmp_path), "--quiet")[0] == 0
+    text = simulated.read_text(encoding="utf-8")
+    section = (
+        f'orientations:\n  file: {tmp_path / "photos.csv"}\n  crs: "EPSG:32633"\n  axes: [east, north, up]\n'
+        "  role: approximate\nprocessing: {adjustment: bundle}\n"
+    )
+    path = simulated.parent / "free.yaml"
+    path.write_text(text[: text.index("control:")] + section, encoding="utf-8")
+    assert main(["check", str(path)]) == 0
+    capsys.readouterr()
+    code, out, _ = run(capsys, str(path), "--format", "json")
+    document = json.loads(out)
+    assert code == 0
+    assert document["bundle"]["free_network"] is True
+    assert document["frame"]["crs"] == "EPSG:32633"
+    first = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
+    place = {photo["id"]: (photo["x"], photo["y"], photo["z"]) for photo in first["photos"]}
+    for photo in document["photos"]:
+        assert (photo["x"], photo["y"], photo["z"]) == pytest.approx(place[photo["id"]], abs=3.0)

@@ -31,6 +31,8 @@ def deformations_of(result: Result) -> Document:
     dict
         Twist and bending of each such model, with t values and the limit that all of them together are held to.
     """
+    if result.bundle is not None:  # its photos are not put together from models
+        return {}
     found = [(strip, model) for strip in result.strips for model in model_deformations(strip, result.frames)]
     tests = 2 * len(found)
     rows = []
