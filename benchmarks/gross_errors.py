@@ -1,9 +1,10 @@
 """Whole strips with gross errors: what is found, what is lost, and what the new points are worth afterwards.
 
-Run it as ``python benchmarks/gross_errors.py [strips]``. Every simulated strip of 20 photos is adjusted three times: as
-it is, with gross errors in 1 to 5 % of its image points, and with those errors and the search switched off. Errors are
-from 5 standard deviations to 50 mm (all sizes on a logarithmic scale equally often), along x or y; in a third of the
-strips one control coordinate is wrong too.
+Run it as ``python benchmarks/gross_errors.py [strips]``. Every simulated strip of 20 photos is adjusted four times: as
+it is, with gross errors in 1 to 5 % of its image points, without those measurements and the wrong control (what could
+be reached at best), and with the errors and the search switched off. Errors are from 5 standard deviations to 50 mm
+(all sizes on a logarithmic scale equally often), along x or y; in a third of the strips one control coordinate is
+wrong too.
 
 An error along the base moves a point that stands on two photos along its other ray, and nothing contradicts it; points
 with a wrong measurement of their own are therefore counted apart.
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
 SMALLEST, LARGEST = 5.0, 50_000.0  # standard deviations of an image coordinate; micrometres
 WRONG_SHARE = (0.01, 0.05)
 CONTROL_ERRORS = (0.5, 50.0)  # m
-KINDS = ("without errors", "errors, auto", "errors, none")
+KINDS = ("without errors", "errors, auto", "errors, none", "errors, known")
 PASS_POINTS = 2  # good ones at a joint, so that a wrong one can be told from them
 CONSPICUOUS = 2.0  # ratio of rms that is printed for a single strip
 STRIP = Spec(
@@ -58,11 +59,13 @@ class Run:
         Errors of the new points in the intermediate frame, metres.
     own : ndarray of bool, shape (n,)
         Points with a wrong measurement of their own.
-    good, lost, other_lost, wrong, found : int
-        Good image points, those of them that took no part in anything, those of them whose point has no wrong ray,
-        wrong image points, those of them that took no part.
+    good, lost, alone, other_lost, wrong, found : int
+        Good image points, those of them that took no part in anything, good ones that are alone on their point, lost
+        ones whose point has no wrong ray, wrong image points, those of them that place no point.
     control_found : bool or None
-        Whether the wrong control coordinate was named; None without one.
+        Whether the wrong control coordinate was named; None without one, or when its point has no place in the strip.
+    alarms : int
+        Control points named beside it.
     supported : bool
         Whether every standard zone of every pair that has points has a good one, and every joint two.
     """
@@ -71,10 +74,12 @@ class Run:
     own: Flags
     good: int
     lost: int
+    alone: int
     other_lost: int
     wrong: int
     found: int
     control_found: bool | None
+    alarms: int
     supported: bool
 
 
@@ -102,21 +107,27 @@ def adjusted(simulation: Simulation, settings: Settings, wrong_rows: set[tuple[s
     photo = [observations.photo_ids[number] for number in observations.photo]
     point = [observations.point_ids[number] for number in observations.point]
     bad = np.array([key in injected for key in zip(photo, point, strict=True)])
-    used = np.zeros(len(bad), bool)
+    used, placing = np.zeros(len(bad), bool), np.zeros(len(bad), bool)
     for strip in result.strips:
         oriented = strip.orientation
-        used[strip.rows] = True
+        placing[strip.rows] = True
         used[oriented.rows[oriented.used].ravel()] = True
+    used |= placing
     own = np.array([name in spoiled for name in names])[new]
     wrong_control = [error.point for error in simulation.truth.errors if error.kind == "control"]
-    named = None
-    if wrong_control:
-        named = any(wrong_control[0] in note.points for note in result.notes if note.code.startswith("control-"))
+    reported = {name for note in result.notes if note.code == "control-rejected" for name in note.points}
+    placed = {name for strip in result.strips for name in strip.control.ids}
+    named = wrong_control[0] in reported if wrong_control and wrong_control[0] in placed else None
+    alarms = len(reported - set(wrong_control))
     local = (errors @ result.strips[0].intermediate.axes)[new]
     lost = ~bad & ~used
     other = lost & ~np.isin(point, list(spoiled))
-    good, gone, spared, wrong, found = (int(each.sum()) for each in (~bad, lost, other, bad, bad & ~used))
-    return Run(local, own, good, gone, spared, wrong, found, named, supported(result, wrong_rows))
+    rays = np.bincount(observations.point[~bad], minlength=len(observations.point_ids))
+    alone = ~bad & (rays[observations.point] == 1)
+    flags = (~bad, lost, alone, other, bad, bad & ~placing)
+    good, gone, single, spared, wrong, found = (int(each.sum()) for each in flags)
+    enough = supported(result, wrong_rows)
+    return Run(local, own, good, gone, single, spared, wrong, found, named, alarms, enough)
 
 
 def wrong_measurements(simulation: Simulation) -> set[tuple[str, str]]:
@@ -157,7 +168,8 @@ class Table:
     @classmethod
     def empty(cls) -> Table:
         """Begin with nothing."""
-        names = ("good", "lost", "other lost", "wrong", "found", "clean good", "clean lost", "control", "control found")
+        names = ["good", "lost", "alone", "other lost", "wrong", "found", "clean good", "clean lost"]
+        names += ["control", "control found", "alarms", "clean alarms"]
         return cls(
             {kind: np.zeros(3) for kind in KINDS},
             dict.fromkeys(KINDS, 0),
@@ -172,13 +184,14 @@ class Table:
         self.squares[kind] += (sound**2).sum(axis=0)
         self.points[kind] += len(sound)
         if kind == KINDS[1]:
-            for name in ("good", "lost", "other_lost", "wrong", "found"):
+            for name in ("good", "lost", "alone", "other_lost", "wrong", "found", "alarms"):
                 self.counts[name.replace("_", " ")] += getattr(run, name)
             self.counts["control"] += run.control_found is not None
             self.counts["control found"] += bool(run.control_found)
         elif kind == KINDS[0]:
             self.counts["clean good"] += run.good
             self.counts["clean lost"] += run.lost
+            self.counts["clean alarms"] += run.alarms > 0
         return float(np.sqrt((sound**2).sum(axis=1).mean()))
 
     def show(self, strips: int) -> None:
@@ -194,27 +207,30 @@ class Table:
         middle, most = np.quantile(self.ratios, (0.5, 0.95))
         c = self.counts
         print(f"\nratio of a strip's rms: median {middle:.3f}, 95 % below {most:.3f}, largest {max(self.ratios):.3f}")
-        print(f"wrong image points out of everything: {c['found']} of {c['wrong']}")
-        print(
-            f"good image points lost: {100 * c['lost'] / c['good']:.2f} %, of points without a wrong ray: "
-            f"{100 * c['other lost'] / c['good']:.2f} %"
-        )
+        print(f"wrong image points that place no point: {c['found']} of {c['wrong']}")
+        percent = {name: 100 * c[name] / c["good"] for name in ("lost", "alone", "other lost")}
+        print(f"good image points lost: {percent['lost']:.2f} %; alone on their point: {percent['alone']:.2f} %")
+        print(f"    of points without a wrong ray: {percent['other lost']:.3f} %")
         print(f"the same in strips without errors: {c['clean lost']} of {c['clean good']}")
-        print(f"wrong control coordinates named: {c['control found']} of {c['control']}")
+        print(f"wrong control coordinates named: {c['control found']} of {c['control']}; others named: {c['alarms']}")
+        print(f"strips without errors of which control is named: {c['clean alarms']}\n", flush=True)
 
 
-def three_runs(seed: int) -> tuple[dict[str, Run], list[str]]:
-    """Adjust one strip without errors, with errors, and with errors and no search; give what failed, too."""
+def four_runs(seed: int) -> tuple[dict[str, Run], list[str]]:
+    """Adjust one strip without errors, with errors, without search, and without the errors; give what failed, too."""
     rng = np.random.default_rng(seed)
     clean = replace(STRIP, seed=seed)
     plain = simulate(clean)
     errors = gross_errors(rng, len(plain.observations), clean.image.sigma_um, control=seed % 3 == 0)
     spoiled = simulate(replace(clean, gross_errors=tuple(errors)))
     runs, failed = {}, []
-    for kind, simulation in zip(KINDS, (plain, spoiled, spoiled), strict=True):
+    known = [f"{photo}/{point}" for photo, point in sorted(wrong_measurements(spoiled))]
+    for kind, simulation in zip(KINDS, (plain, spoiled, spoiled, plain), strict=True):
         settings = settings_of(simulation)
         if kind == KINDS[2]:
             settings = replace(settings, relative=replace(settings.relative, screening="none"))
+        if kind == KINDS[3]:
+            settings = replace(settings, relative=replace(settings.relative, drop=known))
         try:
             runs[kind] = adjusted(simulation, settings, wrong_measurements(spoiled))
         except PhotostripError as error:
@@ -229,7 +245,7 @@ def main(strips: int) -> None:
     tables = Table.empty(), Table.empty()
     number = [strips, 0]
     for seed in range(1, strips + 1):
-        runs, failed = three_runs(seed)
+        runs, failed = four_runs(seed)
         enough = KINDS[0] in runs and runs[KINDS[0]].supported
         number[1] += enough
         for table in tables if enough else tables[:1]:

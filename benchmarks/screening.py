@@ -16,8 +16,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from anywhere, installed or not
 
+from photostrip.formats.simulation import inputs_of
+from photostrip.simulate.simulation import simulate
+from photostrip.simulate.spec import Flight, GrossError, Points, Spec
 from photostrip.statistics import chi2_quantile
-from photostrip.triangulation import deletion, relative, screening
+from photostrip.triangulation import deletion, formation, relative, screening, settling
 from photostrip.triangulation.relative import Pairs, Settings
 
 if TYPE_CHECKING:
@@ -253,6 +256,37 @@ def times(pairs_of_strip: int = 999, points: int = 30, seed: int = 5) -> list[st
     return lines
 
 
+def strip_times(photos: int = 1000) -> list[str]:
+    """Seconds of computing of pairs and of the whole strip, 30 points on a photo, for shares of wrong measurements."""
+    clean = Spec(
+        flight=Flight(photos=photos, end_lap_percent=62.0, heading_deg=0.0, scale=5000.0),
+        points=Points(rows=5, extra_per_model=6, reach_percent=75.0),
+    )
+    count = len(simulate(clean).observations)
+    lines = []
+    for share in (0.0, 0.001, 0.01, 0.05):
+        errors = (GrossError("image", count=round(share * count)),) if share else ()
+        inputs = inputs_of(simulate(replace(clean, gross_errors=errors)))
+        (strip,), observations = inputs.strips, inputs.observations
+        times = [time.process_time()]
+        pairs, point, rows = relative.collect_pairs(observations, strip.photos, strip.camera.principal_distance)
+        oriented, converged = relative.attempt(pairs, point, rows)
+        times.append(time.process_time())
+        sigma = float(np.median(observations.sigma))
+        screened = screening.examine(oriented, Settings(), sigma, converged)
+        times.append(time.process_time())
+        scatter, nothing = screened.scatter.by_pair, np.zeros(0, np.intp)
+        formation.form(screened.orientation, formation.Settings(), strip.photos, scatter)
+        times.append(time.process_time())
+        measured = settling.Measured(observations, strip.photos, pairs.weight, scatter, sigma, nothing)
+        settling.settle(screened.orientation, measured, formation.Settings(), readmit=True)
+        times.append(time.process_time())
+        orient, search, form, settle = np.diff(times)
+        each = 1000 * (search + settle - form) / (photos - 1)
+        lines.append(f"{100 * share:9.1f}{orient:14.3f}{search:10.3f}{form:12.3f}{settle - form:20.3f}{each:12.2f}")
+    return lines
+
+
 def main(repetitions: int) -> None:
     """Print all tables."""
     print(f"Published experiment, 34 models x 16 points, 44 errors of 0.1-0.5 mm, {repetitions} repetitions")
@@ -274,6 +308,9 @@ def main(repetitions: int) -> None:
     print("\n999 pairs of 30 points")
     print(" wrong %   orientation s   screening s    ratio   screening ms/pair")
     print("\n".join(times()))
+    print("\n1000 photos of 30 points, seconds: pairs oriented and searched, strip formed, judged and formed again")
+    print("  wrong %   orientation    search     forming    judging the strip  ms a pair")
+    print("\n".join(strip_times()))
 
 
 if __name__ == "__main__":
