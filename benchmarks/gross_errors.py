@@ -17,15 +17,19 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from anywhere, installed or not
 
-from photostrip.errors import PhotostripError
-from photostrip.formats.simulation import inputs_of, settings_of
-from photostrip.pipeline import triangulate
-from photostrip.simulate.simulation import simulate
-from photostrip.simulate.spec import Control, Flight, GrossError, Points, Spec
+from photostrip.threads import limit_threads
+
+limit_threads()  # as the command does, before numpy is imported
+
+import numpy as np  # noqa: E402
+
+from photostrip.errors import PhotostripError  # noqa: E402
+from photostrip.formats.simulation import inputs_of, settings_of  # noqa: E402
+from photostrip.pipeline import triangulate  # noqa: E402
+from photostrip.simulate.simulation import simulate  # noqa: E402
+from photostrip.simulate.spec import Control, Flight, GrossError, Points, Spec  # noqa: E402
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

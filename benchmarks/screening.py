@@ -12,16 +12,20 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from anywhere, installed or not
 
-from photostrip.formats.simulation import inputs_of
-from photostrip.simulate.simulation import simulate
-from photostrip.simulate.spec import Flight, GrossError, Points, Spec
-from photostrip.statistics import chi2_quantile
-from photostrip.triangulation import deletion, formation, relative, screening, settling
-from photostrip.triangulation.relative import Pairs, Settings
+from photostrip.threads import limit_threads
+
+limit_threads()  # as the command does, before numpy is imported
+
+import numpy as np  # noqa: E402
+
+from photostrip.formats.simulation import inputs_of  # noqa: E402
+from photostrip.simulate.simulation import simulate  # noqa: E402
+from photostrip.simulate.spec import Flight, GrossError, Points, Spec  # noqa: E402
+from photostrip.statistics import chi2_quantile  # noqa: E402
+from photostrip.triangulation import deletion, formation, relative, screening, settling  # noqa: E402
+from photostrip.triangulation.relative import Pairs, Settings  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

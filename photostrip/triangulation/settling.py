@@ -92,13 +92,13 @@ def settle(
     """
     of_pairs = oriented
     suspected = np.zeros(0, np.intp)
-    verdict = Verdict()
+    verdict: Verdict | None = None
     aside = np.zeros(len(oriented.point), bool)
     formed = formation.form(oriented, settings, measured.photos, measured.sigma)
     for _ in range(PASSES):
         scene = Scene(oriented, formed, measured.observations, measured.photos, measured.sigma, measured.stated)
         suspected = np.union1d(suspected, strip_screening.suspects(scene)).astype(np.intp)
-        verdict = strip_screening.examine(scene, suspected, measured.kept)
+        verdict = strip_screening.examine(scene, suspected, measured.kept, verdict)
         used, outside = _uses(of_pairs, verdict, readmit=readmit)
         if (used == oriented.used).all() and (outside == aside).all():
             break
@@ -107,7 +107,7 @@ def settle(
         except GeometryError:
             break  # nothing would join two models: what joined them before stays
         aside = outside
-    formed = formation.without(formed, oriented, aside)
+    formed, verdict = formation.without(formed, oriented, aside), verdict or Verdict()
     return oriented, _bridged(formed, oriented, measured, verdict), verdict
 
 

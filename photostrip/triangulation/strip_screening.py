@@ -39,6 +39,7 @@ LONGEST_REACH = 8  # photos; windows do not grow for points that reach over more
 BATCH = 48  # windows solved together
 ABSOLUTE_STEPS, WELSCH_STEPS = 15, 8
 WELSCH = 3.0  # standard deviations
+STILL = 0.3  # standard deviations; the robust start is to find wrong points, not digits
 LEAST_WEIGHT = 1e-9  # keeps a photo in its window
 ROUNDS = 12
 TOLD, BOTH, SEVERAL = "ray", "pair", "rays"
@@ -182,7 +183,7 @@ def _best_start(
     return windows.linearise(place, image, photos, best[place[2]])
 
 
-def examine(scene: Scene, points: Numbers, kept: Numbers) -> Verdict:
+def examine(scene: Scene, points: Numbers, kept: Numbers, earlier: Verdict | None = None) -> Verdict:
     """Judge all points near some suspected ones.
 
     Parameters
@@ -193,6 +194,8 @@ def examine(scene: Scene, points: Numbers, kept: Numbers) -> Verdict:
         Points that are suspected.
     kept : ndarray of int
         Rows of the observations that the user keeps: their points are not judged.
+    earlier : Verdict, optional
+        What was said of the same strip before its last small change.
 
     Returns
     -------
@@ -215,16 +218,30 @@ def examine(scene: Scene, points: Numbers, kept: Numbers) -> Verdict:
     found: list[Decision] = []
     for part in range(0, len(at), BATCH):
         batch = at[part : part + BATCH]
-        decisions = _adjusted(windows.groups(rays, first[batch], length), len(batch), length)
+        groups = windows.groups(rays, first[batch], length)
+        start = (
+            None
+            if earlier is None
+            else [np.where(np.isin(rays.row[group.ray], earlier.wrong), 0.0, 1.0) for group in groups]
+        )
+        decisions = _adjusted(groups, len(batch), length, start)
         found += [each.take(home[rays.point[each.group.ray[:, 0]]] == batch[each.group.window]) for each in decisions]
     return _verdict(scene, rays, found, kept)
 
 
-def _adjusted(groups: list[Group], count: int, length: int) -> list[Decision]:
-    """Adjust windows and judge their points, until the points that take part are those that agree."""
+def _adjusted(groups: list[Group], count: int, length: int, start: list[Floats] | None) -> list[Decision]:
+    """Adjust windows and judge their points, until the points that take part are those that agree.
+
+    Without weights of the rays to start from, which an earlier judgement gives, the start is a robust one.
+    """
     number = np.sum([np.bincount(group.window, minlength=count) for group in groups], axis=0)
-    solved = _robust(groups, count, length)
-    found = [decide(group, solved.of(group), number) for group in groups]
+    if start is None:
+        solved = _robust(groups, count, length)
+        found = [decide(group, solved.of(group), number) for group in groups]
+    else:
+        solved = _least_squares(groups, start, count, length)
+        parts = zip(groups, start, strict=True)
+        found = [decide(group, windows.without(group, weight, solved), number) for group, weight in parts]
     state = [_State(each, each.weight, *(np.zeros(each.weight.shape, bool) for _ in range(2))) for each in found]
     for _ in range(ROUNDS):
         solved = _least_squares(groups, [each.weight for each in state], count, length)
@@ -286,11 +303,24 @@ def _robust(groups: list[Group], count: int, length: int) -> Solved:
     """Adjust windows with weights of the conditions that fall with their misclosures."""
     conditions = windows.stacked([(group, windows.coplanarities(group)) for group in groups], count, length)
     solved = conditions.solved(np.ones(conditions.misfit.shape))
-    for step in range(ABSOLUTE_STEPS + WELSCH_STEPS):
-        left = np.abs(conditions.misfit - np.einsum("wcj,wj->wc", conditions.design, solved.estimate))
-        falling = 1 / np.maximum(left, 1.0) if step < ABSOLUTE_STEPS else np.exp(-((left / WELSCH) ** 2)) + LEAST_WEIGHT
-        solved = conditions.solved(falling)
+    left = conditions.left(solved)
+    for steps, weights in ((ABSOLUTE_STEPS, _absolute), (WELSCH_STEPS, _welsch)):
+        for _ in range(steps):
+            solved = conditions.solved(weights(left))
+            before, left = left, conditions.left(solved)
+            if np.abs(left - before).max() < STILL:
+                break
     return solved
+
+
+def _absolute(left: Floats) -> Floats:
+    """Weights that minimise absolute misclosures beyond one standard deviation."""
+    return np.asarray(1 / np.maximum(left, 1.0), float)
+
+
+def _welsch(left: Floats) -> Floats:
+    """Weights that forget what lies far away."""
+    return np.asarray(np.exp(-((left / WELSCH) ** 2)) + LEAST_WEIGHT, float)
 
 
 def _least_squares(groups: list[Group], weights: list[Floats], count: int, length: int) -> Solved:

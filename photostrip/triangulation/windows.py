@@ -291,6 +291,10 @@ class Conditions:
     design: Floats
     misfit: Floats
 
+    def left(self, solved: Solved) -> Floats:
+        """Sizes of what an adjustment leaves of the misclosures, shape (w, c)."""
+        return np.abs(self.misfit - (self.design @ solved.estimate[:, :, None])[:, :, 0])
+
     def solved(self, weight: Floats) -> Solved:
         """Adjust the windows with weights of the conditions, shape (w, c)."""
         weighted = self.design * weight[:, :, None]
