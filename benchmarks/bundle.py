@@ -215,13 +215,12 @@ def corridor(rounds: int) -> None:
     table(("photos", "rays", "solve", "covariances", "per ray", "to the first"), lines)
 
 
-def _peak(case: Case) -> tuple[float, float]:
-    """Peak memory of a process that adjusts a case, MB: all of it, and what it had before."""
+def _peak(given: Problem) -> tuple[float, float]:
+    """Peak memory of a process that adjusts a problem, MB: all of it, and what it had before, the arrays included."""
     import resource
 
     import scipy.linalg.lapack  # noqa: F401  what the adjustment needs
 
-    given = problem(case)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / MEGABYTE
     precision(solve(given))
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / MEGABYTE, before
@@ -231,7 +230,7 @@ def memory() -> None:
     """Print the peak memory of a process of its own."""
     case = STRIPS[-1]
     with get_context("spawn").Pool(1) as pool:
-        peak, before = pool.apply(_peak, (case,))
+        peak, before = pool.apply(_peak, (problem(case),))
     verdict = "yes" if peak <= LARGEST_MEMORY else "no"
     print(f"peak memory of a process that adjusts {case.title} with all covariances, MB (limit {LARGEST_MEMORY:.0f})")
     table(("before", "peak", "within"), [(f"{before:.0f}", f"{peak:.0f}", verdict)])

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 FLIP = np.diag([1.0, -1.0, -1.0])  # our photo axes to theirs
 MODEL = "SIMPLE_PINHOLE"
 RADIUS = 1e12  # of the first trust region
-TOLERANCE = 1e-12  # relative change of the sum of squares at which Ceres stops; with 1e-6 up to 2e-3 sigma are left
+TOLERANCE = 1e-10  # relative change of the sum of squares at which Ceres stops; with 1e-6 up to 2e-3 sigma are left
 KEPT: list[object] = []  # objects that two libraries own together: freeing them ends the process
 
 

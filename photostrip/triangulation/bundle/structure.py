@@ -68,7 +68,7 @@ class Structure:
     batches : tuple of Batch
         The rays.
     pairs, singles : tuple of Gather
-        For each batch: of its blocks to the pairs (by group, then pair within the set of photos), and of its rays to
+        For each batch: of its blocks to the pairs (by pair within the set of photos, then group), and of its rays to
         photos (by ray, then group).
     """
 
@@ -143,9 +143,9 @@ def triangle(rays: int) -> tuple[Numbers, Numbers]:
 
 
 def _keys(sets: Numbers, photos: int) -> Numbers:
-    """Keys of the pairs of each set, shape (groups, pairs)."""
+    """Keys of the pairs of each set, shape (pairs, groups)."""
     row, column = triangle(sets.shape[1])
-    keys: Numbers = sets[:, row] * photos + sets[:, column]
+    keys: Numbers = sets.T[row] * photos + sets.T[column]
     return keys
 
 
@@ -254,7 +254,7 @@ def blocks_of(added: Floats, taken: Floats, rays: int) -> tuple[Floats, Floats, 
 
     Returns
     -------
-    pairs : ndarray, shape (groups * k (k + 1) / 2, 6, 6)
+    pairs : ndarray, shape (k (k + 1) / 2 * groups, 6, 6)
         Blocks of pairs of photos.
     border : ndarray, shape (k * groups, 6, more + 1)
         Blocks of photos with common parameters and right-hand side.
@@ -265,12 +265,13 @@ def blocks_of(added: Floats, taken: Floats, rays: int) -> tuple[Floats, Floats, 
     groups = len(taken)
     row, column = triangle(rays)
     squares = taken[:, :n, :n].reshape(groups, rays, PHOTO, rays, PHOTO)
-    pairs = -squares.transpose(1, 3, 0, 2, 4)[row, column]
+    pairs = squares.transpose(1, 3, 0, 2, 4)[row, column]
+    np.negative(pairs, out=pairs)
     pairs[row == column] += added[:, :, :PHOTO, :PHOTO]
     border = added[:, :, :PHOTO, PHOTO:] - taken[:, :n, n:].reshape(groups, rays, PHOTO, -1).transpose(1, 0, 2, 3)
     corner = added[:, :, PHOTO:, PHOTO:].sum(axis=(0, 1)) - taken[:, n:, n:].sum(axis=0)
     return (
-        pairs.transpose(1, 0, 2, 3).reshape(-1, PHOTO, PHOTO),
+        pairs.reshape(-1, PHOTO, PHOTO),
         border.reshape(rays * groups, PHOTO, -1),
         corner,
     )
