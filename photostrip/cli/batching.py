@@ -14,7 +14,7 @@ from photostrip.batch.run import Run, Stop, on_signals
 from photostrip.batch.selection import choose
 from photostrip.cli.showing import BatchFormat, Format
 from photostrip.cli.talking import as_fault, failures_as
-from photostrip.errors import InputError
+from photostrip.errors import InputError, PhotostripError
 from photostrip.formats import batch as formats
 from photostrip.formats.writing import make_rule, write_text
 from photostrip.report import console, layout, messages, text
@@ -87,11 +87,11 @@ def run_asked(asked: Asked, form: BatchFormat, width: int | None, *, quiet: bool
                 folder = stack.enter_context(opened(asked.output, asked.overrides))
         table = stack.enter_context(batch_table(sys.stderr, len(projects), quiet=quiet))
         run = Run(projects, asked.overrides, folder, force=asked.force)
-        trouble: list[InputError] = []
+        trouble: list[PhotostripError] = []
         try:
             with executor_of(asked, len(projects), table) as executor:
                 run.go(executor, Talking(table, len(projects), quiet=quiet, verbose=verbose), stop)
-        except InputError as error:  # the cluster is gone, or was never there
+        except PhotostripError as error:  # nobody computes: the cluster is gone, or no process starts
             trouble.append(error)
         finally:
             table.stop()
@@ -103,8 +103,8 @@ def run_asked(asked: Asked, form: BatchFormat, width: int | None, *, quiet: bool
     if asked.depfile is not None and asked.output is not None:
         write_text(asked.depfile, make_rule(asked.output / "summary.json", run.files_read()))
     _close(run.batch, stop, quiet=quiet)
-    if trouble:
-        raise InputError(fault for each in trouble for fault in each.faults)
+    for each in trouble:
+        raise each
     return code
 
 

@@ -137,7 +137,7 @@ def test_all_executors_write_the_same_bytes(tmp_path: Path, cluster: str) -> Non
 
 @pytest.mark.slow
 def test_one_of_two_machines_dies_in_the_middle(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    number = 30
+    number = 16
     write_projects(tmp_path / "strips", number)
     monkeypatch.chdir(tmp_path)
     count = Count()

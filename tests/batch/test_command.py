@@ -12,6 +12,7 @@ import pytest
 
 from photostrip.cli import batching
 from photostrip.cli.main import main
+from photostrip.errors import PhotostripError
 from tests.batch.projects import PHOTOS, Alone, run, tree, write_projects
 
 if TYPE_CHECKING:
@@ -252,6 +253,16 @@ def test_wrong_usage_is_told(
     (here / "file.txt").write_text("x", encoding="utf-8")
     assert main(["batch", *arguments]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_a_batch_that_nobody_computes_says_so(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object, **__: object) -> None:
+        raise PhotostripError("no worker process starts")
+
+    monkeypatch.setattr(Alone, "answers", broken)
+    assert main(["batch", "strips", "-o", "out"]) == 70
+    summary = json.loads((here / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert (summary["exit_code"], summary["finished"], summary["counts"]) == (70, False, {"not run": 3})
 
 
 @pytest.mark.usefixtures("here")
