@@ -40,6 +40,8 @@ SURE = 1e-5  # probability of a finding where there is nothing to find
 SCALE_LEAST = 0.03  # of the ratio of heights to plan: a smaller one harms nobody and may be a bent strip
 OFFSET_LEAST = 8.0  # a-priori standard deviations of a height: a smaller constant does no harm
 GROUP_LEAST = 3
+SOUND = 4.5  # standard deviations within which the other coordinates of a point with a slip of the pen lie
+EARTH_RADIUS = 6.37e6  # metres
 SCALE_CHANGE = 3e-4  # of a large error: the scale of a map is not the same where the point came to lie
 MOST_ODD = 0.6  # of the points of a list: beyond it the list is wrong, not its points
 AXES = ("east", "north", "up")
@@ -198,7 +200,7 @@ def examine(
             return told
         fitted = _fit(again, w, z, given, seen, took_part)
     judged = ~np.isin(given.group, wrong_lists)
-    told += _in_plan(given, seen, fitted, judged)
+    told += _in_plan(given, seen, fitted, judged, _heights(given, fitted, judged))
     told += _in_height(given, seen, fitted, judged)
     return told
 
@@ -412,7 +414,7 @@ def _feet_fix(where: str) -> str:
 # ---------------------------------------------------------------------------------------------- single points
 
 
-def _in_plan(given: Given, seen: Seen, fitted: Fitted, judged: Flags) -> Iterator[Finding]:
+def _in_plan(given: Given, seen: Seen, fitted: Fitted, judged: Flags, heights: Heights | None) -> Iterator[Finding]:
     """Name points that do not go with the others in plan, and the slip that explains it."""
     fit = fitted.plan
     odd = judged & given.use[:, 0] & np.isfinite(fit.residual) & fit.odd
@@ -432,7 +434,21 @@ def _in_plan(given: Given, seen: Seen, fitted: Fitted, judged: Flags) -> Iterato
         if row in done:
             continue
         difference = np.array([fit.residual[row].real, fit.residual[row].imag, 0.0])
-        yield from _slips(given, seen, row, difference, (float(fit.spread[row]), float(fit.limit[row])), (0, 1))
+        if _height_fits(fitted, row, abs(fit.residual[row]), heights):
+            yield from _slips(given, seen, row, difference, (float(fit.spread[row]), float(fit.limit[row])), (0, 1))
+
+
+def _height_fits(fitted: Fitted, row: int, off: float, heights: Heights | None) -> bool:
+    """Whether the height of a point that is off in plan fits: a wrong measurement along the base moves both."""
+    if heights is None or not heights.usable[row]:
+        return True
+    fit = bend(heights.columns, heights.value, heights.took_part, fitted.floor[1])
+    return bool(abs(fit.residual[row]) <= SOUND * fit.spread[row] + _curved(fitted, off))
+
+
+def _curved(fitted: Fitted, off: float) -> float:
+    """How much an error of one coordinate moves the others, metres: the ground is curved."""
+    return off * (off + float(np.ptp(fitted.along[np.isfinite(fitted.along)]))) / EARTH_RADIUS
 
 
 def _exchanged(given: Given, fit: Bent, rows: list[int]) -> list[tuple[int, int]]:
@@ -614,6 +630,10 @@ def _in_height(given: Given, seen: Seen, fitted: Fitted, judged: Flags) -> Itera
     fit = bend(heights.columns, heights.value, took_part, floor)
     for row in np.flatnonzero(heights.usable & judged & fit.odd).tolist():
         difference = np.array([0.0, 0.0, fit.residual[row]])
+        plan = fitted.plan
+        far = _curved(fitted, abs(fit.residual[row]))
+        if np.isfinite(plan.residual[row]) and abs(plan.residual[row]) > SOUND * plan.spread[row] + far:
+            continue  # a wrong measurement along the base moves both
         yield from _slips(given, seen, row, difference, (float(fit.spread[row]), float(fit.limit[row])), (2,))
 
 
