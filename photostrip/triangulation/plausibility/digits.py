@@ -83,8 +83,8 @@ def _slips(given: float, scatter: float) -> Iterator[Slip]:
                 yield Slip(given + swapped, f"the {_ordinal(number)} and the {_ordinal(number + 1)} digit exchanged")
     for times in (10.0, 100.0, 1000.0):
         if abs(given) / times > scatter:
-            yield Slip(given / times, f"the decimal point is {len(str(int(times))) - 1} places too far right")
-            yield Slip(given * times, f"the decimal point is {len(str(int(times))) - 1} places too far left")
+            yield Slip(given / times, f"the decimal point is {_places(times)} too far right")
+            yield Slip(given * times, f"the decimal point is {_places(times)} too far left")
 
 
 def _lost(given: float, sign: float, length: int) -> Iterator[Slip]:
@@ -99,3 +99,8 @@ def _lost(given: float, sign: float, length: int) -> Iterator[Slip]:
 
 def _ordinal(number: int) -> str:
     return ORDINALS[number] if number < len(ORDINALS) else f"{number + 1}th"
+
+
+def _places(times: float) -> str:
+    number = len(str(int(times))) - 1
+    return f"{number} place" if number == 1 else f"{number} places"

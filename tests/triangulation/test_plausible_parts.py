@@ -1,0 +1,199 @@
+"""The parts of the gate on their own: slips of digits, flight, layout of the control, angles, fits."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from photostrip.triangulation.plausibility import flight, layout, rotations
+from photostrip.triangulation.plausibility.control_fit import bend, lay, upright
+from photostrip.triangulation.plausibility.digits import slip
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+
+
+# --------------------------------------------------------------------------------------------------------- digits
+
+
+@given(
+    value=st.integers(100_000_000, 999_999_999),
+    place=st.integers(1, 5),
+    digit=st.integers(0, 9),
+    noise=st.floats(-0.05, 0.05),
+)
+@settings(max_examples=60)
+def test_any_single_wrong_digit_is_put_right(value: int, place: int, digit: int, noise: float) -> None:
+    text = str(value)
+    wrong = text[:place] + str(digit) + text[place + 1 :]
+    found = slip(int(wrong) / 1000, value / 1000 + noise, 0.05, 0.2)
+    if wrong == text:
+        assert found is None
+    else:
+        assert found is not None
+        assert found.meant == pytest.approx(value / 1000, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("written", "meant", "words"),
+    [
+        (434733.71, 443733.71, "the second and the third digit exchanged"),
+        (-1203.5, 1203.5, "the sign is wrong"),
+        (43473.371, 434733.71, "the decimal point is 1 place"),
+        (4733.71, 34733.71, "a leading 3 is missing"),
+        (434733.71, 435733.71, "a typing error in the third digit (4 for 5)"),
+    ],
+)
+def test_other_slips_are_named(written: float, meant: float, words: str) -> None:
+    found = slip(written, meant + 0.01, 0.05, 0.2)
+    assert found is not None
+    assert words in found.text
+    assert found.meant == pytest.approx(meant, abs=1e-6)
+
+
+@given(st.floats(-0.29, 0.29))
+def test_what_is_within_noise_is_no_slip(off: float) -> None:
+    assert slip(434733.71, 434733.71 + off, 0.05, 0.2) is None
+
+
+def test_an_error_that_no_slip_explains_is_none() -> None:
+    assert slip(434733.71, 434756.14, 0.05, 0.2) is None  # 22.43 m: two digits and more
+
+
+# --------------------------------------------------------------------------------------------------------- flight
+
+
+def straight(photos: int = 8) -> Floats:
+    """Give perspective centres of a straight level flight, base 100, at height 150."""
+    return np.column_stack([100.0 * np.arange(photos), np.zeros(photos), np.full(photos, 150.0)])
+
+
+def flown(centers: Floats, depth: Floats | None = None) -> list[tuple[str, tuple[str, ...]]]:
+    """Examine a flight."""
+    names = [f"{number}" for number in range(len(centers))]
+    height = np.full(len(centers), 150.0) if depth is None else depth
+    up = np.array([0.0, 0.0, 1.0])
+    return [(each.code, each.photos) for each in flight.examine(centers, height, up, names, "A")]
+
+
+@given(st.integers(0, 10_000))
+@settings(max_examples=40, deadline=None)
+def test_a_usual_flight_has_no_finding(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    centers = straight(10) + rng.normal(0.0, [5.0, 5.0, 3.0], (10, 3)).clip(-12, 12)
+    assert flown(centers) == []
+
+
+def test_what_does_not_go_with_its_neighbours_is_named() -> None:
+    high = straight()
+    high[4, 2] += 60.0
+    assert ("P205", ("4",)) in flown(high)
+    long_base = straight()
+    long_base[5:, 0] += 120.0
+    assert flown(long_base) == [("P206", ("4", "5"))]
+    turned = straight()
+    turned[3:, 1] += 80.0
+    assert ("P207", ("2", "3")) in flown(turned)
+    below = np.full(8, 150.0)
+    below[2] = -150.0
+    assert flown(straight(), below) == [("P204", ("2",))]
+
+
+# --------------------------------------------------------------------------------------------------------- layout
+
+
+def laid_out(along: list[float], across: list[float], photos: int = 8) -> list[str]:
+    """Examine control given by its places along (photos) and across (half breadths) a strip."""
+    plan = np.column_stack([100.0 * np.array(along), 150.0 * np.array(across)])
+    names = [f"G{number}" for number in range(len(along))]
+    listed = [f"{number}" for number in range(photos)]
+    return [each.code for each in layout.examine(np.array(along), plan, 150.0, listed, "A", names)]
+
+
+def test_where_control_lies() -> None:
+    across = [-0.8, 0.0, 0.8]
+    assert laid_out([0, 0, 0, 7, 7, 7], across * 2) == []
+    assert laid_out([0, 0, 0, 2, 2, 2], across * 2) == ["P501"]
+    assert laid_out([0, 0, 0, 4, 4, 4], across * 2) == ["P503"]
+    assert laid_out([0, 3, 7], [0.01, -0.02, 0.01]) == ["P502"]
+    assert laid_out([0, 3, 7], [0.4, -0.5, 0.4]) == []
+
+
+# --------------------------------------------------------------------------------------------------------- angles
+
+
+def attitudes(count: int = 6) -> tuple[Floats, Floats]:
+    """Give omega, phi, kappa and the rotations they stand for, by a library that is not ours."""
+    rng = np.random.default_rng(4)
+    values = np.column_stack([rng.normal(0, np.radians(2), (count, 2)), rng.uniform(-3, 3, count)])
+    return values, Rotation.from_euler("XYZ", values).as_matrix()
+
+
+@pytest.mark.parametrize(
+    ("factor", "word"),
+    [(200 / 180, "gons"), (180 / 200, "degrees"), (180 / np.pi, "degrees"), (np.pi / 180, "radians")],
+)
+def test_angles_in_another_unit(factor: float, word: str) -> None:
+    values, matrices = attitudes()
+    names = [f"{number}" for number in range(len(values))]
+    assert list(rotations.examine(values, "omega-phi-kappa", matrices, names)) == []
+    (finding,) = rotations.examine(values * factor, "omega-phi-kappa", matrices, names)
+    assert finding.code == "P601"
+    assert f"; as {word} they differ by 0.00" in finding.message
+    assert finding.evidence["rms_as_read_otherwise_deg"] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_angles_in_another_system() -> None:
+    values, matrices = attitudes()
+    names = [f"{number}" for number in range(len(values))]
+    for wrong in (values * [1, 1, -1], values + np.array([0, 0, np.pi / 2]), values * [-1, 1, 1]):
+        assert [each.code for each in rotations.examine(wrong, "omega-phi-kappa", matrices, names)] == ["P602"]
+    rough = values + np.random.default_rng(1).normal(0, np.radians(3), values.shape)
+    assert list(rotations.examine(rough, "omega-phi-kappa", matrices, names)) == []
+
+
+# --------------------------------------------------------------------------------------------------------- fits
+
+
+@given(st.integers(0, 10_000), st.booleans())
+@settings(max_examples=30, deadline=None)
+def test_a_strip_is_laid_on_control_of_which_a_third_is_wrong(seed: int, mirrored: bool) -> None:
+    rng = np.random.default_rng(seed)
+    w = rng.uniform(0, 10, 12) + 1j * rng.uniform(-1, 1, 12)
+    turn = 50.0 * np.exp(1j * rng.uniform(-3, 3))
+    plan = turn * (np.conj(w) if mirrored else w) + (3e5 + 5e6j)
+    plan[:4] += rng.uniform(100, 1e5, 4) * np.exp(1j * rng.uniform(-3, 3, 4))
+    right, wrong = lay(w, plan, mirrored=mirrored), lay(w, plan, mirrored=not mirrored)
+    assert right is not None
+    assert wrong is not None
+    assert right.middle < 1e-6
+    assert wrong.middle > 1.0
+    assert right.turn == pytest.approx(turn, rel=1e-9)
+
+
+@given(st.integers(0, 10_000))
+@settings(max_examples=30, deadline=None)
+def test_a_fit_is_not_disturbed_by_wrong_values(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    columns = np.column_stack([np.ones(15), rng.uniform(-1, 1, (15, 2))])
+    values = columns @ [3.0, -2.0, 1.0] + rng.normal(0, 0.01, 15)
+    values[[2, 7, 11]] += rng.choice([-1, 1], 3) * rng.uniform(5, 1e4, 3)
+    fit = bend(columns, values, np.ones(15, bool), 0.01)
+    assert np.flatnonzero(fit.odd).tolist() == [2, 7, 11]
+    assert fit.coefficient == pytest.approx([3.0, -2.0, 1.0], abs=0.06)
+
+
+def test_a_strip_is_set_upright() -> None:
+    axes = Rotation.from_euler("XYZ", [[30, 20, 10], [31, 19, 200]], degrees=True).as_matrix()[:, :, 2]
+    turn = upright(axes)
+    assert turn @ turn.T == pytest.approx(np.eye(3), abs=1e-12)
+    assert np.linalg.det(turn) == pytest.approx(1.0)
+    mean = axes.mean(axis=0)
+    assert turn @ mean / np.linalg.norm(mean) == pytest.approx([0, 0, 1], abs=1e-12)
