@@ -108,7 +108,7 @@ def test_expected_precision_is_the_scatter_of_whole_runs() -> None:
     layout = Layout("mixed", kind="corners", spots=single, sigma=(0.03, 0.03, 0.05))
     geometry = StripGeometry(FILM, 8)
     strip = ideal_strip(geometry)
-    methods = (SIMILARITY, "degree 2", COVARIANCE)
+    methods = (SIMILARITY, COVARIANCE)
     count = 100
     found = repetitions(Task(geometry, layout, methods, 0, count))
     for method in methods:
