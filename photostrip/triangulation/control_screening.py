@@ -361,8 +361,10 @@ def _log(control: ControlPoints, kept: ControlPoints, setting: Setting) -> tuple
     rows = np.flatnonzero(out.any(axis=1)).tolist()
     found = []
     for row in rows:
-        axes = np.flatnonzero(out[row] & (value[row] > limit[row]))
-        worst = axes[(value[row] / limit[row])[axes].argmax()]
+        beyond = out[row] & (value[row] > limit[row])
+        # what others that were taken back since then do not contradict any more is named as it was rejected
+        axes = np.flatnonzero(beyond if beyond.any() else out[row])
+        worst = axes[np.nan_to_num(value[row] / limit[row])[axes].argmax()]
         found.append(
             ControlRejection(
                 control.ids[row],
