@@ -272,7 +272,7 @@ def _normalised(result: Result) -> tuple[Numbers, Floats]:
     control = result.inputs.control
     rows = np.flatnonzero(control.check & (result.control_rows >= 0))
     values = np.full((len(rows), 2), np.nan)
-    if result.precision is None or not len(rows):
+    if result.precision is None or not result.frames:  # a free network has nothing to be compared with
         return rows, values
     for place, row in enumerate(rows.tolist()):
         frame, point = result.frames[control.frame[row]], result.control_rows[row]
