@@ -3,7 +3,7 @@
 Every program gets the same arrays and the same start in the same process, one thread each, one after the other in each
 round; times are those of the processor, medians of the rounds. Without the two packages only our own times are printed.
 
-Usage: python benchmarks/bundle.py [--rounds N] [--cases strip large block corridor memory]
+Usage: python benchmarks/bundle.py [--rounds N] [--cases strip large block corridor memory] [--largest N] [--alone]
 """
 
 from __future__ import annotations
@@ -117,13 +117,13 @@ class Times:
     steps: tuple[int, int, int]
 
 
-def measure(given: Problem, rounds: int) -> Times:
+def measure(given: Problem, rounds: int, *, alone: bool) -> Times:
     """Adjust a problem with all programs, several times."""
     solve(given)  # imports and warms up
     rows = []
     for _ in range(rounds):
         own, more, solution, cofactors = timed(given)
-        if not peers.available():
+        if alone:
             rows.append((own, more, np.nan, np.nan, np.nan))
             difference, steps = np.nan, (len(solution.steps), 0, 0)
             continue
@@ -136,13 +136,13 @@ def measure(given: Problem, rounds: int) -> Times:
     return Times(own, more, whole, solver, colmap_whole, difference, steps)
 
 
-def side_by_side(cases: Iterable[Case], rounds: int) -> None:
+def side_by_side(cases: Iterable[Case], rounds: int, *, alone: bool) -> None:
     """Print times and ratios."""
     head = ("photos", "rays", "points", "solve", "covariances", "Ceres", "its solver", "COLMAP", "steps", "difference")
     lines, ratios = [], []
     for case in cases:
         given = problem(case)
-        found = measure(given, rounds)
+        found = measure(given, rounds, alone=alone)
         lines.append(
             (
                 case.title,
@@ -177,8 +177,8 @@ def _print_ratios(ratios: Sequence[tuple[Case, Times]]) -> None:
             (found.covariances / found.solve, LIMITS["covariances"]),
         ]
         limits = [f" of {limit:.2f}" if limit else "" for _, limit in pairs]
-        values = ["-" if np.isnan(value) else f"{value:.2f}" for value, _ in pairs]
-        cells = [value + limit for value, limit in zip(values, limits, strict=True)]
+        both = zip((value for value, _ in pairs), limits, strict=True)
+        cells = ["-" if np.isnan(value) else f"{value:.2f}{limit}" for value, limit in both]
         good = all(limit is None or value <= limit for value, limit in pairs if np.isfinite(value))
         lines.append((case.title, *cells, "yes" if good else "no"))
     print(
@@ -191,11 +191,11 @@ def _print_ratios(ratios: Sequence[tuple[Case, Times]]) -> None:
 # --------------------------------------------------------------------------------------------- growth and memory
 
 
-def corridor(rounds: int) -> None:
+def corridor(cases: Iterable[Case], rounds: int) -> None:
     """Print how time grows with the length of a strip."""
     lines: list[tuple[str, ...]] = []
     shortest = 0.0
-    for case in LONG:
+    for case in cases:
         given = problem(case)
         solve(given)
         own, more = np.median([timed(given)[:2] for _ in range(rounds)], axis=0).tolist()
@@ -256,14 +256,18 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=5, help="rounds of which medians are taken")
     names = [*CASES, "corridor", "memory"]
     parser.add_argument("--cases", nargs="*", choices=names, default=names, help="which tables to print")
+    parser.add_argument("--largest", type=int, default=100_000, help="photos of the largest strip to adjust")
+    parser.add_argument("--alone", action="store_true", help="without the other programs")
     wanted = parser.parse_args()
+    alone = wanted.alone or not peers.available()
     if not peers.available():
         print("pyceres and pycolmap are not installed (pip install 'photostrip[peer]'): only our own times\n")
     for name, cases in CASES.items():
         if name in wanted.cases:
-            side_by_side(cases, wanted.rounds)
+            fitting = [case for case in cases if case.photos <= wanted.largest]
+            side_by_side(fitting, wanted.rounds, alone=alone)
     if "corridor" in wanted.cases:
-        corridor(wanted.rounds)
+        corridor([case for case in LONG if case.photos <= wanted.largest], wanted.rounds)
     if "memory" in wanted.cases:
         memory()
     sys.stdout.flush()

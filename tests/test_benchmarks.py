@@ -50,6 +50,16 @@ def test_methods_prints_errors_and_ratios() -> None:
 
 
 @pytest.mark.slow
+def test_bundle_prints_times_ratios_and_growth() -> None:
+    out = printed("bundle.py", "--rounds", "1", "--cases", "strip", "corridor", "--largest", "1000", "--alone")
+    rows = re.findall(r"^(\d+) x (\d+) +\d+ +\d+ +(\d+) +(\d+) +- +- +- +3/0/0 +-$", out, re.MULTILINE)
+    assert [row[:2] for row in rows] == [("100", "40"), ("100", "300"), ("300", "40"), ("300", "300"), ("1000", "40")]
+    assert all(int(solve) > 0 and int(covariances) > 0 for _, _, solve, covariances in rows)
+    assert len(re.findall(r"^\d+ x \d+ +- +- +- +\d\.\d\d of 1\.00 +(?:yes|no)$", out, re.MULTILINE)) == 5
+    assert re.search(r"^1000 x 40 +\d+ +\d+ +\d+ +\d+\.\d\d +1\.00$", out, re.MULTILINE)
+
+
+@pytest.mark.slow
 def test_batch_prints_overhead_and_speed_up() -> None:
     out = printed("batch.py", "--strips", "4", "--rounds", "1", "--photos", "8")
     for words in (
