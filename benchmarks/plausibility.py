@@ -96,8 +96,24 @@ def sound(seed: int) -> Case:
             simulation = simulate(spec)
         except InputError:
             continue  # the pass points of so few photos did not suffice
-        return Case(simulation, inputs_of(simulation), settings_of(simulation), rng)
+        case = Case(simulation, inputs_of(simulation), settings_of(simulation), rng)
+        if holds_both_ends(case):
+            return case
     raise SystemExit(f"no strip can be made of seed {seed}")
+
+
+def holds_both_ends(case: Case) -> bool:
+    """Whether control at random places reaches the first and the last two photos: to leave an end out is a mistake."""
+    o, control = case.inputs.observations, case.inputs.control
+    given = {
+        name
+        for name, check, use in zip(control.ids, control.check, control.use[:, 0], strict=True)
+        if use and not check
+    }
+    return all(
+        any(o.point_ids[point] in given for photo in end for point in o.point[rows_of(case, photo)])
+        for end in (case.photos[:1], case.photos[-1:])
+    )
 
 
 def drawn(rng: np.random.Generator, seed: int) -> Spec:

@@ -13,7 +13,7 @@ from photostrip.triangulation.plausibility import mosaic
 from photostrip.triangulation.plausibility.control_reading import Seen
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     Numbers = NDArray[np.intp]
 
 WINDOW = 10  # photos of a mosaic that is laid on control: a longer one curls
+LONG, STRETCH, STRETCHES = 40, 30, 8  # photos: a longer strip is examined in so many stretches of so many
 BREADTH = 0.95  # of the image points lie within the half breadth of a strip
 SEEN_BY = 2  # photos that must show a given point
 MOSAIC_SIGMA = 0.02  # of the flying height: what relief and tilts leave in a mosaic
@@ -161,6 +162,38 @@ def sighted(formed: Formed, observations: PhotoPoints, control: ControlPoints) -
         _base_angle(observations, formed.strip.photos),
     )
     return rows, seen
+
+
+def stretches(rows: Numbers, seen: Seen) -> Iterator[tuple[Numbers, Seen]]:
+    """Cut a long strip into stretches that no low polynomial need bend far.
+
+    Parameters
+    ----------
+    rows : ndarray of int, shape (n,)
+        Rows of given points.
+    seen : Seen
+        The same points in the strip.
+
+    Yields
+    ------
+    rows : ndarray of int
+        Those of a stretch.
+    Seen
+        The same points in the strip. A strip of up to 40 photos is one stretch; of a longer one eight of 30 photos,
+        evenly spread, are given.
+    """
+    photos = len(seen.centers)
+    if photos <= LONG:
+        yield rows, seen
+        return
+    up = seen.axes.mean(axis=0)
+    flat = [each - np.outer(each @ up, up) for each in (seen.xyz, seen.centers)]
+    near = np.array([int(((flat[1] - point) ** 2).sum(axis=1).argmin()) for point in flat[0]], np.intp)
+    starts = np.unique(np.linspace(0, photos - STRETCH, min(STRETCHES, photos // STRETCH)).astype(np.intp))
+    for start in starts.tolist():
+        inside = (near >= start) & (near < start + STRETCH)
+        part = slice(start, start + STRETCH)
+        yield rows[inside], replace(seen, xyz=seen.xyz[inside], axes=seen.axes[part], centers=seen.centers[part])
 
 
 def _sigma(observations: PhotoPoints, strip: Strip) -> float:

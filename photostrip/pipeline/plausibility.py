@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from photostrip.pipeline.inputs import Inputs, Settings, Strip
     from photostrip.pipeline.results import Result
     from photostrip.points import ControlPoints, PhotoPoints
-    from photostrip.triangulation.plausibility.control_reading import Given
+    from photostrip.triangulation.plausibility.control_reading import Given, Seen
     from photostrip.triangulation.plausibility.flight_order import Arranged
 
 
@@ -261,12 +261,24 @@ def _on_strip(
     """Compare given points with a strip: the formed one, or else the mosaic of its photos."""
     if formed is not None:
         rows, seen = evidence.sighted(formed, examined.observations, control)
-    else:
-        mosaic = evidence.sighted_in_mosaic(strip, examined.observations, control)
-        if mosaic is None:
-            return []
-        rows, seen = mosaic
-    here = control.take(rows)
+        return [
+            finding
+            for part, sight in evidence.stretches(rows, seen)
+            for finding in _read(
+                control.take(part), sight, frames, as_written=as_written, axes_are_right=axes_are_right
+            )
+        ]
+    mosaic = evidence.sighted_in_mosaic(strip, examined.observations, control)
+    if mosaic is None:
+        return []
+    rows, seen = mosaic
+    return _read(control.take(rows), seen, frames, as_written=as_written, axes_are_right=axes_are_right)
+
+
+def _read(
+    here: ControlPoints, seen: Seen, frames: Sequence[GroundFrame], *, as_written: bool, axes_are_right: bool | None
+) -> list[Finding]:
+    """Read given points against what a strip sees of them."""
     given = given_points.level(here, frames, as_written=as_written)
     if given is None:
         return []

@@ -42,6 +42,7 @@ OFFSET_LEAST = 8.0  # a-priori standard deviations of a height: a smaller consta
 GROUP_LEAST = 3
 SOUND = 4.5  # standard deviations within which the other coordinates of a point with a slip of the pen lie
 EARTH_RADIUS = 6.37e6  # metres
+EXPLAINED = 0.5  # of what heights leave without it: what explains a bend of the strip as well explains nothing
 SCALE_CHANGE = 3e-4  # of a large error: the scale of a map is not the same where the point came to lie
 MOST_ODD = 0.6  # of the points of a list: beyond it the list is wrong, not its points
 AXES = ("east", "north", "up")
@@ -618,13 +619,16 @@ def _in_height(given: Given, seen: Seen, fitted: Fitted, judged: Flags) -> Itera
         return
     took_part, floor = heights.took_part, fitted.floor[1]
     ratio, sigma = heights.ratio
-    if _significant(ratio - 1.0, sigma, heights.scaled.freedom, SCALE_LEAST):
+    plain = bend(heights.columns, heights.value, took_part, floor)
+    explains = heights.scaled.sigma0 < EXPLAINED * plain.sigma0
+    if explains and _significant(ratio - 1.0, sigma, heights.scaled.freedom, SCALE_LEAST):
         yield _other_scale(seen, ratio, sigma, took_part)
         return
     for names, inside, key in _groups(given, took_part):
         _, offset = _simplest([inside.astype(float), *heights.whole], 4, heights.value, took_part, floor)
         size, sigma = float(offset.coefficient[0]), float(offset.sigma[0])
-        if _significant(size, sigma, offset.freedom, OFFSET_LEAST * floor):
+        explains = offset.sigma0 < EXPLAINED * _simplest(heights.whole, 3, heights.value, took_part, floor)[1].sigma0
+        if explains and _significant(size, sigma, offset.freedom, OFFSET_LEAST * floor):
             yield _other_heights(given, seen, names, key, size, sigma, inside & took_part)
             return
     fit = bend(heights.columns, heights.value, took_part, floor)
