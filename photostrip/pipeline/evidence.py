@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     Numbers = NDArray[np.intp]
 
 WINDOW = 10  # photos of a mosaic that is laid on control: a longer one curls
-LONG, STRETCH, STRETCHES = 40, 30, 8  # photos: a longer strip is examined in so many stretches of so many
+LONG, STRETCH, STRETCHES = 40, 30, 4  # photos: a longer strip is examined in so many stretches of so many
 BREADTH = 0.95  # of the image points lie within the half breadth of a strip
 SEEN_BY = 2  # photos that must show a given point
 MOSAIC_SIGMA = 0.02  # of the flying height: what relief and tilts leave in a mosaic
@@ -179,7 +179,7 @@ def stretches(rows: Numbers, seen: Seen) -> Iterator[tuple[Numbers, Seen]]:
     rows : ndarray of int
         Those of a stretch.
     Seen
-        The same points in the strip. A strip of up to 40 photos is one stretch; of a longer one eight of 30 photos,
+        The same points in the strip. A strip of up to 40 photos is one stretch; of a longer one four of 30 photos,
         evenly spread, are given.
     """
     photos = len(seen.centers)

@@ -20,12 +20,15 @@ if TYPE_CHECKING:
     from photostrip.notes import Finding
 
     Floats = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
 
 HIGH = 0.2  # of the flying height, from the line of the neighbours
 LONG, SHORT = 1.75, 0.5  # of the usual base
 TURNED_DEG = 30.0  # of a base against its neighbours
 WINDOW = 3  # bases on either side that say what is usual
 FEWEST = 4  # photos
+FEW_STEPS = 0.3  # of a limit: what goes beyond it within the window has a step of that size somewhere
+SHORT_FLIGHT = 30  # photos of which each is looked at
 
 
 def examine(centers: Floats, depth: Floats, up: Floats, photos: Sequence[str], strip: str) -> Iterator[Finding]:
@@ -66,7 +69,9 @@ def examine(centers: Floats, depth: Floats, up: Floats, photos: Sequence[str], s
 
 
 def _heights(height: Floats, flying: float, photos: Sequence[str], names: tuple[str, ...]) -> Iterator[Finding]:
-    for number in range(len(photos)):
+    bend = np.zeros(len(height))
+    bend[1:-1] = height[1:-1] - (height[:-2] + height[2:]) / 2.0
+    for number in _worth_a_look(np.abs(bend) > FEW_STEPS * HIGH * flying):
         near = [k for k in range(max(number - WINDOW, 0), min(number + WINDOW + 1, len(photos))) if k != number]
         line = _robust_line(np.array(near, float), height[near])
         off = float(height[number] - line[0] - line[1] * number) / flying
@@ -81,6 +86,14 @@ def _heights(height: Floats, flying: float, photos: Sequence[str], names: tuple[
             yield found("P205", message, fix, evidence, photos=(photos[number],), strips=names)
 
 
+def _worth_a_look(conspicuous: Flags) -> list[int]:
+    """Give what stands near something conspicuous; everything of a short flight."""
+    if len(conspicuous) <= SHORT_FLIGHT:
+        return list(range(len(conspicuous)))
+    around = np.convolve(conspicuous, np.ones(2 * WINDOW + 1), "same")
+    return [int(number) for number in np.flatnonzero(np.round(around))]
+
+
 def _robust_line(x: Floats, y: Floats) -> tuple[float, float]:
     """Line whose slope is the median of those of all pairs of points."""
     i, j = np.triu_indices(len(x), 1)
@@ -89,7 +102,8 @@ def _robust_line(x: Floats, y: Floats) -> tuple[float, float]:
 
 
 def _lengths(length: Floats, photos: Sequence[str], names: tuple[str, ...]) -> Iterator[Finding]:
-    for number in range(len(length)):
+    step = np.abs(np.diff(np.log(np.maximum(length, 1e-12))))
+    for number in _worth_a_look(np.append(step, 0.0) > FEW_STEPS * np.log(LONG)):
         near = [k for k in range(max(number - WINDOW, 0), min(number + WINDOW + 1, len(length))) if k != number]
         usual = float(np.median(length[near]))
         ratio = float(length[number]) / max(usual, 1e-12)
@@ -102,10 +116,11 @@ def _lengths(length: Floats, photos: Sequence[str], names: tuple[str, ...]) -> I
 
 
 def _directions(bases: Floats, up: Floats, photos: Sequence[str], names: tuple[str, ...]) -> Iterator[Finding]:
-    for number in range(len(bases)):
+    unit = bases / np.maximum(np.linalg.norm(bases, axis=1, keepdims=True), 1e-12)
+    cosine = (unit[1:] * unit[:-1]).sum(axis=1)
+    for number in _worth_a_look(np.append(cosine, 1.0) < np.cos(np.radians(FEW_STEPS * TURNED_DEG))):
         near = [k for k in range(max(number - WINDOW, 0), min(number + WINDOW + 1, len(bases))) if k != number]
-        unit = bases[near] / np.maximum(np.linalg.norm(bases[near], axis=1, keepdims=True), 1e-12)
-        usual = np.median(unit, axis=0)
+        usual = np.median(unit[near], axis=0)
         turn = np.degrees(np.arctan2(np.cross(usual, bases[number]) @ up, usual @ bases[number]))
         if abs(turn) <= TURNED_DEG:
             continue
