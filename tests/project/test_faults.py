@@ -90,6 +90,7 @@ SCHEMA = [
     (Y, "[1001, 1002]", "1001", "project.yaml:12:13:", "a single value", "a list"),
     (Y, "[1001, 1002]", "[1001, [1002]]", "project.yaml:12:20: strips[0].photos[1]:", "a list stands here"),
     (Y, "unit: mm", "unit: cm", "project.yaml:18:9: observations.unit:", "`cm` is not known", "mm, um, 0.1um, px"),
+    (Y, "unit: mm", "unit: mm\n  repeated: mean", "project.yaml:19:13: observations.repeated:", "`mean` is not known"),
     (Y, "  unit: mm\n", "", "project.yaml:17:3: observations.unit:", "`unit` is missing"),
     (Y, "y_axis: up", "y_axis: Up", "project.yaml:19:11:", "did you mean `up`?"),
     (Y, "sigma: 0.005", "sigma: 0", "project.yaml:20:10:", "out of range"),

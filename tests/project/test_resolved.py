@@ -72,6 +72,7 @@ processing:
   scale_transfer: least_squares
   earth_curvature: auto
   earth_radius: 6371000.0
+  precision: true
   refraction: false
   flying_height: auto
   ground_height: auto

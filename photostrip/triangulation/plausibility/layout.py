@@ -84,7 +84,7 @@ def examine(
 
 def _on_a_line(plan: Floats, half_breadth: float, ids: Sequence[str], strip: str) -> Iterator[Finding]:
     """Tell control that stands on one line: nothing holds the rotation about it."""
-    if len(ids) <= LEAST:
+    if len(ids) <= LEAST or half_breadth <= 0:  # points measured along one line only: there is nothing to compare with
         return
     values = np.linalg.svd(plan - plan.mean(axis=0), compute_uv=False)
     breadth = float(values[-1] / np.sqrt(len(ids) - LEAST) / half_breadth)
