@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 
     from photostrip.pipeline import Result
     from photostrip.pipeline.results import Bundle
+    from photostrip.triangulation.bundle.settings import Settings
     from photostrip.triangulation.bundle.snooping import Rejection
+    from photostrip.triangulation.bundle.solution import Solution
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -59,7 +61,6 @@ def bundle_of(result: Result) -> Document:
     problem, solution = screened.problem, screened.solution
     shift = reliability.noncentrality(settings.alpha, settings.power)
     observed = {group.kind: int(np.isfinite(group.sigma).sum()) for group in found.groups}
-    out = [each for each in screened.rejections if not each.readmitted]
     block: Document = {
         "free_network": solution.free,
         "sigma0": significant(solution.sigma0, SHORT),
@@ -73,24 +74,8 @@ def bundle_of(result: Result) -> Document:
         },
         "iterations": len(solution.steps),
         "adjustments": screened.rounds,
-        "convergence": [
-            {
-                "chi_square": significant(step.chi_square, 10),
-                "length": significant(step.length),
-                "damping": significant(step.damping),
-                "shift": significant(step.shift),
-                "turn_deg": significant(np.degrees(step.turn)),
-            }
-            for step in solution.steps
-        ],
-        "screening": {
-            "method": settings.screening,
-            "test": settings.test,
-            "alpha": settings.alpha,
-            "limit": rounded(reliability.limit(settings.test, settings.alpha, solution.redundancy), 3),
-            "rejected": {kind: sum(each.kind == kind for each in out) for kind in AXES},
-            "readmitted": len(screened.rejections) - len(out),
-        },
+        "convergence": _convergence(solution),
+        "screening": _screening(found, settings),
         "reliability": {
             "power": settings.power,
             "noncentrality": rounded(shift, 3),
@@ -98,31 +83,8 @@ def bundle_of(result: Result) -> Document:
             "weakest": _named(result, found, "weakest"),
             "worst": _named(result, found, "worst"),
         },
-        "variance_components": [
-            {
-                "group": each.name,
-                "observations": each.observations,
-                "redundancy": rounded(each.redundancy, 1),
-                "factor": significant(each.factor),
-                "sigma": significant(each.sigma),
-                "estimated": each.estimated,
-            }
-            for each in found.components
-        ],
-        "calibration": [
-            {
-                "camera": each.camera,
-                "parameter": each.name,
-                "unit": each.unit,
-                "value": significant(each.value, 6),
-                "sigma": significant(each.sigma),
-                "p": significant(each.p),
-                "significant": each.significant,
-                "sigma_a_priori": significant(each.prior) if np.isfinite(each.prior) else None,
-                "controlled": rounded(each.redundancy, 2),
-            }
-            for each in found.parameters
-        ],
+        "variance_components": _components(found),
+        "calibration": _calibration(found),
         "correlations": [
             {"first": each.first, "second": each.second, "value": rounded(each.value, 4)} for each in found.correlations
         ],
@@ -136,6 +98,64 @@ def bundle_of(result: Result) -> Document:
         "corrections": list(_corrections(found)),
     }
     return {"bundle": block}
+
+
+def _convergence(solution: Solution) -> list[Document]:
+    return [
+        {
+            "chi_square": significant(step.chi_square, 10),
+            "length": significant(step.length),
+            "damping": significant(step.damping),
+            "shift": significant(step.shift),
+            "turn_deg": significant(np.degrees(step.turn)),
+        }
+        for step in solution.steps
+    ]
+
+
+def _screening(found: Bundle, settings: Settings) -> Document:
+    """Sum up the search for gross errors."""
+    screened = found.screened
+    out = [each for each in screened.rejections if not each.readmitted]
+    return {
+        "method": settings.screening,
+        "test": settings.test,
+        "alpha": settings.alpha,
+        "limit": rounded(reliability.limit(settings.test, settings.alpha, screened.solution.redundancy), 3),
+        "rejected": {kind: sum(each.kind == kind for each in out) for kind in AXES},
+        "readmitted": len(screened.rejections) - len(out),
+    }
+
+
+def _components(found: Bundle) -> list[Document]:
+    return [
+        {
+            "group": each.name,
+            "observations": each.observations,
+            "redundancy": rounded(each.redundancy, 1),
+            "factor": significant(each.factor),
+            "sigma": significant(each.sigma),
+            "estimated": each.estimated,
+        }
+        for each in found.components
+    ]
+
+
+def _calibration(found: Bundle) -> list[Document]:
+    return [
+        {
+            "camera": each.camera,
+            "parameter": each.name,
+            "unit": each.unit,
+            "value": significant(each.value, 6),
+            "sigma": significant(each.sigma),
+            "p": significant(each.p),
+            "significant": each.significant,
+            "sigma_a_priori": significant(each.prior) if np.isfinite(each.prior) else None,
+            "controlled": rounded(each.redundancy, 2),
+        }
+        for each in found.parameters
+    ]
 
 
 def _sigma0(found: Bundle) -> Document:
