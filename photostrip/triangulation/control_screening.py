@@ -152,8 +152,7 @@ def screen(control: ControlPoints, setting: Setting) -> tuple[ControlPoints, tup
     """
     try:
         start = _without(control, _gross(control, setting))
-        setting = _fitting(start, setting)
-        kept = _snoop(start, setting)
+        setting, kept = _snooped(start, setting)
         if np.array_equal(kept.use, control.use):
             return control, ()
         kept = _taken_back(control, kept, setting)
@@ -263,14 +262,16 @@ def judged(problem: polynomial.Problem, fit: polynomial.Polynomial) -> tuple[Flo
     return np.where(seen, value, 0.0), np.broadcast_to(limit, value.shape), size, redundancy
 
 
-def _fitting(control: ControlPoints, setting: Setting) -> Setting:
-    """Leave the covariance out where it does not explain the misclosures of most of the control."""
-    if setting.joint is None:
-        return setting
+def _snooped(control: ControlPoints, setting: Setting) -> tuple[Setting, ControlPoints]:
+    """Take out what is wrong; by polynomials where the covariance does not explain the misclosures of most control."""
     kept = _snoop(control, setting)
+    if setting.joint is None:
+        return setting, kept
     found = control_tests.judge(setting.joint, setting.misclosures(kept), kept.use, ALPHA)
-    bent = not found.sigma0 < control_tests.BENT
-    return replace(setting, joint=None) if bent else setting
+    if found.sigma0 < control_tests.BENT:
+        return setting, kept
+    bent = replace(setting, joint=None)
+    return bent, _snoop(control, bent)
 
 
 def _snoop(control: ControlPoints, setting: Setting) -> ControlPoints:
