@@ -391,6 +391,7 @@ def rms(spec: Spec, seeds: int, *choices: str) -> dict[str, Floats]:
             asked = Settings(
                 adjustment="similarity" if simple else "polynomial",
                 polynomial=polynomial.Settings("auto" if simple else choice),
+                precision=False,
             )
             squares[choice].append(Recovery(done, triangulate(inputs_of(done), asked)).along_across_up())
     return {choice: np.sqrt(np.mean(found, axis=0)) / SIGMA for choice, found in squares.items()}

@@ -140,23 +140,6 @@ def precision(solution: Solution) -> Precision:
     )
 
 
-def inverse_of(solution: Solution) -> Inverse:
-    """Give the inverse of photos and common parameters alone.
-
-    Parameters
-    ----------
-    solution : Solution
-        An adjusted problem, not a free network: there the cofactors of photos mean nothing without the datum.
-
-    Returns
-    -------
-    Inverse
-        The inverse.
-    """
-    _, reduced, band = _at(solution)
-    return _inverse(reduced, band)
-
-
 def _at(solution: Solution) -> tuple[State, Reduced, Factor]:
     """Linearise and factor at a solution."""
     model = solution.model
@@ -189,7 +172,7 @@ def _batch(
     white = by_point(rays)
     forward(eliminated.root, white)
     joint = inverse.joint(batch.sets, more)
-    spread = carried(batch, joint, eliminated.rows[:-1])
+    spread = _carried(batch, joint, eliminated.rows[:-1])
     of_point = np.einsum("pcs,pds->cds", eliminated.rows[:-1], spread)
     of_point[range(3), range(3)] += 1.0
     partials = by_photo(rays, more)[:-1]
@@ -213,23 +196,8 @@ def _batch(
     return of_point.transpose(2, 0, 1), found
 
 
-def carried(batch: Batch, joint: Floats, rows: Floats) -> Floats:
-    """Multiply the rows T of a batch with the joint cofactors of their photos.
-
-    Parameters
-    ----------
-    batch : Batch
-        The groups.
-    joint : ndarray, shape (groups, q, q)
-        Joint cofactors of the photos of each group and the calibration parameters.
-    rows : ndarray, shape (q, 3, S)
-        T.
-
-    Returns
-    -------
-    ndarray, shape (q, 3, S)
-        Z T.
-    """
+def _carried(batch: Batch, joint: Floats, rows: Floats) -> Floats:
+    """Multiply the rows T of a batch with the joint cofactors of their photos: Z T, shape (q, 3, S)."""
     product = np.empty_like(rows)
     q, done = len(rows), 0
     for first, last, count, size in batch.runs:
