@@ -36,7 +36,7 @@ from photostrip.formats.simulation import inputs_of  # noqa: E402
 from photostrip.pipeline import Settings, triangulate  # noqa: E402
 from photostrip.simulate.simulation import simulate  # noqa: E402
 from photostrip.simulate.spec import FILM, Control, Flight, Image, Points, Spec, Terrain  # noqa: E402
-from photostrip.triangulation import polynomial, relative  # noqa: E402
+from photostrip.triangulation import polynomial, relative, strip_conditions  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -49,6 +49,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
+ALONE = "control alone"  # the covariance without the distances of the pass points
 METHODS = ("similarity", "1", "2", "3", "covariance")
 SIGMA_UM = 5.0
 CHUNKS = 20
@@ -69,6 +70,8 @@ class Case:
     sigma: tuple[float, float, float] = (0.05, 0.05, 0.05)
     relief: float = 60.0
     uav: bool = False
+    layout: str = "bands"
+    methods: tuple[str, ...] = METHODS
 
     @property
     def spec(self) -> Spec:
@@ -79,6 +82,7 @@ class Case:
             terrain=Terrain(relief=self.relief),
             points=Points(rows=5, reach_percent=75.0, extra_per_model=2),
             control=Control(
+                layout=self.layout,
                 bands=self.bands,
                 every=self.every,
                 per_band=self.per_band,
@@ -90,6 +94,8 @@ class Case:
 
 
 MIXED = (("xyz", 0.4), ("xy", 0.3), ("z", 0.3))
+MIDDLE = "corners+centre"  # four corners and a point in the middle
+GOOD = (0.02, 0.02, 0.02)
 SCATTER = (
     Case("5 models, 4 bands", 6),
     Case("10 models, 4 bands", 11),
@@ -98,30 +104,42 @@ SCATTER = (
     Case("20 models, 2 per band", 21, bands=5, per_band=2),
     Case("30 models, 7 bands", 31, bands=7),
     Case("10 models, 80 %", 11, lap=80.0),
+    Case("10 models, middle", 11, layout=MIDDLE),
+    Case("20 models, middle", 21, layout=MIDDLE),
+    Case("30 photos, 3 bands", 30, bands=3, sigma=GOOD, methods=("covariance",)),
+    Case("100 photos, every 5", 100, every=5, sigma=GOOD, methods=("covariance",)),
 )
-GOOD = (0.02, 0.02, 0.02)
 BUNDLE = (
     Case("6 photos, 3 bands", 6, bands=3, sigma=GOOD),
+    Case("6 photos, middle", 6, layout=MIDDLE, sigma=GOOD),
     Case("10 photos, 4 bands", 10, sigma=GOOD),
+    Case("10 photos, middle", 10, layout=MIDDLE, sigma=GOOD),
     Case("20 photos, every 4", 20, every=4, sigma=GOOD),
     Case("20 photos, every 5", 20, every=5, sigma=GOOD),
     Case("20 photos, 3 bands", 20, bands=3, sigma=GOOD),
     Case("20 photos, 2 per band", 20, bands=3, per_band=2, sigma=GOOD),
+    Case("20 photos, middle", 20, layout=MIDDLE, sigma=GOOD),
     Case("30 photos, every 5", 30, every=5, sigma=GOOD),
     Case("30 photos, 3 bands", 30, bands=3, sigma=GOOD),
+    Case("30 photos, middle", 30, layout=MIDDLE, sigma=GOOD),
     Case("14 photos, 70 %, hills", 14, every=4, lap=70.0, relief=300.0, sigma=GOOD),
     Case("16 photos, 80 %", 16, every=5, lap=80.0, sigma=GOOD),
     Case("16 photos, 80 %, 8.8 mm", 16, every=5, lap=80.0, uav=True, sigma=(0.005, 0.005, 0.005)),
     Case("60 photos, every 5", 60, every=5, sigma=GOOD),
     Case("100 photos, every 5", 100, every=5, sigma=GOOD),
+    Case("100 photos, 3 bands", 100, bands=3, sigma=GOOD),
+    Case("40 photos, 80 %", 40, every=10, lap=80.0, sigma=GOOD),
+    Case("40 photos, 80 %, middle", 40, lap=80.0, layout=MIDDLE, sigma=GOOD),
 )
 
 
 def settings(method: str, *, screening: str = "none", precision: bool = True) -> Settings:
     """Give what is asked for: a method by its name, or a degree."""
     degree = method if method in {"1", "2", "3"} else "auto"
+    adjustments = {"similarity": "similarity", "covariance": "covariance", ALONE: "covariance"}
     return Settings(
-        adjustment=method if method in {"similarity", "covariance"} else "polynomial",
+        adjustment=adjustments.get(method, "polynomial"),
+        covariance=strip_conditions.Settings(distances=method != ALONE),
         relative=relative.Settings(screening=screening),
         polynomial=polynomial.Settings(degree),
         precision=precision,
@@ -190,7 +208,7 @@ def stated(case: Case, method: str) -> tuple[Floats, Floats]:
 
 def scatter(pool: Pool, case: Case, repetitions: int) -> None:
     """Print one kind of strip."""
-    for method in METHODS:
+    for method in case.methods:
         tasks = [(case, method, repetitions // CHUNKS, seed) for seed in range(CHUNKS)]
         first, squares, photo_first, photo_squares = (
             sum(part) for part in zip(*pool.map(repeated, tasks), strict=True)
@@ -219,7 +237,7 @@ def compared(case: Case, seed: int) -> dict[str, Floats]:
     simulation = simulate(replace(case.spec, seed=seed + 1))
     inputs = inputs_of(simulation)
     found: dict[str, Floats] = {}
-    for method in ("auto", "covariance"):
+    for method in ("auto", ALONE, "covariance"):
         result = triangulate(inputs, settings(method, screening="auto", precision=method == "covariance"))
         found[method] = accuracy.mean_squares(simulation, result, result.points.cartesian)
     bundle = accuracy.bundle(simulation)[result.points.number]
@@ -251,13 +269,14 @@ def against_bundle(pool: Pool, case: Case, seeds: int) -> None:
         "/".join(f"{value:.{digits}f}" for value in values)
         for values, digits in (
             (plan_height(mean["auto"]) / bundle, 2),
+            (plan_height(mean[ALONE]) / bundle, 3),
             (plan_height(mean["covariance"]) / bundle, 3),
             (bundle, 3),
             (plan_height(mean["stated"]) / plan_height(mean["covariance"]), 2),
         )
     ]
     print(
-        f"{case.name:24} {cells[0]:11} {cells[1]:13} {cells[2]:13} {cells[3]:11} {mean['test'][0]:.3f}  "
+        f"{case.name:24} {cells[0]:11} {cells[1]:13} {cells[2]:13} {cells[3]:13} {cells[4]:11} {mean['test'][0]:.3f}  "
         f"{100 * mean['test'][1]:5.1f} %  {100 * mean['rejected'][0]:5.1f} %",
         flush=True,
     )
@@ -280,7 +299,10 @@ def main() -> None:
             wanted.repetitions,
         ),
         "bundle": (
-            "strip                    polynomial  covariance    bundle, m     stated      test   doubtful rejected",
+            (
+                f"{'strip':24} {'polynomial':11} {ALONE} {'covariance':13} {'bundle, m':13} {'stated':11} "
+                "test   doubtful rejected"
+            ),
             BUNDLE,
             against_bundle,
             wanted.seeds,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from photostrip.triangulation import absolute, formation, interior, polynomial, refinement, relative
+from photostrip.triangulation import absolute, formation, interior, polynomial, refinement, relative, strip_conditions
 from photostrip.triangulation.bundle import settings as bundle
 
 if TYPE_CHECKING:
@@ -158,7 +158,7 @@ class Settings:
     ----------
     adjustment : str
         One of :data:`ADJUSTMENTS`.
-    relative, formation, absolute, polynomial, bundle, interior, refinement
+    relative, formation, absolute, polynomial, covariance, bundle, interior, refinement
         Settings of the operations.
     precision : bool
         Whether standard deviations and covariances of points and photos are computed.
@@ -175,6 +175,7 @@ class Settings:
     formation: formation.Settings = field(default_factory=formation.Settings)
     absolute: absolute.Settings = field(default_factory=absolute.Settings)
     polynomial: polynomial.Settings = field(default_factory=polynomial.Settings)
+    covariance: strip_conditions.Settings = field(default_factory=strip_conditions.Settings)
     bundle: bundle.Settings = field(default_factory=bundle.Settings)
     interior: interior.Settings = field(default_factory=interior.Settings)
     refinement: refinement.Settings = field(default_factory=refinement.Settings)

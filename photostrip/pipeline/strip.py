@@ -185,7 +185,8 @@ def adjust_formed(
     if settings.adjustment == "covariance":
         targets = absolute.Targets(here, frames, intermediate)
         images = (covariance.measured(strip, observations), observations.sigma, sigma)
-        own = covariance.adjust((oriented, formed), orientation, (targets, rows), images)
+        distances = settings.covariance.distances
+        own = covariance.adjust((oriented, formed), orientation, (targets, rows), images, distances=distances)
     adjusted = own.xyz if own is not None else xyz if correction is None else correction(xyz)
     resection, image_rows = _orient_photos(strip, observations, oriented, formed, adjusted, orientation, own)
     return StripResult(

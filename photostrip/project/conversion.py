@@ -427,6 +427,7 @@ def settings(project: schema.ProjectFile) -> Settings:
         formation=replace(usual.formation, scale_transfer=wanted.scale_transfer),
         absolute=replace(usual.absolute, earth_curvature=wanted.earth_curvature, earth_radius=wanted.earth_radius),
         polynomial=replace(usual.polynomial, degree=wanted.polynomial.degree),
+        covariance=replace(usual.covariance, **wanted.covariance.model_dump()),
         bundle=replace(
             usual.bundle,
             screening=wanted.bundle.screening,

@@ -519,6 +519,15 @@ class Polynomial(Section):
     )
 
 
+class Covariance(Section):
+    """Adjustment of a strip with its own covariance."""
+
+    distances: Flag = key(
+        "Let distances of pass points from the common centers of their models count beside the control",
+        DEFAULTS.covariance.distances,
+    )
+
+
 class Interior(Section):
     """Interior orientation by fiducial marks."""
 
@@ -575,6 +584,7 @@ class Processing(Section):
         DEFAULTS.adjustment,
     )
     polynomial: Polynomial = key("Polynomial adjustment", Polynomial.model_construct())
+    covariance: Covariance = key("Adjustment of a strip with its own covariance", Covariance.model_construct())
     bundle: Bundle = key("Bundle adjustment", Bundle.model_construct())
     relative: Relative = key("Relative orientation", Relative.model_construct())
     scale_transfer: Annotated[str, *_choice(SCALE_TRANSFERS)] = key(
@@ -667,7 +677,7 @@ def json_schema() -> dict[str, Any]:
     dict
         JSON Schema, draft 2020-12; the same on every call.
     """
-    for section in (Angles, Output, Relative, Bundle, Polynomial, Interior, Processing, Tolerances):
+    for section in (Angles, Output, Relative, Bundle, Polynomial, Covariance, Interior, Processing, Tolerances):
         section.model_rebuild()  # early versions of pydantic cannot describe a default of a section not built yet
     return described(ProjectFile, "photostrip project")
 

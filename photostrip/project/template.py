@@ -59,6 +59,7 @@ output:
 # processing:
 #   adjustment: polynomial          # polynomial | similarity | covariance | bundle
 #   polynomial: {{degree: auto}}      # auto | 1 | 2 | 3
+#   covariance: {{distances: true}}   # false: the control alone
 #   earth_curvature: auto           # auto | model | none
 #   refraction: false
 # tolerances: {{check_rms_xy: 0.40, check_rms_z: 0.60}}     # metres; exceeded: exit code 1

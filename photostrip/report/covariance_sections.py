@@ -25,9 +25,12 @@ def covariance_section(document: Document, *, everything: bool) -> Section:
         Whether all control coordinates are shown.
     """
     blocks = document["covariance"]
+    # a result that was written before the choice existed has none
+    distances = document["settings"].get("covariance", {}).get("distances", True)
     text = (
-        "The misclosures at the control and the distances of the pass points go to every point by least-squares "
-        "prediction with the covariance of the strip itself; there is no polynomial and nothing to choose."
+        f"The misclosures at the control {'and the distances of the pass points ' if distances else 'alone '}go to "
+        "every point by least-squares prediction with the covariance of the strip itself; there is no polynomial and "
+        "nothing to choose."
     )
     parts: list[Part] = [Words(text)]
     for block in blocks:

@@ -196,7 +196,8 @@ def project_section(document: Document) -> Section:
 
 def _adjustment(document: Document) -> str:
     if document["adjustment"] == "covariance":
-        return "with the covariance of the strip itself"
+        alone = document["settings"].get("covariance", {}).get("distances") is False
+        return "with the covariance of the strip itself" + (", control alone" if alone else "")
     if document["adjustment"] != "polynomial":
         return str(document["adjustment"])
     return f"polynomial, degree {document['settings']['polynomial']['degree']}"

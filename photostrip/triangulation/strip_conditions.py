@@ -33,6 +33,19 @@ if TYPE_CHECKING:
 JOINT, CONTROL, DISTANCE = 0, 1, 2
 
 
+@dataclass(frozen=True)
+class Settings:
+    """Which misclosures an adjustment with the covariance of the strip distributes.
+
+    Parameters
+    ----------
+    distances : bool
+        Whether distances of pass points from the common centres of their models count beside the control.
+    """
+
+    distances: bool = True
+
+
 @dataclass(frozen=True, eq=False)
 class Local:
     """Similarities of the models about their own left photos.

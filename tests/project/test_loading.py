@@ -83,6 +83,7 @@ def test_every_setting_arrives(tmp_path: Path) -> None:
 processing:
   adjustment: similarity
   polynomial: {degree: 2}
+  covariance: {distances: no}
   relative: {screening: tau, grubbs_alpha: 0.01, parallax_limit: 0.03}
   scale_transfer: distances
   earth_curvature: none
@@ -99,6 +100,7 @@ tolerances: {check_rms_xy: 0.4, sigma0_um: 7}
     assert (settings.relative.screening, settings.relative.grubbs_alpha) == ("tau", 0.01)
     assert settings.relative.parallax_limit == 0.03
     assert settings.formation.scale_transfer == "distances"
+    assert settings.covariance.distances is False
     assert (settings.absolute.earth_curvature, settings.absolute.earth_radius) == ("none", 6.4e6)
     assert (settings.refinement.refraction, settings.refinement.flying_height) == (True, 1500.0)
     assert settings.refinement.ground_height == -3.5

@@ -58,6 +58,8 @@ processing:
   adjustment: polynomial
   polynomial:
     degree: auto
+  covariance:
+    distances: true
   bundle:
     screening: snooping
     test: tau

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from photostrip.formats.result.document import document_of
 from photostrip.pipeline import Result, Settings, StripResult, triangulate
 from photostrip.pipeline import covariance as pipeline_covariance
+from photostrip.report.document import project_section
 from photostrip.triangulation import block_tridiagonal, polynomial, strip_conditions, strip_covariance, strip_system
 from tests.derivatives import UNSCREENED, errors_of, spec, without_noise, written_out
 
@@ -114,6 +116,25 @@ def test_true_coordinates_come_back(lap: float) -> None:
     (strip,) = result.strips
     assert strip.resection.rotations == pytest.approx(plain.strips[0].resection.rotations, abs=1e-9)
     assert strip.resection.residuals == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_control_alone_when_asked_for() -> None:
+    """Without the distances nothing is known better, and much is known worse; both forms say what took part."""
+    inputs = noisy(9, 80.0).inputs
+    alone = replace(COVARIANCE, covariance=strip_conditions.Settings(distances=False))
+    found = [triangulate(inputs, wanted) for wanted in (alone, COVARIANCE)]
+    documents = [document_of(result) for result in found]
+    blocks = [document["covariance"][0] for document in documents]
+    control = blocks[0]["control_coordinates"]
+    assert [block["distances"] > 0 for block in blocks] == [False, True]
+    assert [block["redundancy"] - block["distances"] for block in blocks] == [control - 7, control - 7]
+    assert [document["settings"]["covariance"] for document in documents] == [{"distances": False}, {"distances": True}]
+    told = [project_section(document).parts[0] for document in documents]
+    assert ["control alone" in str(part) for part in told] == [True, False]
+    more, less = (each.precision.points for each in found if each.precision is not None)
+    assert np.linalg.eigvalsh(more - less).min() > -1e-9
+    plan = [np.sqrt((each[:, 0, 0] + each[:, 1, 1]).mean()) for each in (more, less)]
+    assert 1.1 < plan[0] / plan[1] < 1.6  # a prototype's 80 % strips: 1.33
 
 
 def adjusted(seed: int, *, wrong: float = 0.0, axis: int = 2) -> tuple[StripResult, str]:

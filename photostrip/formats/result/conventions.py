@@ -53,7 +53,7 @@ def settings_of(result: Result) -> Document:
     found: Document = {"adjustment": settings.adjustment}
     for field in fields(settings):
         value = getattr(settings, field.name)
-        if field.name == "bundle" and settings.adjustment != "bundle":
+        if field.name in {"bundle", "covariance"} and settings.adjustment != field.name:
             continue
         if is_dataclass(value) and not isinstance(value, type):
             found[field.name] = asdict(value)
