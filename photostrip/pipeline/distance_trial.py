@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.pipeline import evidence
-from photostrip.triangulation.plausibility import control_reading, found
+from photostrip.triangulation.plausibility import control_heights, found
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from photostrip.pipeline.evidence import Formed
     from photostrip.pipeline.inputs import Settings, Strip
     from photostrip.points import PhotoPoints
-    from photostrip.triangulation.plausibility.control_reading import Stretched
+    from photostrip.triangulation.plausibility.control_heights import Stretched
 
     Read = Callable[[Formed], Stretched | None]
 
@@ -56,7 +56,7 @@ def examine(formed: Formed, observations: PhotoPoints, settings: Settings, read:
         P105, at most one.
     """
     first = read(formed) if len(formed.strip.photos) <= LONGEST else None
-    if first is None or first.misfit < MISFIT or abs(first.ratio - 1.0) < control_reading.SCALE_LEAST:
+    if first is None or first.misfit < MISFIT or abs(first.ratio - 1.0) < control_heights.SCALE_LEAST:
         return []
     for start in (first.ratio, *FIRST):
         ratio, last, pairs = _settled(formed.strip, observations, settings, read, start)
@@ -126,7 +126,7 @@ def _settled(
 
 
 def _told(strip: Strip, ratio: float, how: str, numbers: dict[str, float | int | str]) -> list[Finding]:
-    if abs(ratio - 1.0) < control_reading.SCALE_LEAST:
+    if abs(ratio - 1.0) < control_heights.SCALE_LEAST:
         return []
     given = strip.camera.principal_distance
     message = f"strip {strip.id} {how} with a principal distance of {given * ratio:.1f} mm; {given:g} mm are given"

@@ -10,7 +10,7 @@ import numpy as np
 from photostrip.errors import PhotostripError
 from photostrip.triangulation import formation, refinement, relative, screening
 from photostrip.triangulation.plausibility import mosaic
-from photostrip.triangulation.plausibility.control_reading import Seen
+from photostrip.triangulation.plausibility.control_strip import Seen
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

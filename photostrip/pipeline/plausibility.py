@@ -18,6 +18,7 @@ from photostrip.pipeline import distance_trial, evidence
 from photostrip.triangulation import interior
 from photostrip.triangulation.plausibility import (
     accepted,
+    control_heights,
     control_place,
     control_reading,
     flight,
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
     from photostrip.pipeline.inputs import Inputs, Settings, Strip
     from photostrip.pipeline.results import Result
     from photostrip.points import ControlPoints, PhotoPoints
-    from photostrip.triangulation.plausibility.control_reading import Given, Seen
+    from photostrip.triangulation.plausibility.control_strip import Given, Seen
     from photostrip.triangulation.plausibility.flight_order import Arranged
 
 
@@ -292,11 +293,11 @@ def _read(
 
 def _by_heights(
     formed: evidence.Formed, examined: Examined, control: ControlPoints, frames: Sequence[GroundFrame]
-) -> control_reading.Stretched | None:
+) -> control_heights.Stretched | None:
     """Compare a formed strip with the heights of its control."""
     rows, seen = evidence.sighted(formed, examined.observations, control)
     given = given_points.level(control.take(rows), frames)
-    return None if given is None else control_reading.stretched(given, seen)
+    return None if given is None else control_heights.stretched(given, seen)
 
 
 def _held(strip: Strip, examined: Examined, control: ControlPoints, frames: Sequence[GroundFrame]) -> list[Finding]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.errors import PhotostripError
-from photostrip.triangulation.plausibility.control_reading import FOOT
+from photostrip.triangulation.plausibility.control_strip import FOOT
 from photostrip.triangulation.plausibility.finding import found
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import PhotostripError
-from photostrip.triangulation.plausibility.control_reading import Given
+from photostrip.triangulation.plausibility.control_strip import Given
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
