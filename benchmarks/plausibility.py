@@ -45,6 +45,8 @@ FOOT = 0.3048
 GROSS_SHARE = 0.2  # of the strips without a mistake have two gross errors of image coordinates, which are none of these
 THIRD, HALF, LINE = 0.3, 0.55, 0.03  # of the length of the strip; of its half breadth
 EVEN = 0.5
+BEYOND = 1 / 3  # of what the control spans, beyond which a sound strip does not reach at either end
+TOLD_APART = 5.0  # standard deviations of an image coordinate
 WIDE = replace(FILM, name="wide", principal_distance=88.0)
 LONG = replace(FILM, name="long", principal_distance=305.0)
 CAMERAS = (FILM, FILM, DIGITAL, WIDE, LONG)
@@ -97,23 +99,46 @@ def sound(seed: int) -> Case:
         except InputError:
             continue  # the pass points of so few photos did not suffice
         case = Case(simulation, inputs_of(simulation), settings_of(simulation), rng)
-        if holds_both_ends(case):
+        if holds_both_ends(case) and not in_one_place(case):
             return case
     raise SystemExit(f"no strip can be made of seed {seed}")
 
 
 def holds_both_ends(case: Case) -> bool:
-    """Whether control at random places reaches the first and the last two photos: to leave an end out is a mistake."""
-    o, control = case.inputs.observations, case.inputs.control
-    given = {
-        name
-        for name, check, use in zip(control.ids, control.check, control.use[:, 0], strict=True)
-        if use and not check
-    }
-    return all(
-        any(o.point_ids[point] in given for photo in end for point in o.point[rows_of(case, photo)])
-        for end in (case.photos[:1], case.photos[-1:])
-    )
+    """Whether neither end lies farther beyond the control than a third of what it spans: to leave one out is a mistake.
+
+    Farther than half of it must be told; between a third and a half nothing is demanded.
+    """
+    control = case.inputs.control
+    counts = control.use[:, 0] & ~control.check & np.isin(control.ids, case.inputs.observations.point_ids)
+    along = np.clip(places(case)[0][counts], 0.0, 1.0)
+    low, high = float(along.min(initial=1.0)), float(along.max(initial=0.0))
+    return max(low, 1.0 - high) <= BEYOND * (high - low)
+
+
+def in_one_place(case: Case) -> bool:
+    """Whether two points lie so near to each other that no measurement tells them apart: one point under two ids."""
+    o = case.inputs.observations
+    near = TOLD_APART * case.spec.image.sigma_um / 1000.0
+    for photo in range(len(o.photo_ids)):
+        xy = o.xy[o.photo == photo]
+        d = np.abs(xy[:, None, :] - xy[None, :, :]).max(axis=2)
+        if (d[np.triu_indices(len(xy), 1)] < near).any():
+            return True
+    return False
+
+
+def places(case: Case) -> tuple[Floats, Floats]:
+    """Where given points lie, along the strip (0 at its first photo, 1 at its last) and across it (in bases)."""
+    truth = case.simulation.truth
+    index = {name: row for row, name in enumerate(truth.points.ids)}
+    order = [truth.photo_ids.index(name) for name in case.photos]
+    first, last = truth.centers[order[0]], truth.centers[order[-1]]
+    length = float(np.linalg.norm(last - first))
+    axis = (last - first) / length
+    side = np.cross(truth.rotations[:, :, 2].mean(axis=0), axis)
+    xyz = truth.points.xyz[[index[name] for name in case.inputs.control.ids]] - first
+    return xyz @ axis / length, xyz @ side / case.spec.base
 
 
 def drawn(rng: np.random.Generator, seed: int) -> Spec:
@@ -522,15 +547,7 @@ def lies_there(case: Case, crs: str) -> bool:
 def kept(case: Case, wanted: Callable[[Floats, Floats], NDArray[np.bool_]]) -> Planted | None:
     """Keep control where it is wanted, by its place along the strip (0 to 1) and across it (in bases)."""
     o, control = case.inputs.observations, case.inputs.control
-    index = {name: row for row, name in enumerate(case.simulation.truth.points.ids)}
-    centers = case.simulation.truth.centers
-    order = [case.simulation.truth.photo_ids.index(name) for name in case.photos]
-    first, last = centers[order[0]], centers[order[-1]]
-    axis = (last - first) / np.linalg.norm(last - first)
-    up = case.simulation.truth.rotations[:, :, 2].mean(axis=0)
-    side = np.cross(up, axis)
-    xyz = case.simulation.truth.points.xyz[[index[name] for name in control.ids]] - first
-    along, across = xyz @ axis / np.linalg.norm(last - first), xyz @ side / case.spec.base
+    along, across = places(case)
     keep = control.check | wanted(along, across)
     inside = keep & ~control.check & control.use.all(axis=1) & np.isin(control.ids, o.point_ids)
     if inside.sum() < 3 or len(case.photos) < 6:

@@ -13,7 +13,7 @@ from photostrip.triangulation.plausibility import mosaic
 from photostrip.triangulation.plausibility.control_strip import Seen
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -85,8 +85,7 @@ def form(strip: Strip, observations: PhotoPoints, settings: Settings) -> Formed 
     Formed or None
         None when a pair or a joint cannot be determined.
     """
-    members = [photo in strip.photos for photo in observations.photo_ids]
-    sigma = float(np.median(observations.sigma[np.array(members, bool)[observations.photo]]))
+    sigma = _sigma(observations, strip)
     try:
         pairs, point, rows = relative.collect_pairs(observations, strip.photos, strip.camera.principal_distance)
         first, converged = relative.attempt(pairs, point, rows)
@@ -126,7 +125,9 @@ def ideal(observations: PhotoPoints, strips: Sequence[Strip], settings: Settings
 # ------------------------------------------------------------------------------- given points as a strip sees them
 
 
-def sighted(formed: Formed, observations: PhotoPoints, control: ControlPoints) -> tuple[Numbers, Seen]:
+def sighted(
+    formed: Formed, observations: PhotoPoints, control: ControlPoints, steps: Mapping[str, complex]
+) -> tuple[Numbers, Seen]:
     """Give the points of a formed strip whose ground coordinates are given.
 
     Parameters
@@ -137,6 +138,8 @@ def sighted(formed: Formed, observations: PhotoPoints, control: ControlPoints) -
         Image points.
     control : ControlPoints
         Given points.
+    steps : mapping of str to complex
+        Centre of the next photo on each photo, mm.
 
     Returns
     -------
@@ -159,7 +162,7 @@ def sighted(formed: Formed, observations: PhotoPoints, control: ControlPoints) -
         strip.centers,
         (2.0 * share, 2.0 * np.sqrt(2.0) * share * depth / max(base, 1e-12)),
         depth,
-        _base_angle(observations, formed.strip.photos),
+        _base_angle(formed.strip.photos, steps),
     )
     return rows, seen
 
@@ -198,19 +201,21 @@ def stretches(rows: Numbers, seen: Seen) -> Iterator[tuple[Numbers, Seen]]:
 
 def _sigma(observations: PhotoPoints, strip: Strip) -> float:
     """Median standard deviation of the image coordinates of a strip, mm."""
-    members = np.array([photo in set(strip.photos) for photo in observations.photo_ids], bool)
+    names = set(strip.photos)
+    members = np.array([photo in names for photo in observations.photo_ids], bool)
     return float(np.median(observations.sigma[members[observations.photo]]))
 
 
-def _base_angle(observations: PhotoPoints, photos: Sequence[str]) -> float:
+def _base_angle(photos: Sequence[str], steps: Mapping[str, complex]) -> float:
     """Mean direction on the photos towards the next one, radians."""
-    links = mosaic.link(observations, photos)
-    steps = np.array([links.toward(number, number + 1) for number in range(len(photos) - 1)])
-    steps = steps[np.isfinite(steps) & (steps != 0)]
-    return float(np.angle((steps / np.abs(steps)).sum())) if len(steps) else 0.0
+    known = np.array([steps.get(photo, complex("nan")) for photo in photos])
+    known = known[np.isfinite(known) & (known != 0)]
+    return float(np.angle((known / np.abs(known)).sum())) if len(known) else 0.0
 
 
-def sighted_in_mosaic(strip: Strip, observations: PhotoPoints, control: ControlPoints) -> tuple[Numbers, Seen] | None:
+def sighted_in_mosaic(
+    strip: Strip, observations: PhotoPoints, control: ControlPoints, steps: Mapping[str, complex]
+) -> tuple[Numbers, Seen] | None:
     """Give the points of a mosaic of some photos whose ground coordinates are given.
 
     Parameters
@@ -221,6 +226,8 @@ def sighted_in_mosaic(strip: Strip, observations: PhotoPoints, control: ControlP
         Image points, mm.
     control : ControlPoints
         Given points.
+    steps : mapping of str to complex
+        Centre of the next photo on each photo, mm.
 
     Returns
     -------
@@ -255,7 +262,7 @@ def sighted_in_mosaic(strip: Strip, observations: PhotoPoints, control: ControlP
     xyz = np.column_stack([here.real, here.imag, np.full(len(here), np.nan)])
     centers = np.column_stack([layout.center.real, layout.center.imag, np.full(len(photos), depth)])
     up = np.array([[0.0, 0.0, 1.0]])
-    seen = Seen(strip.id, xyz, up, centers, (MOSAIC_SIGMA, MOSAIC_SIGMA), depth, _base_angle(observations, photos))
+    seen = Seen(strip.id, xyz, up, centers, (MOSAIC_SIGMA, MOSAIC_SIGMA), depth, _base_angle(photos, steps))
     return given, seen
 
 
@@ -273,7 +280,9 @@ def _richest(strip: Strip, observations: PhotoPoints, control: ControlPoints) ->
     return strip.photos[first : first + WINDOW]
 
 
-def stations(strip: Strip, observations: PhotoPoints, control: ControlPoints) -> tuple[Numbers, Floats]:
+def stations(
+    strip: Strip, observations: PhotoPoints, control: ControlPoints, steps: Mapping[str, complex]
+) -> tuple[Numbers, Floats]:
     """Give where along a strip given points lie.
 
     Parameters
@@ -281,23 +290,31 @@ def stations(strip: Strip, observations: PhotoPoints, control: ControlPoints) ->
     strip : Strip
         The strip, its photos as they lie.
     observations : PhotoPoints
-        Image points.
+        Image points, mm.
     control : ControlPoints
         Given points.
+    steps : mapping of str to complex
+        Centre of the next photo on each photo, mm.
 
     Returns
     -------
     rows : ndarray of int, shape (m,)
         Rows of the given points that at least two of its photos show.
     place : ndarray, shape (m,)
-        Mean number of those photos, from 0.
+        Where they lie along the strip in bases, from 0 at the first photo; the mean of what its photos say.
     """
     order = {photo: number for number, photo in enumerate(strip.photos)}
     position = np.array([order.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo]
-    rows = position >= 0
+    rows = np.flatnonzero(position >= 0)
+    step = np.array([steps.get(photo, complex("nan")) for photo in strip.photos])
+    known = np.isfinite(step) & (step != 0)
+    usual = complex(np.median(step[known].real), np.median(step[known].imag)) if known.any() else 1.0
+    step = np.where(known, step, usual)[position[rows]]
+    along = (observations.xy[rows] * np.column_stack([step.real, step.imag])).sum(axis=1) / np.abs(step) ** 2
+    along = along if known.any() else np.zeros(len(rows))
     size = len(observations.point_ids)
     count = np.bincount(observations.point[rows], minlength=size)
-    total = np.bincount(observations.point[rows], position[rows].astype(float), size)
+    total = np.bincount(observations.point[rows], position[rows] + along, size)
     number = {name: n for n, name in enumerate(observations.point_ids)}
     points = np.array([number.get(name, -1) for name in control.ids], np.intp)
     seen = np.flatnonzero((points >= 0) & (count[points] >= SEEN_BY))
@@ -305,7 +322,9 @@ def stations(strip: Strip, observations: PhotoPoints, control: ControlPoints) ->
     return seen, total[chosen] / count[chosen]
 
 
-def half_breadth(strip: Strip, observations: PhotoPoints, ids: Sequence[str], plan: Floats) -> float:
+def half_breadth(
+    strip: Strip, observations: PhotoPoints, ids: Sequence[str], plan: Floats, steps: Mapping[str, complex]
+) -> float:
     """Give half the breadth of a strip.
 
     Parameters
@@ -318,14 +337,17 @@ def half_breadth(strip: Strip, observations: PhotoPoints, ids: Sequence[str], pl
         Ids of given points.
     plan : ndarray, shape (n, 2)
         Their plan coordinates in metres.
+    steps : mapping of str to complex
+        Centre of the next photo on each photo, mm.
 
     Returns
     -------
     float
         Metres, with the scale of photos that show two given points or more; infinite when there is none.
     """
-    inside = np.array([name in set(strip.photos) for name in observations.photo_ids], bool)[observations.photo]
-    angle = _base_angle(observations, strip.photos)
+    members = set(strip.photos)
+    inside = np.array([name in members for name in observations.photo_ids], bool)[observations.photo]
+    angle = _base_angle(strip.photos, steps)
     across = observations.xy[inside] @ [-np.sin(angle), np.cos(angle)]
     row_of = {name: row for row, name in enumerate(ids)}
     given = np.array([row_of.get(name, -1) for name in observations.point_ids], np.intp)[observations.point]

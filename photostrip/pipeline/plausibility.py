@@ -15,6 +15,7 @@ import numpy as np
 from photostrip.errors import PhotostripError
 from photostrip.geodesy.crs import area_of_use, tie_frames
 from photostrip.pipeline import distance_trial, evidence
+from photostrip.pipeline.base_directions import closer_look
 from photostrip.triangulation import interior
 from photostrip.triangulation.plausibility import (
     accepted,
@@ -55,6 +56,8 @@ class Examined:
         Image points with what was found put right, for further evidence only; mm, y up.
     arranged : tuple of Arranged
         Each strip as its photos lie.
+    steps : dict of str to complex
+        Centre of the next photo, as the photos lie, on each photo; mm, y up.
     settings : Settings
         What is to be done.
     light : bool
@@ -64,6 +67,7 @@ class Examined:
     findings: tuple[Finding, ...]
     observations: PhotoPoints
     arranged: tuple[Arranged, ...]
+    steps: dict[str, complex]
     settings: Settings
     light: bool = False
 
@@ -85,20 +89,25 @@ def before(inputs: Inputs, settings: Settings) -> Examined:
     """
     cameras = {photo: strip.camera for strip in inputs.strips for photo in strip.photos}
     observations, told = _photo_coordinates(inputs, settings)
-    of_units, factors = units.examine(observations, cameras)
+    of_units, of_camera = units.examine(observations, cameras)
     told += of_units
-    arranged = []
+    factor = {name: of_camera[cameras[name].name] if name in cameras else 1.0 for name in observations.photo_ids}
+    in_unit = _put_right(observations, factor, frozenset())
+    arranged: list[Arranged] = []
     for strip in inputs.strips:
-        findings, order = flight_order.examine(observations, strip.id, strip.photos)
+        closer = closer_look(strip, in_unit, settings)
+        findings, order = flight_order.examine(observations, strip.id, strip.photos, closer)
         told += findings
         arranged.append(order)
-    size = {name: each.size[name] for each in arranged for name in each.size}
-    name_of = {photo: camera.name for photo, camera in cameras.items()}
-    factor = {
-        photo: factors.get(name_of.get(photo, ""), 1.0) / size.get(photo, 1.0) for photo in observations.photo_ids
-    }
+    for each in arranged:
+        factor |= {name: factor[name] / size for name, size in each.size.items()}
     mirrored = frozenset(name for each in arranged for name in each.mirrored)
-    return Examined(tuple(told), _put_right(observations, factor, mirrored), tuple(arranged), settings)
+    steps = {
+        name: factor.get(name, 1.0) * (step.conjugate() if name in mirrored else step)
+        for each in arranged
+        for name, step in zip(each.photos, each.steps, strict=True)
+    }
+    return Examined(tuple(told), _put_right(observations, factor, mirrored), tuple(arranged), steps, settings)
 
 
 def _photo_coordinates(inputs: Inputs, settings: Settings) -> tuple[PhotoPoints, list[Finding]]:
@@ -245,7 +254,8 @@ def _of_control(
             elif not examined.findings:
                 here = distance_trial.without_pairs(strip, points, settings, read) or here
         told += here
-        told += _held(strip, examined, control, frames)
+    for strip in _as_they_lie(inputs, examined):
+        told += _held(strip, examined, control, frames) if len(strip.photos) > 1 else []
     return told
 
 
@@ -261,7 +271,7 @@ def _on_strip(
 ) -> list[Finding]:
     """Compare given points with a strip: the formed one, or else the mosaic of its photos."""
     if formed is not None:
-        rows, seen = evidence.sighted(formed, examined.observations, control)
+        rows, seen = evidence.sighted(formed, examined.observations, control, examined.steps)
         return [
             finding
             for part, sight in evidence.stretches(rows, seen)
@@ -269,7 +279,7 @@ def _on_strip(
                 control.take(part), sight, frames, as_written=as_written, axes_are_right=axes_are_right
             )
         ]
-    mosaic = evidence.sighted_in_mosaic(strip, examined.observations, control)
+    mosaic = evidence.sighted_in_mosaic(strip, examined.observations, control, examined.steps)
     if mosaic is None:
         return []
     rows, seen = mosaic
@@ -295,21 +305,21 @@ def _by_heights(
     formed: evidence.Formed, examined: Examined, control: ControlPoints, frames: Sequence[GroundFrame]
 ) -> control_heights.Stretched | None:
     """Compare a formed strip with the heights of its control."""
-    rows, seen = evidence.sighted(formed, examined.observations, control)
+    rows, seen = evidence.sighted(formed, examined.observations, control, examined.steps)
     given = given_points.level(control.take(rows), frames)
     return None if given is None else control_heights.stretched(given, seen)
 
 
 def _held(strip: Strip, examined: Examined, control: ControlPoints, frames: Sequence[GroundFrame]) -> list[Finding]:
     """Judge where the control of a strip lies."""
-    rows, place = evidence.stations(strip, examined.observations, control)
+    rows, place = evidence.stations(strip, examined.observations, control, examined.steps)
     counts = control.use[rows, 0] & ~control.check[rows]
     here = control.take(rows[counts])
     given = given_points.level(here, frames)
     if given is None:
         return []
     plan = given.level[:, :2]
-    breadth = evidence.half_breadth(strip, examined.observations, here.ids, plan)
+    breadth = evidence.half_breadth(strip, examined.observations, here.ids, plan, examined.steps)
     return list(layout.examine(place[counts], plan, breadth, strip.photos, strip.id, here.ids))
 
 

@@ -14,9 +14,10 @@ from photostrip.cli.main import main
 from photostrip.errors import PhotostripError
 from photostrip.formats.simulation import inputs_of, project_files, settings_of
 from photostrip.geometry.rotation import angles
-from photostrip.pipeline import Settings, plausibility, triangulate
+from photostrip.pipeline import Settings, evidence, plausibility, triangulate
 from photostrip.pipeline.inputs import GivenOrientations
 from photostrip.simulate import DIGITAL, Control, Film, Flight, GrossError, Ground, Image, Spec, Terrain, simulate
+from photostrip.triangulation.plausibility import flight_order
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -367,3 +368,34 @@ def test_an_error_fails_a_run_that_is_done(tmp_path: Path, capsys: pytest.Captur
     else:  # so wrong that nothing can be adjusted
         assert code == 3
         assert "P105" in {each["code"] for each in document["findings"]}
+
+
+# ---------------------------------------------------------------------------------- a closer look where it is needed
+
+
+@pytest.mark.parametrize("seed", [26, 68, 112])
+def test_tilts_as_large_as_bases_are_no_wrong_order(seed: int) -> None:
+    lens = Flight(photos=6, end_lap_percent=78.0, attitude_sigma_deg=(3.0, 3.0, 2.0))
+    inputs = inputs_of(simulate(Spec(seed=seed, camera=DIGITAL, flight=lens)))
+    (screen,) = flight_order.examine(inputs.observations, "A", inputs.strips[0].photos)[0]
+    assert screen.code == "P201"  # side by side, the photos look exchanged
+    assert plausibility.of_inputs(inputs, Settings()) == ()
+    photos = [*inputs.strips[0].photos]
+    photos[3], photos[1] = photos[1], photos[3]
+    wrong = replace(inputs, strips=(replace(inputs.strips[0], photos=tuple(photos)),))
+    assert codes(plausibility.of_inputs(wrong, Settings())) == ["P201"]
+
+
+@pytest.mark.parametrize("end_lap", [60.0, 80.0])
+def test_where_a_point_lies_along_a_strip_does_not_depend_on_the_end_lap(end_lap: float) -> None:
+    made = simulate(Spec(seed=4, flight=Flight(photos=6, end_lap_percent=end_lap, attitude_sigma_deg=(2.0, 2.0, 2.0))))
+    inputs = inputs_of(made)
+    examined = plausibility.before(inputs, Settings())
+    rows, place = evidence.stations(inputs.strips[0], examined.observations, inputs.control, examined.steps)
+    index = {name: row for row, name in enumerate(made.truth.points.ids)}
+    xyz = made.truth.points.xyz[[index[inputs.control.ids[row]] for row in rows]]
+    first, last = made.truth.centers[0], made.truth.centers[-1]
+    true = 5.0 * (xyz - first) @ (last - first) / ((last - first) ** 2).sum()
+    assert np.abs(place - true).max() < 0.5  # base; the mean number of its photos is off by 1.0 at the ends at 80 %
+    assert place.min() < 0.3
+    assert place.max() > 4.7

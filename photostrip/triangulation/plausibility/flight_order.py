@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -14,7 +15,7 @@ from photostrip.triangulation.plausibility.finding import found
 from photostrip.triangulation.plausibility.units import reading_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -22,12 +23,16 @@ if TYPE_CHECKING:
     from photostrip.points import PhotoPoints
 
     Flags = NDArray[np.bool_]
+    Toward = Callable[[int, int], complex | None]
+    Against = Callable[[Sequence[int]], list[int]]
+    Closer = Callable[[str, str], tuple[complex, complex] | None]
 
 TURNED_BACK = 0.3  # cosine between the directions to both neighbours; -1 in a straight flight
 SURE_COUNT = 3  # common points of a link that may speak against the list
 SURE_MISFIT = 0.35  # of its base
 SAME_PLACE = 0.03  # of the median base: two photos from one place
 NAMED = 8
+LOOKED_AT = 24  # photos that are looked at closer; a list that is wrong at more places needs no closer look
 FEWEST = 3  # photos that have an order
 
 
@@ -39,6 +44,8 @@ class Arranged:
     ----------
     photos : tuple of str
         Photos in the order in which they lie, each place once.
+    steps : tuple of complex
+        Centre of the next photo on each of them, in the unit of its coordinates; NaN where it has no link.
     mirrored : frozenset of str
         Photos that are mirror images of the others.
     size : dict of str to float
@@ -48,12 +55,15 @@ class Arranged:
     """
 
     photos: tuple[str, ...]
+    steps: tuple[complex, ...]
     mirrored: frozenset[str]
     size: dict[str, float]
     changed: bool
 
 
-def examine(observations: PhotoPoints, strip: str, photos: Sequence[str]) -> tuple[list[Finding], Arranged]:
+def examine(
+    observations: PhotoPoints, strip: str, photos: Sequence[str], closer: Closer = lambda _one, _other: None
+) -> tuple[list[Finding], Arranged]:
     """Compare the list of a strip's photos with what their common points say.
 
     Parameters
@@ -64,6 +74,9 @@ def examine(observations: PhotoPoints, strip: str, photos: Sequence[str]) -> tup
         Id of the strip.
     photos : sequence of str
         Its photos as listed.
+    closer : callable
+        Gives of two photos the direction of each from the other, tilts taken into account, or None; asked where the
+        layout contradicts the list.
 
     Returns
     -------
@@ -78,15 +91,27 @@ def examine(observations: PhotoPoints, strip: str, photos: Sequence[str]) -> tup
     twice = _twice(links)
     told += [_twin(links, pair, strip, photos) for pair in twice]
     left = [number for number in range(len(photos)) if number not in {other for _, other in twice}]
-    order = _order(links, layout, left)
+    against = partial(turned_back, links, closer=_by_number(closer, photos))
+    order = _order(links, layout, left, against)
     moved = _moved(order, left)
     if moved:
-        told.append(_out_of_order(links, order, moved, strip, photos))
+        told.append(_out_of_order(links, order, moved, strip, photos, against))
     told += _gaps(links, order, strip, photos)
     mirrored = frozenset(photos[number] for number in np.flatnonzero(layout.mirrored).tolist())
     size = {photos[number]: float(layout.size[number]) for number in _other_size(layout)}
     changed = bool(twice or moved or mirrored or size)
-    return told, Arranged(tuple(photos[number] for number in order), mirrored, size, changed)
+    return told, Arranged(tuple(photos[number] for number in order), _steps(links, order), mirrored, size, changed)
+
+
+def _steps(links: mosaic.Links, order: Sequence[int]) -> tuple[complex, ...]:
+    """Half of the way from the photo before to the one behind, on each photo: a tilt of its own does not count."""
+    steps = []
+    for before, here, after in zip((-1, *order), order, (*order[1:], -1), strict=False):
+        ways = [links.toward(here, after) if after >= 0 else complex("nan")]
+        ways += [-links.toward(here, before)] if before >= 0 else []
+        known = [way for way in ways if np.isfinite(way)]
+        steps.append(sum(known) / len(known) if known else complex("nan"))
+    return tuple(steps)
 
 
 # ------------------------------------------------------------------------------- photos unlike their neighbours
@@ -156,7 +181,17 @@ def _sure(links: mosaic.Links) -> Flags:
     return sure
 
 
-def turned_back(links: mosaic.Links, order: Sequence[int]) -> list[int]:
+def _by_number(closer: Closer, photos: Sequence[str]) -> Toward:
+    """Give the direction of one photo on another, both by number, as the closer look has it."""
+
+    def toward(of: int, other: int) -> complex | None:
+        seen = closer(photos[min(of, other)], photos[max(of, other)])
+        return None if seen is None else seen[0 if of < other else 1]
+
+    return toward
+
+
+def turned_back(links: mosaic.Links, order: Sequence[int], closer: Toward = lambda _of, _other: None) -> list[int]:
     """Find photos whose two neighbours lie on the same side.
 
     Parameters
@@ -165,6 +200,8 @@ def turned_back(links: mosaic.Links, order: Sequence[int]) -> list[int]:
         Links of the strip.
     order : sequence of int
         Photos in an order.
+    closer : callable
+        Gives the direction of a photo on another, tilts taken into account, or None where that is not known.
 
     Returns
     -------
@@ -172,24 +209,33 @@ def turned_back(links: mosaic.Links, order: Sequence[int]) -> list[int]:
         Those photos; none is told where a link is missing or doubtful.
     """
     sure = _sure(links)
-    found = []
+    found: list[int] = []
+    looked_at = 0
     for before, here, after in zip(order, order[1:], order[2:], strict=False):
         rows = [links.index.get((min(here, other), max(here, other)), -1) for other in (before, after)]
         if min(rows) < 0 or not sure[rows].all():
             continue
         one, two = links.toward(here, before), links.toward(here, after)
-        if (one * two.conjugate()).real > TURNED_BACK * abs(one) * abs(two):
+        if not _same_side(one, two):
+            continue
+        looked_at += 1
+        near = [closer(here, other) for other in (before, after)] if looked_at <= LOOKED_AT else [None, None]
+        if near[0] is None or near[1] is None or _same_side(near[0], near[1]):
             found.append(here)
     return found
+
+
+def _same_side(one: complex, two: complex) -> bool:
+    return (one * two.conjugate()).real > TURNED_BACK * abs(one) * abs(two)
 
 
 def _unlinked(links: mosaic.Links, order: Sequence[int]) -> int:
     return sum((min(pair), max(pair)) not in links.index for pair in pairwise(order))
 
 
-def _order(links: mosaic.Links, layout: mosaic.Layout, listed: list[int]) -> list[int]:
+def _order(links: mosaic.Links, layout: mosaic.Layout, listed: list[int], contradictions: Against) -> list[int]:
     """Photos as they lie, where the list is contradicted; else as listed."""
-    against = len(turned_back(links, listed)) + _unlinked(links, listed)
+    against = len(contradictions(listed)) + _unlinked(links, listed)
     if not against or len(listed) < FEWEST:
         return listed
     order: list[int] = []
@@ -197,7 +243,7 @@ def _order(links: mosaic.Links, layout: mosaic.Layout, listed: list[int]) -> lis
         inside = [number for number in listed if layout.part[number] == part]
         order += _along(layout, inside)
     order.sort(key=lambda number: listed.index(_first_of(layout, listed, number)))  # parts as they are listed
-    left = len(turned_back(links, order)) + _unlinked(links, order)
+    left = len(contradictions(order)) + _unlinked(links, order)
     return order if left < against else listed
 
 
@@ -238,7 +284,12 @@ def _moved(order: Sequence[int], listed: Sequence[int]) -> list[int]:
 
 
 def _out_of_order(
-    links: mosaic.Links, order: Sequence[int], moved: Sequence[int], strip: str, photos: Sequence[str]
+    links: mosaic.Links,
+    order: Sequence[int],
+    moved: Sequence[int],
+    strip: str,
+    photos: Sequence[str],
+    contradictions: Against,
 ) -> Finding:
     names = [photos[number] for number in order]
     wrong = [photos[number] for number in moved]
@@ -259,8 +310,8 @@ def _out_of_order(
     listed = [number for number in range(len(photos)) if number in set(order)]
     evidence = {
         "photos_moved": len(moved),
-        "turned_back_as_listed": len(turned_back(links, listed)),
-        "turned_back_as_found": len(turned_back(links, order)),
+        "turned_back_as_listed": len(contradictions(listed)),
+        "turned_back_as_found": len(contradictions(order)),
         "neighbours_without_link_as_listed": _unlinked(links, listed),
     }
     fix = "list the photos in flight order, or correct the photo ids in the table"

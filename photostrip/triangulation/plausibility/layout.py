@@ -33,7 +33,7 @@ def examine(
     Parameters
     ----------
     place : ndarray, shape (n,)
-        Place of each control point along the strip: the mean number of the photos that show it, from 0.
+        Place of each control point along the strip in bases, from 0 at the first photo.
     plan : ndarray, shape (n, 2)
         Its given plan coordinates, metres.
     half_breadth : float
@@ -56,7 +56,7 @@ def examine(
     last = len(photos) - 1
     if len(photos) < FEWEST:
         return
-    low, high = float(place.min()), float(place.max())
+    low, high = float(np.clip(place, 0, last).min()), float(np.clip(place, 0, last).max())
     evidence: dict[str, float | int | str] = {
         "first_control_at_photo": low + 1,
         "last_control_at_photo": high + 1,
