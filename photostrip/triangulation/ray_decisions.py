@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.statistics import chi2_quantile
-from photostrip.triangulation import windows
+from photostrip.triangulation.windows import FEWEST
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.windows import Group
+    from photostrip.triangulation.window_points import Group
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -98,15 +98,15 @@ class _Doubted:
         return self.total - np.einsum("ki,ki->k", right, shift), shift.reshape(-1, len(rays), 2)
 
 
-def decide(group: Group, predicted: tuple[Floats, Floats], number: Numbers) -> Decision:
+def decide(group: Group, expected: tuple[Floats, Floats], number: Numbers) -> Decision:
     """Judge points by photos that were oriented without them.
 
     Parameters
     ----------
     group : Group
         Points with r rays.
-    predicted : tuple of ndarray, shapes (k, 6r), (k, 6r, 6r)
-        Changes of the photos of each point and their cofactors.
+    expected : tuple of ndarray, shapes (k, 2r - 3), (k, 2r - 3, 2r - 3)
+        What those photos leave of the conditions of each point, and its variances.
     number : ndarray of int, shape (w,)
         Points of each window, among which one in a hundred windows may lose a good one.
 
@@ -116,13 +116,9 @@ def decide(group: Group, predicted: tuple[Floats, Floats], number: Numbers) -> D
         What may be used.
     """
     k, r = group.ray.shape
-    estimate, cofactors = predicted
-    basis = windows.coplanarities(group)
-    design = basis @ group.by_photo
-    gap = np.einsum("kij,kj->ki", basis, group.misfit) - np.einsum("kij,kj->ki", design, estimate)
-    variance = basis @ basis.transpose(0, 2, 1) + design @ cofactors @ design.transpose(0, 2, 1)
+    gap, variance = expected
     held = np.asarray(np.linalg.inv(variance), float)
-    pulled = np.einsum("kij,kj->ki", held, gap)
+    pulled = (held @ gap[:, :, None])[:, :, 0]
     total = np.maximum(np.einsum("ki,ki->k", gap, pulled), 0.0)
     level = 1 - ALPHA / np.maximum(number, 1)[group.window]
     limit = _quantiles(level, 2 * r - 3)
@@ -130,8 +126,8 @@ def decide(group: Group, predicted: tuple[Floats, Floats], number: Numbers) -> D
         group, np.ones((k, r)), np.sqrt(total), np.sqrt(limit), np.full((k, r, 2), np.nan), np.zeros(k, np.intp)
     )
     bad = np.flatnonzero(~(total <= limit))
-    doubted = _Doubted(bad, basis[bad], held[bad], pulled[bad], total[bad], level[bad])
-    return _of_two(start, bad, gap) if r == windows.FEWEST else _told(start, doubted)
+    doubted = _Doubted(bad, group.basis[bad], held[bad], pulled[bad], total[bad], level[bad])
+    return _of_two(start, bad, gap) if r == FEWEST else _told(start, doubted)
 
 
 def _quantiles(level: Floats, freedom: int) -> Floats:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.triangulation import windows
+from photostrip.triangulation import window_adjustment, window_points, windows
 from photostrip.triangulation.ray_decisions import GOOD, NONE, PAIR, RAY, RAYS, Decision, decide
 
 if TYPE_CHECKING:
@@ -29,7 +29,9 @@ if TYPE_CHECKING:
     from photostrip.points import PhotoPoints
     from photostrip.triangulation.formation import FormedStrip
     from photostrip.triangulation.relative import Orientation
-    from photostrip.triangulation.windows import Group, Rays, Solved
+    from photostrip.triangulation.window_adjustment import Solved
+    from photostrip.triangulation.window_points import Group
+    from photostrip.triangulation.windows import Rays
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -218,7 +220,7 @@ def examine(scene: Scene, points: Numbers, kept: Numbers, earlier: Verdict | Non
     found: list[Decision] = []
     for part in range(0, len(at), BATCH):
         batch = at[part : part + BATCH]
-        groups = windows.groups(rays, first[batch], length)
+        groups = window_points.groups(rays, first[batch], length)
         start = (
             None
             if earlier is None
@@ -237,15 +239,14 @@ def _adjusted(groups: list[Group], count: int, length: int, start: list[Floats] 
     number = np.sum([np.bincount(group.window, minlength=count) for group in groups], axis=0)
     if start is None:
         solved = _robust(groups, count, length)
-        found = [decide(group, solved.of(group), number) for group in groups]
+        found = [decide(group, window_adjustment.expected(group, solved), number) for group in groups]
     else:
-        solved = _least_squares(groups, start, count, length)
-        parts = zip(groups, start, strict=True)
-        found = [decide(group, windows.without(group, weight, solved), number) for group, weight in parts]
+        found = _judged(groups, start, number, length)
+        if all((each.weight == weight).all() for each, weight in zip(found, start, strict=True)):
+            return found  # those that were left out before are left out again
     state = [_State(each, each.weight, *(np.zeros(each.weight.shape, bool) for _ in range(2))) for each in found]
     for _ in range(ROUNDS):
-        solved = _least_squares(groups, [each.weight for each in state], count, length)
-        judged = [decide(each.group, windows.without(each.group, each.weight, solved), number) for each in state]
+        judged = _judged(groups, [each.weight for each in state], number, length)
         worst = np.zeros(count)
         for old, new in zip(state, judged, strict=True):
             np.maximum.at(worst, old.group.window, np.where(old.loses(new), new.value / new.limit, 0.0))
@@ -255,6 +256,13 @@ def _adjusted(groups: list[Group], count: int, length: int, start: list[Floats] 
         if settled:
             break
     return [each.decided for each in state]
+
+
+def _judged(groups: list[Group], weights: list[Floats], number: Numbers, length: int) -> list[Decision]:
+    """Adjust windows with the rays that count, and judge each point by an adjustment without it."""
+    solved = _least_squares(groups, weights, len(number), length)
+    parts = zip(groups, weights, strict=True)
+    return [decide(group, window_adjustment.without(group, weight, solved), number) for group, weight in parts]
 
 
 @dataclass(frozen=True, eq=False)
@@ -301,16 +309,19 @@ class _State:
 
 def _robust(groups: list[Group], count: int, length: int) -> Solved:
     """Adjust windows with weights of the conditions that fall with their misclosures."""
-    conditions = windows.stacked([(group, windows.coplanarities(group)) for group in groups], count, length)
-    solved = conditions.solved(np.ones(conditions.misfit.shape))
-    left = conditions.left(solved)
+    parts = [(group, group.design, group.closing) for group in groups]
+    conditions = window_adjustment.stacked(parts, count, length)
+    left = conditions.left(conditions.estimate(np.ones(conditions.misfit.shape)))
     for steps, weights in ((ABSOLUTE_STEPS, _absolute), (WELSCH_STEPS, _welsch)):
+        going, part = np.arange(count), conditions
         for _ in range(steps):
-            solved = conditions.solved(weights(left))
-            before, left = left, conditions.left(solved)
-            if np.abs(left - before).max() < STILL:
+            now = part.left(part.estimate(weights(left[going])))
+            moving = np.abs(now - left[going]).max(axis=1) >= STILL
+            left[going] = now
+            going, part = going[moving], part.take(moving)
+            if not len(going):
                 break
-    return solved
+    return conditions.solved(_welsch(left))
 
 
 def _absolute(left: Floats) -> Floats:
@@ -325,9 +336,18 @@ def _welsch(left: Floats) -> Floats:
 
 def _least_squares(groups: list[Group], weights: list[Floats], count: int, length: int) -> Solved:
     """Adjust windows with the rays that count."""
-    matrices = [windows.projectors(group, weight) for group, weight in zip(groups, weights, strict=True)]
-    conditions = windows.stacked(list(zip(groups, matrices, strict=True)), count, length)
-    return conditions.solved(np.ones(conditions.misfit.shape))
+    parts = []
+    for group, weight in zip(groups, weights, strict=True):
+        whole = np.asarray(weight.all(axis=1), bool)
+        some = np.asarray(~whole & weight.any(axis=1), bool)
+        if whole.any():
+            part = group.take(whole)
+            parts.append((part, *window_adjustment.independent(part)))
+        if some.any():
+            part = group.take(some)
+            parts.append((part, *window_adjustment.projected(part, weight[some])))
+    found = window_adjustment.stacked(parts, count, length)
+    return found.solved(np.ones(found.misfit.shape))
 
 
 def _verdict(scene: Scene, rays: Rays, found: list[Decision], kept: Numbers) -> Verdict:

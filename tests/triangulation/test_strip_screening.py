@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from photostrip.geometry.rotation import from_vector
 from photostrip.pipeline import Settings, triangulate
-from photostrip.triangulation import bridging, ray_decisions, windows
+from photostrip.triangulation import bridging, ray_decisions, window_adjustment, window_points, windows
 from photostrip.triangulation.strip_screening import BOTH, SEVERAL, TOLD
 from tests.strips import MICROMETRE, control_points, fly, photograph, project
 
@@ -111,8 +111,8 @@ def test_derivatives_are_those_of_the_central_projection(seed: int) -> None:
 @pytest.mark.parametrize("photos", [2, 3, 4, 5])
 def test_conditions_do_not_feel_the_point(photos: int) -> None:
     rays, _, _ = some_rays(3, photos)
-    (group,) = windows.groups(rays, np.zeros(1, np.intp), photos)
-    basis = windows.coplanarities(group)
+    (group,) = window_points.groups(rays, np.zeros(1, np.intp), photos)
+    basis = window_points.coplanarities(group)
     assert basis.shape[1:] == (2 * photos - 3, 2 * photos)
     assert basis @ group.by_point == pytest.approx(0.0, abs=1e-6 * np.abs(group.by_point).max())
     assert np.linalg.matrix_rank(basis, tol=1e-6).tolist() == [2 * photos - 3] * len(basis)
@@ -124,10 +124,11 @@ def test_conditions_do_not_feel_the_point(photos: int) -> None:
 def test_windows_are_the_adjustment_of_all_rays_at_once() -> None:
     """Against least squares with the points as unknowns, by a library function, in which no one eliminates anything."""
     rays, _, _ = some_rays(5, photos=4, points=12)
-    groups = windows.groups(rays, np.zeros(1, np.intp), 4)
+    groups = window_points.groups(rays, np.zeros(1, np.intp), 4)
     (group,) = groups
     weight = np.ones(group.ray.shape)
-    solved = windows.stacked([(group, windows.projectors(group, weight))], 1, 4).solved(np.ones((1, 12 * 8)))
+    parts = [(group, *window_adjustment.projected(group, weight))]
+    solved = window_adjustment.stacked(parts, 1, 4).solved(np.ones((1, 12 * 8)))
     design = np.zeros((len(rays.row), 2, 24 + 36))
     for n, (photo, point) in enumerate(zip(rays.photo, rays.point, strict=True)):
         design[n, :, 6 * photo : 6 * photo + 6] = rays.by_photo[n]
@@ -136,31 +137,36 @@ def test_windows_are_the_adjustment_of_all_rays_at_once() -> None:
     estimate = np.linalg.lstsq(flat, rays.misfit.ravel(), rcond=1e-10)[0]
     left = rays.misfit.ravel() - flat @ estimate
     ours = group.misfit - np.einsum("kij,kj->ki", group.by_photo, solved.of(group)[0])
-    ours = np.einsum("kij,kj->ki", windows.projectors(group, weight), ours)
+    ours = np.einsum("kij,kj->ki", window_points.projectors(group, weight), ours)
     assert ours.ravel() == pytest.approx(left, abs=1e-4)
+    # the same with as few conditions as there are
+    fewer = window_adjustment.stacked([(group, *window_adjustment.independent(group))], 1, 4)
+    assert fewer.misfit.shape == (1, 12 * 5)
+    every = window_adjustment.stacked(parts, 1, 4)
+    weights = np.ones(fewer.misfit.shape)
+    same = every.left(fewer.estimate(weights))
+    assert same == pytest.approx(every.left(solved.estimate), abs=1e-4)
+    quick = every.left(fewer.solved(weights).estimate)
+    assert quick == pytest.approx(same, abs=1e-4)
 
 
 def test_a_point_taken_out_by_formula_is_left_out() -> None:
     rays, _, _ = some_rays(6, photos=4, points=14)
-    (group,) = windows.groups(rays, np.zeros(1, np.intp), 4)
+    (group,) = window_points.groups(rays, np.zeros(1, np.intp), 4)
 
-    def solved(weight: Floats) -> windows.Solved:
-        conditions = windows.stacked([(group, windows.projectors(group, weight))], 1, 4)
+    def solved(weight: Floats) -> window_adjustment.Solved:
+        conditions = window_adjustment.stacked([(group, *window_adjustment.projected(group, weight))], 1, 4)
         return conditions.solved(np.ones(conditions.misfit.shape))
 
     weight = np.ones(group.ray.shape)
     weight[3, 1] = 0.0
-    estimate, cofactors = windows.without(group, weight, solved(weight))
-    basis = windows.coplanarities(group)
-    for point in (0, 3, 7):
+    gap, variance = window_adjustment.without(group, weight, solved(weight))
+    for point in (0, 3, 7):  # the second lacks a ray already
         fewer = weight.copy()
         fewer[point] = 0.0
-        again = solved(fewer)
-        one, two = again.of(group)
-        design = basis[point] @ group.by_photo[point]  # what the place and scale of the window do not touch
-        assert design @ estimate[point] == pytest.approx(design @ one[point], abs=1e-3)
-        expected = design @ two[point] @ design.T
-        assert design @ cofactors[point] @ design.T == pytest.approx(expected, rel=1e-3, abs=1e-3)
+        left, spread = window_adjustment.expected(group, solved(fewer))
+        assert gap[point] == pytest.approx(left[point], abs=1e-3)
+        assert variance[point] == pytest.approx(spread[point], rel=1e-3, abs=1e-3)
 
 
 def test_every_photo_is_in_a_window_and_every_point_at_home_with_all_its_rays() -> None:
@@ -192,9 +198,10 @@ def test_good_points_are_called_wrong_as_often_as_the_level_says() -> None:
     alarms = points = 0
     for seed in range(400):
         rays, _, _ = some_rays(seed, points=10)
-        (group,) = windows.groups(rays, np.zeros(1, np.intp), 3)
-        exact = np.zeros((10, 18)), np.zeros((10, 18, 18))
-        found = ray_decisions.decide(group, exact, np.array([1]))  # level 1 % a point
+        (group,) = window_points.groups(rays, np.zeros(1, np.intp), 3)
+        found = ray_decisions.decide(
+            group, (group.closing, group.gram), np.array([1])
+        )  # exact photos; level 1 % a point
         alarms, points = alarms + int((found.kind != ray_decisions.GOOD).sum()), points + 10
     assert 0.006 < alarms / points < 0.014
 
@@ -208,8 +215,8 @@ def test_of_three_rays_the_wrong_one_is_told_across_the_base_and_not_along(
     for axis, kind in ((1, ray_decisions.RAY), (0, ray_decisions.RAYS)):
         misfit = rays.misfit * 0.2  # quiet measurements: the decision, not the luck of the draw
         misfit[place, axis] += sign * size / SIGMA
-        (group,) = windows.groups(replace(rays, misfit=misfit), np.zeros(1, np.intp), 3)
-        found = ray_decisions.decide(group, (np.zeros((1, 18)), np.zeros((1, 18, 18))), np.array([1]))
+        (group,) = window_points.groups(replace(rays, misfit=misfit), np.zeros(1, np.intp), 3)
+        found = ray_decisions.decide(group, (group.closing, group.gram), np.array([1]))
         # tilted photos: a large error along the photo's x is a little one across the base too
         assert found.kind[0] in ({kind} if axis else {kind, ray_decisions.RAY})
         if found.kind[0] == ray_decisions.RAY:
