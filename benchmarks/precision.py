@@ -34,6 +34,7 @@ from benchmarks import accuracy  # noqa: E402
 from photostrip.camera import Camera  # noqa: E402
 from photostrip.formats.simulation import inputs_of  # noqa: E402
 from photostrip.pipeline import Settings, triangulate  # noqa: E402
+from photostrip.pipeline.strip import adjust_formed, form_strip  # noqa: E402
 from photostrip.simulate.simulation import simulate  # noqa: E402
 from photostrip.simulate.spec import FILM, Control, Flight, Image, Points, Spec, Terrain  # noqa: E402
 from photostrip.triangulation import polynomial, relative, strip_conditions  # noqa: E402
@@ -45,7 +46,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.geodesy.local_frame import IntermediateFrame
-    from photostrip.pipeline import Inputs, Result
+    from photostrip.pipeline import Inputs, StripResult
 
     Floats = NDArray[np.float64]
 
@@ -156,9 +157,8 @@ def true_inputs(spec: Spec) -> Inputs:
     return replace(inputs, observations=replace(inputs.observations, sigma=sigma))
 
 
-def placed(result: Result, frame: IntermediateFrame) -> tuple[Floats, Floats, Floats]:
+def placed(strip: StripResult, frame: IntermediateFrame) -> tuple[Floats, Floats, Floats]:
     """Points, centres and rotations in the axes of a frame."""
-    (strip,) = result.strips
     there = strip.intermediate
     centers = frame.intermediate_from_cartesian(there.cartesian_from_intermediate(strip.resection.centers))
     rotations = frame.intermediate_rotations(there.cartesian_rotations(strip.resection.rotations))
@@ -173,24 +173,35 @@ def drawn(inputs: Inputs, rng: np.random.Generator) -> Inputs:
     return replace(inputs, observations=replace(observations, xy=xy), control=replace(control, enu=enu))
 
 
-def repeated(task: tuple[Case, str, int, int]) -> tuple[Floats, Floats, Floats, Floats]:
-    """Add up displacements and their squares of points and photos over some repetitions."""
-    case, method, number, seed = task
-    inputs, wanted = true_inputs(case.spec), settings(method, precision=False)
-    truth = triangulate(inputs, wanted)
-    frame = truth.strips[0].intermediate
-    true_points, true_centers, true_rotations = placed(truth, frame)
+def displaced(found: tuple[Floats, Floats, Floats], true: tuple[Floats, Floats, Floats]) -> tuple[Floats, Floats]:
+    """Displacements of points, (n, 3), and of centres with small rotations, (m, 6)."""
+    turn = found[2] @ true[2].transpose(0, 2, 1)
+    vector = np.column_stack([turn[:, 2, 1] - turn[:, 1, 2], turn[:, 0, 2] - turn[:, 2, 0],
+                              turn[:, 1, 0] - turn[:, 0, 1]]) / 2  # fmt: skip
+    return found[0] - true[0], np.column_stack([found[1] - true[1], vector])
+
+
+def repeated(task: tuple[Case, int, int]) -> dict[str, list[Floats]]:
+    """Add up displacements and their squares of points and photos over some repetitions, each strip formed once."""
+    case, number, seed = task
+    inputs, wanted = true_inputs(case.spec), {method: settings(method, precision=False) for method in case.methods}
+    first = wanted[case.methods[0]]
+    truth = triangulate(inputs, first)
+    (strip,) = truth.strips
+    frame, measured = strip.intermediate, np.isin(inputs.control.ids, strip.control.ids)
+    true = placed(strip, frame)
     rng = np.random.default_rng([seed, 7])
-    sums = [np.zeros((len(true_points), 3)) for _ in range(2)] + [np.zeros((len(true_centers), 6)) for _ in range(2)]
+    sums = {method: [np.zeros(each.shape) for each in displaced(true, true) for _ in range(2)] for method in wanted}
     for _ in range(number):
-        points, centers, rotations = placed(triangulate(drawn(inputs, rng), wanted), frame)
-        turn = rotations @ true_rotations.transpose(0, 2, 1)
-        vector = np.column_stack([turn[:, 2, 1] - turn[:, 1, 2], turn[:, 0, 2] - turn[:, 2, 0],
-                                  turn[:, 1, 0] - turn[:, 0, 1]]) / 2  # fmt: skip
-        moved, photo = points - true_points, np.column_stack([centers - true_centers, vector])
-        for place, value in enumerate((moved, moved**2, photo, photo**2)):
-            sums[place] += value
-    return sums[0], sums[1], sums[2], sums[3]
+        again = drawn(inputs, rng)
+        formed = form_strip(strip.strip, again.observations, first)
+        control = again.control.take(np.flatnonzero(measured))
+        for method, asked in wanted.items():
+            found = adjust_formed(formed, again.observations, control, truth.frames, asked)
+            points, photos = displaced(placed(found, frame), true)
+            for place, value in enumerate((points, points**2, photos, photos**2)):
+                sums[method][place] += value
+    return sums
 
 
 def stated(case: Case, method: str) -> tuple[Floats, Floats]:
@@ -208,12 +219,11 @@ def stated(case: Case, method: str) -> tuple[Floats, Floats]:
 
 def scatter(pool: Pool, case: Case, repetitions: int) -> None:
     """Print one kind of strip."""
+    tasks = [(case, repetitions // CHUNKS, seed) for seed in range(CHUNKS)]
+    parts, number = pool.map(repeated, tasks, chunksize=1), repetitions // CHUNKS * CHUNKS
     for method in case.methods:
-        tasks = [(case, method, repetitions // CHUNKS, seed) for seed in range(CHUNKS)]
-        first, squares, photo_first, photo_squares = (
-            sum(part) for part in zip(*pool.map(repeated, tasks), strict=True)
-        )
-        number = repetitions // CHUNKS * CHUNKS
+        sums = [sum(part) for part in zip(*(part[method] for part in parts), strict=True)]
+        first, squares, photo_first, photo_squares = sums
         points, photos = stated(case, method)
         actual = squares / number - (first / number) ** 2
         actual_photos = photo_squares / number - (photo_first / number) ** 2
