@@ -11,7 +11,7 @@ Source: [001] eq. 150-151, the free term of 151 corrected to X - X'.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +19,7 @@ import numpy as np
 from photostrip.statistics import f_p_value
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
+    Terms = tuple[tuple[str, ...], ...]  # of the three axes
+    Fits = Callable[[Terms], list["AxisFit"]]
 
 DEGREES = ("auto", "1", "2", "3")
 POWERS = {"1": (0, 0), "X": (1, 0), "Y": (0, 1), "XY": (1, 1), "X^2": (2, 0), "X^3": (3, 0)}
@@ -44,6 +46,7 @@ RANK_LIMIT = (
 SURE, LIKELY = 0.10, 0.40  # levels of the F test: enough by itself, and enough when left-out points get better too
 WORSE = 1.5  # left-out errors may not grow by more, however significant the step: such control only bends the strip
 PASSES = 4  # plan-only and height-only points take their missing coordinate from the fit itself
+SETTLED = 1e-9  # m: nothing moves any more
 PLAN, HEIGHT = "plan", "height"
 GROUPS = ((PLAN, (0, 1)), (HEIGHT, (2,)))  # decided apart: control can be good in one and poor in the other
 SMALLEST_REST = 1e-6  # smallest eigenvalue of I - H for a group that can be left out
@@ -342,41 +345,91 @@ def _degree_of(terms: Sequence[str]) -> int:
     return max((POWERS[t][0] for t in terms), default=0)
 
 
-def _fit_axis(problem: Problem, misclosure: Floats, weight: Floats, terms: tuple[str, ...]) -> AxisFit:
-    """Weighted least squares of one axis; the misclosure is strip minus given."""
-    rows = weight > 0
-    n, k = len(weight), len(terms)
-    residuals, basis = np.where(rows, misclosure, 0.0), np.zeros((n, k))
-    empty = np.zeros(0)
-    if not terms:
-        return AxisFit((), empty, empty, empty, residuals, basis, float("nan"), int(rows.sum()), float("nan"))
-    scales = _scales(terms, problem)
-    columns = _columns(problem.xyz, terms)[rows] / scales
-    root = np.sqrt(weight[rows] / weight[rows].mean())
-    basis[rows], r = np.linalg.qr(columns * root[:, None])
-    # eq. 151 with the free term X - X': the polynomial equals given minus strip
-    estimate = np.linalg.solve(r, basis[rows].T @ (-misclosure[rows] * root))
-    residuals[rows] += columns @ estimate
-    redundancy = int(rows.sum()) - k
-    squares = float(((residuals[rows] * root) ** 2).sum())
-    sigma0 = float(np.sqrt(squares / redundancy)) if redundancy > 0 else float("nan")
-    sigmas = sigma0 * np.sqrt((np.linalg.inv(r) ** 2).sum(axis=1))
-    condition = _condition(problem.xyz[rows], terms, problem)
-    return AxisFit(terms, estimate / scales, sigmas / scales, estimate, residuals, basis, sigma0, redundancy, condition)
+@dataclass(frozen=True, eq=False)
+class _Design:
+    """What the fit of one axis is made of, before there are misclosures.
+
+    Parameters
+    ----------
+    terms : tuple of str
+        Terms; empty when the axis is not corrected.
+    rows : ndarray of bool, shape (n,)
+        Points that count.
+    columns : ndarray, shape (n, k)
+        Scaled columns of all points.
+    scales : ndarray, shape (k,)
+        What they were divided by.
+    root : ndarray, shape (n,)
+        Square roots of the weights over their mean; 0 for points that do not count.
+    basis, triangle : ndarray, shape (n, k) and (k, k)
+        The weighted columns, decomposed.
+    condition : float
+        Condition number of the scaled columns.
+    """
+
+    terms: tuple[str, ...]
+    rows: NDArray[np.bool_]
+    columns: Floats
+    scales: Floats
+    root: Floats
+    basis: Floats
+    triangle: Floats
+    condition: float
+
+    @classmethod
+    def of(cls, problem: Problem, weight: Floats, terms: tuple[str, ...]) -> _Design:
+        """Decompose the columns of one axis."""
+        rows, scales = weight > 0, _scales(terms, problem)
+        columns = _columns(problem.xyz, terms) / scales
+        root = np.sqrt(weight / weight[rows].mean()) if rows.any() else np.zeros(len(weight))
+        basis, triangle = np.zeros(columns.shape), np.zeros((0, 0))
+        condition = float("nan")
+        if terms:
+            basis[rows], triangle = np.linalg.qr(columns[rows] * root[rows, None])
+            condition = _condition(problem.xyz[rows], terms, problem)
+        return cls(terms, rows, columns, scales, root, basis, triangle, condition)
+
+    def effects(self, misclosure: Floats) -> Floats:
+        """Weighted least squares; the misclosure is strip minus given."""
+        if not self.terms:
+            return np.zeros(0)
+        # eq. 151 with the free term X - X': the polynomial equals given minus strip
+        return np.asarray(np.linalg.solve(self.triangle, self.basis.T @ (-misclosure * self.root)), float)
+
+    def correction(self, misclosure: Floats) -> Floats:
+        """Correct all points, those that do not count too."""
+        result: Floats = self.columns @ self.effects(misclosure)
+        return result
+
+    def fit(self, misclosure: Floats) -> AxisFit:
+        """Fit, with residuals and standard deviations."""
+        estimate = self.effects(misclosure)
+        residuals = np.where(self.rows, misclosure + self.columns @ estimate, 0.0)
+        redundancy = int(self.rows.sum()) - len(self.terms)
+        if not self.terms:
+            nan = float("nan")
+            return AxisFit((), estimate, estimate, estimate, residuals, self.basis, nan, redundancy, nan)
+        squares = float(((residuals * self.root) ** 2).sum())
+        sigma0 = float(np.sqrt(squares / redundancy)) if redundancy > 0 else float("nan")
+        sigmas = sigma0 * np.sqrt((np.linalg.inv(self.triangle) ** 2).sum(axis=1)) / self.scales
+        coefficients = estimate / self.scales
+        return AxisFit(
+            self.terms, coefficients, sigmas, estimate, residuals, self.basis, sigma0, redundancy, self.condition
+        )
 
 
-def _fit(problem: Problem, terms: Sequence[tuple[str, ...]]) -> list[AxisFit]:
+def _fit(problem: Problem, terms: Terms) -> list[AxisFit]:
     """Fit all three axes; a few passes settle points that give only some of their coordinates."""
-    weight = problem.by_axis
+    designs = [_Design.of(problem, problem.by_axis[:, axis], terms[axis]) for axis in range(3)]
     misclosure = problem.misclosures
-    fits = [_fit_axis(problem, misclosure[:, axis], weight[:, axis], terms[axis]) for axis in range(3)]
-    if problem.targets.control.use.all():
-        return fits
-    for _ in range(PASSES):
-        corrections = [_columns(problem.xyz, axis.terms) @ axis.coefficients for axis in fits]
-        misclosure = problem.xyz - problem.targets.of(problem.xyz + np.column_stack(corrections))
-        fits = [_fit_axis(problem, misclosure[:, axis], weight[:, axis], terms[axis]) for axis in range(3)]
-    return fits
+    if not problem.targets.control.use.all():
+        for _ in range(PASSES):
+            corrections = [design.correction(misclosure[:, axis]) for axis, design in enumerate(designs)]
+            before = misclosure
+            misclosure = problem.xyz - problem.targets.of(problem.xyz + np.column_stack(corrections))
+            if np.abs(misclosure - before).max() < SETTLED:
+                break
+    return [design.fit(misclosure[:, axis]) for axis, design in enumerate(designs)]
 
 
 def fit(problem: Problem, settings: Settings) -> Polynomial:
@@ -399,11 +452,12 @@ def fit(problem: Problem, settings: Settings) -> Polynomial:
     stations = tuple(count_stations(x[counts[:, axis]], problem.spacing) for axis in (0, 2))
     chosen: list[tuple[str, ...]] = []
     evidence: list[Evidence] = []
+    fits_of: Fits = cache(partial(_fit, problem))  # plan and height often weigh the same candidates
     for group, axes in GROUPS:
-        terms, weighed = _decide(problem, group, axes, settings.degree)
+        terms, weighed = _decide(problem, (group, axes), settings.degree, fits_of)
         chosen += [terms] * len(axes)
         evidence += weighed
-    fits = _fit(problem, chosen)
+    fits = fits_of(tuple(chosen))
     inside = x[counts.any(axis=1)]
     return Polynomial(
         max(_degree_of(terms) for terms in chosen),
@@ -415,26 +469,29 @@ def fit(problem: Problem, settings: Settings) -> Polynomial:
     )
 
 
-def _candidates(problem: Problem, axis: int, asked: str) -> list[list[tuple[str, ...]]]:
+def _candidates(problem: Problem, axis: int, asked: str) -> list[Terms]:
     """Terms of all axes for the similarity alone and for every degree that adds something to one axis.
 
     The other axes get the terms of the same degree as far as their own control carries them.
     """
     forced = asked != "auto"
     points = [problem.xyz[_counted(problem, k)] for k in range(3)]
-    found: list[list[tuple[str, ...]]] = [[(), (), ()]]
+    found: list[Terms] = [((), (), ())]
     for degree in range(1, (int(asked) if forced else 3) + 1):
-        terms = [choose_terms(xyz, degree, problem, forced=forced) for xyz in points]
+        terms = tuple(choose_terms(xyz, degree, problem, forced=forced) for xyz in points)
         if terms[axis] != found[-1][axis]:
             found.append(terms)
     return found
 
 
-def _decide(problem: Problem, group: str, axes: tuple[int, ...], asked: str) -> tuple[tuple[str, ...], list[Evidence]]:
+def _decide(
+    problem: Problem, part: tuple[str, tuple[int, ...]], asked: str, fits_of: Fits
+) -> tuple[tuple[str, ...], list[Evidence]]:
     """Go up the degrees of one group: each step must be asked for by its F test and not spoil left-out points."""
+    group, axes = part
     every = _candidates(problem, axes[0], asked)
     forced = asked != "auto"
-    fits = [_fit(problem, terms) for terms in every]
+    fits = [fits_of(terms) for terms in every]
     candidates = [terms[axes[0]] for terms in every]
     left_out, by = _left_out_errors(problem, candidates, fits, axes)
     expected = _expected(problem)

@@ -12,6 +12,7 @@ import pytest
 from photostrip.formats.result.document import document_of
 from photostrip.pipeline import Result, Settings, StripResult, triangulate
 from photostrip.pipeline import covariance as pipeline_covariance
+from photostrip.pipeline.strip import adjust_formed, form_strip
 from photostrip.report.document import project_section
 from photostrip.triangulation import block_tridiagonal, polynomial, strip_conditions, strip_covariance, strip_system
 from tests.derivatives import UNSCREENED, errors_of, spec, without_noise, written_out
@@ -216,23 +217,29 @@ def test_check_points_together_follow_chi_square(adjustment: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("adjustment", ["polynomial", "covariance"])
-def test_repetitions_scatter_as_stated(adjustment: str) -> None:
+def test_repetitions_scatter_as_stated() -> None:
     """One strip of six photos with mixed control drawn anew 250 times, which knows the scatter to about 3 %."""
     inputs = without_noise(spec(6, use={"xyz": 0.5, "xy": 0.25, "z": 0.25}))
-    wanted = Settings(adjustment=adjustment, relative=UNSCREENED, polynomial=polynomial.Settings("2"), precision=False)
-    truth, rng = triangulate(inputs, wanted).points.cartesian, np.random.default_rng(12)
-    squares = np.zeros_like(truth)
+    base = Settings(relative=UNSCREENED, polynomial=polynomial.Settings("2"))
+    settings = {name: replace(base, adjustment=name) for name in ("polynomial", "covariance")}
+    truth, rng = triangulate(inputs, base), np.random.default_rng(12)
+    strip, true = truth.strips[0].strip, truth.points.cartesian
+    measured = np.flatnonzero(np.isin(inputs.control.ids, truth.strips[0].control.ids))
+    squares = {name: np.zeros_like(true) for name in settings}
     for _ in range(250):
         xy = inputs.observations.xy + rng.normal(0, 0.005, inputs.observations.xy.shape)
         errors = rng.normal(0, 1, inputs.control.enu.shape) * np.where(inputs.control.use, inputs.control.sigma, 0.0)
-        control = replace(inputs.control, enu=inputs.control.enu + errors)
-        again = replace(inputs, observations=replace(inputs.observations, xy=xy), control=control)
-        squares += (triangulate(again, wanted).points.cartesian - truth) ** 2
+        control = replace(inputs.control, enu=inputs.control.enu + errors).take(measured)
+        observations = replace(inputs.observations, xy=xy)
+        formed = form_strip(strip, observations, base)
+        for name, wanted in settings.items():
+            found = adjust_formed(formed, observations, control, truth.frames, wanted)
+            squares[name] += (found.cartesian - true) ** 2
     noisy_xy = inputs.observations.xy + rng.normal(0, 0.005, inputs.observations.xy.shape)
     once = replace(inputs, observations=replace(inputs.observations, xy=noisy_xy))
-    precision = triangulate(once, replace(wanted, precision=True)).precision
-    assert precision is not None
-    factor = (0.005 / precision.sigma[0]) ** 2 if precision.basis[0] == "a-posteriori" else 1.0
-    stated = np.sqrt(factor * np.diagonal(precision.points, axis1=1, axis2=2).mean(axis=0))
-    assert stated / np.sqrt(squares.mean(axis=0) / 250) == pytest.approx(np.ones(3), abs=0.1)
+    for name, wanted in settings.items():
+        precision = triangulate(once, wanted).precision
+        assert precision is not None
+        factor = (0.005 / precision.sigma[0]) ** 2 if precision.basis[0] == "a-posteriori" else 1.0
+        stated = np.sqrt(factor * np.diagonal(precision.points, axis1=1, axis2=2).mean(axis=0))
+        assert stated / np.sqrt(squares[name].mean(axis=0) / 250) == pytest.approx(np.ones(3), abs=0.1)
