@@ -19,6 +19,7 @@ import sys
 from dataclasses import dataclass, replace
 from functools import partial
 from multiprocessing import get_context
+from multiprocessing.pool import ThreadPool
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -51,7 +52,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 ALONE = "control alone"  # the covariance without the distances of the pass points
-METHODS = ("similarity", "1", "2", "3", "covariance")
+METHODS = ("similarity", "1", "2", "3", ALONE, "covariance")
 SIGMA_UM = 5.0
 CHUNKS = 20
 UAV = Camera("uav", 8.8, format=(13.2, 8.8))
@@ -129,6 +130,7 @@ BUNDLE = (
     Case("60 photos, every 5", 60, every=5, sigma=GOOD),
     Case("100 photos, every 5", 100, every=5, sigma=GOOD),
     Case("100 photos, 3 bands", 100, bands=3, sigma=GOOD),
+    Case("300 photos, every 5", 300, every=5, sigma=GOOD),
     Case("40 photos, 80 %", 40, every=10, lap=80.0, sigma=GOOD),
     Case("40 photos, 80 %, middle", 40, lap=80.0, layout=MIDDLE, sigma=GOOD),
 )
@@ -230,10 +232,10 @@ def scatter(pool: Pool, case: Case, repetitions: int) -> None:
         ratio = np.sqrt(points.mean(axis=0) / actual.mean(axis=0))
         of_photos = np.sqrt(photos.mean(axis=0) / actual_photos.mean(axis=0))
         single = np.sqrt(points / actual)
-        name = method if len(method) > 1 else f"degree {method}"
+        name = f"degree {method}" if len(method) == 1 else method
         cells = [" ".join(f"{value:.3f}" for value in ratio), " ".join(f"{value:.3f}" for value in of_photos)]
         print(
-            f"{case.name:24} {name:11} {cells[0]}   {cells[1]}   {single.min():.2f} {single.max():.2f}   "
+            f"{case.name:24} {name:13} {cells[0]}   {cells[1]}   {single.min():.2f} {single.max():.2f}   "
             f"{np.sqrt(actual[:, :2].sum(axis=1).mean()):.3f} {np.sqrt(actual[:, 2].mean()):.3f}",
             flush=True,
         )
@@ -303,7 +305,7 @@ def main() -> None:
     wanted = parser.parse_args()
     tables: dict[str, tuple[str, Sequence[Case], Callable[[Pool, Case, int], None], int]] = {
         "scatter": (
-            f"{'strip':24} {'method':11} {'points: along, across, up':19} {'photos: centre, rotation':44} single",
+            f"{'strip':24} {'method':13} {'points: along, across, up':19} {'photos: centre, rotation':44} single",
             SCATTER,
             scatter,
             wanted.repetitions,
@@ -318,7 +320,8 @@ def main() -> None:
             wanted.seeds,
         ),
     }
-    with get_context("spawn").Pool(wanted.workers) as pool:
+    # one worker needs no other process
+    with get_context("spawn").Pool(wanted.workers) if wanted.workers > 1 else ThreadPool(1) as pool:
         for name in wanted.tables or tables:
             head, cases, measure, number = tables[name]
             print(head)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,11 +11,14 @@ from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.geometry.rotation import from_vector
 from photostrip.notes import Note
 from photostrip.triangulation import (
+    absolute,
     control_errors,
     exterior,
+    reforming,
     strip_conditions,
     strip_covariance,
     strip_errors,
+    strip_passes,
     strip_system,
 )
 from photostrip.triangulation.error_rows import ELEMENTS, PARAMETERS, UNITS, Rows, similarity_rows
@@ -40,6 +43,8 @@ LONG_STRIP = 25  # models; beyond it polynomials fall far behind a rigorous adju
 POLYNOMIAL_MODELS = 15  # models from which on, and
 POLYNOMIAL_BANDS = 4  # bands of control below which the adjustment with the covariance is proposed
 LEVEL = 0.01  # of the test of the whole
+MOST_PASSES = 5
+ENOUGH = 0.1  # of the angle that an image coordinate's standard deviation spans: what squares of turns may leave
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +75,8 @@ class CovarianceAdjustment:
         Standard deviation of an image coordinate of weight one, mm.
     errors, conditions, local, system
         Rows of the strip, conditions, unknowns and the solved system.
+    passes : int
+        How often the strip was formed.
     """
 
     xyz: Floats
@@ -86,71 +93,146 @@ class CovarianceAdjustment:
     conditions: strip_conditions.Conditions
     local: strip_conditions.Local
     system: strip_system.System
+    passes: int
 
 
 def adjust(
-    formed: tuple[Orientation, FormedStrip],
-    absolute: AbsoluteOrientation,
+    strip: Strip,
+    formed: tuple[Orientation, FormedStrip, AbsoluteOrientation],
     control: tuple[Targets, Numbers],
-    images: tuple[Numbers, Floats, float],
-    *,
-    distances: bool = True,
+    observations: PhotoPoints,
+    sigma: float,
+    settings: strip_conditions.Settings,
 ) -> CovarianceAdjustment:
     """Adjust a strip with its own covariance.
 
     Parameters
     ----------
-    formed : tuple of Orientation and FormedStrip
-        Oriented pairs and the strip formed from them.
-    absolute : AbsoluteOrientation
-        Similarity from the strip to the intermediate frame.
+    strip : Strip
+        The strip.
+    formed : tuple of Orientation, FormedStrip and AbsoluteOrientation
+        Oriented pairs, the strip formed from them, and its similarity to the intermediate frame.
     control : tuple of Targets and ndarray of int
         The control, and its rows in the points of the strip.
-    images : tuple of ndarray of int, ndarray and float
-        Place of every image point's photo in the strip, standard deviations of the image points in mm, and that of one
-        of weight one.
-    distances : bool
-        Whether distances of pass points from the common centres count.
+    observations : PhotoPoints
+        Ideal image coordinates of the project.
+    sigma : float
+        Standard deviation of an image coordinate of weight one, mm.
+    settings : strip_conditions.Settings
+        Which misclosures are distributed.
 
     Returns
     -------
     CovarianceAdjustment
         Points, photos, covariances and tests.
     """
-    orientation, strip = formed
-    targets, control_rows = control
-    position, sigma, stated = images
-    similarity = absolute.similarity
-    errors = strip_errors.strip_errors(orientation, strip, similarity, position, sigma)
-    factor, basis = image_variance(orientation, stated)
-    xyz = similarity(strip.xyz)
-    at_control = xyz[control_rows]
-    turned, axes = targets.turned(at_control), targets.axes(at_control)
-    found = control_errors.misclosures(errors.points, turned, control_rows, axes)
-    given = absolute.misclosures[found.point, found.axis]
-    length = float(np.linalg.norm(errors.pairs.reach, axis=1).mean())
-    local = strip_conditions.Local.about(centers_of(errors)[:-1], length)
-    wanted = strip_conditions.conditions(errors, formed, (found, given), local, distances=distances)
-    solved = strip_system.system(errors, wanted, factor)
-    things = [errors.points, photo_rows(errors)]
-    (points, photos), cofactors = strip_covariance.predict(errors, wanted, local, solved, things)
-    tested = strip_covariance.tested(wanted, solved, cofactors, len(found.point))
+    given = _Given(strip, control, observations, measured(strip, observations), settings)
+    factor, basis = image_variance(formed[0], sigma)
+    one, passes = _first(given, formed, factor), 1
+    enough = ENOUGH * sigma / strip.camera.principal_distance
+    while passes < MOST_PASSES and strip_passes.remainder(one.system, one.length) > enough:
+        one, passes = _next(given, one, factor), passes + 1
+    things = [one.errors.points, photo_rows(one.errors)]
+    (points, photos), cofactors = strip_covariance.predict(one.errors, one.conditions, one.local, one.system, things)
+    known = [strip_passes.displacements(one.errors, rows, one.images) for rows in things]
+    left = photos.error - known[1]
+    similarity = one.absolute.similarity
     return CovarianceAdjustment(
-        xyz - points.error,
-        similarity(strip.centers) - photos.error[:, :3],
-        from_vector(-photos.error[:, 3:]) @ similarity.rotation @ strip.rotations,
+        similarity(one.formed.xyz) - (points.error - known[0]),
+        similarity(one.formed.centers) - left[:, :3],
+        from_vector(-left[:, 3:]) @ similarity.rotation @ one.formed.rotations,
         points.covariance * factor,
         photos.covariance * factor,
-        found,
-        tested,
+        one.control,
+        strip_covariance.tested(one.conditions, one.system, cofactors, len(one.control.point)),
         factor,
         basis,
-        stated * float(np.sqrt(factor)),
-        errors,
-        wanted,
-        local,
-        solved,
+        sigma * float(np.sqrt(factor)),
+        one.errors,
+        one.conditions,
+        one.local,
+        one.system,
+        passes,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Given:
+    """What all passes have in common: strip, control, image points, the places of their photos, settings."""
+
+    strip: Strip
+    control: tuple[Targets, Numbers]
+    observations: PhotoPoints
+    position: Numbers
+    settings: strip_conditions.Settings
+
+
+@dataclass(frozen=True, eq=False)
+class _Pass:
+    """One linear adjustment, at a strip that was formed from image coordinates less the errors known so far.
+
+    ``images`` are these errors, in units of the stated standard deviations.
+    """
+
+    orientation: Orientation
+    formed: FormedStrip
+    absolute: AbsoluteOrientation
+    images: Floats
+    errors: strip_errors.StripErrors
+    control: control_errors.Misclosures
+    conditions: strip_conditions.Conditions
+    local: strip_conditions.Local
+    length: float
+    system: strip_system.System
+
+
+def _first(given: _Given, formed: tuple[Orientation, FormedStrip, AbsoluteOrientation], factor: float) -> _Pass:
+    errors = strip_errors.strip_errors(
+        formed[0], formed[1], formed[2].similarity, given.position, given.observations.sigma
+    )
+    return _solved(given, formed, errors, np.zeros((len(errors.images.row), 2)), factor)
+
+
+def _next(given: _Given, before: _Pass, factor: float) -> _Pass:
+    """Form the strip from corrected image coordinates, and adjust it with the whole errors as unknowns again."""
+    images = strip_passes.image_errors(before.errors, before.conditions, before.system)
+    seen = before.errors.images
+    xy = given.observations.xy.copy()
+    xy[seen.row] -= images * seen.sigma
+    observations = replace(given.observations, xy=xy)
+    orientation = reforming.oriented_again(before.orientation, xy)
+    formed = reforming.formed_again(before.formed, orientation, observations, given.strip.photos)
+    targets, rows = given.control
+    # the strip fits its control by now: weights do not matter to where it lies
+    similarity = absolute.orient(formed.xyz[rows], targets, targets.control.use.astype(float), formed.xyz)
+    errors = strip_errors.strip_errors(
+        orientation, formed, similarity.similarity, given.position, given.observations.sigma
+    )
+    return _solved(given, (orientation, formed, similarity), errors, images, factor)
+
+
+def _solved(
+    given: _Given,
+    formed: tuple[Orientation, FormedStrip, AbsoluteOrientation],
+    errors: strip_errors.StripErrors,
+    images: Floats,
+    factor: float,
+) -> _Pass:
+    """Solve the conditions ``w + H v = A y + H v' + g``, v known so far, v' all errors of the image coordinates."""
+    (orientation, strip, oriented), (targets, rows) = formed, given.control
+    at_control = oriented.similarity(strip.xyz)[rows]
+    found = control_errors.misclosures(errors.points, targets.turned(at_control), rows, targets.axes(at_control))
+    misclosures = oriented.misclosures[found.point, found.axis]
+    length = float(np.linalg.norm(errors.pairs.reach, axis=1).mean())
+    local = strip_conditions.Local.about(centers_of(errors)[:-1], length)
+    wanted = strip_conditions.conditions(
+        errors, (orientation, strip), (found, misclosures), local, distances=given.settings.distances
+    )
+    if images.any():
+        known = strip_passes.displacements(errors, wanted.rows, images)[:, 0]
+        wanted = replace(wanted, value=wanted.value + known)
+    solved = strip_system.system(errors, wanted, factor)
+    return _Pass(orientation, strip, oriented, images, errors, found, wanted, local, length, solved)
 
 
 def photo_rows(errors: strip_errors.StripErrors) -> Rows:

@@ -184,9 +184,8 @@ def adjust_formed(
     own = None
     if settings.adjustment == "covariance":
         targets = absolute.Targets(here, frames, intermediate)
-        images = (covariance.measured(strip, observations), observations.sigma, sigma)
-        distances = settings.covariance.distances
-        own = covariance.adjust((oriented, formed), orientation, (targets, rows), images, distances=distances)
+        whole = (oriented, formed, orientation)
+        own = covariance.adjust(strip, whole, (targets, rows), observations, sigma, settings.covariance)
     adjusted = own.xyz if own is not None else xyz if correction is None else correction(xyz)
     resection, image_rows = _orient_photos(strip, observations, oriented, formed, adjusted, orientation, own)
     return StripResult(

@@ -39,7 +39,7 @@ def covariance_section(document: Document, *, everything: bool) -> Section:
 
 
 def _facts(block: Document, *, several: bool) -> Sequence[tuple[str, str]]:
-    rows = [("strip", block["strip"])] if several else []
+    rows: list[tuple[str, str]] = [("strip", block["strip"])] if several else []
     conditions = (
         f"{counted(block['control_coordinates'], 'control coordinate')}, "
         f"{counted(block['distances'], 'distance')} of pass points, {counted(block['models'], 'model')}"
@@ -47,6 +47,10 @@ def _facts(block: Document, *, several: bool) -> Sequence[tuple[str, str]]:
     test = f"σ0 {ratio(block['sigma0'])} (1 when all standard deviations are right), redundancy {block['redundancy']}"
     if block["p"] is not None:
         test += f", probability of a larger one by chance {fixed(100 * block['p'], 1)} %"
+    if block.get("passes", 1) > 1:
+        rows.append(
+            ("passes", f"{block['passes']}: the strip was so bent that it was formed again from corrected images")
+        )
     return [*rows, ("conditions", conditions), ("test of the whole", test)]
 
 

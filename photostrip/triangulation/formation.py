@@ -332,16 +332,39 @@ def form(
         When a joint is broken or a base is parallel to the strip's Z axis.
     """
     vectors, gap, sound = model_points(orientation)
-    base, rotation = orientation.relative
     junctions = transfer_scale(orientation, vectors, sound, settings, photos, sigma, aside)
+    formed = placed(orientation, vectors, gap, junctions, orientation.used & sound)
+    _refuse_vertical_base(np.diff(formed.centers, axis=0) / formed.scale[:, None], photos)
+    return formed
+
+
+def placed(orientation: Orientation, vectors: Floats, gap: Floats, junctions: Junctions, use: Flags) -> FormedStrip:
+    """Put oriented models of known scales one behind the other.
+
+    Parameters
+    ----------
+    orientation : Orientation
+        Oriented pairs in flight order.
+    vectors, gap : ndarray
+        Model points as :func:`model_points` gives them.
+    junctions : Junctions
+        Scale transfer.
+    use : ndarray of bool, shape (m,)
+        Rows of the pairs' table whose points count.
+
+    Returns
+    -------
+    FormedStrip
+        Centres, rotations, scales and points in the frame of the first photo.
+    """
+    base, rotation = orientation.relative
     rotations = hand_on(rotation)
     scale = np.concatenate([[1.0], np.cumprod(junctions.factor)])
     bases = scale[:, None] * np.einsum("pij,pj->pi", rotations[:-1], base)
     centers = np.concatenate([np.zeros((1, 3)), np.cumsum(bases, axis=0)])
-    _refuse_vertical_base(bases / scale[:, None], photos)
     pair = orientation.pairs.pair
     xyz = centers[pair] + scale[pair, None] * np.einsum("mij,mj->mi", rotations[pair], vectors)
-    point, mean, models = mean_points(orientation.point, xyz, orientation.used & sound)
+    point, mean, models = mean_points(orientation.point, xyz, use)
     return FormedStrip(
         centers,
         rotations,

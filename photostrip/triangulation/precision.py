@@ -204,6 +204,29 @@ def sums_of(errors: StripErrors, rows: Rows, operator: Floats) -> Floats:
     return np.asarray((found + found.T) / 2, float)
 
 
+def by_images(errors: StripErrors, rows: Rows, weights: Floats) -> Floats:
+    """Coefficients of the image coordinates in a weighted sum of rows.
+
+    Parameters
+    ----------
+    errors : StripErrors
+        The strip.
+    rows : Rows
+        Rows with d = 1.
+    weights : ndarray, shape (n,)
+        Weights of the rows.
+
+    Returns
+    -------
+    ndarray, shape (k, 2)
+        In the order of ``errors.images``, for coordinates in units of their standard deviations.
+    """
+    core = _summed_units(errors, rows, weights[:, None])
+    result = _by_photo(errors, core, np.arange(len(errors.images.row)))[:, :, 0]
+    np.add.at(result, rows.image, rows.own[:, 0] * weights[rows.item][:, None])
+    return result
+
+
 def _sums(errors: StripErrors, rows: Rows, operator: Floats) -> tuple[Floats, Floats, Numbers, Floats]:
     """Sum rows: coefficients of units, covariances with units; image points of their own and coefficients."""
     images = errors.images

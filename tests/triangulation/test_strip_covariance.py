@@ -10,17 +10,27 @@ import numpy as np
 import pytest
 
 from photostrip.formats.result.document import document_of
-from photostrip.pipeline import Result, Settings, StripResult, triangulate
+from photostrip.pipeline import Inputs, Result, Settings, StripResult, triangulate
 from photostrip.pipeline import covariance as pipeline_covariance
 from photostrip.pipeline.strip import adjust_formed, form_strip
 from photostrip.report.document import project_section
-from photostrip.triangulation import block_tridiagonal, polynomial, strip_conditions, strip_covariance, strip_system
+from photostrip.triangulation import (
+    block_tridiagonal,
+    polynomial,
+    strip_conditions,
+    strip_covariance,
+    strip_passes,
+    strip_system,
+)
 from tests.derivatives import UNSCREENED, errors_of, spec, without_noise, written_out
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from photostrip.triangulation.error_rows import Rows
     from photostrip.triangulation.strip_errors import StripErrors
 
+    Floats = NDArray[np.float64]
     Prepared = tuple[StripErrors, strip_conditions.Conditions, strip_conditions.Local]
 
 COVARIANCE = Settings(adjustment="covariance", relative=UNSCREENED)
@@ -72,6 +82,9 @@ def test_the_band_gives_what_the_whole_matrix_gives(photos: int, lap: float, *, 
     solution = np.linalg.solve(whole, np.concatenate([wanted.value, np.zeros(7 * n)]))
     inverse = np.linalg.inv(whole)
     assert cofactors == pytest.approx(np.diag(inverse)[: len(cofactors)], abs=1e-8 * np.abs(inverse).max())
+    images = strip_passes.image_errors(errors, wanted, solved)
+    expected = by_images.T @ solution[: len(by_images)]
+    assert images.ravel() == pytest.approx(expected, abs=1e-8 * np.abs(expected).max())
     for rows, found in zip(things, predicted, strict=True):
         own = written_out(without_frame(rows), errors)
         size = rows.frame.shape[1]
@@ -81,6 +94,8 @@ def test_the_band_gives_what_the_whole_matrix_gives(photos: int, lap: float, *, 
             start = len(by_images) + 7 * rows.first[thing]
             column[start : start + 7] = (rows.frame[thing] @ local.to_common[rows.first[thing]]).T
             assert found.error[thing] == pytest.approx(column.T @ solution, abs=1e-9)
+            moved = strip_passes.displacements(errors, rows, images)[thing]
+            assert moved == pytest.approx(own[thing] @ images.ravel(), abs=1e-9)
             covariance = own[thing] @ own[thing].T - column.T @ inverse @ column
             assert found.covariance[thing] == pytest.approx(covariance, abs=1e-8 * np.abs(covariance).max())
 
@@ -117,6 +132,44 @@ def test_true_coordinates_come_back(lap: float) -> None:
     (strip,) = result.strips
     assert strip.resection.rotations == pytest.approx(plain.strips[0].resection.rotations, abs=1e-9)
     assert strip.resection.residuals == pytest.approx(0.0, abs=1e-9)
+
+
+def bent(photos: int, sigma: float) -> Inputs:
+    """A strip with errors so large that squares of its bend count, as in a much longer one."""
+    inputs = without_noise(spec(photos, bands=5))
+    xy = inputs.observations.xy + np.random.default_rng(2).normal(0, sigma, inputs.observations.xy.shape)
+    sigmas = np.full_like(inputs.observations.sigma, sigma)
+    return replace(inputs, observations=replace(inputs.observations, xy=xy, sigma=sigmas))
+
+
+def formed_from_what_is_taken_for_true(result: Result) -> Floats:
+    """Lay the strip of the corrected image coordinates on what the adjustment gives the control: all points."""
+    inputs, own = result.inputs, result.strips[0].covariance
+    assert own is not None
+    xy, images = inputs.observations.xy.copy(), own.errors.images
+    xy[images.row] -= strip_passes.image_errors(own.errors, own.conditions, own.system) * images.sigma
+    row_of = {inputs.observations.point_ids[number]: row for row, number in enumerate(result.points.number)}
+    given = np.array([result.points.ground[row_of[name]] for name in inputs.control.ids])
+    control = replace(inputs.control, enu=given)
+    again = replace(inputs, observations=replace(inputs.observations, xy=xy), control=control)
+    return triangulate(again, SIMILARITY).points.cartesian
+
+
+def test_passes_go_on_until_nothing_is_left_to_be_linear(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The strip formed from what the adjustment takes for true is the adjusted strip; after one pass it is not."""
+    inputs = bent(20, 0.2)
+    off, passes = [], []
+    for most in (pipeline_covariance.MOST_PASSES, 1):
+        monkeypatch.setattr(pipeline_covariance, "MOST_PASSES", most)
+        result = triangulate(inputs, COVARIANCE)
+        assert result.precision is not None
+        sigma = np.sqrt(np.trace(result.precision.points, axis1=1, axis2=2))
+        difference = formed_from_what_is_taken_for_true(result) - result.points.cartesian
+        off.append(float(np.sqrt(np.mean((np.linalg.norm(difference, axis=1) / sigma) ** 2))))
+        passes.append(document_of(result)["covariance"][0]["passes"])
+    assert passes[0] > passes[1] == 1
+    assert off[0] < 0.02  # of a standard deviation
+    assert off[1] > 0.5
 
 
 def test_the_control_alone_when_asked_for() -> None:

@@ -37,6 +37,7 @@ def _block(strip: StripResult, found: CovarianceAdjustment) -> Document:
     return {
         "strip": strip.strip.id,
         "models": len(strip.formed.scale),
+        "passes": found.passes,
         "control_coordinates": len(found.control.point),
         "distances": tested.distances,
         "squares": significant(tested.squares),
