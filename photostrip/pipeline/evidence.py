@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from photostrip.errors import PhotostripError
 from photostrip.triangulation import formation, refinement, relative, screening
 from photostrip.triangulation.plausibility import mosaic
-from photostrip.triangulation.plausibility.control_strip import Seen
+from photostrip.triangulation.plausibility.control_strip import Rays, Seen
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -66,6 +67,43 @@ class Formed:
         ground = np.bincount(pair[good], height[good], self.orientation.pairs.size) / count
         centers = self.formed.centers @ up
         return np.concatenate([centers[:1] - ground[:1], centers[1:] - ground])
+
+
+def with_doubtful_points(formed: Formed) -> Formed:
+    """Give a strip with the points that it has no place for, because their rays contradict each other.
+
+    Parameters
+    ----------
+    formed : Formed
+        The strip.
+
+    Returns
+    -------
+    Formed
+        The same strip; such a point stands in the middle of where its models put it.
+    """
+    strip, orientation = formed.formed, formed.orientation
+    gone = np.asarray(~np.isfinite(strip.model_xyz).all(axis=1), bool)
+    if not gone.any():
+        return formed
+    vectors, _, sound = formation.model_points(orientation)
+    pair = orientation.pairs.pair
+    back = strip.centers[pair] + strip.scale[pair, None] * np.einsum("mij,mj->mi", strip.rotations[pair], vectors)
+    xyz = np.where(gone[:, None], back, strip.model_xyz)
+    point, mean, models = formation.mean_points(orientation.point, xyz, orientation.used & sound)
+    lost = np.flatnonzero(~np.isin(point, strip.point))
+    point = np.concatenate([strip.point, point[lost]])
+    mean, models = np.concatenate([strip.xyz, mean[lost]]), np.concatenate([strip.models, models[lost]])
+    order = np.argsort(point, kind="stable")
+    whole = replace(
+        strip,
+        model_xyz=xyz,
+        point=point[order],
+        xyz=mean[order],
+        models=models[order],
+        home=np.zeros(0, np.intp),  # serves precision, which is not asked of evidence
+    )
+    return replace(formed, formed=whole)
 
 
 def form(strip: Strip, observations: PhotoPoints, settings: Settings) -> Formed | None:
@@ -163,8 +201,20 @@ def sighted(
         (2.0 * share, 2.0 * np.sqrt(2.0) * share * depth / max(base, 1e-12)),
         depth,
         _base_angle(formed.strip.photos, steps),
+        partial(_rays, formed, observations),
     )
     return rows, seen
+
+
+def _rays(formed: Formed, observations: PhotoPoints, name: str) -> Rays:
+    """Give what the photos of a strip show of a point."""
+    place = {photo: number for number, photo in enumerate(formed.strip.photos)}
+    rows = np.flatnonzero(observations.point == observations.point_ids.index(name))
+    here = np.array([place.get(observations.photo_ids[photo], -1) for photo in observations.photo[rows]], np.intp)
+    rows, here = rows[here >= 0], here[here >= 0]
+    strip, focal = formed.formed, formed.strip.camera.principal_distance
+    sigma = np.sqrt((observations.sigma[rows] ** 2).mean(axis=1))
+    return Rays(observations.xy[rows], sigma, strip.centers[here], strip.rotations[here], focal)
 
 
 def stretches(rows: Numbers, seen: Seen) -> Iterator[tuple[Numbers, Seen]]:

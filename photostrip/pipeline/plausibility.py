@@ -250,7 +250,8 @@ def _of_control(
             read = partial(_by_heights, examined=examined, control=control, frames=frames)
             points, settings = examined.observations, examined.settings
             if each is not None:
-                here = distance_trial.examine(each, points, settings, read) or here  # then single points prove nothing
+                whole = evidence.with_doubtful_points(each)
+                here = distance_trial.examine(whole, points, settings, read) or here  # then single points prove nothing
             elif not examined.findings:
                 here = distance_trial.without_pairs(strip, points, settings, read) or here
         told += here
@@ -329,10 +330,11 @@ def _held(strip: Strip, examined: Examined, control: ControlPoints, frames: Sequ
 def _of_strip(each: evidence.Formed, observations: PhotoPoints) -> list[Finding]:
     """Examine a formed strip: its perspective centres, and the ids of its points."""
     strip, formed = each.strip, each.formed
+    whole = evidence.with_doubtful_points(each).formed  # rays that contradict each other may be those of two points
     sigma = float(np.median(observations.sigma))
     told = list(flight.examine(formed.centers, each.depth, each.up, strip.photos, strip.id))
     names = observations.point_ids
-    told += identity.one_id(each.orientation, formed, names, strip.photos, sigma, strip.id)
+    told += identity.one_id(each.orientation, whole, names, strip.photos, sigma, strip.id)
     focal = strip.camera.principal_distance
     told += identity.two_ids(observations, formed, focal, strip.photos, strip.id, sigma)
     return told

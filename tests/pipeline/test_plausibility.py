@@ -239,6 +239,20 @@ def test_a_slip_of_a_digit_is_named_with_the_digit(axis: int, step: float, role:
     assert finding.evidence["would_fit"] == pytest.approx(inputs.control.enu[row, axis], abs=1e-6)
 
 
+@pytest.mark.parametrize("size", [0.05, 0.2, 0.37, 1.0, 3.0])  # mm: 0.4 to 25 m on the ground
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_wrong_image_coordinate_is_no_slip_of_a_digit(size: float, axis: int) -> None:
+    inputs = inputs_of(simulation("utm"))
+    o = inputs.observations
+    row = int(control_rows(inputs)[4])
+    rays = np.flatnonzero(o.point == o.point_ids.index(inputs.control.ids[row]))
+    assert len(rays) > 2
+    for ray in rays.tolist():
+        xy = o.xy.copy()
+        xy[ray, axis] += size
+        assert "P406" not in codes(told(replace(inputs, observations=replace(o, xy=xy))))
+
+
 def test_two_control_points_exchanged() -> None:
     inputs = inputs_of(simulation("utm"))
     one, other = control_rows(inputs)[[1, 7]]

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from photostrip.triangulation.plausibility import flight, layout, rotations
 from photostrip.triangulation.plausibility.control_fit import bend, lay, upright
+from photostrip.triangulation.plausibility.control_strip import Rays
 from photostrip.triangulation.plausibility.digits import slip
 
 if TYPE_CHECKING:
@@ -188,6 +189,21 @@ def test_a_fit_is_not_disturbed_by_wrong_values(seed: int) -> None:
     fit = bend(columns, values, np.ones(15, bool), 0.01)
     assert np.flatnonzero(fit.odd).tolist() == [2, 7, 11]
     assert fit.coefficient == pytest.approx([3.0, -2.0, 1.0], abs=0.06)
+
+
+def test_image_residuals_and_how_a_step_moves_them() -> None:
+    rng = np.random.default_rng(8)
+    rotations = Rotation.from_euler("xyz", rng.normal(0, 0.1, (4, 3))).as_matrix()
+    centers, place = np.column_stack([np.arange(4.0), rng.normal(0, 0.1, (4, 2))]), np.array([1.3, 0.4, -2.0])
+    axes = (rotations.transpose(0, 2, 1) @ (place - centers)[:, :, None])[:, :, 0]
+    xy = -153.0 * axes[:, :2] / axes[:, 2:]  # the camera looks along -z
+    rays = Rays(xy, np.full(4, 0.005), centers, rotations, 153.0)
+    residual, jacobian = rays.residuals(place)
+    assert np.abs(residual).max() < 1e-10
+    for axis in range(3):
+        step = 1e-6 * np.eye(3)[axis]
+        numeric = (rays.residuals(place + step)[0] - rays.residuals(place - step)[0]) / 2e-6
+        assert jacobian[:, :, axis] == pytest.approx(numeric, abs=1e-5)
 
 
 def test_a_strip_is_set_upright() -> None:

@@ -81,6 +81,16 @@ def test_one_photo_listed_far_from_its_place_is_named_alone() -> None:
     assert f"between {photos[0]} and {photos[2]}" in finding.message
 
 
+@pytest.mark.parametrize("count", [4, 5, 7])
+@pytest.mark.parametrize("last", [False, True])
+def test_an_end_of_the_strip_that_is_listed_at_the_other_is_named_alone(count: int, last: bool) -> None:
+    made = simulation()
+    photos = list(made.strips[0][1])[:count]
+    wrong = [photos[-1], *photos[:-1]] if last else [*photos[1:], photos[0]]
+    (finding,) = found(made.observations, wrong)
+    assert (finding.code, finding.photos) == ("P201", (photos[-1 if last else 0],))
+
+
 @pytest.mark.parametrize("by", [1.0, -1.0, 1j, -1j, np.exp(0.4j)])
 def test_a_mirrored_photo_is_named_however_it_was_mirrored(by: complex) -> None:
     made = simulation()

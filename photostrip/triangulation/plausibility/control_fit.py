@@ -55,6 +55,13 @@ class Laid:
     mirrored: bool
     middle: float
 
+    @property
+    def matrix(self) -> Floats:
+        """The same turn of plan and height together, shape (3, 3)."""
+        sense = -1.0 if self.mirrored else 1.0
+        a, b = self.turn.real, self.turn.imag
+        return np.array([[a, -sense * b, 0.0], [b, sense * a, 0.0], [0.0, 0.0, abs(self.turn)]])
+
     def __call__(self, w: Complex) -> Complex:
         """Bring places of the upright strip to the plan."""
         result: Complex = self.turn * (np.conj(w) if self.mirrored else w) + self.shift

@@ -1,4 +1,4 @@
-"""Given heights against those of a strip: their unit and sense, groups that are off by a constant, single slips."""
+"""Given heights against those of a strip: their unit and sense, groups that are off by a constant."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 
 from photostrip.statistics import t_quantile
 from photostrip.triangulation.plausibility.control_fit import KEPT, LEAST, Bent, bend, lay, upright
-from photostrip.triangulation.plausibility.control_slips import slips
 from photostrip.triangulation.plausibility.control_strip import (
     FEET_NEAR,
     FOOT,
     SPARE,
     Fitted,
     Given,
+    Level,
     Seen,
     levelled,
     simplest,
@@ -37,8 +37,6 @@ SURE = 1e-5  # probability of a finding where there is nothing to find
 SCALE_LEAST = 0.03  # of the ratio of heights to plan: a smaller one harms nobody and may be a bent strip
 OFFSET_LEAST = 8.0  # a-priori standard deviations of a height: a smaller constant does no harm
 GROUP_LEAST = 3
-SOUND = 4.5  # standard deviations within which the other coordinates of a point with a slip of the pen lie
-EARTH_RADIUS = 6.37e6  # metres
 EXPLAINED = 0.5  # of what heights leave without it: what explains a bend of the strip as well explains nothing
 
 
@@ -77,11 +75,26 @@ class Heights:
 
 
 def compare(given: Given, fitted: Fitted, judged: Flags) -> Heights | None:
-    """Compare given heights with those of a strip; None when too few are given."""
+    """Compare given heights with those of a strip.
+
+    Parameters
+    ----------
+    given : Given
+        Given points.
+    fitted : Fitted
+        The strip on them.
+    judged : ndarray of bool, shape (n,)
+        Points of lists that go with each other.
+
+    Returns
+    -------
+    Heights or None
+        None when too few are given.
+    """
     usable = given.use[:, 2] & np.isfinite(given.level[:, 2]) & np.isfinite(fitted.height)
     took_part = usable & ~given.check & judged
     agreeing = took_part & ~(np.isfinite(fitted.plan.residual) & fitted.plan.odd)
-    took_part = agreeing if agreeing.sum() > LEAST else took_part
+    took_part = agreeing if agreeing.sum() >= LEAST + SPARE else took_part
     if took_part.sum() <= LEAST:
         return None
     x, y = fitted.along, fitted.across
@@ -94,19 +107,6 @@ def compare(given: Given, fitted: Fitted, judged: Flags) -> Heights | None:
     base = base[:, 1:]
     scaled = bend(np.column_stack([base, deviation]), value, took_part, fitted.floor[1])
     return Heights(usable, took_part, value, base, whole, deviation, scaled)
-
-
-def height_fits(fitted: Fitted, heights: Heights | None, row: int, off: float) -> bool:
-    """Whether the height of a point that is off in plan fits: a wrong measurement along the base moves both."""
-    if heights is None or not heights.usable[row]:
-        return True
-    fit = bend(heights.columns, heights.value, heights.took_part, fitted.floor[1])
-    return bool(abs(fit.residual[row]) <= SOUND * fit.spread[row] + _curved(fitted, off))
-
-
-def _curved(fitted: Fitted, off: float) -> float:
-    """How much an error of one coordinate moves the others, metres: the ground is curved."""
-    return off * (off + float(np.ptp(fitted.along[np.isfinite(fitted.along)]))) / EARTH_RADIUS
 
 
 class Stretched(NamedTuple):
@@ -146,8 +146,8 @@ def stretched(given: Given, seen: Seen) -> Stretched | None:
     laid = lay(w[took_part], given.plan[took_part])
     if laid is None:
         return None
-    seen, w, z, laid = levelled(given, seen, w, s[:, 2], laid, took_part)
-    fitted = straightened(laid, w, z, given, seen, took_part)
+    level = levelled(given, Level(w, s[:, 2], laid, turn, seen.depth), seen.floor[1], took_part)
+    fitted = straightened(given, level, seen.floor, took_part)
     heights = compare(given, fitted, np.ones(len(w), bool))
     if heights is None or heights.took_part.sum() < LEAST + SPARE:
         return None
@@ -160,12 +160,30 @@ def stretched(given: Given, seen: Seen) -> Stretched | None:
     return Stretched(1.0 + float(free.coefficient[-1]), max(misfit, 1.0))
 
 
-def examine(given: Given, seen: Seen, fitted: Fitted, judged: Flags, heights: Heights) -> Iterator[Finding]:
-    """Examine the heights: their unit and sense, groups that are off by a constant, slips."""
-    took_part, floor = heights.took_part, fitted.floor[1]
+def examine(given: Given, seen: Seen, heights: Heights, fit: Bent, floor: float) -> Iterator[Finding]:
+    """Examine the heights: their unit and sense, groups that are off by a constant.
+
+    Parameters
+    ----------
+    given : Given
+        Given points.
+    seen : Seen
+        The same points in the strip.
+    heights : Heights
+        Their heights against those of the strip.
+    fit : Bent
+        What is left of them, tilt and bending taken out.
+    floor : float
+        Smallest standard deviation that makes sense, metres.
+
+    Yields
+    ------
+    Finding
+        P105, P401, P404, P405, at most one.
+    """
+    took_part = heights.took_part
     ratio, sigma = heights.ratio
-    plain = bend(heights.columns, heights.value, took_part, floor)
-    explains = heights.scaled.sigma0 < EXPLAINED * plain.sigma0
+    explains = heights.scaled.sigma0 < EXPLAINED * fit.sigma0
     if explains and _significant(ratio - 1.0, sigma, heights.scaled.freedom, SCALE_LEAST):
         yield _other_scale(seen, ratio, sigma, took_part)
         return
@@ -176,14 +194,6 @@ def examine(given: Given, seen: Seen, fitted: Fitted, judged: Flags, heights: He
         if explains and _significant(size, sigma, offset.freedom, OFFSET_LEAST * floor):
             yield _other_heights(given, seen, names, key, size, sigma, inside & took_part)
             return
-    fit = bend(heights.columns, heights.value, took_part, floor)
-    for row in np.flatnonzero(heights.usable & judged & fit.odd).tolist():
-        difference = np.array([0.0, 0.0, fit.residual[row]])
-        plan = fitted.plan
-        far = _curved(fitted, abs(fit.residual[row]))
-        if np.isfinite(plan.residual[row]) and abs(plan.residual[row]) > SOUND * plan.spread[row] + far:
-            continue  # a wrong measurement along the base moves both
-        yield from slips(given, seen, row, difference, (float(fit.spread[row]), float(fit.limit[row])), (2,))
 
 
 def _significant(value: float, sigma: float, freedom: int, least: float) -> bool:

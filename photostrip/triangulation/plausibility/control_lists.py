@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.triangulation.plausibility.control_fit import Laid, lay
-from photostrip.triangulation.plausibility.control_strip import FEET_NEAR, FOOT, Fitted, Given, Seen, straightened
+from photostrip.triangulation.plausibility.control_strip import FEET_NEAR, FOOT, Given, Level, Seen, straightened
 from photostrip.triangulation.plausibility.finding import found
 
 if TYPE_CHECKING:
@@ -22,23 +22,42 @@ APART = 0.1  # of the distance from camera to ground: lists that lie nearer to e
 MOST_ODD = 0.6  # of the points of a list: beyond it the list is wrong, not its points
 
 
-def examine(given: Given, seen: Seen, w: Complex, fitted: Fitted, took_part: Flags) -> tuple[list[int], list[Finding]]:
-    """Find control lists that do not go with the largest one."""
+def examine(given: Given, seen: Seen, level: Level, took_part: Flags) -> tuple[list[int], list[Finding]]:
+    """Find control lists that do not go with the largest one.
+
+    Parameters
+    ----------
+    given : Given
+        Given points.
+    seen : Seen
+        The same points in the strip.
+    level : Level
+        The strip, level and laid on them.
+    took_part : ndarray of bool, shape (n,)
+        Points on which it was laid.
+
+    Returns
+    -------
+    list of int
+        Numbers of the lists that do not go with the others.
+    list of Finding
+        P403, P407.
+    """
     numbers, counts = np.unique(given.group[took_part], return_counts=True)
     if len(numbers) < 2:
         return [], []
-    own = {int(n): lay(w[took_part & (given.group == n)], given.plan[took_part & (given.group == n)],
-                       mirrored=fitted.laid.mirrored) for n in numbers}  # fmt: skip
+    own = {int(n): lay(level.w[took_part & (given.group == n)], given.plan[took_part & (given.group == n)],
+                       mirrored=level.laid.mirrored) for n in numbers}  # fmt: skip
     first = int(numbers[int(counts.argmax())])
     reference = own[first]
     if reference is None:
         return [], []
-    base = straightened(reference, w, np.zeros(len(w)), given, seen, took_part & (given.group == first))
+    base = straightened(given, level._replace(laid=reference), seen.floor, took_part & (given.group == first))
     wrong, told = [], []
     for number in (int(each) for each in numbers if each != first):
         rows = took_part & (given.group == number)
         off = base.plan.residual[rows]
-        limit = np.maximum(base.plan.limit[rows], APART * np.abs(reference.turn) * seen.depth)
+        limit = np.maximum(base.plan.limit[rows], APART * np.abs(reference.turn) * level.depth)
         if (np.abs(off) > limit).mean() <= MOST_ODD:
             continue
         wrong.append(number)

@@ -8,14 +8,22 @@ the others predict, check points too, but no check point ever takes part in a fi
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.triangulation.plausibility import control_heights, control_lists, control_slips
-from photostrip.triangulation.plausibility.control_fit import LEAST, Laid, lay, upright
-from photostrip.triangulation.plausibility.control_strip import AXES, Given, Seen, levelled, rotated, straightened
+from photostrip.triangulation.plausibility.control_fit import LEAST, Laid, bend, lay, upright
+from photostrip.triangulation.plausibility.control_slips import Left
+from photostrip.triangulation.plausibility.control_strip import (
+    AXES,
+    Given,
+    Level,
+    Seen,
+    levelled,
+    rotated,
+    straightened,
+)
 from photostrip.triangulation.plausibility.finding import found
 
 if TYPE_CHECKING:
@@ -73,23 +81,26 @@ def examine(
         told.append(_mirror(seen, normal, mirror, extent, axes_are_right=axes_are_right))
     elif normal.middle > FITS * extent:
         return _columns(given, exchanged(), seen, w, took_part, normal)
-    seen, w, z, best = levelled(given, seen, w, s[:, 2], best, took_part)
-    fitted = straightened(best, w, z, given, seen, took_part)
-    wrong_lists, lists = control_lists.examine(given, seen, w, fitted, took_part)
+    level = levelled(given, Level(w, s[:, 2], best, turn, seen.depth), seen.floor[1], took_part)
+    wrong_lists, lists = control_lists.examine(given, seen, level, took_part)
     told += lists
     if wrong_lists:
         took_part = took_part & ~np.isin(given.group, wrong_lists)
-        again = lay(w[took_part], given.plan[took_part], mirrored=best.mirrored)
+        again = lay(level.w[took_part], given.plan[took_part], mirrored=level.laid.mirrored)
         if again is None:
             return told
-        fitted = straightened(again, w, z, given, seen, took_part)
+        level = level._replace(laid=again)
+    fitted = straightened(given, level, seen.floor, took_part)
     judged = ~np.isin(given.group, wrong_lists)
     heights = control_heights.compare(given, fitted, judged)
-    height_fits = partial(control_heights.height_fits, fitted, heights)
-    told += control_slips.examine(given, seen, fitted, judged, height_fits)
-    if heights is not None:
-        told += control_heights.examine(given, seen, fitted, judged, heights)
-    return told
+    if heights is None:
+        left = Left(fitted.plan, None, np.zeros(len(judged), bool))
+        return [*told, *control_slips.examine(given, seen, fitted, judged, left)]
+    fit = bend(heights.columns, heights.value, heights.took_part, fitted.floor[1])
+    left = Left(fitted.plan, fit, heights.usable)
+    told += control_slips.examine(given, seen, fitted, judged, left)
+    whole = list(control_heights.examine(given, seen, heights, fit, fitted.floor[1]))
+    return told + (whole or list(control_slips.examine_heights(given, seen, fitted, judged, left)))
 
 
 # ------------------------------------------------------------------------------------------ the strip as a whole

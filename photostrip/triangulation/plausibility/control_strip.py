@@ -6,13 +6,15 @@ In plan the bending is taken out by a conformal polynomial, with as few terms as
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from photostrip.triangulation.plausibility.control_fit import LEAST, SMALL, Bent, Laid, bend, lay, upright
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
@@ -71,6 +73,61 @@ class Given:
 
 
 @dataclass(frozen=True, eq=False)
+class Rays:
+    """What the photos of a strip show of one point.
+
+    Parameters
+    ----------
+    xy : ndarray, shape (r, 2)
+        Image coordinates, mm.
+    sigma : ndarray, shape (r,)
+        Their standard deviations, mm.
+    centers : ndarray, shape (r, 3)
+        Perspective centres in the strip.
+    rotations : ndarray, shape (r, 3, 3)
+        Photo to strip.
+    focal : float
+        Principal distance, mm.
+    """
+
+    xy: Floats
+    sigma: Floats
+    centers: Floats
+    rotations: Floats
+    focal: float
+
+    @property
+    def count(self) -> int:
+        """Number of photos."""
+        return len(self.xy)
+
+    def residuals(self, xyz: Floats) -> tuple[Floats, Floats]:
+        """Give image residuals of a place, and how a step of it moves its images.
+
+        Parameters
+        ----------
+        xyz : ndarray, shape (3,)
+            A place in the strip.
+
+        Returns
+        -------
+        residual : ndarray, shape (r, 2)
+            Where the place comes to lie on each photo, minus where the point was measured; mm.
+        jacobian : ndarray, shape (r, 2, 3)
+            Millimetres on each photo for a step in the strip.
+        """
+        back = self.rotations.transpose(0, 2, 1)
+        seen = np.einsum("rij,rj->ri", back, xyz - self.centers)
+        depth = np.minimum(seen[:, 2], -SMALL)[:, None]
+        image = -self.focal * seen[:, :2] / depth
+        jacobian = -(self.focal * back[:, :2] + image[:, :, None] * back[:, 2:]) / depth[:, :, None]
+        return image - self.xy, jacobian
+
+
+NO_RAYS = Rays(np.zeros((0, 2)), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3, 3)), 1.0)
+
+
+@dataclass(frozen=True, eq=False)
 class Seen:
     """The same points as a strip sees them.
 
@@ -91,6 +148,8 @@ class Seen:
         Distance from camera to ground, in units of the strip.
     base_angle : float
         Direction of the bases on the photos, radians from the x axis; a mean.
+    rays_of : callable
+        Gives the rays of a point by its id; a mosaic knows none.
     """
 
     strip: str
@@ -100,6 +159,7 @@ class Seen:
     floor: tuple[float, float]
     depth: float
     base_angle: float = 0.0
+    rays_of: Callable[[str], Rays] = lambda _name: NO_RAYS
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,6 +178,8 @@ class Fitted:
         A-priori standard deviations in plan and height, metres.
     plan : Bent
         What is left in plan.
+    strip_from_level : ndarray, shape (3, 3)
+        Steps in the strip from steps in the level frame, metres.
     """
 
     laid: Laid
@@ -126,51 +188,123 @@ class Fitted:
     height: Floats
     floor: tuple[float, float]
     plan: Bent
+    strip_from_level: Floats
 
 
 def rotated(xyz: Floats, turn: Floats) -> Floats:
-    """Turn coordinates of a mosaic, which are upright already, or of a strip with points that have none."""
+    """Turn coordinates of a mosaic, which are upright already, or of a strip with points that have none.
+
+    Parameters
+    ----------
+    xyz : ndarray, shape (n, 3)
+        Strip coordinates; points of a mosaic have no third one.
+    turn : ndarray, shape (3, 3)
+        Rotation that sets the strip upright.
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+        Coordinates of the upright strip.
+    """
     flat = np.isfinite(xyz[:, :2]).all(axis=1) & ~np.isfinite(xyz[:, 2])
     result = xyz @ turn.T
     result[flat] = xyz[flat]
     return result
 
 
-def levelled(
-    given: Given, seen: Seen, w: Complex, z: Floats, laid: Laid, took_part: Flags
-) -> tuple[Seen, Complex, Floats, Laid]:
+class Level(NamedTuple):
+    """A strip, turned level.
+
+    Parameters
+    ----------
+    w : ndarray of complex, shape (n,)
+        Places of its points.
+    z : ndarray, shape (n,)
+        Their heights, in the same unit.
+    laid : Laid
+        The strip on its control in plan.
+    turn : ndarray, shape (3, 3)
+        Steps of the level strip from steps of the strip as it was formed.
+    depth : float
+        Distance from camera to ground, in the unit of `w`.
+    """
+
+    w: Complex
+    z: Floats
+    laid: Laid
+    turn: Floats
+    depth: float
+
+
+def levelled(given: Given, level: Level, floor: float, took_part: Flags) -> Level:
     """Turn a strip by the tilt that the heights of its control show; the cameras look down within degrees only.
 
     Relief times that tilt is a displacement in plan. Where the heights do not help, all stays as it is.
+
+    Parameters
+    ----------
+    given : Given
+        Given points.
+    level : Level
+        The strip, set upright by its cameras.
+    floor : float
+        Smallest standard deviation of a height that makes sense, as a share of the distance from camera to ground.
+    took_part : ndarray of bool, shape (n,)
+        Points on which the strip is laid in plan.
+
+    Returns
+    -------
+    Level
+        The strip, level.
     """
-    unchanged = seen, w, z, laid
+    w, z, laid, turn, depth = level
     scale = abs(laid.turn)
     place, height = laid(w), scale * z
     usable = given.use[:, 2] & ~given.check & np.isfinite(given.level[:, 2]) & np.isfinite(height) & np.isfinite(place)
     if usable.sum() <= LEAST:
-        return unchanged
+        return level
     mean = float(height[usable].mean())
     columns = [np.ones(len(w)), place.real, place.imag]
     columns += [height - mean] if usable.sum() >= LEAST + 2 * SPARE else []  # a wrong unit of the heights is no tilt
     design = np.where(usable[:, None], np.column_stack(columns), 0.0)
     value = np.where(usable, given.level[:, 2] - height, 0.0)
-    floor = max(seen.floor[1] * seen.depth * scale, given.sigma[1], SMALL)
-    tilt = bend(design, value, usable, floor).coefficient[1:3]
-    turned = np.column_stack([place.real, place.imag, height]) @ upright(np.array([[tilt[0], tilt[1], 1.0]])).T
-    level = turned[:, 0] + 1j * turned[:, 1]
-    again = lay(level[took_part], given.plan[took_part])
+    least = max(floor * depth * scale, given.sigma[1], SMALL)
+    tilt = bend(design, value, usable, least).coefficient[1:3]
+    leaning = upright(np.array([[tilt[0], tilt[1], 1.0]]))
+    turned = np.column_stack([place.real, place.imag, height]) @ leaning.T
+    here = turned[:, 0] + 1j * turned[:, 1]
+    again = lay(here[took_part], given.plan[took_part])
     if again is None or again.middle > laid.middle:
-        return unchanged
-    return replace(seen, depth=seen.depth * scale), level, turned[:, 2], again
+        return level
+    return Level(here, turned[:, 2], again, leaning @ laid.matrix @ turn, depth * scale)
 
 
-def straightened(laid: Laid, w: Complex, z: Floats, given: Given, seen: Seen, took_part: Flags) -> Fitted:
-    """Take the bending out of the plan."""
+def straightened(given: Given, level: Level, floor: tuple[float, float], took_part: Flags) -> Fitted:
+    """Take the bending out of the plan.
+
+    Parameters
+    ----------
+    given : Given
+        Given points.
+    level : Level
+        The strip, level and laid on them.
+    floor : tuple of float
+        Smallest standard deviations that make sense in plan and height, as shares of the distance from camera to
+        ground.
+    took_part : ndarray of bool, shape (n,)
+        Points that may say how the strip bends.
+
+    Returns
+    -------
+    Fitted
+        The strip on its control.
+    """
+    w, z, laid, turn, depth = level
     scale = abs(laid.turn)
-    distance = seen.depth * scale
-    floor = (
-        max(float(np.hypot(seen.floor[0] * distance, given.sigma[0])), SMALL),
-        max(float(np.hypot(seen.floor[1] * distance, given.sigma[1])), SMALL),
+    distance = depth * scale
+    least = (
+        max(float(np.hypot(floor[0] * distance, given.sigma[0])), SMALL),
+        max(float(np.hypot(floor[1] * distance, given.sigma[1])), SMALL),
     )
     place = laid(w)
     axis = _direction(place[took_part])
@@ -178,9 +312,10 @@ def straightened(laid: Laid, w: Complex, z: Floats, given: Given, seen: Seen, to
     local = (place - middle) / axis
     known = np.isfinite(given.plan)
     columns = [np.where(np.isfinite(local), local, 0.0) ** k for k in range(3)]
-    bent = simplest(columns, 2, np.where(known, given.plan, 0.0), took_part, floor[0])[1]
+    bent = simplest(columns, 2, np.where(known, given.plan, 0.0), took_part, least[0])[1]
     residual = np.where(known & np.isfinite(w), bent.residual, np.nan)
-    return Fitted(laid, local.real, local.imag, scale * z, floor, replace(bent, residual=residual))
+    back = np.asarray(np.linalg.inv(laid.matrix @ turn), float)
+    return Fitted(laid, local.real, local.imag, scale * z, least, replace(bent, residual=residual), back)
 
 
 def simplest(
@@ -190,7 +325,28 @@ def simplest(
     took_part: Flags,
     floor: float,
 ) -> tuple[NDArray[Any], Bent]:
-    """Fit as few columns as leave no more than makes sense, at least some of them."""
+    """Fit as few columns as leave no more than makes sense, at least some of them.
+
+    Parameters
+    ----------
+    columns : list of ndarray, shape (n,)
+        Columns, the simplest first.
+    least : int
+        Number of them that are always taken.
+    values : ndarray of float or complex, shape (n,)
+        Values, metres.
+    took_part : ndarray of bool, shape (n,)
+        Points that may take part.
+    floor : float
+        Smallest standard deviation that makes sense, metres.
+
+    Returns
+    -------
+    columns : ndarray, shape (n, c)
+        Those taken.
+    Bent
+        Their fit.
+    """
     number = least
     while True:
         chosen = np.column_stack(columns[:number])

@@ -252,16 +252,15 @@ def _first_of(layout: mosaic.Layout, listed: Sequence[int], number: int) -> int:
 
 
 def _along(layout: mosaic.Layout, inside: list[int]) -> list[int]:
-    """Photos of one part along its longest direction, in the sense in which they are listed."""
+    """Photos of one part along its longest direction, in the sense in which fewer are out of the list's order."""
     if len(inside) < FEWEST:
         return inside
     center = layout.center[inside]
     d = center - center.mean()
     axis = np.sqrt((d**2).sum())  # direction of the largest extent
     along = (d * np.conj(axis)).real
-    if np.corrcoef(along, np.arange(len(inside)))[0, 1] < 0:
-        along = -along
-    return [inside[k] for k in np.argsort(along, kind="stable")]
+    order = [inside[k] for k in np.argsort(along, kind="stable")]
+    return min((order, order[::-1]), key=lambda each: len(_moved(each, inside)))
 
 
 def _moved(order: Sequence[int], listed: Sequence[int]) -> list[int]:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     Numbers = NDArray[np.intp]
     Flags = NDArray[np.bool_]
 
-GOOD_PARALLAX = 6.0  # standard deviations of a y parallax
+ALONG_BASE = 5.0  # times the y parallax: how large an error of the x parallax may be
 APART = 0.05  # of the distance from camera to ground: no bending of a strip moves a point by it
 SAME_PLACE = 8.0  # standard deviations of an image coordinate, at photo scale, in plan
 SAME_DEPTH = 3.0  # times that in height, times height over base
@@ -32,7 +32,9 @@ SAME_IMAGE = 3.5  # standard deviations of the mean difference of image coordina
 
 def one_id(orientation: Orientation, formed: FormedStrip, names: Sequence[str], strip: Sequence[str], sigma: float,
            strip_id: str) -> Iterator[Finding]:  # fmt: skip
-    """Find ids that stand for two points: two pairs without a common photo put it at two places, each one soundly.
+    """Find ids that stand for two points: two pairs without a common photo put it at two places.
+
+    What a pair says is believed within what its y parallax lets expect along the base.
 
     Parameters
     ----------
@@ -54,8 +56,7 @@ def one_id(orientation: Orientation, formed: FormedStrip, names: Sequence[str], 
     Finding
         P301.
     """
-    sound = np.isfinite(formed.model_xyz).all(axis=1) & (np.abs(orientation.parallax) < GOOD_PARALLAX * 1.5 * sigma)
-    rows = np.flatnonzero(sound)
+    rows = np.flatnonzero(np.isfinite(formed.model_xyz).all(axis=1))
     pair = orientation.pairs.pair[rows]
     order = np.lexsort((pair, orientation.point[rows]))
     rows, pair = rows[order], pair[order]
@@ -64,7 +65,12 @@ def one_id(orientation: Orientation, formed: FormedStrip, names: Sequence[str], 
     distance = np.linalg.norm(formed.model_xyz[rows[apart + 1]] - formed.model_xyz[rows[apart]], axis=1)
     depth = np.linalg.norm(formed.model_xyz[rows[apart]] - formed.centers[pair[apart]], axis=1)
     told: set[int] = set()
-    for k in np.flatnonzero(distance > APART * (pair[apart + 1] - pair[apart]) * depth).tolist():
+    parallax = np.maximum(np.abs(orientation.parallax[rows]), sigma)
+    base = np.linalg.norm(np.diff(formed.centers, axis=0), axis=1)[pair]
+    doubt = ALONG_BASE * parallax / orientation.pairs.focal  # of an x parallax, in units of the distance
+    believed = APART * (pair[apart + 1] - pair[apart]) * depth
+    believed += sum(doubt[each] * depth**2 / base[each] for each in (apart, apart + 1))
+    for k in np.flatnonzero(distance > believed).tolist():
         number = int(point[apart[k]])
         if number in told:
             continue
@@ -73,7 +79,7 @@ def one_id(orientation: Orientation, formed: FormedStrip, names: Sequence[str], 
         share = float(distance[k] / depth[k])
         message = (
             f"point {names[number]} stands for two points: photos {' and '.join(one)} put it {100 * share:.0f} % of "
-            f"the flying height away from where photos {' and '.join(two)} put it, each without a y parallax"
+            f"the flying height away from where photos {' and '.join(two)} put it"
         )
         evidence = {
             "distance_over_flying_height": share,
