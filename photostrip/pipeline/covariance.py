@@ -95,6 +95,28 @@ class CovarianceAdjustment:
     system: strip_system.System
     passes: int
 
+    def by_control(self, points: Numbers, coordinates: Numbers) -> Floats:
+        """Give what errors of control coordinates subtract from points.
+
+        Parameters
+        ----------
+        points : ndarray of int, shape (n,)
+            Points of the strip.
+        coordinates : ndarray of int, shape (c,)
+            Rows of ``control``.
+
+        Returns
+        -------
+        ndarray, shape (n, 3, c)
+            Derivatives, intermediate frame.
+        """
+        wanted = self.conditions
+        place = np.empty(len(self.control.point), np.intp)
+        rows = np.flatnonzero(wanted.kind == strip_conditions.CONTROL)
+        place[wanted.source[rows]] = rows
+        things = self.errors.points.taken(points)
+        return strip_covariance.by_conditions(self.errors, wanted, self.local, self.system, things, place[coordinates])
+
 
 def adjust(
     strip: Strip,

@@ -15,7 +15,7 @@ from photostrip.pipeline.results import Precision
 from photostrip.triangulation import precision
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -28,6 +28,9 @@ if TYPE_CHECKING:
     Numbers = NDArray[np.intp]
 
 
+AT_A_TIME = 100  # control coordinates that two strips share, looked at together
+
+
 @dataclass(frozen=True, eq=False)
 class StripPrecision:
     """Covariances of one strip in the axes of the Cartesian frame.
@@ -38,12 +41,11 @@ class StripPrecision:
         Of the points of the strip, metres^2.
     photos : ndarray, shape (m, 6, 6)
         Of centre and small rotation of its photos; NaN where a photo could not be oriented.
-    influence : ndarray, shape (q, 3, t)
-        Points by the parameters fitted to the control.
-    operator : ndarray, shape (t, w)
-        Those parameters by errors of the control coordinates that count.
+    by_control : callable
+        Takes rows of points (n,) and of control coordinates (c,), gives what errors of these coordinates subtract from
+        these points, (n, 3, c), in the same axes.
     control : ndarray of int, shape (w, 2)
-        These coordinates: the control point's number among the image points' ids, and its ground axis.
+        The control coordinates that count: the control point's number among the image points' ids, and its ground axis.
     variance : ndarray, shape (w,)
         Their variances, metres^2.
     sigma : float
@@ -56,8 +58,7 @@ class StripPrecision:
 
     points: Floats
     photos: Floats
-    influence: Floats
-    operator: Floats
+    by_control: Callable[[Numbers, Numbers], Floats]
     control: Numbers
     variance: Floats
     sigma: float
@@ -100,8 +101,7 @@ def of_strip(
     numbers = strip.formed.point[strip.control_rows][found.control.point]
     return StripPrecision(
         *_turned(strip, points, photos),
-        strip.intermediate.axes @ found.influence,
-        operator,
+        lambda rows, columns: strip.intermediate.axes @ found.influence[rows] @ operator[:, columns],
         np.column_stack([numbers, found.control.axis]),
         found.control.variance,
         stated * float(np.sqrt(factor)),
@@ -120,10 +120,14 @@ def _of_covariance(
 ) -> StripPrecision:
     """Covariances that the adjustment with the strip's own covariance has found already."""
     numbers = strip.formed.point[strip.control_rows][adjusted.control.point]
+
+    def by_control(rows: Numbers, columns: Numbers) -> Floats:
+        axes: Floats = strip.intermediate.axes
+        return np.asarray(axes @ adjusted.by_control(rows, columns), float)
+
     return StripPrecision(
         *_turned(strip, adjusted.points, adjusted.photos),
-        np.zeros((len(adjusted.points), 3, 0)),  # what it shares with other strips through their control dies away
-        np.zeros((0, len(numbers))),
+        by_control,
         np.column_stack([numbers, adjusted.control.axis]),
         adjusted.control.variance,
         adjusted.sigma,
@@ -167,9 +171,12 @@ def joined(strips: Sequence[StripPrecision], results: Sequence[StripResult], poi
     for (row_a, a), (row_b, b) in combinations(zip(rows, strips, strict=True), 2):
         shared, in_a, in_b = np.intersect1d(row_a, row_b, return_indices=True)
         _, of_a, of_b = np.intersect1d(_keys(a), _keys(b), return_indices=True)
-        if len(shared) and len(of_a):
-            seen_a, seen_b = a.influence[in_a] @ a.operator[:, of_a], b.influence[in_b] @ b.operator[:, of_b]
-            mixed = (seen_a * a.variance[of_a]) @ seen_b.transpose(0, 2, 1)
+        if not len(shared):
+            continue
+        for start in range(0, len(of_a), AT_A_TIME):
+            part = slice(start, start + AT_A_TIME)
+            seen_a, seen_b = a.by_control(in_a, of_a[part]), b.by_control(in_b, of_b[part])
+            mixed = (seen_a * a.variance[of_a[part]]) @ seen_b.transpose(0, 2, 1)
             total[shared] += mixed + mixed.transpose(0, 2, 1)
     return Precision(
         total / (count**2)[:, None, None],

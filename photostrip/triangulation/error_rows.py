@@ -77,10 +77,11 @@ class Rows:
     own: Floats
 
     def taken(self, order: Numbers) -> Rows:
-        """Give the same rows in another order of things."""
-        back = np.argsort(order, kind="stable")
+        """Give the rows of some things, or of all in another order."""
+        back = np.full(len(self.first), -1)
+        back[order] = np.arange(len(order))
         item = back[self.item]
-        entry = np.argsort(item, kind="stable")
+        entry = np.argsort(item, kind="stable")[int((item < 0).sum()) :]
         return Rows(
             self.first[order],
             self.frame[order],

@@ -289,6 +289,47 @@ def influence(errors: StripErrors, wanted: Conditions, local: Local, found: Syst
     return np.asarray(solved[layout.block, layout.position].T, float)
 
 
+def by_conditions(
+    errors: StripErrors, wanted: Conditions, local: Local, found: System, rows: Rows, chosen: Numbers
+) -> Floats:
+    """Predicted errors of many things by the misclosures of some conditions.
+
+    Parameters
+    ----------
+    errors : StripErrors
+        The formed strip.
+    wanted : Conditions
+        The conditions.
+    local : Local
+        Unknowns of the models.
+    found : System
+        The solved system.
+    rows : Rows
+        n things of d coordinates, in any order.
+    chosen : ndarray of int, shape (c,)
+        The conditions that are asked about.
+
+    Returns
+    -------
+    ndarray, shape (n, d, c)
+        What is subtracted from each thing, by each misclosure.
+    """
+    layout, size = found.layout, rows.frame.shape[1]
+    right = np.zeros((layout.blocks, layout.height, len(chosen)))
+    right[layout.block[chosen], layout.position[chosen], np.arange(len(chosen))] = 1.0
+    solved = np.zeros((layout.blocks + 2, layout.height, len(chosen)))
+    solved[1:-1] = found.factors.solve(right)
+    order = np.argsort(rows.first, kind="stable")
+    job = _Job.of(errors, wanted, local, found, rows.taken(order))
+    result = np.zeros((len(order), size, len(chosen)))
+    for number in range(layout.blocks):
+        low, high, mixed = job.columns(number, found)
+        if low < high:
+            window = solved[number : number + 3].reshape(3 * layout.height, -1)
+            result[order[low:high]] = (mixed.reshape(len(window), -1).T @ window).reshape(high - low, size, -1)
+    return result
+
+
 def tested(wanted: Conditions, found: System, cofactors: Floats, count: int) -> Tested:
     """Test the adjustment as a whole and every control coordinate.
 
