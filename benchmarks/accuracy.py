@@ -34,7 +34,7 @@ from photostrip.geometry.rotation import from_vector  # noqa: E402
 from photostrip.pipeline import triangulate  # noqa: E402
 from photostrip.simulate.simulation import simulate  # noqa: E402
 from photostrip.simulate.spec import FILM, Control, Flight, Points, Spec  # noqa: E402
-from photostrip.triangulation import polynomial  # noqa: E402
+from photostrip.triangulation import polynomial, polynomial_terms  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -202,7 +202,7 @@ def _degrees(result: Result) -> tuple[int, int]:
     found = result.strips[0].polynomial
     if found is None:
         return 0, 0
-    plan, _, height = ([polynomial.POWERS[term][0] for term in axis.terms] for axis in found.axes)
+    plan, _, height = ([polynomial_terms.POWERS[term][0] for term in axis.terms] for axis in found.axes)
     return max(plan, default=0), max(height, default=0)
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.triangulation.error_rows import PARAMETERS, Rows, similarity_rows
-from photostrip.triangulation.polynomial import POWERS
+from photostrip.triangulation.polynomial_terms import POWERS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

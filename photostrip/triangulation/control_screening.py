@@ -22,7 +22,7 @@ import numpy as np
 
 from photostrip.errors import PhotostripError
 from photostrip.statistics import t_quantile
-from photostrip.triangulation import absolute, control_tests, polynomial
+from photostrip.triangulation import absolute, control_tests, polynomial, polynomial_terms
 from photostrip.triangulation.absolute import Targets
 
 if TYPE_CHECKING:
@@ -190,7 +190,7 @@ def _gross(control: ControlPoints, setting: Setting) -> Flags:
 
 def _witnessed(x: Floats, spacing: float, kept: Flags) -> Flags:
     """Whether another point of the same band gives the same coordinate and is kept."""
-    group = polynomial.bands(x, spacing)
+    group = polynomial_terms.bands(x, spacing)
     total = np.zeros((int(group.max()) + 1, 3), np.intp)
     np.add.at(total, group, kept)
     return np.array(total[group] - kept > 0, bool)
@@ -336,8 +336,8 @@ def _predicted(control: ControlPoints, kept: ControlPoints, setting: Setting) ->
 
 def _leverages(problem: polynomial.Problem, terms: Sequence[str], weight: Floats) -> Floats:
     """Variance of the fit at every point in units of that of a coordinate of mean weight, shape (n,)."""
-    x, y = problem.xyz[:, 0] / problem.reach, problem.xyz[:, 1] / problem.breadth
-    columns = np.column_stack([x**i * y**j for i, j in (polynomial.POWERS[term] for term in terms)])
+    x, y = problem.xyz[:, 0] / problem.sizes.reach, problem.xyz[:, 1] / problem.breadth
+    columns = np.column_stack([x**i * y**j for i, j in (polynomial_terms.POWERS[term] for term in terms)])
     used = weight > 0
     design = columns[used] * np.sqrt(weight[used] / weight[used].mean())[:, None]
     cofactors = np.linalg.pinv(design.T @ design, hermitian=True)

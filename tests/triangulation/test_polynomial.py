@@ -18,7 +18,8 @@ from photostrip.pipeline import Settings as RunSettings
 from photostrip.pipeline import triangulate
 from photostrip.triangulation import polynomial
 from photostrip.triangulation.absolute import weights
-from photostrip.triangulation.polynomial import Problem, Settings, bands, choose_terms, count_stations, fit
+from photostrip.triangulation.polynomial import Problem, Settings, fit
+from photostrip.triangulation.polynomial_terms import bands, choose_terms, count_stations
 from tests.strips import MICROMETRE, control_points, fly, project, targets
 from tests.vectors import cases, section
 
@@ -197,8 +198,8 @@ def test_the_ladder(points: int, stations: int, asked: tuple[str, ...], exact: t
     along = np.linspace(-9000, 9000, stations)
     xyz = np.array([[along[n % stations], 1400.0 * (-1) ** (n // stations + n % stations), 0.0] for n in range(points)])
     one = problem(xyz, xyz)
-    assert choose_terms(xyz, 3, one) == asked
-    assert choose_terms(xyz, 3, one, forced=True) == exact
+    assert choose_terms(xyz, 3, one.sizes) == asked
+    assert choose_terms(xyz, 3, one.sizes, forced=True) == exact
 
 
 @pytest.mark.parametrize(
@@ -212,7 +213,7 @@ def test_the_ladder(points: int, stations: int, asked: tuple[str, ...], exact: t
 )
 def test_control_on_one_side_carries_no_terms_across(y: list[float], terms: tuple[str, ...]) -> None:
     xyz = np.column_stack([np.linspace(-9000, 9000, 8), y, np.zeros(8)])
-    assert choose_terms(xyz, 3, problem(xyz, xyz)) == terms
+    assert choose_terms(xyz, 3, problem(xyz, xyz).sizes) == terms
     assert np.linalg.matrix_rank(columns(xyz) / np.abs(columns(xyz)).max(axis=0).clip(1)) == len(terms)
 
 
@@ -368,9 +369,9 @@ def test_bands_are_left_out_when_the_ladder_says_so_of_what_is_left(seed: int, s
     group = bands(xyz[:, 0], one.spacing)
     for kind, _ in polynomial.GROUPS:
         richest = steps(found, kind)[-1]
-        terms = choose_terms(xyz, 3, one)
+        terms = choose_terms(xyz, 3, one.sizes)
         rest = [xyz[group != band] for band in range(1, group.max())]
-        carried = [choose_terms(left, richest.degree, one, forced=True) == terms for left in rest]
+        carried = [choose_terms(left, richest.degree, one.sizes, forced=True) == terms for left in rest]
         assert richest.left_out_by == ("band" if rest and all(carried) else "point")
 
 
