@@ -37,6 +37,8 @@ SURE = 1e-5  # probability of a finding where there is nothing to find
 SCALE_LEAST = 0.03  # of the ratio of heights to plan: a smaller one harms nobody and may be a bent strip
 OFFSET_LEAST = 8.0  # a-priori standard deviations of a height: a smaller constant does no harm
 GROUP_LEAST = 3
+ASIDE = 2  # more points that a bend leaves aside than a constant: it does not explain them
+EXPLAINED_BY_FEET = 0.75  # the same, for a ratio that would be a strange coincidence
 EXPLAINED = 0.5  # of what heights leave without it: what explains a bend of the strip as well explains nothing
 
 
@@ -183,14 +185,18 @@ def examine(given: Given, seen: Seen, heights: Heights, fit: Bent, floor: float)
     """
     took_part = heights.took_part
     ratio, sigma = heights.ratio
-    explains = heights.scaled.sigma0 < EXPLAINED * fit.sigma0
+    feet = min(abs(ratio * each - 1.0) for each in (FOOT, 1 / FOOT)) < FEET_NEAR
+    explains = heights.scaled.sigma0 < (EXPLAINED_BY_FEET if feet else EXPLAINED) * fit.sigma0
     if explains and _significant(ratio - 1.0, sigma, heights.scaled.freedom, SCALE_LEAST):
         yield _other_scale(seen, ratio, sigma, took_part)
         return
     for names, inside, key in _groups(given, took_part):
         _, offset = simplest([inside.astype(float), *heights.whole], 4, heights.value, took_part, floor)
         size, sigma = float(offset.coefficient[0]), float(offset.sigma[0])
-        explains = offset.sigma0 < EXPLAINED * simplest(heights.whole, 3, heights.value, took_part, floor)[1].sigma0
+        bending = simplest(heights.whole, 3, heights.value, took_part, floor)[1]
+        # a bend may leave all points with more, or some of them aside as if they were wrong
+        aside = int((took_part & ~bending.used).sum()) - int((took_part & ~offset.used).sum())
+        explains = offset.sigma0 < EXPLAINED * bending.sigma0 or aside >= ASIDE
         if explains and _significant(size, sigma, offset.freedom, OFFSET_LEAST * floor):
             yield _other_heights(given, seen, names, key, size, sigma, inside & took_part)
             return

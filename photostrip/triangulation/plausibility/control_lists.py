@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     Flags = NDArray[np.bool_]
 
 APART = 0.1  # of the distance from camera to ground: lists that lie nearer to each other go together
+PAIR = 2
 MOST_ODD = 0.6  # of the points of a list: beyond it the list is wrong, not its points
 
 
@@ -46,8 +47,7 @@ def examine(given: Given, seen: Seen, level: Level, took_part: Flags) -> tuple[l
     numbers, counts = np.unique(given.group[took_part], return_counts=True)
     if len(numbers) < 2:
         return [], []
-    own = {int(n): lay(level.w[took_part & (given.group == n)], given.plan[took_part & (given.group == n)],
-                       mirrored=level.laid.mirrored) for n in numbers}  # fmt: skip
+    own = {int(n): _own(given, level, took_part & (given.group == n)) for n in numbers}
     first = int(numbers[int(counts.argmax())])
     reference = own[first]
     if reference is None:
@@ -63,6 +63,15 @@ def examine(given: Given, seen: Seen, level: Level, took_part: Flags) -> tuple[l
         wrong.append(number)
         told.append(_other_frame(given, seen, own[number], reference, number, first, rows, off))
     return wrong, told
+
+
+def _own(given: Given, level: Level, rows: Flags) -> Laid | None:
+    """Lay the strip on one list alone; of two points their distance says the scale, if nothing else."""
+    w, plan = level.w[rows], given.plan[rows]
+    if len(w) == PAIR and abs(w[1] - w[0]) > 0:
+        turn = complex(abs(plan[1] - plan[0]) / abs(w[1] - w[0]))
+        return Laid(turn, 0j, level.laid.mirrored, 0.0)
+    return lay(w, plan, mirrored=level.laid.mirrored)
 
 
 def _other_frame(
