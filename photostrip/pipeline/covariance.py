@@ -343,11 +343,12 @@ def proposal(strip: Strip, correction: Polynomial) -> list[Note]:
         )
         return [Note("long-strip", text, strip=strip.id)]
     few = min(correction.stations) < POLYNOMIAL_BANDS
-    if correction.degree and (models > POLYNOMIAL_MODELS or few):
+    if models > 1 and (models > POLYNOMIAL_MODELS or few):
         bands = f"on {min(correction.stations)} bands of control"
         why = f"over {models} models" if models > POLYNOMIAL_MODELS else bands
+        what = "a polynomial" if correction.degree else "the similarity, which no polynomial betters,"
         text = (
-            f"strip {strip.id}: a polynomial {why} leaves more than it must; `processing.adjustment: covariance` "
+            f"strip {strip.id}: {what} {why} leaves more than it must; `processing.adjustment: covariance` "
             "distributes the same misclosures within 5 % of a bundle adjustment"
         )
         return [Note("covariance-proposed", text, severity="note", strip=strip.id)]

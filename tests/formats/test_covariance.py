@@ -60,12 +60,13 @@ def test_the_report_shows_the_tests() -> None:
 
 
 def test_a_polynomial_is_told_of_the_alternative() -> None:
-    """Three bands of control are few for a polynomial; with none used there is nothing to propose."""
+    """Three bands of control are few for a polynomial, whatever its degree; the covariance itself proposes nothing."""
     for known in (case("projected"), adjusted()):
-        polynomial = known.result.strips[0].polynomial
-        used = polynomial is not None and polynomial.degree > 0
-        codes = {note["code"] for note in known.document["notes"]}
-        assert ("covariance-proposed" in codes) == used
+        asked = known.result.strips[0].polynomial is not None
+        told = [note["message"] for note in known.document["notes"] if note["code"] == "covariance-proposed"]
+        assert len(told) == asked
+        text = " ".join(to_text(title_of(known.document), sections_of(known.document), 100).split())
+        assert ("`processing.adjustment: covariance` distributes" in text) == asked
 
 
 def test_exchanged_image_points_do_not_stop_it() -> None:
