@@ -103,6 +103,8 @@ class FormedStrip:
         tau and nu of each base in radians.
     model_xyz : ndarray, shape (m, 3)
         Strip coordinates of every row of the pairs' table, from its own model; NaN where rays do not meet.
+    vectors : ndarray, shape (m, 3)
+        The same in the frame of the left photo of the model, from its centre, base length 1.
     gap : ndarray, shape (m,)
         Y gap of the two rays at photo scale, mm.
     point : ndarray of int, shape (q,)
@@ -125,6 +127,7 @@ class FormedStrip:
     base_direction: Floats
     base_inclination: Floats
     model_xyz: Floats
+    vectors: Floats
     gap: Floats
     point: Numbers
     xyz: Floats
@@ -185,16 +188,34 @@ def model_points(orientation: Orientation) -> tuple[Floats, Floats, Flags]:
     return vectors, found.gap / found.ray_factor, found.sound
 
 
+def _points_again(orientation: Orientation, earlier: tuple[FormedStrip, Flags] | None) -> tuple[Floats, Floats, Flags]:
+    """Points of all models; of models that are what they were, those that are known."""
+    if earlier is None:
+        return model_points(orientation)
+    formed, changed = earlier
+    part, rows = relative.taken(orientation, np.flatnonzero(changed))
+    vectors, gap = formed.vectors.copy(), formed.gap.copy()
+    vectors[rows], gap[rows], _ = model_points(part)
+    return vectors, gap, np.isfinite(vectors[:, 0])
+
+
 def _junction_rows(
-    orientation: Orientation, sound: Flags, aside: Flags | None = None
+    orientation: Orientation, sound: Flags, aside: Flags | None = None, touched: Flags | None = None
 ) -> tuple[Numbers, Numbers, Numbers]:
-    """Rows of points that stand in two neighbouring models: joint, row before, row after."""
-    usable = np.flatnonzero(orientation.used & sound)
-    pair, point = orientation.pairs.pair[usable], orientation.point[usable]
-    order = np.lexsort((pair, point))
-    usable, pair, point = usable[order], pair[order], point[order]
-    both = np.flatnonzero((point[1:] == point[:-1]) & (pair[1:] == pair[:-1] + 1))
-    before, after, joint = usable[both], usable[both + 1], pair[both]
+    """Rows of points that stand in two neighbouring models: joint, row before, row after; of some joints or all."""
+    usable = orientation.used & sound
+    if touched is not None:
+        usable &= (np.append(touched, False) | np.append(False, touched))[orientation.pairs.pair]
+    rows = np.flatnonzero(usable)
+    pair, point = orientation.pairs.pair[rows], orientation.point[rows]
+    # the table is ordered by pair
+    order = np.argsort(point, kind="stable")
+    rows, pair, point = rows[order], pair[order], point[order]
+    both = (point[1:] == point[:-1]) & (pair[1:] == pair[:-1] + 1)
+    if touched is not None:
+        both &= np.append(touched, False)[pair[:-1]]
+    first = np.flatnonzero(both)
+    before, after, joint = rows[first], rows[first + 1], pair[first]
     if aside is not None:
         good = ~(aside[before] | aside[after])
         # a joint with nothing better keeps what it has
@@ -212,6 +233,7 @@ def transfer_scale(
     photos: Sequence[str],
     sigma: Floats | None = None,
     aside: Flags | None = None,
+    touched: Flags | None = None,
 ) -> Junctions:
     """Scale of every model from the one before it, through the pass points at their common photo.
 
@@ -231,6 +253,8 @@ def transfer_scale(
         Standard deviation of a y parallax of weight one in each pair, mm; by default from the pairs' own residuals.
     aside : ndarray of bool, shape (m,), optional
         Rows that must not join models, unless a joint has no other.
+    touched : ndarray of bool, shape (p - 1,), optional
+        Joints that are wanted; all by default. The others have no rows and the factor NaN.
 
     Returns
     -------
@@ -246,23 +270,39 @@ def transfer_scale(
     -----
     Source: [001] eq. 139-141.
     """
-    joint, before, after = _junction_rows(orientation, sound, aside)
     joints = orientation.pairs.size - 1
-    _require_joints(joint, joints, photos)
+    wanted = np.ones(joints, bool) if touched is None else touched
+    joint, before, after = _junction_rows(orientation, sound, aside, touched)
+    _require_joints(joint, wanted, photos)
     base, _ = orientation.relative
     distance_before = np.linalg.norm(vectors[before] - base[joint], axis=1)
     distance_after = np.linalg.norm(vectors[after], axis=1)
     ratio = distance_before / distance_after
     weight = _weights(orientation, vectors, before, after, joint, settings)
     spreads = scale_screening.spreads(orientation, vectors, (joint, before, after), sigma)
-    used, limit = scale_screening.screen(ratio, weight, spreads, joint, joints)
-    factor, spread = _factors(ratio, weight * used, joint, joints, settings)
+    count = int(wanted.sum())
+    number = (np.cumsum(wanted) - 1)[joint]
+    used, limit = scale_screening.screen(ratio, weight, spreads, number, count)
+    factor, spread = np.full((2, joints), np.nan)
+    factor[wanted], spread[wanted] = _factors(ratio, weight * used, number, count, settings)
     return Junctions(joint, before, after, orientation.point[before], ratio, used, limit, factor, spread, weight * used)
 
 
-def _require_joints(joint: Numbers, joints: int, photos: Sequence[str]) -> None:
-    counts = np.bincount(joint, minlength=joints) if joints else np.zeros(0, np.intp)
-    for number in np.flatnonzero(counts == 0).tolist():
+def _joined(earlier: Junctions, fresh: Junctions, touched: Flags) -> Junctions:
+    """Put joints made anew in the place of earlier ones."""
+    kept = ~touched[earlier.joint]
+    order = np.argsort(np.concatenate([earlier.joint[kept], fresh.joint]), kind="stable")
+    rows = {
+        name: np.concatenate([getattr(earlier, name)[kept], getattr(fresh, name)])[order]
+        for name in ("joint", "before", "after", "point", "ratio", "used", "limit", "weight")
+    }
+    joints = {name: np.where(touched, getattr(fresh, name), getattr(earlier, name)) for name in ("factor", "spread")}
+    return Junctions(**rows, **joints)
+
+
+def _require_joints(joint: Numbers, wanted: Flags, photos: Sequence[str]) -> None:
+    counts = np.bincount(joint, minlength=len(wanted))
+    for number in np.flatnonzero((counts[: len(wanted)] == 0) & wanted).tolist():
         names = photos[number : number + 3]
         msg = (
             f"no point is common to photos {names[0]}, {names[1]} and {names[2]}: the models on either side of photo "
@@ -280,8 +320,8 @@ def _weights(
         return np.ones(len(before))
     base, _ = orientation.relative
     # A distance from the centre is known to sigma_p / p of itself, and p is inverse to the depth along the base.
-    depth_before = np.linalg.norm(np.cross(vectors[before], base[joint]), axis=1)
-    depth_after = np.linalg.norm(np.cross(vectors[after], base[joint + 1]), axis=1)
+    depth_before = scale_screening.depths(vectors[before], base[joint])
+    depth_after = scale_screening.depths(vectors[after], base[joint + 1])
     quality = np.minimum(orientation.pairs.weight[before], orientation.pairs.weight[after])
     weight: Floats = quality / (depth_before**2 + depth_after**2)
     return weight
@@ -305,6 +345,7 @@ def form(
     photos: Sequence[str],
     sigma: Floats | None = None,
     aside: Flags | None = None,
+    earlier: tuple[FormedStrip, Flags] | None = None,
 ) -> FormedStrip:
     """Form the strip from its oriented pairs.
 
@@ -320,6 +361,8 @@ def form(
         Standard deviation of a y parallax of weight one in each pair, mm; by default from the pairs' own residuals.
     aside : ndarray of bool, shape (m,), optional
         Rows whose points are in doubt: they join models only where a joint has no other.
+    earlier : tuple of FormedStrip and ndarray of bool, shape (p,), optional
+        The strip as it was formed before some of its pairs changed, and which: only joints on them are made anew.
 
     Returns
     -------
@@ -331,8 +374,11 @@ def form(
     GeometryError
         When a joint is broken or a base is parallel to the strip's Z axis.
     """
-    vectors, gap, sound = model_points(orientation)
-    junctions = transfer_scale(orientation, vectors, sound, settings, photos, sigma, aside)
+    vectors, gap, sound = _points_again(orientation, earlier)
+    touched = None if earlier is None else np.asarray(earlier[1][:-1] | earlier[1][1:], bool)
+    junctions = transfer_scale(orientation, vectors, sound, settings, photos, sigma, aside, touched)
+    if earlier is not None and touched is not None:
+        junctions = _joined(earlier[0].junctions, junctions, touched)
     formed = placed(orientation, vectors, gap, junctions, orientation.used & sound)
     _refuse_vertical_base(np.diff(formed.centers, axis=0) / formed.scale[:, None], photos)
     return formed
@@ -372,6 +418,7 @@ def placed(orientation: Orientation, vectors: Floats, gap: Floats, junctions: Ju
         np.arctan2(bases[:, 1], bases[:, 0]),
         np.arcsin(np.clip(bases[:, 2] / scale, -1, 1)),
         xyz,
+        vectors,
         gap,
         point,
         mean,
@@ -397,6 +444,8 @@ def without(formed: FormedStrip, orientation: Orientation, left_out: Flags) -> F
     FormedStrip
         The same models; points without a row are gone, and rows left out have no model coordinates.
     """
+    if not left_out.any():
+        return formed
     model_xyz = np.where(left_out[:, None], np.nan, formed.model_xyz)
     use = orientation.used & np.isfinite(model_xyz).all(axis=1)
     point, mean, models = mean_points(orientation.point, model_xyz, use)
@@ -433,7 +482,8 @@ def mean_points(point: Numbers, xyz: Floats, use: Flags) -> tuple[Numbers, Float
         Rows that made each mean.
     """
     rows = np.flatnonzero(use)
-    numbers, inverse = np.unique(point[rows], return_inverse=True)
-    count = np.bincount(inverse, minlength=len(numbers))
-    sums = np.column_stack([np.bincount(inverse, xyz[rows, axis], len(numbers)) for axis in range(3)])
-    return numbers, sums / np.maximum(count, 1)[:, None], count
+    of_row = point[rows]
+    count = np.bincount(of_row)
+    numbers = np.flatnonzero(count).astype(np.intp)
+    sums = np.column_stack([np.bincount(of_row, xyz[rows, axis]) for axis in range(3)])
+    return numbers, sums[numbers] / count[numbers, None], count[numbers]

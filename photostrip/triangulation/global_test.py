@@ -13,6 +13,8 @@ from photostrip.statistics import chi2_quantile, normal_quantile
 from photostrip.triangulation import relative
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from photostrip.triangulation.relative import Orientation
@@ -57,9 +59,10 @@ def global_limits(count: Numbers) -> Floats:
     ndarray
         Chi-square with count - 5 degrees of freedom; infinite without redundancy.
     """
-    freedom = count - relative.MINIMUM_POINTS
-    table = {int(n): chi2_quantile(CONFIDENCE, int(n)) if n > 0 else np.inf for n in np.unique(freedom)}
-    return np.array([table[int(n)] for n in freedom.ravel()]).reshape(freedom.shape)
+    return _by_number(
+        count,
+        lambda n: chi2_quantile(CONFIDENCE, n - relative.MINIMUM_POINTS) if n > relative.MINIMUM_POINTS else np.inf,
+    )
 
 
 def standardised(orientation: Orientation, sigma: Floats) -> Floats:
@@ -121,5 +124,12 @@ def largest_limits(count: Numbers) -> Floats:
     ndarray
         Quantiles of the normal distribution.
     """
-    table = {int(n): normal_quantile(1 - (1 - CONFIDENCE) / (2 * max(int(n), 1))) for n in np.unique(count)}
-    return np.array([table[int(n)] for n in count])
+    return _by_number(count, lambda n: normal_quantile(1 - (1 - CONFIDENCE) / (2 * max(n, 1))))
+
+
+def _by_number(count: Numbers, limit: Callable[[int], float]) -> Floats:
+    """Look up a limit for every number of points; each number is asked for once."""
+    table = np.zeros(int(count.max(initial=0)) + 1)
+    for number in np.flatnonzero(np.bincount(np.maximum(count.ravel(), 0))).tolist():
+        table[number] = limit(number)
+    return table[np.maximum(count, 0)]

@@ -44,9 +44,14 @@ def readmit(orientation: Orientation, rows: Numbers, given: Floats, sigma: Float
     ndarray of int
         Rows taken back.
     """
-    result, back = orientation, []
-    waiting = np.unique(rows)
-    pairs = orientation.pairs
+    if not len(rows):
+        return orientation, np.zeros(0, np.intp)
+    todo = np.unique(orientation.pairs.pair[rows])
+    result, place = relative.taken(orientation, todo)
+    given, sigma = given[place], sigma[todo]
+    pairs = result.pairs
+    back: list[int] = []
+    waiting = np.searchsorted(place, np.unique(rows))
     while len(waiting):
         number = pairs.pair[waiting]
         value, growth = _predicted(result, waiting, given, sigma)
@@ -64,7 +69,9 @@ def readmit(orientation: Orientation, rows: Numbers, given: Floats, sigma: Float
         back += waiting[best].tolist()
         result = relative.refine(result, weight, np.unique(number[best]))
         waiting = np.delete(waiting, best)
-    return result, np.array(back, np.intp)
+    if not back:
+        return orientation, np.zeros(0, np.intp)
+    return relative.put_back(orientation, todo, place, result), place[np.array(back, np.intp)]
 
 
 def _predicted(orientation: Orientation, rows: Numbers, given: Floats, sigma: Floats) -> tuple[Floats, Floats]:

@@ -39,6 +39,9 @@ RETRIES = np.radians([15, -15, 30, -30, 60, -60, 90, -90, 180])
 RETRY_RMS = 1e-3  # of the principal distance: a larger rms y parallax is a false minimum or a gross error
 SMALLEST_PARALLAX = 1e-3  # of the principal distance, mean over a pair: below it there is no base to speak of
 UPPER = np.triu_indices(5)
+BY_PAIR = ("elements", "sigmas", "sigma0", "condition", "iterations", "cofactors")
+BY_ROW = ("parallax", "redundancy")
+"""What an orientation says of each pair and of each of its rows."""
 
 
 @dataclass(frozen=True)
@@ -332,7 +335,23 @@ def in_front(elements: Floats, pairs: Pairs) -> NDArray[np.bool_]:
     ndarray of bool, shape (m,)
         True where both rays meet on their way down.
     """
-    (lx, _, lz), (rx, _, rz) = rays(elements, pairs)
+    return ahead(*rays(elements, pairs))
+
+
+def ahead(left: Floats, right: Floats) -> NDArray[np.bool_]:
+    """Whether the rays of points meet on their way down.
+
+    Parameters
+    ----------
+    left, right : ndarray, shape (3, m)
+        Rays of the left and right photo in the base frame, mm.
+
+    Returns
+    -------
+    ndarray of bool, shape (m,)
+        True in front of both cameras.
+    """
+    (lx, _, lz), (rx, _, rz) = left, right
     determinant = lx * rz - rx * lz
     with np.errstate(divide="ignore", invalid="ignore"):
         front: NDArray[np.bool_] = (rz / determinant > 0) & (lz / determinant > 0)
@@ -429,6 +448,8 @@ class Orientation:
         Residual y parallaxes in mm, of rejected points too.
     redundancy : ndarray, shape (m,)
         Redundancy numbers; NaN for rejected points.
+    cofactors : ndarray, shape (p, 5, 5)
+        Cofactors of the elements for a y parallax of weight one, rad^2/mm^2; NaN for a degenerate pair.
     """
 
     pairs: Pairs
@@ -441,6 +462,7 @@ class Orientation:
     iterations: Numbers
     parallax: Floats
     redundancy: Floats
+    cofactors: Floats
 
     @property
     def used(self) -> NDArray[np.bool_]:
@@ -526,22 +548,19 @@ def _require_points(counts: Numbers, photos: Sequence[str]) -> None:
         raise GeometryError(msg, photos=names, code="too-few-common-points")
 
 
-def condition_numbers(jacobian: Floats, pairs: Pairs) -> Floats:
+def condition_numbers(normal: Floats) -> Floats:
     """Condition numbers of the column-normalised Jacobians.
 
     Parameters
     ----------
-    jacobian : ndarray, shape (5, m)
-        Derivatives by row.
-    pairs : Pairs
-        Measurements with their weights.
+    normal : ndarray, shape (p, 5, 5)
+        Normal matrices of the pairs.
 
     Returns
     -------
     ndarray, shape (p,)
         Largest over smallest singular value; infinite when singular.
     """
-    normal = normal_matrices(jacobian, pairs)
     diagonal = normal[:, np.arange(5), np.arange(5)]
     with np.errstate(all="ignore"):
         scale = 1 / np.sqrt(diagonal)
@@ -573,11 +592,11 @@ def assess(elements: Floats, pairs: Pairs, point: Numbers, rows: Numbers, iterat
     """
     with np.errstate(all="ignore"):
         q, jacobian = linearised(elements, pairs)
-        condition = condition_numbers(jacobian, pairs)
         normal = normal_matrices(jacobian, pairs)
+        condition = condition_numbers(normal)
         regular = condition < CONDITION_LIMIT
         normal[~regular] = np.eye(5)
-        cofactors = np.linalg.inv(normal)
+        cofactors = np.asarray(np.linalg.inv(normal), float)
         cofactors[~regular] = np.nan
         freedom = pairs.sums((pairs.weight > 0).astype(float)) - MINIMUM_POINTS
         variance = pairs.sums(pairs.weight * q**2) / freedom  # of a y parallax: twice that of an image coordinate
@@ -586,7 +605,7 @@ def assess(elements: Floats, pairs: Pairs, point: Numbers, rows: Numbers, iterat
         redundancy = np.where(pairs.weight > 0, 1 - pairs.weight * spread, np.nan)
         sigmas = np.sqrt(variance[:, None] * cofactors[:, np.arange(5), np.arange(5)])
     return Orientation(
-        pairs, point, rows, elements, sigmas, np.sqrt(variance / 2), condition, iterations, q, redundancy
+        pairs, point, rows, elements, sigmas, np.sqrt(variance / 2), condition, iterations, q, redundancy, cofactors
     )
 
 
@@ -611,7 +630,9 @@ def attempt(pairs: Pairs, point: Numbers, rows: Numbers) -> tuple[Orientation, N
     return assess(elements, pairs, point, rows, steps), converged
 
 
-def doubtful(result: Orientation, converged: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def doubtful(
+    result: Orientation, converged: NDArray[np.bool_], known: tuple[Floats, Floats] | None = None
+) -> NDArray[np.bool_]:
     """Pairs that cannot be used as they are: degenerate, not converged or behind their cameras.
 
     Parameters
@@ -620,6 +641,8 @@ def doubtful(result: Orientation, converged: NDArray[np.bool_]) -> NDArray[np.bo
         The pairs.
     converged : ndarray of bool, shape (p,)
         Whether the iteration of each pair converged.
+    known : tuple of ndarray, shape (3, m), optional
+        The rays of its points, when they are known already.
 
     Returns
     -------
@@ -627,11 +650,12 @@ def doubtful(result: Orientation, converged: NDArray[np.bool_]) -> NDArray[np.bo
         True for those that :func:`require` refuses.
     """
     pairs = result.pairs
+    left, right = rays(result.elements, pairs) if known is None else known
     with np.errstate(all="ignore"):
-        front = in_front(result.elements, pairs) & result.used
+        front = ahead(left, right) & result.used
     share = pairs.sums(front.astype(float)) / np.maximum(result.points_used, 1)
     bad: NDArray[np.bool_] = ~converged | ~(result.condition <= CONDITION_LIMIT) | (share <= 0.5)  # noqa: PLR2004  half of the points
-    return bad | (mean_parallax(result) < SMALLEST_PARALLAX * pairs.focal)
+    return bad | (_mean_parallax(result, left, right) < SMALLEST_PARALLAX * pairs.focal)
 
 
 def mean_parallax(result: Orientation) -> Floats:
@@ -647,7 +671,12 @@ def mean_parallax(result: Orientation) -> Floats:
     ndarray, shape (p,)
         Near zero when both photos were taken from the same place.
     """
-    (lx, _, lz), (rx, _, rz) = rays(result.elements, result.pairs)
+    return _mean_parallax(result, *rays(result.elements, result.pairs))
+
+
+def _mean_parallax(result: Orientation, left: Floats, right: Floats) -> Floats:
+    """Mean x parallax of each pair out of its rays."""
+    (lx, _, lz), (rx, _, rz) = left, right
     with np.errstate(all="ignore"):
         size = np.where(result.used, np.abs(lx / lz - rx / rz), 0.0) * result.pairs.focal
     mean: Floats = np.nan_to_num(result.pairs.sums(size)) / np.maximum(result.points_used, 1)
@@ -727,17 +756,53 @@ def refine(orientation: Orientation, weight: Floats, todo: Numbers) -> Orientati
         again, _ = part.take(lost)
         solved[lost], _, steps[lost] = solve(again)
     fresh = assess(solved, part, orientation.point[rows], orientation.rows[rows], orientation.iterations[todo] + steps)
-    return replace(
-        orientation,
-        pairs=pairs,
-        elements=_put(orientation.elements, todo, fresh.elements),
-        sigmas=_put(orientation.sigmas, todo, fresh.sigmas),
-        sigma0=_put(orientation.sigma0, todo, fresh.sigma0),
-        condition=_put(orientation.condition, todo, fresh.condition),
-        iterations=_put(orientation.iterations, todo, fresh.iterations),
-        parallax=_put(orientation.parallax, rows, fresh.parallax),
-        redundancy=_put(orientation.redundancy, rows, fresh.redundancy),
-    )
+    return put_back(replace(orientation, pairs=pairs), todo, rows, fresh)
+
+
+def taken(orientation: Orientation, todo: Numbers) -> tuple[Orientation, Numbers]:
+    """Give some of the pairs alone.
+
+    Parameters
+    ----------
+    orientation : Orientation
+        All pairs.
+    todo : ndarray of int
+        Pairs to take, ascending.
+
+    Returns
+    -------
+    Orientation
+        Those pairs, numbered from 0.
+    ndarray of int
+        Their rows in the table of all.
+    """
+    pairs, rows = orientation.pairs.take(todo)
+    by_pair = {name: getattr(orientation, name)[todo] for name in BY_PAIR}
+    by_row = {name: getattr(orientation, name)[rows] for name in ("point", "rows", *BY_ROW)}
+    return replace(orientation, pairs=pairs, **by_pair, **by_row), rows
+
+
+def put_back(orientation: Orientation, todo: Numbers, rows: Numbers, part: Orientation) -> Orientation:
+    """Put pairs back that were taken.
+
+    Parameters
+    ----------
+    orientation : Orientation
+        All pairs.
+    todo, rows : ndarray of int
+        The pairs that were taken, ascending, and their rows.
+    part : Orientation
+        What became of them.
+
+    Returns
+    -------
+    Orientation
+        All pairs; those not named keep their numbers.
+    """
+    by_pair = {name: _put(getattr(orientation, name), todo, getattr(part, name)) for name in BY_PAIR}
+    by_row = {name: _put(getattr(orientation, name), rows, getattr(part, name)) for name in BY_ROW}
+    weight = _put(orientation.pairs.weight, rows, part.pairs.weight)
+    return replace(orientation, pairs=replace(orientation.pairs, weight=weight), **by_pair, **by_row)
 
 
 def restored(orientation: Orientation, earlier: Orientation, todo: Numbers) -> Orientation:
@@ -757,15 +822,8 @@ def restored(orientation: Orientation, earlier: Orientation, todo: Numbers) -> O
     """
     if not len(todo):
         return orientation
-    _, rows = earlier.pairs.take(todo)
-    columns = ("elements", "sigmas", "sigma0", "condition", "iterations")
-    by_pair = {name: _put(getattr(orientation, name), todo, getattr(earlier, name)[todo]) for name in columns}
-    by_row = {
-        name: _put(getattr(orientation, name), rows, getattr(earlier, name)[rows])
-        for name in ("parallax", "redundancy")
-    }
-    weight = _put(orientation.pairs.weight, rows, earlier.pairs.weight[rows])
-    return replace(orientation, pairs=replace(orientation.pairs, weight=weight), **by_pair, **by_row)
+    part, rows = taken(earlier, todo)
+    return put_back(orientation, todo, rows, part)
 
 
 def _put(values: NDArray[Any], rows: Numbers, fresh: NDArray[Any]) -> NDArray[Any]:

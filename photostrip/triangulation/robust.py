@@ -51,9 +51,11 @@ def median_by_pair(values: Floats, pairs: Pairs, use: NDArray[np.bool_]) -> Floa
         Lower medians; NaN for a pair without a value.
     """
     count = pairs.sums(use.astype(float)).astype(np.intp)
-    order = np.lexsort((np.where(use, values, np.inf), pairs.pair))
-    middle = pairs.starts + np.maximum(count - 1, 0) // 2
-    return np.where(count > 0, values[order[middle]], np.nan)
+    place = np.arange(len(values)) - pairs.starts[pairs.pair]
+    table = np.full((pairs.size, int(place.max(initial=0)) + 1), np.inf)
+    table[pairs.pair, place] = np.where(use, values, np.inf)
+    table.sort(axis=1)
+    return np.where(count > 0, table[np.arange(pairs.size), np.maximum(count - 1, 0) // 2], np.nan)
 
 
 def start_values(pairs: Pairs) -> Floats:

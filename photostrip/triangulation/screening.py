@@ -13,6 +13,7 @@ Source: [004a]; the two-sided form and the order of work are chosen here, see do
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from photostrip.triangulation.relative import Orientation, Settings
 
     Floats = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
 
 METHODS = ("auto", "parallax+grubbs", "tau", "deletion", "robust", "none")
 SEARCHES = {"auto": (True, True), "deletion": (False, True), "robust": (True, False)}  # robust start, sets of points
@@ -82,8 +84,6 @@ class Screened:
         Pairs oriented without the rejected points.
     rejections : tuple of Rejection
         What was rejected, in order; re-admitted points are marked.
-    zone : ndarray of int, shape (m,)
-        Standard zone of every point, 1 to 6.
     scatter : screening_search.Scatter
         Standard deviations of a y parallax of weight one.
     masked : ndarray of bool, shape (p,)
@@ -94,10 +94,14 @@ class Screened:
 
     orientation: Orientation
     rejections: tuple[Rejection, ...]
-    zone: NDArray[np.intp]
     scatter: screening_search.Scatter
     masked: NDArray[np.bool_]
     converged: NDArray[np.bool_]
+
+    @cached_property
+    def zone(self) -> NDArray[np.intp]:
+        """Standard zone of every point, 1 to 6, shape (m,)."""
+        return zones(self.orientation.elements, self.orientation.pairs)
 
     @property
     def counts(self) -> NDArray[np.intp]:
@@ -176,23 +180,25 @@ def examine(
         raise InputError(msg)
     start, sets = SEARCHES.get(settings.screening, SEARCHES["auto"])
     sound = np.ones(orientation.pairs.size, bool) if converged is None else converged
-    doubtful = relative.doubtful(orientation, sound)
+    rays = relative.rays(orientation.elements, orientation.pairs)
+    doubtful = relative.doubtful(orientation, sound, rays)
+    behind = ~relative.ahead(*rays)
     with np.errstate(all="ignore"):
         scatter, found = screening_search.search(orientation, sigma, start=start, sets=sets, doubtful=doubtful)
     if settings.screening in SEARCHES:
-        result, log = _readmitted(orientation, scatter, found)
-        # a pair that was lost at first and now fits its points has converged after all; any other is refused as it was
-        sound = sound | (doubtful & ~global_test.failing(result, scatter.by_pair))
-        result = relative.restored(result, orientation, np.flatnonzero(doubtful & relative.doubtful(result, sound)))
+        result, log = _readmitted(orientation, scatter, found, behind)
+        if doubtful.any():
+            # a pair that was lost at first and now fits its points has converged after all; any other is refused
+            sound = sound | (doubtful & ~global_test.failing(result, scatter.by_pair))
+            result = relative.restored(result, orientation, np.flatnonzero(doubtful & relative.doubtful(result, sound)))
     else:
-        result, log = _sequential(orientation, settings, sigma)
-    zone = zones(result.elements, result.pairs)
+        result, log = _sequential(orientation, settings, sigma, behind)
     masked = global_test.failing(result, scatter.by_pair)
-    return Screened(result, _completed(log, result, zone), zone, scatter, masked, sound)
+    return Screened(result, _completed(log, result), scatter, masked, sound)
 
 
 def _readmitted(
-    orientation: Orientation, scatter: screening_search.Scatter, found: screening_search.Deleted
+    orientation: Orientation, scatter: screening_search.Scatter, found: screening_search.Deleted, behind: Flags
 ) -> tuple[Orientation, list[Rejection]]:
     """Take back what the final elements predict well, take out what lies behind a camera, write the log."""
     weight = orientation.pairs.weight
@@ -202,13 +208,15 @@ def _readmitted(
         Rejection(int(row), test, float(value), float(limit), float(before[row]))
         for row, test, value, limit in zip(found.rows, found.tests, found.values, found.limits, strict=True)
     ]
-    result, behind = _drop_behind(result)
-    return result, log + behind
+    result, dropped = _drop_behind(result, _behind_now(orientation, result, behind))
+    return result, log + dropped
 
 
-def _sequential(orientation: Orientation, settings: Settings, sigma: float) -> tuple[Orientation, list[Rejection]]:
+def _sequential(
+    orientation: Orientation, settings: Settings, sigma: float, behind: Flags
+) -> tuple[Orientation, list[Rejection]]:
     """Test single residuals, one stage after the other."""
-    result, log = _drop_behind(orientation)
+    result, log = _drop_behind(orientation, behind)
     limit = settings.parallax_limit if settings.parallax_limit is not None else LIMIT_FACTOR * sigma * np.sqrt(2.0)
     stages = {
         "none": [],
@@ -247,21 +255,38 @@ def spared(orientation: Orientation, rows: NDArray[np.bool_]) -> NDArray[np.bool
     return result
 
 
-def _completed(log: list[Rejection], result: Orientation, zone: NDArray[np.intp]) -> tuple[Rejection, ...]:
+def _completed(log: list[Rejection], result: Orientation) -> tuple[Rejection, ...]:
     """Add to each rejection what only the final orientation can say."""
+    if not log:
+        return ()
     used = result.used
+    part, rows = relative.taken(result, np.unique(result.pairs.pair[[each.row for each in log]]))
+    number = dict(zip(rows.tolist(), zones(part.elements, part.pairs).tolist(), strict=True))
     return tuple(
-        replace(r, zone=int(zone[r.row]), size=float(result.parallax[r.row]), readmitted=bool(used[r.row])) for r in log
+        replace(r, zone=number[r.row], size=float(result.parallax[r.row]), readmitted=bool(used[r.row])) for r in log
     )
 
 
-def _drop_behind(orientation: Orientation) -> tuple[Orientation, list[Rejection]]:
+def _behind_now(before: Orientation, after: Orientation, behind: Flags) -> Flags:
+    """Points behind a camera, given those of an earlier orientation."""
+    changed = np.flatnonzero((before.elements != after.elements).any(axis=1))
+    if not len(changed):
+        return behind
+    part, rows = relative.taken(after, changed)
+    result = behind.copy()
+    result[rows] = ~relative.in_front(part.elements, part.pairs)
+    return result
+
+
+def _drop_behind(orientation: Orientation, behind: Flags) -> tuple[Orientation, list[Rejection]]:
     """Take out the points that come out behind a camera; no measurement of theirs can be right."""
     pairs, used = orientation.pairs, orientation.used
-    front = relative.in_front(orientation.elements, pairs)
+    rows = np.flatnonzero(behind & used)
+    if not len(rows):
+        return orientation, []
     # with most of its points behind, the pair itself is wrong, and relative.require says so
-    most = pairs.sums((front & used).astype(float)) > MOST_IN_FRONT * orientation.points_used
-    rows = np.flatnonzero(~front & used & most[pairs.pair])
+    most = pairs.sums((~behind & used).astype(float)) > MOST_IN_FRONT * orientation.points_used
+    rows = rows[most[pairs.pair[rows]]]
     if not len(rows):
         return orientation, []
     log = [Rejection(int(row), "in front", np.nan, np.nan, float(orientation.parallax[row])) for row in rows]

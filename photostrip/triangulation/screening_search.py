@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.triangulation import deletion, relative, robust
+from photostrip.triangulation import deletion, global_test, relative, robust
 from photostrip.triangulation.global_test import failing, global_limits, largest_limits, standardised
 from photostrip.triangulation.zones import EMPTY_ZONES, MINIMUM_LEFT, ZONES, Support
 
@@ -38,6 +38,7 @@ SMALLEST_SIGMA = 1e-9  # mm
 GROSS = 4.0  # standard deviations; residuals from the robust start beyond it are wrong points
 PAIRS_AT_ONCE = 64
 HALF = 0.5
+MILD = 10.0  # root of the sum of squares in units of its variance
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,17 +169,63 @@ def search(
     todo = np.flatnonzero(failing(orientation, scatter.by_pair) | lost)
     if not len(todo):
         return scatter, _Log([], [], [], []).closed(orientation)
-    elements = orientation.elements.copy()
-    elements[todo], scale = robust_start(orientation, todo, scatter.by_pair)
-    seen = _seen_from(orientation, elements, todo)
-    cleaned = _cleaned(seen, todo, scale)
+    part, rows = relative.taken(orientation, todo)
+    passed = _Sizes.of(orientation)
+    every = np.arange(len(todo))
+    if sets and not lost.any():
+        found = _mildly(part, scatter.by_pair[todo])
+        if found is not None:
+            sizes = passed.with_part(rows, _left(part, found, found.orientation, scatter.by_pair[todo]))
+            if (_revised(scatter, orientation.pairs, sizes).by_pair <= UNCHANGED * scatter.by_pair).all():
+                return scatter, _whole(orientation, todo, rows, found)
+    elements, scale = robust_start(part, every, scatter.by_pair[todo])
+    seen = _seen_from(part, elements, every)
+    cleaned = _cleaned(seen, every, scale)
     while True:
-        todo = np.flatnonzero(failing(orientation, scatter.by_pair) | lost)
-        found = _search_once(orientation, seen if start else orientation, todo, scatter.by_pair, sets=sets, start=start)
-        revised = _revised(scatter, orientation, found, cleaned)
+        sigma_now = scatter.by_pair[todo]
+        failed = np.flatnonzero(failing(part, sigma_now) | lost[todo])
+        found = _search_once(part, seen if start else part, failed, sigma_now, sets=sets, start=start)
+        sizes = passed.with_part(rows, _left(part, found, cleaned, sigma_now))
+        revised = _revised(scatter, orientation.pairs, sizes)
         if (revised.by_pair <= UNCHANGED * scatter.by_pair).all():
-            return scatter, found
+            return scatter, _whole(orientation, todo, rows, found)
         scatter = revised
+
+
+def _mildly(part: Orientation, sigma: Floats) -> Deleted | None:
+    """Search pairs that fail by so little that least squares have turned them by nothing worth speaking of.
+
+    They need no robust start. None when there are others among them, or when no set of three points explains one.
+    """
+    if (global_test.squares(part, sigma) > MILD**2).any():
+        return None
+    log = _Log([], [], [], [])
+    result = _delete_sets(part, sigma, np.arange(part.pairs.size), log)
+    return None if failing(result, sigma).any() else log.closed(result)
+
+
+def _whole(orientation: Orientation, todo: Numbers, rows: Numbers, found: Deleted) -> Deleted:
+    """Put searched pairs back among all."""
+    return replace(
+        found, orientation=relative.put_back(orientation, todo, rows, found.orientation), rows=rows[found.rows]
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Sizes:
+    """What the parallaxes of all rows say about the scatter: sizes as :func:`_normalised`, redundancy numbers."""
+
+    size: Floats
+    redundancy: Floats
+
+    @classmethod
+    def of(cls, orientation: Orientation) -> _Sizes:
+        return cls(_normalised(orientation), orientation.redundancy)
+
+    def with_part(self, rows: Numbers, part: _Sizes) -> _Sizes:
+        size, redundancy = self.size.copy(), self.redundancy.copy()
+        size[rows], redundancy[rows] = part.size, part.redundancy
+        return _Sizes(size, redundancy)
 
 
 def _cleaned(seen: Orientation, todo: Numbers, scale: Floats) -> Orientation:
@@ -193,20 +240,26 @@ def _cleaned(seen: Orientation, todo: Numbers, scale: Floats) -> Orientation:
     return relative.refine(seen, weight, todo)
 
 
-def _revised(scatter: Scatter, given: Orientation, found: Deleted, cleaned: Orientation) -> Scatter:
-    """Raise the scatter where the residuals left by a search contradict it.
+def _left(given: Orientation, found: Deleted, cleaned: Orientation, sigma: Floats) -> _Sizes:
+    """Give what a search leaves of the pairs that failed.
 
     Pairs from which too many points went, or that still fail, do not speak by what the search chose to leave but by
     what a robust start leaves.
     """
-    pairs = given.pairs
     total, left = given.points_used, found.orientation.points_used
     few = total - left <= np.maximum(deletion.LARGEST, FEW * total)
-    trusted = (few & ~failing(found.orientation, scatter.by_pair))[pairs.pair]
-    sizes = np.where(trusted, _normalised(found.orientation), _normalised(cleaned))
+    trusted = (few & ~failing(found.orientation, sigma))[given.pairs.pair]
+    chosen, robustly = _Sizes.of(found.orientation), _Sizes.of(cleaned)
+    return _Sizes(
+        np.where(trusted, chosen.size, robustly.size), np.where(trusted, chosen.redundancy, robustly.redundancy)
+    )
+
+
+def _revised(scatter: Scatter, pairs: Pairs, left: _Sizes) -> Scatter:
+    """Raise the scatter where the residuals left by a search contradict it."""
+    sizes = left.size
     tested = np.isfinite(sizes)
-    redundancy = np.where(trusted, found.orientation.redundancy, cleaned.redundancy)
-    freedom = pairs.sums(np.where(tested, redundancy, 0.0))
+    freedom = pairs.sums(np.where(tested, left.redundancy, 0.0))
     if freedom.sum() < ENOUGH:
         return scatter
     pooled = robust.NORMAL * float(np.median(sizes[tested]))

@@ -12,7 +12,7 @@ import numpy as np
 
 from photostrip.errors import GeometryError
 from photostrip.triangulation import bridging, formation, relative, strip_screening
-from photostrip.triangulation.strip_screening import SEVERAL, Scene, Verdict
+from photostrip.triangulation.strip_screening import SEVERAL, Layout, Scene, Verdict
 from photostrip.triangulation.zones import MINIMUM_LEFT
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     Flags = NDArray[np.bool_]
 
 PASSES = 4  # most of the strips settle in the second
+STILL = 5e-4  # rad, and relative: the second order of such a change is 0.04 µm on a photo of 150 mm
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,39 +92,65 @@ def settle(
         When a joint is broken.
     """
     of_pairs = oriented
+    layout = Layout.of(oriented, measured.observations, measured.photos)
     suspected = np.zeros(0, np.intp)
     verdict: Verdict | None = None
     aside = np.zeros(len(oriented.point), bool)
+    moved: Flags | None = None
     formed = formation.form(oriented, settings, measured.photos, measured.sigma)
     for _ in range(PASSES):
-        scene = Scene(oriented, formed, measured.observations, measured.photos, measured.sigma, measured.stated)
+        scene = Scene(oriented, formed, measured.observations, layout, measured.sigma, measured.stated)
         suspected = np.union1d(suspected, strip_screening.suspects(scene)).astype(np.intp)
-        verdict = strip_screening.examine(scene, suspected, measured.kept, verdict)
+        verdict = strip_screening.examine(scene, suspected, measured.kept, verdict, moved)
         used, outside = _uses(of_pairs, verdict, readmit=readmit)
         if (used == oriented.used).all() and (outside == aside).all():
             break
+        before = oriented, formed
         try:
-            oriented, formed = _formed_again(oriented, used, outside, measured, settings)
+            oriented, formed = _formed_again(before, used, (aside, outside), measured, settings)
         except GeometryError:
             break  # nothing would join two models: what joined them before stays
-        aside = outside
+        aside, moved = outside, _moved(before, (oriented, formed))
     formed, verdict = formation.without(formed, oriented, aside), verdict or Verdict()
     return oriented, _bridged(formed, oriented, measured, verdict), verdict
 
 
 def _formed_again(
-    oriented: Orientation, used: Flags, aside: Flags, measured: Measured, settings: formation.Settings
+    before: tuple[Orientation, FormedStrip],
+    used: Flags,
+    asides: tuple[Flags, Flags],
+    measured: Measured,
+    settings: formation.Settings,
 ) -> tuple[Orientation, FormedStrip]:
-    """Orient the pairs whose points changed, and form the strip."""
-    changed = np.unique(oriented.pairs.pair[used != oriented.used])
+    """Orient the pairs whose points changed, and form the strip from there."""
+    oriented, formed = before
+    aside, outside = asides
+    pair = oriented.pairs.pair
+    changed = np.unique(pair[used != oriented.used])
+    touched = np.zeros(oriented.pairs.size, bool)
+    touched[changed] = touched[pair[aside != outside]] = True
     if len(changed):
         oriented = relative.refine(oriented, np.where(used, measured.weight, 0.0), changed)
-    return oriented, formation.form(oriented, settings, measured.photos, measured.sigma, aside)
+    earlier = formed, touched
+    return oriented, formation.form(oriented, settings, measured.photos, measured.sigma, outside, earlier)
+
+
+def _moved(before: tuple[Orientation, FormedStrip], after: tuple[Orientation, FormedStrip]) -> Flags:
+    """Find the models that have been turned or stretched noticeably."""
+    (old, formed), (new, again) = before, after
+    turned: Flags = np.asarray(np.abs(new.elements - old.elements).max(axis=1) > STILL, bool)
+    stretched = np.abs(again.junctions.factor / formed.junctions.factor - 1) > STILL
+    return np.asarray(turned | np.append(stretched, False) | np.append(False, stretched), bool)
 
 
 def _bridged(formed: FormedStrip, oriented: Orientation, measured: Measured, verdict: Verdict) -> FormedStrip:
     """Add the points whose good rays come from photos that are no neighbours."""
-    missing = np.isin(oriented.point, np.setdiff1d(verdict.judged, formed.point))
+    placed = np.zeros(len(measured.observations.point_ids), bool)
+    placed[formed.point] = True
+    gone = verdict.judged[~placed[verdict.judged]]
+    if not len(gone):
+        return formed
+    missing = np.isin(oriented.point, gone)
     good = np.setdiff1d(oriented.rows[missing], verdict.wrong)
     return bridging.bridge(formed, measured.observations, measured.photos, oriented.pairs.focal, good)
 
@@ -134,10 +161,16 @@ def _uses(of_pairs: Orientation, verdict: Verdict, *, readmit: bool) -> tuple[Fl
     Where it cannot be told which of several rays is wrong, those pairs that found nothing wrong keep the point: its
     y parallaxes are good, its place is not.
     """
-    judged = np.isin(of_pairs.point, verdict.judged)
-    gone = np.isin(of_pairs.rows, verdict.wrong).any(axis=1)
-    unclear = [kind == SEVERAL and bool(across) for kind, across in zip(verdict.kind, verdict.across, strict=True)]
-    aside: Flags = np.isin(of_pairs.rows, verdict.wrong[np.array(unclear, bool)]).any(axis=1).astype(bool)
+    if not len(verdict.judged):
+        return of_pairs.used, np.zeros(len(of_pairs.point), bool)
+    flags = np.zeros(int(of_pairs.point.max()) + 1, bool)
+    flags[verdict.judged] = True
+    judged = flags[of_pairs.point]
+    wrong, unclear = np.zeros((2, int(of_pairs.rows.max()) + 1), bool)
+    wrong[verdict.wrong] = True
+    several = np.array([kind == SEVERAL for kind in verdict.kind], bool)
+    unclear[verdict.wrong[several & verdict.across]] = True
+    gone, aside = (np.asarray(each[of_pairs.rows].any(axis=1), bool) for each in (wrong, unclear))
     used = np.where(judged, np.where(aside, of_pairs.used, ~gone), of_pairs.used)
     if not readmit:
         used &= of_pairs.used

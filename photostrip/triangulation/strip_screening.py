@@ -80,6 +80,55 @@ class Verdict:
     size: Floats = field(default_factory=lambda: np.zeros((0, 2)))
     across: Flags = field(default_factory=lambda: np.zeros(0, bool))
 
+    def of(self, points: Flags) -> Verdict:
+        """Give what was found of some points, a flag for each point of the observations."""
+        here = points[self.point]
+        kind = tuple(each for each, yes in zip(self.kind, here.tolist(), strict=True) if yes)
+        rows = (getattr(self, name)[here] for name in ("value", "limit", "size", "across"))
+        return Verdict(self.judged[points[self.judged]], self.wrong[here], self.point[here], kind, *rows)
+
+    def joined(self, other: Verdict) -> Verdict:
+        """Give both together; they know different points."""
+        order = np.argsort(np.concatenate([self.wrong, other.wrong]), kind="stable")
+        names = ("wrong", "point", "value", "limit", "size", "across")
+        rows = {name: np.concatenate([getattr(self, name), getattr(other, name)])[order] for name in names}
+        kind = self.kind + other.kind
+        return Verdict(np.union1d(self.judged, other.judged), kind=tuple(kind[number] for number in order), **rows)
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Where the image points of a strip are, whatever becomes of them.
+
+    Parameters
+    ----------
+    position : ndarray of int, shape (n,)
+        Place in the strip of the photo of every image point; -1 for photos of other strips.
+    paired : ndarray of bool, shape (n,)
+        Whether an image point stands in a pair.
+    begin, last : ndarray of int, shape (q,)
+        First and last photo of each point in pairs; the last is -1 for points of no pair.
+    """
+
+    position: Numbers
+    paired: Flags
+    begin: Numbers
+    last: Numbers
+
+    @classmethod
+    def of(cls, orientation: Orientation, observations: PhotoPoints, photos: Sequence[str]) -> Layout:
+        """Look up where everything is."""
+        place = {photo: number for number, photo in enumerate(photos)}
+        position = np.array([place.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo]
+        paired = np.zeros(len(position), bool)
+        paired[orientation.rows] = True
+        begin = np.full(len(observations.point_ids), len(photos))
+        last = np.full(len(begin), -1)
+        # the table is ordered by pair: of several the last one written stays
+        begin[orientation.point[::-1]] = orientation.pairs.pair[::-1]
+        last[orientation.point] = orientation.pairs.pair + 1
+        return cls(position, paired, begin, last)
+
 
 @dataclass(frozen=True, eq=False)
 class Scene:
@@ -93,8 +142,8 @@ class Scene:
         The strip formed from them.
     observations : PhotoPoints
         Image points.
-    photos : sequence of str
-        Photos of the strip in flight order.
+    layout : Layout
+        Where they are.
     sigma : ndarray, shape (p,)
         Standard deviations of a y parallax of weight one in each pair, mm.
     stated : float
@@ -104,9 +153,14 @@ class Scene:
     orientation: Orientation
     formed: FormedStrip
     observations: PhotoPoints
-    photos: Sequence[str]
+    layout: Layout
     sigma: Floats
     stated: float
+
+    @property
+    def photos(self) -> int:
+        """Number of photos of the strip."""
+        return len(self.formed.centers)
 
 
 def suspects(scene: Scene) -> Numbers:
@@ -131,61 +185,48 @@ def collect(scene: Scene, wanted: Flags | None = None) -> Rays:
     Rays
         Ordered by point and photo; points with one ray are left out.
     """
-    o, formed = scene.observations, scene.formed
-    place = {photo: number for number, photo in enumerate(scene.photos)}
-    position = np.array([place.get(photo, -1) for photo in o.photo_ids], np.intp)[o.photo]
-    row = np.unique(scene.orientation.rows)
-    if wanted is not None:
-        row = row[wanted[position[row]]]
-    row = row[np.lexsort((position[row], o.point[row]))]
-    photo, point = position[row], np.asarray(o.point[row], np.intp)
+    o, layout = scene.observations, scene.layout
+    inside = layout.paired if wanted is None else layout.paired & np.append(wanted, False)[layout.position]
+    row = np.flatnonzero(inside)
+    row = row[np.lexsort((layout.position[row], o.point[row]))]
+    photo, point = layout.position[row], np.asarray(o.point[row], np.intp)
     factor = scene.sigma / (np.sqrt(2.0) * scene.stated)
     by_photo = np.maximum(np.append(factor, factor[-1]), np.append(factor[0], factor))
     image = o.xy[row], o.sigma[row] * by_photo[photo, None], scene.orientation.pairs.focal
-    photos = formed.centers, formed.rotations
-    rays = _best_start(scene, (row, photo, point), image, photos)
+    rays = _best_start(scene, (row, photo, point), image)
     sound = np.isfinite(rays.misfit).all(axis=1) & np.isfinite(rays.by_photo).all(axis=(1, 2))
     several = np.bincount(rays.point[sound], minlength=len(o.point_ids)) > 1
     return rays.take(np.flatnonzero(sound & several[rays.point]))
 
 
-def _spans(scene: Scene) -> tuple[Numbers, Numbers]:
-    """First and last photo of each point; the last is -1 for points of no pair."""
-    oriented = scene.orientation
-    begin = np.full(len(scene.observations.point_ids), len(scene.photos))
-    last = np.full(len(begin), -1)
-    np.minimum.at(begin, oriented.point, oriented.pairs.pair)
-    np.maximum.at(last, oriented.point, oriented.pairs.pair + 1)
-    return begin, last
-
-
-def _best_start(
-    scene: Scene,
-    place: tuple[Numbers, Numbers, Numbers],
-    image: tuple[Floats, Floats, float],
-    photos: tuple[Floats, Floats],
-) -> Rays:
+def _best_start(scene: Scene, place: tuple[Numbers, Numbers, Numbers], image: tuple[Floats, Floats, float]) -> Rays:
     """Linearise at that of the places of each point, one from each model, with which most of its rays agree."""
     oriented, formed = scene.orientation, scene.formed
-    known = np.flatnonzero(np.isfinite(formed.model_xyz).all(axis=1))
-    known = known[np.lexsort((oriented.pairs.pair[known], oriented.point[known]))]
-    point = oriented.point[known]
+    photos = formed.centers, formed.rotations
+    new = np.diff(place[2], prepend=-1) > 0
+    number = np.full(len(scene.observations.point_ids), -1)
+    number[place[2][new]] = np.arange(new.sum())
+    known = np.flatnonzero((number[oriented.point] >= 0) & np.isfinite(formed.model_xyz[:, 0]))
+    known = known[np.argsort(oriented.point[known], kind="stable")]  # the table is ordered by pair
+    point, of_ray = number[oriented.point[known]], number[place[2]]
     slot = np.arange(len(known)) - np.searchsorted(point, point)
-    best = np.full((len(scene.observations.point_ids), 3), np.nan)
+    best = np.full((int(new.sum()), 3), np.nan)
     cost = np.full(len(best), np.inf)
-    for number in range(int(slot.max(initial=-1)) + 1):
-        here = slot == number
+    for count in range(int(slot.max(initial=-1)) + 1):
+        here = slot == count
         candidate = np.full(best.shape, np.nan)
         candidate[point[here]] = formed.model_xyz[known[here]]
-        rays = windows.linearise(place, image, photos, candidate[place[2]])
+        rays = windows.linearise(place, image, photos, candidate[of_ray])
         size = np.minimum(np.nan_to_num(np.abs(rays.misfit).max(axis=1), nan=np.inf), 1e6)
-        total = np.bincount(place[2], np.sqrt(size), len(best))
+        total = np.bincount(of_ray, np.sqrt(size), len(best))
         better = np.isfinite(candidate[:, 0]) & (total < cost)
         best[better], cost[better] = candidate[better], total[better]
-    return windows.linearise(place, image, photos, best[place[2]])
+    return windows.linearise(place, image, photos, best[of_ray])
 
 
-def examine(scene: Scene, points: Numbers, kept: Numbers, earlier: Verdict | None = None) -> Verdict:
+def examine(
+    scene: Scene, points: Numbers, kept: Numbers, earlier: Verdict | None = None, moved: Flags | None = None
+) -> Verdict:
     """Judge all points near some suspected ones.
 
     Parameters
@@ -198,6 +239,9 @@ def examine(scene: Scene, points: Numbers, kept: Numbers, earlier: Verdict | Non
         Rows of the observations that the user keeps: their points are not judged.
     earlier : Verdict, optional
         What was said of the same strip before its last small change.
+    moved : ndarray of bool, shape (p,), optional
+        Models that this change has turned or stretched by more than the adjustment of a window is linear for; what was
+        said where there is none stands. All by default.
 
     Returns
     -------
@@ -206,26 +250,43 @@ def examine(scene: Scene, points: Numbers, kept: Numbers, earlier: Verdict | Non
     """
     if not len(points):
         return Verdict()
-    begin, last = _spans(scene)
+    begin, last = scene.layout.begin, scene.layout.last
     seen = last >= 0
     reach = int(min((last - begin)[seen].max(initial=1), LONGEST_REACH)) + 1
-    first = windows.starts(len(scene.photos), reach)
-    length = min(windows.size_of(reach)[0], len(scene.photos))
+    first = windows.starts(scene.photos, reach)
+    length = min(windows.size_of(reach)[0], scene.photos)
     home = np.full(len(begin), -1)
     home[seen] = windows.homes((begin + last)[seen] / 2, first, reach)
     at = np.unique(home[points])
-    wanted = np.zeros(len(scene.photos), bool)
-    wanted[np.minimum(first[at, None] + np.arange(length), len(wanted) - 1)] = True
+    if earlier is None:
+        return _examined(scene, (first[at], length), (home, at), kept, None)
+    if moved is not None:
+        before = np.concatenate([[0], np.cumsum(moved)])
+        quiet = before[first + length - 1] == before[first]
+        at = at[~(quiet[at] & np.isin(at, home[earlier.judged]))]
+    if not len(at):
+        return earlier
+    fresh = _examined(scene, (first[at], length), (home, at), kept, earlier)
+    return earlier.of(~np.isin(home, at)).joined(fresh)
+
+
+def _examined(
+    scene: Scene, place: tuple[Numbers, int], homes: tuple[Numbers, Numbers], kept: Numbers, earlier: Verdict | None
+) -> Verdict:
+    """Judge the points at home in some windows, given by first photos and length."""
+    first, length = place
+    home, at = homes
+    wanted = np.zeros(scene.photos, bool)
+    wanted[np.minimum(first[:, None] + np.arange(length), len(wanted) - 1)] = True
     rays = collect(scene, wanted)
+    out = np.zeros(len(scene.observations), bool)
+    if earlier is not None:
+        out[earlier.wrong] = True
     found: list[Decision] = []
     for part in range(0, len(at), BATCH):
+        groups = window_points.groups(rays, first[part : part + BATCH], length)
+        start = None if earlier is None else [np.where(out[rays.row[group.ray]], 0.0, 1.0) for group in groups]
         batch = at[part : part + BATCH]
-        groups = window_points.groups(rays, first[batch], length)
-        start = (
-            None
-            if earlier is None
-            else [np.where(np.isin(rays.row[group.ray], earlier.wrong), 0.0, 1.0) for group in groups]
-        )
         decisions = _adjusted(groups, len(batch), length, start)
         found += [each.take(home[rays.point[each.group.ray[:, 0]]] == batch[each.group.window]) for each in decisions]
     return _verdict(scene, rays, found, kept)
@@ -341,8 +402,8 @@ def _least_squares(groups: list[Group], weights: list[Floats], count: int, lengt
         whole = np.asarray(weight.all(axis=1), bool)
         some = np.asarray(~whole & weight.any(axis=1), bool)
         if whole.any():
-            part = group.take(whole)
-            parts.append((part, *window_adjustment.independent(part)))
+            conditions = group.independent[whole]  # of points that lack a ray too: they change from round to round
+            parts.append((group.take(whole), conditions[:, :, :-1], conditions[:, :, -1]))
         if some.any():
             part = group.take(some)
             parts.append((part, *window_adjustment.projected(part, weight[some])))

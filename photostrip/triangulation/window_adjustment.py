@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.triangulation.window_points import CONCORDANT, projectors
+from photostrip.triangulation.window_points import projectors
 from photostrip.triangulation.windows import PARAMETERS
 
 if TYPE_CHECKING:
@@ -150,25 +150,6 @@ def projected(group: Group, weight: Floats) -> tuple[Floats, Floats]:
     """
     matrix = projectors(group, weight)
     return matrix @ group.by_photo, (matrix @ group.misfit[:, :, None])[:, :, 0]
-
-
-def independent(group: Group) -> tuple[Floats, Floats]:
-    """Conditions of all rays of the points, each as precise as a coordinate and none correlated with another.
-
-    Parameters
-    ----------
-    group : Group
-        Points.
-
-    Returns
-    -------
-    tuple of ndarray, shapes (k, 2r - 3, 6r), (k, 2r - 3)
-        Derivatives by the photos, and misclosures.
-    """
-    root = np.linalg.cholesky(group.gram + CONCORDANT * np.eye(group.gram.shape[1]))
-    joined = np.concatenate([group.design, group.closing[:, :, None]], axis=2)
-    found = np.linalg.solve(root, joined)
-    return found[:, :, :-1], found[:, :, -1]
 
 
 def expected(group: Group, solved: Solved) -> tuple[Floats, Floats]:

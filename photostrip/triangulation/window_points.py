@@ -26,7 +26,13 @@ if TYPE_CHECKING:
     Flags = NDArray[np.bool_]
 
 CONCORDANT = 1e-9  # smallest share of a condition that the others do not hold already
-KEPT = ("basis", "design", "closing", "gram")  # of a group, what is not computed again for some of its points
+KEPT = (
+    "basis",
+    "design",
+    "closing",
+    "gram",
+    "independent",
+)  # of a group, what is not computed again for some of its points
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,6 +100,13 @@ class Group:
     def gram(self) -> Floats:
         """Their cofactors, shape (k, 2r - 3, 2r - 3)."""
         return np.asarray(self.basis @ self.basis.transpose(0, 2, 1), float)
+
+    @cached_property
+    def independent(self) -> Floats:
+        """The same as precise as coordinates and uncorrelated: derivatives, then misclosures, (k, 2r - 3, 6r + 1)."""
+        root = np.linalg.cholesky(self.gram + CONCORDANT * np.eye(self.gram.shape[1]))
+        joined = np.concatenate([self.design, self.closing[:, :, None]], axis=2)
+        return np.asarray(np.linalg.solve(root, joined), float)
 
 
 def groups(rays: Rays, first: Numbers, length: int) -> list[Group]:

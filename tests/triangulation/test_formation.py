@@ -129,7 +129,7 @@ def oriented_as(elements: Floats, points: int = 6) -> Orientation:
     rows = np.column_stack([np.arange(p * points)] * 2)
     by_row = np.zeros(p * points)
     point = np.tile(np.arange(points), p)
-    return Orientation(pairs, point, rows, elements, elements, ones, ones, numbers, by_row, by_row)
+    return Orientation(pairs, point, rows, elements, elements, ones, ones, numbers, by_row, by_row, np.zeros((p, 5, 5)))
 
 
 @pytest.mark.parametrize("example", cases("scale_transfer"))

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
 from photostrip.pipeline import Settings, triangulate
-from photostrip.triangulation import formation, scale_screening
+from photostrip.triangulation import formation, relative, scale_screening
 from tests.strips import MICROMETRE, control_points, fly, project
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from photostrip.pipeline import Result
+    from photostrip.triangulation.relative import Orientation
     from tests.strips import Flown
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
 
 SIGMA = 5 * MICROMETRE
 STATIONS = (0, 3, 6, 9, 12)
@@ -49,6 +56,61 @@ def test_scale_ratios_scatter_as_propagated() -> None:
         values.append((joined.ratio / joined.factor[joined.joint] - 1) / np.hypot(single, model))
     # the mean of a joint takes its part away, the points take part in their own orientation
     assert 0.75 < np.concatenate(values).std() < 1.05
+
+
+def distances(oriented: Orientation, rows: Numbers) -> tuple[Floats, Floats]:
+    """Logarithms of the distances of points from both centres of their model."""
+    vectors, _, _ = formation.model_points(oriented)
+    base, _ = oriented.relative
+    right = vectors[rows] - base[oriented.pairs.pair[rows]]
+    return np.log(np.linalg.norm(vectors[rows], axis=1)), np.log(np.linalg.norm(right, axis=1))
+
+
+def test_the_spread_by_the_models_is_that_of_differences() -> None:
+    strip = flown(3)
+    oriented = strip.oriented()
+    vectors, _, _ = formation.model_points(oriented)
+    joined = formation.form(oriented, formation.Settings(), strip.photos).junctions
+    rows = (joined.joint, joined.before, joined.after)
+    sigma = np.full(oriented.pairs.size, 0.007)
+    slopes = []
+    for side, row in ((1, joined.before), (0, joined.after)):
+        columns = []
+        for element in range(5):
+            step = 1e-6 * np.eye(5)[element]
+            up, down = (
+                distances(replace(oriented, elements=oriented.elements + sign * step), row)[side] for sign in (1, -1)
+            )
+            columns.append((up - down) / 2e-6)
+        slopes.append(np.column_stack(columns))
+    variance = np.zeros(len(joined.joint))
+    for joint in range(oriented.pairs.size - 1):
+        here = joined.joint == joint
+        for slope, model in zip(slopes, (joint, joint + 1), strict=True):
+            own = slope[here] - slope[here].mean(axis=0)
+            _, jacobian = relative.linearised(oriented.elements, oriented.pairs)
+            part = jacobian[:, oriented.pairs.pair == model]
+            variance[here] += np.diag(own @ np.linalg.inv(part @ part.T) @ own.T) * sigma[model] ** 2
+    _, model_spread = scale_screening.spreads(oriented, vectors, rows, sigma)
+    assert model_spread == pytest.approx(np.sqrt(variance), rel=1e-4)
+
+
+def test_a_strip_formed_again_in_part_is_the_strip_formed_anew() -> None:
+    strip = flown(4)
+    oriented = strip.oriented()
+    sigma = np.full(oriented.pairs.size, np.sqrt(2) * SIGMA)
+    before = formation.form(oriented, formation.Settings(), strip.photos, sigma)
+    weight = oriented.pairs.weight.copy()
+    weight[np.flatnonzero(oriented.pairs.pair == 5)[[1, 4]]] = 0.0
+    changed = np.arange(oriented.pairs.size) == 5
+    again = relative.refine(oriented, weight, np.flatnonzero(changed))
+    whole = formation.form(again, formation.Settings(), strip.photos, sigma)
+    part = formation.form(again, formation.Settings(), strip.photos, sigma, earlier=(before, changed))
+    for name in ("centers", "rotations", "scale", "model_xyz", "gap", "point", "xyz", "models"):
+        assert np.array_equal(getattr(part, name), getattr(whole, name), equal_nan=True)
+    for name in ("joint", "before", "after", "point", "ratio", "used", "limit", "factor", "spread", "weight"):
+        assert np.array_equal(getattr(part.junctions, name), getattr(whole.junctions, name))
+    assert not np.array_equal(whole.xyz, before.xyz)
 
 
 def test_a_wrong_ratio_among_three_does_not_reach_the_scale() -> None:
