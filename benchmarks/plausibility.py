@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from anywher
 
 from photostrip.errors import InputError, PhotostripError
 from photostrip.formats.simulation import inputs_of, settings_of
-from photostrip.geometry.rotation import angles
+from photostrip.geometry.rotation import angles, from_angles
 from photostrip.pipeline import plausibility, triangulate
 from photostrip.pipeline.inputs import GivenOrientations
 from photostrip.simulate import DIGITAL, FILM, Control, Flight, GrossError, Ground, Image, Points, Spec, Terrain
@@ -45,6 +45,7 @@ FOOT = 0.3048
 GROSS_SHARE = 0.2  # of the strips without a mistake have two gross errors of image coordinates, which are none of these
 THIRD, HALF, LINE = 0.3, 0.55, 0.03  # of the length of the strip; of its half breadth
 EVEN = 0.5
+HARMLESS = np.radians(0.3)  # rms of given angles: start values need not be better
 BEYOND = 1 / 3  # of what the control spans, beyond which a sound strip does not reach at either end
 TOLD_APART = 5.0  # standard deviations of an image coordinate
 WIDE = replace(FILM, name="wide", principal_distance=88.0)
@@ -214,10 +215,19 @@ def unit_of_one(case: Case) -> Planted | None:
     return with_xy(case, xy), frozenset({photo})
 
 
-def mirrored(case: Case) -> Planted | None:
-    """Turn all photos over: y down, negatives, or x and y exchanged."""
-    xy = case.inputs.observations.xy
-    return with_xy(case, (xy * [1, -1], xy * [-1, 1], xy[:, ::-1])[case.rng.integers(3)]), NOBODY
+def y_down(case: Case) -> Planted | None:
+    """Read y down as y up."""
+    return with_xy(case, case.inputs.observations.xy * [1, -1]), NOBODY
+
+
+def negatives(case: Case) -> Planted | None:
+    """Read negatives as positives."""
+    return with_xy(case, case.inputs.observations.xy * [-1, 1]), NOBODY
+
+
+def x_and_y(case: Case) -> Planted | None:
+    """Exchange x and y."""
+    return with_xy(case, case.inputs.observations.xy[:, ::-1]), NOBODY
 
 
 def one_mirrored(case: Case) -> Planted | None:
@@ -585,19 +595,35 @@ def with_angles(case: Case, read: Callable[[Floats], Floats], system: str) -> In
     return replace(case.inputs, orientations=given)
 
 
+def turned(case: Case, values: Floats, system: str) -> bool:
+    """Whether angles are off by more than three times what noise turns photos by, and by more than harms a start."""
+    steps = case.simulation.truth.rotations_local.transpose(0, 2, 1) @ from_angles(values, system)
+    off = np.arccos(np.clip((np.trace(steps, axis1=1, axis2=2) - 1.0) / 2.0, -1.0, 1.0))
+    noise = case.noise[1] / case.spec.base
+    return bool(np.sqrt((off**2).mean()) > max(3.0 * noise, HARMLESS))
+
+
 def angle_unit(case: Case) -> Planted | None:
     """Read gons as degrees, degrees as radians, and the like."""
     factor = float(case.rng.choice([200 / 180, 180 / 200, 180 / np.pi, np.pi / 180]))
-    return with_angles(case, lambda values: values * factor, "omega-phi-kappa"), NOBODY
+    inputs = with_angles(case, lambda values: values * factor, "omega-phi-kappa")
+    given = inputs.orientations
+    if given is None or not turned(case, given.angles, given.system):
+        return None
+    return inputs, NOBODY
 
 
 def angle_system(case: Case) -> Planted | None:
     """Read omega, phi, kappa as another system, or with another sense of kappa."""
     if case.spec.flight.attitude_sigma_deg[0] < 1.0:
         return None
-    if case.rng.random() < EVEN:
-        return with_angles(case, lambda values: values * [1, 1, -1], "omega-phi-kappa"), NOBODY
-    return with_angles(case, lambda values: values, "alpha-omega-kappa"), NOBODY
+    sense = case.rng.random() < EVEN
+    read, system = ([1, 1, -1], "omega-phi-kappa") if sense else ([1, 1, 1], "alpha-omega-kappa")
+    inputs = with_angles(case, lambda values: values * read, system)
+    given = inputs.orientations
+    if given is None or not turned(case, given.angles, given.system):
+        return None
+    return inputs, NOBODY
 
 
 # ------------------------------------------------------------------------------------------------------- the table
@@ -615,7 +641,9 @@ class Mistake:
 MISTAKES = (
     Mistake("image coordinates in another unit", unit, ("P101",)),
     Mistake("one photo in another unit", unit_of_one, ("P102",)),
-    Mistake("image coordinates mirrored", mirrored, ("P103", "P401")),
+    Mistake("y down read as y up", y_down, ("P103", "P401")),
+    Mistake("negatives read as positives", negatives, ("P103", "P401")),
+    Mistake("x and y of the images exchanged", x_and_y, ("P103", "P401")),
     Mistake("one photo mirrored", one_mirrored, ("P104",)),
     Mistake("principal distance off by 10 or 1000", distance_by_ten, ("P105",)),
     Mistake("principal distance of another lens", distance, ("P105",)),

@@ -55,7 +55,7 @@ def examine(formed: Formed, observations: PhotoPoints, settings: Settings, read:
     list of Finding
         P105, at most one.
     """
-    first = read(formed) if len(formed.strip.photos) <= LONGEST else None
+    first = read(formed.whole) if len(formed.strip.photos) <= LONGEST else None
     if first is None or first.misfit < MISFIT or abs(first.ratio - 1.0) < control_heights.SCALE_LEAST:
         return []
     for start in (first.ratio, *FIRST):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -68,42 +68,34 @@ class Formed:
         centers = self.formed.centers @ up
         return np.concatenate([centers[:1] - ground[:1], centers[1:] - ground])
 
+    @cached_property
+    def whole(self) -> Formed:
+        """The strip with the points that it has no place for, because their rays contradict each other.
 
-def with_doubtful_points(formed: Formed) -> Formed:
-    """Give a strip with the points that it has no place for, because their rays contradict each other.
-
-    Parameters
-    ----------
-    formed : Formed
-        The strip.
-
-    Returns
-    -------
-    Formed
-        The same strip; such a point stands in the middle of where its models put it.
-    """
-    strip, orientation = formed.formed, formed.orientation
-    gone = np.asarray(~np.isfinite(strip.model_xyz).all(axis=1), bool)
-    if not gone.any():
-        return formed
-    vectors, _, sound = formation.model_points(orientation)
-    pair = orientation.pairs.pair
-    back = strip.centers[pair] + strip.scale[pair, None] * np.einsum("mij,mj->mi", strip.rotations[pair], vectors)
-    xyz = np.where(gone[:, None], back, strip.model_xyz)
-    point, mean, models = formation.mean_points(orientation.point, xyz, orientation.used & sound)
-    lost = np.flatnonzero(~np.isin(point, strip.point))
-    point = np.concatenate([strip.point, point[lost]])
-    mean, models = np.concatenate([strip.xyz, mean[lost]]), np.concatenate([strip.models, models[lost]])
-    order = np.argsort(point, kind="stable")
-    whole = replace(
-        strip,
-        model_xyz=xyz,
-        point=point[order],
-        xyz=mean[order],
-        models=models[order],
-        home=np.zeros(0, np.intp),  # serves precision, which is not asked of evidence
-    )
-    return replace(formed, formed=whole)
+        Such a point stands in the middle of where its models put it.
+        """
+        strip, orientation = self.formed, self.orientation
+        gone = np.asarray(~np.isfinite(strip.model_xyz).all(axis=1), bool)
+        if not gone.any():
+            return self
+        vectors, _, sound = formation.model_points(orientation)
+        pair = orientation.pairs.pair
+        back = strip.centers[pair] + strip.scale[pair, None] * np.einsum("mij,mj->mi", strip.rotations[pair], vectors)
+        xyz = np.where(gone[:, None], back, strip.model_xyz)
+        point, mean, models = formation.mean_points(orientation.point, xyz, orientation.used & sound)
+        lost = np.flatnonzero(~np.isin(point, strip.point))
+        point = np.concatenate([strip.point, point[lost]])
+        mean, models = np.concatenate([strip.xyz, mean[lost]]), np.concatenate([strip.models, models[lost]])
+        order = np.argsort(point, kind="stable")
+        whole = replace(
+            strip,
+            model_xyz=xyz,
+            point=point[order],
+            xyz=mean[order],
+            models=models[order],
+            home=np.zeros(0, np.intp),  # serves precision, which is not asked of evidence
+        )
+        return replace(self, formed=whole)
 
 
 def form(strip: Strip, observations: PhotoPoints, settings: Settings) -> Formed | None:
@@ -353,6 +345,36 @@ def stations(
     place : ndarray, shape (m,)
         Where they lie along the strip in bases, from 0 at the first photo; the mean of what its photos say.
     """
+    rows, along = places(strip, observations, steps)
+    size = len(observations.point_ids)
+    count = np.bincount(observations.point[rows], minlength=size)
+    total = np.bincount(observations.point[rows], along, size)
+    number = {name: n for n, name in enumerate(observations.point_ids)}
+    points = np.array([number.get(name, -1) for name in control.ids], np.intp)
+    seen = np.flatnonzero((points >= 0) & (count[points] >= SEEN_BY))
+    chosen = points[seen]
+    return seen, total[chosen] / count[chosen]
+
+
+def places(strip: Strip, observations: PhotoPoints, steps: Mapping[str, complex]) -> tuple[Numbers, Floats]:
+    """Give where each photo of a strip puts its points along the strip.
+
+    Parameters
+    ----------
+    strip : Strip
+        The strip, its photos as they lie.
+    observations : PhotoPoints
+        Image points, mm.
+    steps : mapping of str to complex
+        Centre of the next photo on each photo, mm.
+
+    Returns
+    -------
+    rows : ndarray of int, shape (m,)
+        Image points of the strip.
+    along : ndarray, shape (m,)
+        Their places in bases, from 0 at the first photo.
+    """
     order = {photo: number for number, photo in enumerate(strip.photos)}
     position = np.array([order.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo]
     rows = np.flatnonzero(position >= 0)
@@ -361,15 +383,7 @@ def stations(
     usual = complex(np.median(step[known].real), np.median(step[known].imag)) if known.any() else 1.0
     step = np.where(known, step, usual)[position[rows]]
     along = (observations.xy[rows] * np.column_stack([step.real, step.imag])).sum(axis=1) / np.abs(step) ** 2
-    along = along if known.any() else np.zeros(len(rows))
-    size = len(observations.point_ids)
-    count = np.bincount(observations.point[rows], minlength=size)
-    total = np.bincount(observations.point[rows], position[rows] + along, size)
-    number = {name: n for n, name in enumerate(observations.point_ids)}
-    points = np.array([number.get(name, -1) for name in control.ids], np.intp)
-    seen = np.flatnonzero((points >= 0) & (count[points] >= SEEN_BY))
-    chosen = points[seen]
-    return seen, total[chosen] / count[chosen]
+    return rows, position[rows] + (along if known.any() else 0.0)
 
 
 def half_breadth(

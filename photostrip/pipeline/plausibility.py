@@ -150,7 +150,8 @@ def of_inputs(inputs: Inputs, settings: Settings, directory: Path | None = None)
     """
     examined = replace(before(inputs, settings), light=True)
     strips = _as_they_lie(inputs, examined)
-    told = [*examined.findings, *_of_control(inputs, examined, strips, [None] * len(strips), directory)]
+    told = [*examined.findings, *_of_ids(strips, examined)]
+    told += _of_control(inputs, examined, strips, [None] * len(strips), directory)
     return accepted(told, settings.accept)
 
 
@@ -206,6 +207,7 @@ def of_failure(inputs: Inputs, settings: Settings, directory: Path | None = None
         told = [*examined.findings, *_of_control(inputs, examined, strips, formed, directory)]
         for each in formed:
             told += _of_strip(each, points) if each is not None else []
+        told += _of_ids([strip for strip, each in zip(strips, formed, strict=True) if each is None], examined)
         return accepted(told, settings.accept)
     except (PhotostripError, ArithmeticError, LookupError, ValueError):
         return ()  # the failure itself is what must be told
@@ -250,13 +252,23 @@ def _of_control(
             read = partial(_by_heights, examined=examined, control=control, frames=frames)
             points, settings = examined.observations, examined.settings
             if each is not None:
-                whole = evidence.with_doubtful_points(each)
-                here = distance_trial.examine(whole, points, settings, read) or here  # then single points prove nothing
+                here = distance_trial.examine(each, points, settings, read) or here  # then single points prove nothing
             elif not examined.findings:
                 here = distance_trial.without_pairs(strip, points, settings, read) or here
         told += here
     for strip in _as_they_lie(inputs, examined):
         told += _held(strip, examined, control, frames) if len(strip.photos) > 1 else []
+    return told
+
+
+def _of_ids(strips: Sequence[Strip], examined: Examined) -> list[Finding]:
+    """Examine ids of points by the images alone."""
+    told: list[Finding] = []
+    o = examined.observations
+    for strip in strips:
+        rows, along = evidence.places(strip, o, examined.steps)
+        told += identity.far_apart(o, rows, along, strip.photos, strip.id)
+        told += identity.on_top(o, rows, strip.id)
     return told
 
 
@@ -330,7 +342,7 @@ def _held(strip: Strip, examined: Examined, control: ControlPoints, frames: Sequ
 def _of_strip(each: evidence.Formed, observations: PhotoPoints) -> list[Finding]:
     """Examine a formed strip: its perspective centres, and the ids of its points."""
     strip, formed = each.strip, each.formed
-    whole = evidence.with_doubtful_points(each).formed  # rays that contradict each other may be those of two points
+    whole = each.whole.formed  # rays that contradict each other may be those of two points
     sigma = float(np.median(observations.sigma))
     told = list(flight.examine(formed.centers, each.depth, each.up, strip.photos, strip.id))
     names = observations.point_ids

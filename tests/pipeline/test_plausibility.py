@@ -414,3 +414,31 @@ def test_where_a_point_lies_along_a_strip_does_not_depend_on_the_end_lap(end_lap
     assert np.abs(place - true).max() < 0.5  # base; the mean number of its photos is off by 1.0 at the ends at 80 %
     assert place.min() < 0.3
     assert place.max() > 4.7
+
+
+def test_ids_are_examined_by_the_images_alone() -> None:
+    inputs = inputs_of(simulation("utm"))
+    o, photos = inputs.observations, inputs.strips[0].photos
+    place = {name: number for number, name in enumerate(photos)}
+    number = np.array([place[o.photo_ids[photo]] for photo in o.photo])
+    seen = [set(number[o.point == point].tolist()) for point in range(len(o.point_ids))]
+    first = next(point for point, on in enumerate(seen) if on == {0, 1})
+    last = next(point for point, on in enumerate(seen) if on == {len(photos) - 2, len(photos) - 1})
+    same = replace(inputs, observations=replace(o, point=np.where(o.point == last, first, o.point)))
+    findings = plausibility.of_inputs(same, Settings())
+    one = next(each for each in findings if each.code == "P301")
+    assert (one.points, set(one.photos)) == ((o.point_ids[first],), {photos[0], photos[1], photos[-2], photos[-1]})
+    rows = np.flatnonzero(o.point == first)
+    copy = replace(
+        o,
+        point_ids=(*o.point_ids, "again"),
+        photo=np.r_[o.photo, o.photo[rows]],
+        point=np.r_[o.point, np.full(len(rows), len(o.point_ids))],
+        xy=np.r_[o.xy, o.xy[rows] + 0.004],
+        sigma=np.r_[o.sigma, o.sigma[rows]],
+    )
+    (finding,) = plausibility.of_inputs(replace(inputs, observations=copy), Settings())
+    assert (finding.code, set(finding.points)) == ("P302", {o.point_ids[first], "again"})
+    assert finding.evidence["mean_distance_mm"] == pytest.approx(0.004 * np.sqrt(2.0), abs=1e-9)
+    apart = replace(copy, xy=np.r_[o.xy, o.xy[rows] + 0.1])
+    assert plausibility.of_inputs(replace(inputs, observations=apart), Settings()) == ()

@@ -27,6 +27,9 @@ APART = 0.05  # of the distance from camera to ground: no bending of a strip mov
 SAME_PLACE = 8.0  # standard deviations of an image coordinate, at photo scale, in plan
 SAME_DEPTH = 3.0  # times that in height, times height over base
 CHANCE = 0.01  # points that may stand at one place by chance in the whole strip; else nothing is said
+FAR = 2.0  # bases between two places of one id: tilts move them by less
+SEEN_BY = 2  # photos that must agree
+SMALL = 1e-12
 SAME_IMAGE = 3.5  # standard deviations of the mean difference of image coordinates on common photos
 
 
@@ -140,6 +143,103 @@ def two_ids(observations: PhotoPoints, formed: FormedStrip, focal: float, strip:
         fix = f"give {names[1]} the id {names[0]}"
         evidence = {"distance_at_photo_scale_mm": gap, "expected_by_chance": float(expected)}
         yield found("P302", message, fix, evidence, points=names, strips=(strip_id,))
+
+
+def far_apart(
+    observations: PhotoPoints, rows: Numbers, along: Floats, strip: Sequence[str], strip_id: str
+) -> Iterator[Finding]:
+    """Find ids that two groups of photos put at places far from each other along the strip.
+
+    Parameters
+    ----------
+    observations : PhotoPoints
+        Image points of the project.
+    rows : ndarray of int, shape (m,)
+        Those of the strip.
+    along : ndarray, shape (m,)
+        Where the photo of each puts its point along the strip, bases.
+    strip : sequence of str
+        Photos of the strip in order.
+    strip_id : str
+        Its id.
+
+    Yields
+    ------
+    Finding
+        P301.
+    """
+    order = np.lexsort((along, observations.point[rows]))
+    rows, along = rows[order], along[order]
+    point = observations.point[rows]
+    for k in np.flatnonzero((point[1:] == point[:-1]) & (np.diff(along) > FAR)).tolist():
+        here = np.flatnonzero(point == point[k])
+        groups = [rows[here[here <= k]], rows[here[here > k]]]
+        if min(len(each) for each in groups) < SEEN_BY:
+            continue  # a wrong coordinate on one photo
+        names = set(strip)
+        one, two = (
+            tuple(name for name in (observations.photo_ids[n] for n in observations.photo[each]) if name in names)
+            for each in groups
+        )
+        gap = float(along[k + 1] - along[k])
+        name = observations.point_ids[int(point[k])]
+        message = (
+            f"point {name} stands for two points: photos {' and '.join(one)} put it {gap:.1f} bases away from where "
+            f"photos {' and '.join(two)} put it"
+        )
+        fix = f"give one of the two another id on photos {' and '.join(two)}"
+        yield found("P301", message, fix, {"apart_in_bases": gap}, points=(name,), photos=(*one, *two),
+                    strips=(strip_id,))  # fmt: skip
+
+
+def on_top(observations: PhotoPoints, rows: Numbers, strip_id: str) -> Iterator[Finding]:
+    """Find points that stand at one place on every photo that shows both, two photos at least.
+
+    Parameters
+    ----------
+    observations : PhotoPoints
+        Image points, mm.
+    rows : ndarray of int, shape (m,)
+        Those of the strip.
+    strip_id : str
+        Its id.
+
+    Yields
+    ------
+    Finding
+        P302.
+    """
+    if not len(rows):
+        return
+    o = observations
+    reach = SAME_IMAGE * float(np.median(o.sigma[rows])) * np.sqrt(2.0)
+    photos = len(np.unique(o.photo[rows]))
+    area = float(np.prod(np.ptp(o.xy[rows], axis=0)))
+    pairs = len(rows) ** 2 / photos / 2.0  # of points on one photo, each counted on two photos at least
+    if pairs / SEEN_BY * (2.0 * reach) ** 2 / max(area, SMALL) > CHANCE:
+        return
+    rows = rows[np.lexsort((o.xy[rows, 0], o.photo[rows]))]
+    near: dict[tuple[int, int], list[float]] = {}
+    for lag in range(1, len(rows)):
+        step = np.abs(o.xy[rows[lag:]] - o.xy[rows[:-lag]])
+        beside = (o.photo[rows[lag:]] == o.photo[rows[:-lag]]) & (step[:, 0] < reach)
+        if not beside.any():
+            break
+        for k in np.flatnonzero(beside & (step[:, 1] < reach)).tolist():
+            a, b = sorted((int(o.point[rows[k]]), int(o.point[rows[k + lag]])))
+            near.setdefault((a, b), []).append(float(np.hypot(*step[k])))
+    for (a, b), gaps in near.items():
+        both = np.intersect1d(o.photo[rows[o.point[rows] == a]], o.photo[rows[o.point[rows] == b]])
+        if a == b or len(gaps) < max(SEEN_BY, len(both)):
+            continue
+        names = (o.point_ids[a], o.point_ids[b])
+        gap = float(np.mean(gaps))
+        message = (
+            f"points {names[0]} and {names[1]} stand at one place on all {len(both)} photos that show both, "
+            f"{1000 * gap:.0f} µm from each other: two ids for one point"
+        )
+        evidence = {"photos": len(both), "mean_distance_mm": gap}
+        yield found("P302", message, f"give {names[1]} the id {names[0]}", evidence, points=names, strips=(strip_id,))
 
 
 def _depth(formed: FormedStrip) -> float:
