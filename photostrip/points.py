@@ -208,3 +208,48 @@ class ControlPoints:
         return ControlPoints(
             ids, self.enu[numbers], self.use[numbers], self.check[numbers], self.sigma[numbers], self.frame[numbers]
         )
+
+
+@dataclass(frozen=True, eq=False)
+class ModelPoints:
+    """Points and perspective centres measured in independent models, one row for each point of a model.
+
+    Points and centres have one numbering: number ``k`` below ``len(point_ids)`` is a point, above it the perspective
+    centre of photo ``photo_ids[k - len(point_ids)]``.
+
+    Parameters
+    ----------
+    model_ids, point_ids, photo_ids : tuple of str
+        Ids; rows refer to them by number.
+    model, node : ndarray of int, shape (n,)
+        Number of the model, and of the point or centre, of each row.
+    xyz : ndarray, shape (n, 3)
+        Model coordinates in mm, right-handed; every model has a scale, a rotation and an origin of its own.
+    sigma : ndarray, shape (n, 3)
+        Their standard deviations in mm.
+    """
+
+    model_ids: tuple[str, ...]
+    point_ids: tuple[str, ...]
+    photo_ids: tuple[str, ...]
+    model: NDArray[np.intp]
+    node: NDArray[np.intp]
+    xyz: NDArray[np.float64]
+    sigma: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        """Freeze the columns."""
+        for name in ("model", "node"):
+            object.__setattr__(self, name, frozen(getattr(self, name), dtype=np.intp))
+        n = len(self.model)
+        for name in ("xyz", "sigma"):
+            object.__setattr__(self, name, frozen(getattr(self, name), shape=(n, 3)))
+
+    def __len__(self) -> int:
+        """Give the number of rows."""
+        return len(self.model)
+
+    def name(self, node: int) -> str:
+        """Name a point, or a centre by its photo."""
+        points = len(self.point_ids)
+        return self.point_ids[node] if node < points else f"center of photo {self.photo_ids[node - points]}"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from photostrip.triangulation import absolute, formation, interior, polynomial, refinement, relative, strip_conditions
 from photostrip.triangulation.bundle import settings as bundle
+from photostrip.triangulation.models import link_screening
 
 if TYPE_CHECKING:
     import numpy as np
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
     from photostrip.camera import Camera
     from photostrip.geodesy.frame_spec import FrameSpec
-    from photostrip.points import ControlPoints, PhotoPoints
+    from photostrip.points import ControlPoints, ModelPoints, PhotoPoints
 
     Floats = NDArray[np.float64]
     Flags = NDArray[np.bool_]
@@ -42,6 +43,41 @@ class Strip:
     camera: Camera
     photos: tuple[str, ...]
     calibrate: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class ModelStrip:
+    """Independent models of one flight line.
+
+    Parameters
+    ----------
+    id : str
+        Id of the strip.
+    photos : tuple of str
+        Photos in flight order.
+    models : tuple of str
+        Models in flight order; model i shows photos i and i + 1.
+    """
+
+    id: str
+    photos: tuple[str, ...]
+    models: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredModels:
+    """Model coordinates in place of image coordinates.
+
+    Parameters
+    ----------
+    strips : tuple of ModelStrip
+        Strips in the project's order.
+    points : ModelPoints
+        Points and perspective centres as measured, in mm, right-handed.
+    """
+
+    strips: tuple[ModelStrip, ...]
+    points: ModelPoints
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,6 +173,8 @@ class Inputs:
         Measured positions of the cameras.
     orientations : GivenOrientations or None
         Given exterior orientations.
+    models : MeasuredModels or None
+        Measured model coordinates; there are then no `strips` of photos, and `observations` only name the points.
     """
 
     name: str
@@ -148,6 +186,12 @@ class Inputs:
     fiducials: PhotoPoints | None = None
     positions: CameraPositions | None = None
     orientations: GivenOrientations | None = None
+    models: MeasuredModels | None = None
+
+    @property
+    def flights(self) -> tuple[Strip | ModelStrip, ...]:
+        """The strips, of photos or of models."""
+        return self.strips if self.models is None else self.models.strips
 
 
 @dataclass(frozen=True)
@@ -158,7 +202,7 @@ class Settings:
     ----------
     adjustment : str
         One of :data:`ADJUSTMENTS`.
-    relative, formation, absolute, polynomial, covariance, bundle, interior, refinement
+    relative, formation, links, absolute, polynomial, covariance, bundle, interior, refinement
         Settings of the operations.
     precision : bool
         Whether standard deviations and covariances of points and photos are computed.
@@ -173,6 +217,7 @@ class Settings:
     adjustment: str = "polynomial"
     relative: relative.Settings = field(default_factory=relative.Settings)
     formation: formation.Settings = field(default_factory=formation.Settings)
+    links: link_screening.Settings = field(default_factory=link_screening.Settings)
     absolute: absolute.Settings = field(default_factory=absolute.Settings)
     polynomial: polynomial.Settings = field(default_factory=polynomial.Settings)
     covariance: strip_conditions.Settings = field(default_factory=strip_conditions.Settings)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,13 +31,14 @@ from photostrip.triangulation import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
     from photostrip.geodesy.crs import GroundFrame
-    from photostrip.pipeline.inputs import Settings, Strip
+    from photostrip.pipeline.inputs import ModelStrip, Settings, Strip
     from photostrip.points import ControlPoints, PhotoPoints
+    from photostrip.triangulation.models.strip import FormedModels
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -161,8 +163,9 @@ def adjust_formed(
     """
     strip, sigma, screened = stage.strip, stage.sigma, stage.screened
     oriented, formed, contradictions = stage.oriented, stage.formed, stage.contradictions
-    here, rows = _control_of(formed, control, observations)
-    intermediate, orientation, spread = _to_ground(strip, formed, here, rows, frames, oriented, sigma)
+    here, rows = control_of(formed, control, observations.point_ids)
+    spread_at = partial(_precision, formed, oriented, sigma)
+    intermediate, orientation, spread = to_ground(strip, formed, (here, rows), frames, spread_at)
     wrong: tuple[control_screening.ControlRejection, ...] = ()
     judged = None
     if settings.relative.screening != "none":
@@ -173,7 +176,7 @@ def adjust_formed(
         here, wrong = control_screening.screen(given, place)
         judged = place.judged(given, here)
     if wrong:
-        intermediate, orientation, spread = _to_ground(strip, formed, here, rows, frames, oriented, sigma)
+        intermediate, orientation, spread = to_ground(strip, formed, (here, rows), frames, spread_at)
     xyz = orientation.similarity(formed.xyz)
     correction = None
     if settings.adjustment == "polynomial":
@@ -207,7 +210,7 @@ def adjust_formed(
         (
             *overruling.notes(settings.relative, strip.id, strip.photos),
             *_screening_notes(strip, screened, sigma),
-            *_wrong_control_notes(strip, wrong),
+            *wrong_control_notes(strip, wrong),
             *_notes(strip, oriented, formed, orientation, correction, adjusted, resection),
             *covariance.notes(strip, here, own),
         ),
@@ -278,32 +281,71 @@ def _sigma(strip: Strip, observations: PhotoPoints) -> float:
     return float(np.median(observations.sigma[inside[observations.photo]]))
 
 
-def _control_of(
-    formed: formation.FormedStrip, control: ControlPoints, observations: PhotoPoints
+def control_of(
+    formed: formation.FormedStrip | FormedModels, control: ControlPoints, point_ids: Sequence[str]
 ) -> tuple[ControlPoints, Numbers]:
-    """Control points that have strip coordinates, and their rows there."""
-    number = {name: n for n, name in enumerate(observations.point_ids)}
+    """Control points that have strip coordinates, and their rows there.
+
+    Parameters
+    ----------
+    formed : FormedStrip or FormedModels
+        The formed strip.
+    control : ControlPoints
+        Control of the project.
+    point_ids : sequence of str
+        Ids of the points as they are numbered.
+
+    Returns
+    -------
+    ControlPoints
+        The control of the strip.
+    rows : ndarray of int
+        Its rows in the points of the strip.
+    """
+    number = {name: n for n, name in enumerate(point_ids)}
     # a point without a model has no place in the strip's covariance
-    row_of = {int(n): row for row, n in enumerate(formed.point) if formed.models[row]}
+    row_of = {int(n): row for row, n in enumerate(formed.point) if formed.model_count[row]}
     found = [(row, row_of.get(number[name], -1)) for row, name in enumerate(control.ids)]
     kept = np.array([pair for pair in found if pair[1] >= 0], np.intp).reshape(-1, 2)
     return control.take(kept[:, 0]), kept[:, 1]
 
 
-def _to_ground(
-    strip: Strip,
-    formed: formation.FormedStrip,
-    control: ControlPoints,
-    rows: Numbers,
+def to_ground(
+    strip: Strip | ModelStrip,
+    formed: formation.FormedStrip | FormedModels,
+    given: tuple[ControlPoints, Numbers],
     frames: Sequence[GroundFrame],
-    oriented: relative.Orientation,
-    sigma: float,
+    spread_at: Callable[[float], tuple[float, float]],
 ) -> tuple[IntermediateFrame, absolute.AbsoluteOrientation, tuple[float, float]]:
     """Intermediate frame with X along the strip, and the similarity into it.
 
     A provisional similarity in the frame of azimuth 0 gives the direction of the strip and its scale, hence the
     weights; the final one is made in the frame turned along the strip.
+
+    Parameters
+    ----------
+    strip : Strip or ModelStrip
+        The strip, to name it.
+    formed : FormedStrip or FormedModels
+        The formed strip.
+    given : tuple of ControlPoints and ndarray of int
+        Its control, and the rows of that in its points.
+    frames : sequence of GroundFrame
+        Ground frames of the control.
+    spread_at : callable
+        A-priori standard deviations of a point in plan and height, metres, at a scale of the strip.
+
+    Returns
+    -------
+    IntermediateFrame, AbsoluteOrientation, tuple of float
+        Frame, similarity, and the standard deviations that gave the weights.
+
+    Raises
+    ------
+    GeometryError
+        When the control does not determine the similarity; the strip is named.
     """
+    control, rows = given
     if not len(control):
         msg = f"strip {strip.id}: none of its points is a control point"
         raise GeometryError(msg, photos=strip.photos, code="no-control")
@@ -315,9 +357,9 @@ def _to_ground(
             control.use.astype(float),
             formed.xyz,
         )
-        ends = provisional.similarity(formed.centers[[0, -1]])
+        ends = provisional.similarity(formed.ends)
         intermediate = provisional_frame.with_azimuth(strip_azimuth(ends[0], ends[1]))
-        spread = _precision(formed, oriented, sigma, provisional.similarity.scale)
+        spread = spread_at(provisional.similarity.scale)
         targets = absolute.Targets(control, frames, intermediate)
         cartesian = provisional_frame.cartesian_from_intermediate(provisional.similarity(formed.xyz[rows]))
         turned = targets.turned(intermediate.intermediate_from_cartesian(cartesian))
@@ -453,8 +495,9 @@ def _notes(
     return (
         *_pair_notes(strip, oriented),
         *_joint_notes(strip, formed),
-        *_control_notes(strip, orientation),
-        *_polynomial_notes(strip, correction, adjusted),
+        *control_notes(strip, orientation),
+        *polynomial_notes(strip, correction, adjusted),
+        *([] if correction is None else covariance.proposal(strip, correction)),
         *_photo_notes(strip, resection),
     )
 
@@ -496,7 +539,7 @@ def _screening_notes(strip: Strip, screened: screening.Screened, sigma: float) -
     return notes
 
 
-def _wrong_control_notes(strip: Strip, wrong: Sequence[control_screening.ControlRejection]) -> list[Note]:
+def wrong_control_notes(strip: Strip | ModelStrip, wrong: Sequence[control_screening.ControlRejection]) -> list[Note]:
     """Name control that was not used, and what seems to be wrong with it."""
     notes = []
     for each in wrong:
@@ -539,7 +582,8 @@ def _joint_notes(strip: Strip, formed: formation.FormedStrip) -> list[Note]:
     ]
 
 
-def _control_notes(strip: Strip, orientation: absolute.AbsoluteOrientation) -> list[Note]:
+def control_notes(strip: Strip | ModelStrip, orientation: absolute.AbsoluteOrientation) -> list[Note]:
+    """Say where the control hardly checks itself, or hardly holds the strip."""
     notes = []
     if orientation.redundancy < 3:
         text = (
@@ -556,7 +600,10 @@ def _control_notes(strip: Strip, orientation: absolute.AbsoluteOrientation) -> l
     return notes
 
 
-def _polynomial_notes(strip: Strip, correction: polynomial.Polynomial | None, adjusted: Floats) -> list[Note]:
+def polynomial_notes(
+    strip: Strip | ModelStrip, correction: polynomial.Polynomial | None, adjusted: Floats
+) -> list[Note]:
+    """Say which degree the control did not carry, and where the polynomial is extrapolated."""
     if correction is None:
         return []
     notes = []
@@ -581,7 +628,7 @@ def _polynomial_notes(strip: Strip, correction: polynomial.Polynomial | None, ad
         if min(axis.redundancy for axis in correction.axes) < 3:
             text = f"strip {strip.id}: the polynomial has a redundancy below 3 in an axis: its residuals say little"
             notes.append(Note("little-redundancy", text, strip=strip.id))
-    return notes + covariance.proposal(strip, correction)
+    return notes
 
 
 def _photo_notes(strip: Strip, resection: exterior.Resection) -> list[Note]:

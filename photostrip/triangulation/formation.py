@@ -136,6 +136,16 @@ class FormedStrip:
     bridging: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))
     home: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))
 
+    @property
+    def model_count(self) -> Numbers:
+        """Number of models of each point, shape (q,)."""
+        return self.models
+
+    @property
+    def ends(self) -> Floats:
+        """Centres of the first and the last photo, shape (2, 3)."""
+        return self.centers[[0, -1]]
+
 
 def hand_on(rotations: Floats) -> Floats:
     """Orientation chain: each photo from its left neighbour.
