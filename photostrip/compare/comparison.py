@@ -24,7 +24,12 @@ if TYPE_CHECKING:
 Document = dict[str, Any]
 
 SCHEMA = 1
-LEFT_OUT = ("version", "residuals", "parallaxes")  # a number of ours, and what the other numbers are made of
+LEFT_OUT = (
+    "version",
+    "residuals",
+    "parallaxes",
+    "link_residuals",
+)  # a number of ours, and what the other numbers are made of
 SAME_FRAME = {
     "crs": "the CRS",
     "kind": "the kind of frame",
@@ -217,6 +222,8 @@ def _ground(
 ) -> Iterator[Document]:
     """Compare places, in plan and in height."""
     ids, now, before = _shared(document[block], baseline[block], ("x", "y", "z"))
+    known = np.asarray(~(np.isnan(now) & np.isnan(before)).all(axis=1))  # a photo may have no place in both
+    ids, now, before = [name for name, yes in zip(ids, known.tolist(), strict=True) if yes], now[known], before[known]
     plan, height = plan_and_height(frame, now, before)
     yield from _places(block, ids, plan, height, tolerances)
 
@@ -250,11 +257,16 @@ def _rotations(document: Document, baseline: Document, tolerances: Tolerances) -
     shared = _pairs(document["photos"], baseline["photos"])
     allowed = tolerances.of("rotation").absolute
     for now, before in shared:
+        if now["rotation"] is None and before["rotation"] is None:
+            continue
+        row = {"kind": "rotation", "block": "photos", "id": now["id"], "name": "rotation", "unit": "deg"}
+        row |= {"before": None, "now": None}
+        if now["rotation"] is None or before["rotation"] is None:
+            yield _judged(row, math.inf, allowed, tolerances)
+            continue
         one, other = (np.array(row["rotation"], float).reshape(3, 3) for row in (now, before))
         # 2 sqrt(2) sin(angle / 2) is the length of the difference: exact for the smallest angles, unlike the cosine
         half = min(float(np.linalg.norm(one - other)) / math.sqrt(8.0), 1.0)
-        row = {"kind": "rotation", "block": "photos", "id": now["id"], "name": "rotation", "unit": "deg"}
-        row |= {"before": None, "now": None}
         yield _judged(row, math.degrees(2.0 * math.asin(half)), allowed, tolerances)
 
 

@@ -11,7 +11,7 @@ Document = dict[str, Any]
 Number = float | None
 
 ENDINGS = {"_um": "um", "_ppm": "ppm", "_deg": "deg"}
-NO_UNIT = {"photo_scale", "normalised"}
+NO_UNIT = {"photo_scale", "model_scale", "normalised"}
 DEGREES = {"deg": 1.0, "gon": 0.9, "rad": 57.29577951308232}
 ELEMENTS = ("alpha1", "kappa1", "alpha2", "omega2", "kappa2")
 
@@ -68,6 +68,8 @@ def quantities_of(document: Document) -> Iterator[Quantity]:
         yield from _model(model)
     for junction in document["junctions"]:
         yield from _junction(junction)
+    for link in document.get("links", []):
+        yield from _link(link)
     for photo in document["photos"]:
         yield from _leaves("photos", photo["id"], {key: photo[key] for key in ("image_rms_um", "points")})
         yield from _precisions("photos", photo["id"], "sigma", photo["sigma"])
@@ -123,9 +125,9 @@ def _polynomial(block: Document) -> Iterator[Quantity]:
 
 def _model(model: Document) -> Iterator[Quantity]:
     name = model_id(model)
-    unit = DEGREES[model["elements"]["unit"]]
-    for element in ELEMENTS:
-        value = model["elements"][element]
+    elements = model["elements"]  # none where a model was measured as such
+    for element in ELEMENTS if elements is not None else ():
+        value, unit = elements[element], DEGREES[elements["unit"]]
         yield Quantity("rotation", "models", name, element, "deg", None if value is None else value * unit)
     yield Quantity("scale", "models", name, "scale_factor", "", model["scale_factor"])
     kept = ("sigma0_um", "rms_parallax_um", "max_parallax_um", "points_used", "points_rejected", "redundancy")
@@ -137,6 +139,14 @@ def _junction(junction: Document) -> Iterator[Quantity]:
     yield Quantity("scale", "junctions", name, "factor", "", junction["factor"])
     kept = ("points_used", "spread_ppm", "discrepancy")
     yield from _leaves("junctions", name, {key: junction[key] for key in kept})
+
+
+def _link(link: Document) -> Iterator[Quantity]:
+    name = f"{link['before']} – {link['after']}"
+    yield Quantity("scale", "links", name, "factor", "", link["factor"])
+    yield Quantity("statistics", "links", name, "sigma0", "", link["sigma0"])
+    kept = ("points_used", "redundancy", "discrepancy")
+    yield from _leaves("links", name, {key: link[key] for key in kept})
 
 
 def _precisions(block: str, name: str, path: str, value: object) -> Iterator[Quantity]:

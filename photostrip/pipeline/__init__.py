@@ -1,6 +1,7 @@
 """The method from measured coordinates to the result: no disk, no YAML, no printing."""
 
-from photostrip.pipeline.inputs import ADJUSTMENTS, Inputs, Settings, Strip
+from photostrip.pipeline.inputs import ADJUSTMENTS, Inputs, MeasuredModels, ModelStrip, Settings, Strip
+from photostrip.pipeline.model_results import LinkedStrip
 from photostrip.pipeline.results import CHECK, CONTROL, NEW, Adjusted, Precision, Result, StripResult, Ties
 from photostrip.pipeline.triangulate import triangulate
 
@@ -11,6 +12,9 @@ __all__ = [
     "NEW",
     "Adjusted",
     "Inputs",
+    "LinkedStrip",
+    "MeasuredModels",
+    "ModelStrip",
     "Precision",
     "Result",
     "Settings",

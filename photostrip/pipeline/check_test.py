@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from photostrip.geodesy.crs import GroundFrame
     from photostrip.pipeline.covariance import CovarianceAdjustment
+    from photostrip.pipeline.model_results import LinkedStrip
     from photostrip.pipeline.propagation import Propagation
     from photostrip.pipeline.results import StripResult
     from photostrip.points import ControlPoints, PhotoPoints
@@ -30,18 +31,18 @@ LARGEST = 100  # check points of a strip that are tested together, spread over i
 
 
 def check_points(
-    strip: StripResult, control: ControlPoints, observations: PhotoPoints
+    strip: StripResult | LinkedStrip, control: ControlPoints, observations: PhotoPoints
 ) -> tuple[ControlPoints, Numbers]:
     """Check points that a strip holds, and their rows in its points.
 
     Parameters
     ----------
-    strip : StripResult
+    strip : StripResult or LinkedStrip
         The strip.
     control : ControlPoints
         All given points.
     observations : PhotoPoints
-        Image points of the project.
+        Image points of the project, which name its points.
 
     Returns
     -------

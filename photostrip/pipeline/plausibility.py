@@ -171,6 +171,8 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
         By code.
     """
     inputs, settings = result.inputs, result.settings
+    if inputs.models is not None:
+        return ()
     examined = replace(before(inputs, settings), observations=result.refined.observations)
     stages = result.strips if result.bundle is None else result.bundle.start.strips  # as they were formed
     formed = [evidence.Formed(each.strip, each.orientation, each.formed) for each in stages]
@@ -199,6 +201,8 @@ def of_failure(inputs: Inputs, settings: Settings, directory: Path | None = None
     tuple of Finding
         By code; empty when the evidence cannot be put together either.
     """
+    if inputs.models is not None:
+        return ()
     try:
         examined = before(inputs, settings)
         strips = _as_they_lie(inputs, examined)

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from photostrip.geodesy.crs import GroundFrame
     from photostrip.pipeline.covariance import CovarianceAdjustment
+    from photostrip.pipeline.model_results import LinkedStrip
     from photostrip.pipeline.results import Adjusted, StripResult
     from photostrip.points import ControlPoints, PhotoPoints
 
@@ -145,14 +146,16 @@ def _turned(strip: StripResult, points: Floats, photos: Floats) -> tuple[Floats,
     return axes @ points @ axes.T, both @ photos @ both.T
 
 
-def joined(strips: Sequence[StripPrecision], results: Sequence[StripResult], points: Adjusted) -> Precision:
+def joined(
+    strips: Sequence[StripPrecision], results: Sequence[StripResult | LinkedStrip], points: Adjusted
+) -> Precision:
     """Precision of all strips together; a point of several strips is their mean.
 
     Parameters
     ----------
     strips : sequence of StripPrecision
         Precision of each strip.
-    results : sequence of StripResult
+    results : sequence of StripResult or LinkedStrip
         The strips.
     points : Adjusted
         Points of all strips.

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from photostrip.notes import Finding, Note
     from photostrip.pipeline.covariance import CovarianceAdjustment
     from photostrip.pipeline.inputs import Inputs, Settings, Strip
+    from photostrip.pipeline.model_results import LinkedStrip
     from photostrip.points import ControlPoints
     from photostrip.triangulation import (
         absolute,
@@ -114,6 +115,11 @@ class StripResult:
     wrong_control: tuple[control_screening.ControlRejection, ...]
     covariance: CovarianceAdjustment | None = None
     judged_control: control_tests.Judged | None = None
+
+    @property
+    def centers(self) -> Floats:
+        """Perspective centres in flight order, intermediate frame, metres."""
+        return self.resection.centers
 
     @property
     def scale_number(self) -> float:
@@ -352,6 +358,8 @@ class Result:
         The bundle adjustment; ``strips`` then carry its orientations and points.
     findings : tuple of Finding
         What the data say against themselves.
+    linked : tuple of LinkedStrip
+        Strips of independent models; there are then no `strips`.
     """
 
     inputs: Inputs
@@ -370,6 +378,12 @@ class Result:
     precision: Precision | None = None
     bundle: Bundle | None = None
     findings: tuple[Finding, ...] = ()
+    linked: tuple[LinkedStrip, ...] = ()
+
+    @property
+    def flights(self) -> tuple[StripResult | LinkedStrip, ...]:
+        """The strips, of photos or of models: what they have in common has the same name."""
+        return self.linked or self.strips
 
     @property
     def roles(self) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from photostrip.geodesy.frame_spec import GROUND_AXES, FrameSpec
 from photostrip.notes import Note
 from photostrip.pipeline import overruling, plausibility, precision
 from photostrip.pipeline.inputs import ADJUSTMENTS
-from photostrip.pipeline.results import Adjusted, Result, Ties
+from photostrip.pipeline.results import Adjusted, Result, StripResult, Ties
 from photostrip.pipeline.strip import adjust_strip
 from photostrip.triangulation import interior, refinement
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from photostrip.geodesy.crs import GroundFrame
     from photostrip.pipeline.bundle import Block
     from photostrip.pipeline.inputs import Inputs, Settings
-    from photostrip.pipeline.results import StripResult
+    from photostrip.pipeline.model_results import LinkedStrip
     from photostrip.points import ControlPoints, PhotoPoints
 
     Floats = NDArray[np.float64]
@@ -88,6 +88,8 @@ def _triangulated(inputs: Inputs, settings: Settings, directory: Path | None) ->
     refined = _ideal_coordinates(observations, inputs, settings, frames)
     control = _measured_control(inputs, refined.observations)
     block: Block | None = None
+    strips: tuple[StripResult, ...] = ()
+    linked: tuple[LinkedStrip, ...] = ()
     if settings.adjustment == "bundle":
         from photostrip.pipeline.bundle import adjust_block  # a strip needs none of its libraries
 
@@ -95,16 +97,22 @@ def _triangulated(inputs: Inputs, settings: Settings, directory: Path | None) ->
         block = adjust_block(inputs, settings, refined.observations, control, tied)
         refined = replace(refined, observations=block.observations)
         strips, points, ties = block.strips, block.points, Ties.none()
+    elif inputs.models is not None:
+        from photostrip.pipeline.model_strips import adjust_all  # strips of photos need none of it
+
+        linked = adjust_all(inputs.models, control, frames, settings)
+        points, ties = _join(linked, refined.observations, output)
     else:
         strips = tuple(adjust_strip(strip, refined.observations, control, frames, settings) for strip in inputs.strips)
         points, ties = _join(strips, refined.observations, output)
     rows, differences = _at_given_points(inputs, frames, points, refined.observations)
     missing = _not_determined(refined.observations, points, inputs, strips)
+    flights = linked or strips
     covariances = block.precision if block is not None and settings.precision else None
     if block is None and settings.precision:
-        each = [precision.of_strip(strip, refined.observations, frames, inputs.control) for strip in strips]
-        covariances = precision.joined(each, strips, points)
-    found = block.notes if block is not None else tuple(note for strip in strips for note in strip.notes)
+        each = [_precision(strip, refined.observations, frames, inputs.control) for strip in flights]
+        covariances = precision.joined(each, flights, points)
+    found = block.notes if block is not None else tuple(note for strip in flights for note in strip.notes)
     notes = _notes(inputs, settings, found, fiducial)
     return Result(
         inputs,
@@ -122,7 +130,19 @@ def _triangulated(inputs: Inputs, settings: Settings, directory: Path | None) ->
         notes,
         covariances,
         None if block is None else block.bundle,
+        linked=linked,
     )
+
+
+def _precision(
+    strip: StripResult | LinkedStrip, observations: PhotoPoints, frames: Sequence[GroundFrame], given: ControlPoints
+) -> precision.StripPrecision:
+    """Covariances of one strip of either kind."""
+    if isinstance(strip, StripResult):
+        return precision.of_strip(strip, observations, frames, given)
+    from photostrip.pipeline import model_precision
+
+    return model_precision.of_linked(strip, observations, frames, given)
 
 
 def _require(settings: Settings) -> None:
@@ -251,6 +271,8 @@ def _ideal_coordinates(
     observations: PhotoPoints, inputs: Inputs, settings: Settings, frames: Sequence[GroundFrame]
 ) -> refinement.Refined:
     """Image coordinates reduced to the principal point, free of distortion and refraction."""
+    if inputs.models is not None:  # there are none: the observations only name the points
+        return refinement.Refined(observations, {})
     wanted = settings.refinement
     if wanted.needs_heights and (wanted.flying_height is None or wanted.ground_height is None):
         # The heights come from a first run without these corrections; metres do not matter to them.
@@ -282,7 +304,9 @@ def _measured_control(inputs: Inputs, observations: PhotoPoints) -> ControlPoint
     return control.take(np.array(kept, np.intp))
 
 
-def _join(strips: Sequence[StripResult], observations: PhotoPoints, output: GroundFrame) -> tuple[Adjusted, Ties]:
+def _join(
+    strips: Sequence[StripResult | LinkedStrip], observations: PhotoPoints, output: GroundFrame
+) -> tuple[Adjusted, Ties]:
     """Points of all strips: the mean where strips share a point, and their differences there."""
     strip = np.concatenate([np.full(len(s.formed.point), number) for number, s in enumerate(strips)])
     point = np.concatenate([s.formed.point for s in strips])
@@ -293,7 +317,10 @@ def _join(strips: Sequence[StripResult], observations: PhotoPoints, output: Grou
     mean = sums / count[:, None]
     rays = np.zeros(len(number), np.intp)
     for s in strips:
-        np.add.at(rays, np.searchsorted(number, observations.point[s.rows]), 1)
+        if isinstance(s, StripResult):
+            np.add.at(rays, np.searchsorted(number, observations.point[s.rows]), 1)
+        else:
+            rays[np.searchsorted(number, s.formed.point)] += s.formed.photo_count
     ids = [observations.point_ids[n] for n in number]
     joined = Adjusted(number, mean, output.ground_from_cartesian(mean, ids=ids), rays)
     return joined, _ties(strip, point, cartesian, output)
@@ -335,6 +362,9 @@ def _not_determined(
     placed = {photo: (n, k) for n, strip in enumerate(inputs.strips) for k, photo in enumerate(strip.photos)}
     done = np.zeros(len(observations.point_ids), bool)
     done[points.number] = True
+    if inputs.models is not None:
+        why = "its coordinates in the models contradict each other, or were left out"
+        return {observations.point_ids[number]: why for number in np.flatnonzero(~done).tolist()}
     seen: dict[int, list[tuple[int, int]]] = {}
     for row in np.flatnonzero(~done[observations.point]):
         photo = observations.photo_ids[observations.photo[row]]

@@ -18,8 +18,16 @@ from photostrip.formats.findings import Findings
 from photostrip.geodesy.crs import tie_frames
 from photostrip.pipeline import overruling, plausibility
 from photostrip.pipeline.triangulate import require_whole
-from photostrip.project.document import fault_at, key_path
+from photostrip.project.document import fault_at
 from photostrip.project.loading import load_project
+from photostrip.project.model_checking import (
+    counts_of_models,
+    links_of_models,
+    model_sigma,
+    photos_of_points,
+    points_of_strip,
+    source_of,
+)
 from photostrip.project.rows import gaps_of, observations_used, table_rows
 from photostrip.triangulation import interior, refinement
 
@@ -104,14 +112,14 @@ def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
     faults = _refused(project, partial(overruling.require, project.settings.relative, project.inputs.observations))
     notes = list(project.hints)
     notes += _image_coordinates(project, faults)
-    faults += [*_pairs(project), *_joints(project)]
+    faults += [*_pairs(project), *_joints(project)] if project.inputs.models is None else links_of_models(project)
     if project.settings.adjustment != "bundle":  # strips of a block may hang on others
         faults += _control_of_strips(project)
     frames = _frames(project, faults)
     document: Document = {
         "name": project.inputs.name,
         "counts": _counts(project),
-        "image_sigma": _image_sigma(project),
+        **({"model_sigma": model_sigma(project)} if project.inputs.models else {"image_sigma": _image_sigma(project)}),
         "frames": frames,
         "control": list(_control(project)),
         "rows": table_rows(project),
@@ -204,9 +212,9 @@ def _control_of_strips(project: Project) -> Iterator[Fault]:
     inputs = project.inputs
     number = {name: code for code, name in enumerate(inputs.observations.point_ids)}
     given = np.array([number.get(name, -1) for name in inputs.control.ids], np.intp)
-    usable = observations_used(inputs)
-    for i, strip in enumerate(inputs.strips):
-        here = np.unique(inputs.observations.point[usable == i])
+    usable = observations_used(inputs) if inputs.models is None else np.zeros(0, np.intp)
+    for i, strip in enumerate(inputs.flights):
+        here = points_of_strip(inputs, i) if inputs.models else np.unique(inputs.observations.point[usable == i])
         rows = np.isin(given, here) & ~inputs.control.check
         plan, height = (int(inputs.control.use[rows, axis].sum()) for axis in (0, 2))
         if plan >= LEAST_PLAN and height >= LEAST_HEIGHT:
@@ -225,8 +233,9 @@ def _counts(project: Project) -> Document:
     new = measured - set(given.ids)
     return {
         "files": len(project.files),
-        "strips": len(inputs.strips),
-        "photos": sum(len(strip.photos) for strip in inputs.strips),
+        "strips": len(inputs.flights),
+        "photos": sum(len(strip.photos) for strip in inputs.flights),
+        **({} if inputs.models is None else counts_of_models(inputs.models)),
         "image_points": len(inputs.observations),
         "points": len(measured),
         "new": len(new),
@@ -234,7 +243,7 @@ def _counts(project: Project) -> Document:
         "control_height": int((given.use[:, 2] & ~given.check & seen).sum()),
         "check_plan": int((given.use[:, 0] & given.check & seen).sum()),
         "check_height": int((given.use[:, 2] & given.check & seen).sum()),
-        "without_neighbour": len(gaps_of(inputs)),
+        "without_neighbour": len(gaps_of(inputs)) if inputs.models is None else 0,
     }
 
 
@@ -247,7 +256,7 @@ def _image_sigma(project: Project) -> Document:
     return {
         "rows_with_own": own,
         "rows_with_default": rows - own,
-        "default_from": _source(project, ("observations", "sigma")),
+        "default_from": source_of(project, ("observations", "sigma")),
         "smallest_um": float(sigma.min(initial=np.inf)) if len(sigma) else None,
         "largest_um": float(sigma.max(initial=0.0)) if len(sigma) else None,
     }
@@ -319,6 +328,8 @@ def _control(project: Project) -> Iterator[Document]:
     """Give the standard deviation of every control coordinate, in the user's order, and where it comes from."""
     photos = {name: set[str]() for name in project.inputs.observations.point_ids}
     observations = project.inputs.observations
+    if project.inputs.models is not None:
+        photos = photos_of_points(project.inputs.models)
     for photo, point in zip(observations.photo.tolist(), observations.point.tolist(), strict=True):
         photos[observations.point_ids[point]].add(observations.photo_ids[photo])
     for number, read in enumerate(project.tables.control):
@@ -330,7 +341,7 @@ def _of_list(project: Project, number: int, read: ControlTable, photos: dict[str
     frame = project.inputs.frames[number]
     default = project.tree.find("control", number, "sigma")
     values = [] if default is None else [float(each.text) for each in default.elements]
-    source = _source(project, ("control", number, "sigma"))
+    source = source_of(project, ("control", number, "sigma"))
     for row, name in enumerate(read.ids):
         own = ~np.isnan(read.sigma[row])
         sigma = [float(read.sigma[row, axis]) if own[axis] else values[axis] if values else None for axis in range(3)]
@@ -349,11 +360,3 @@ def _of_list(project: Project, number: int, read: ControlTable, photos: dict[str
             ],
             "photos": len(photos.get(name, ())),
         }
-
-
-def _source(project: Project, path: tuple[str | int, ...]) -> Document | None:
-    """Say where a value of the project stands: in which file, line and key; None when it is not given."""
-    if not project.tree.has(*path):
-        return None
-    place = project.tree.place_of(path)
-    return {"source": "default", "file": place.file, "line": place.line, "key": key_path(path)}

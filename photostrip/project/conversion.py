@@ -140,6 +140,7 @@ def strips(project: schema.ProjectFile, known: Mapping[str, camera.Camera]) -> t
             tuple(dict.fromkeys(usual if (wanted := own[each.camera]) is None else wanted)),
         )
         for each in project.strips
+        if each.camera is not None
     )
 
 
@@ -424,6 +425,13 @@ def settings(project: schema.ProjectFile) -> Settings:
         adjustment=wanted.adjustment,
         precision=wanted.precision,
         relative=replace(usual.relative, **wanted.relative.model_dump()),
+        links=replace(
+            usual.links,
+            screening=wanted.links.screening,
+            alpha=wanted.links.alpha,
+            keep=tuple(map(str, wanted.links.keep)),
+            drop=tuple(map(str, wanted.links.drop)),
+        ),
         formation=replace(usual.formation, scale_transfer=wanted.scale_transfer),
         absolute=replace(usual.absolute, earth_curvature=wanted.earth_curvature, earth_radius=wanted.earth_radius),
         polynomial=replace(usual.polynomial, degree=wanted.polynomial.degree),

@@ -13,12 +13,14 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from photostrip.notes import Finding
-    from photostrip.pipeline import Strip
+    from photostrip.pipeline import ModelStrip, Strip
     from photostrip.project.document import Node
     from photostrip.project.tables import Tables
 
 
-def placed(findings: Iterable[Finding], tree: Node, tables: Tables, strips: Sequence[Strip]) -> Iterator[Finding]:
+def placed(
+    findings: Iterable[Finding], tree: Node, tables: Tables, strips: Sequence[Strip | ModelStrip]
+) -> Iterator[Finding]:
     """Give findings with the places of what they name.
 
     Parameters
@@ -29,7 +31,7 @@ def placed(findings: Iterable[Finding], tree: Node, tables: Tables, strips: Sequ
         The project file they were found in.
     tables : Tables
         Its tables.
-    strips : sequence of Strip
+    strips : sequence of Strip or ModelStrip
         Its strips.
 
     Yields
@@ -65,7 +67,7 @@ def _given(points: tuple[str, ...], tables: Tables) -> tuple[str, int] | None:
     return None
 
 
-def _listed(finding: Finding, strips: Sequence[Strip]) -> tuple[str | int, ...]:
+def _listed(finding: Finding, strips: Sequence[Strip | ModelStrip]) -> tuple[str | int, ...]:
     """Path of the first photo, or of the strip, that a finding names."""
     for number, strip in enumerate(strips):
         if finding.strips and strip.id not in finding.strips:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from photostrip.formats.measurements import Measurements
     from photostrip.project import schema
     from photostrip.project.document import Node
+    from photostrip.project.models import ModelTables
     from photostrip.project.tables import Tables
     from photostrip.triangulation.certificate import Certificate
 
@@ -52,6 +54,9 @@ def hints(project: schema.ProjectFile, tables: Tables, root: Node) -> Iterator[N
     for measured in (tables.observations, tables.fiducials):
         if measured is not None:
             yield from _photos_in_no_strip(measured, photos)
+    if tables.models is not None:
+        yield from _of_models(tables.models, tables.control, project)
+        return
     observations, control = tables.observations, [read for read in tables.control if read is not None]
     if observations is None:
         return
@@ -65,6 +70,50 @@ def hints(project: schema.ProjectFile, tables: Tables, root: Node) -> Iterator[N
     for name, given_cameras in (("camera_positions", tables.positions), ("orientations", tables.orientations)):
         if given_cameras is not None:
             yield from _cameras_not_used(project, name, given_cameras, photos)
+
+
+def _of_models(
+    models: ModelTables, control: Sequence[ControlTable | None], project: schema.ProjectFile
+) -> Iterator[Note]:
+    """Name models in no strip, and control that stands in none."""
+    photos = [str(photo) for strip in project.strips for photo in strip.photos]
+    used = _models_used(models, project, photos)
+    read = models.points
+    for each, what in ((read, "point"), (models.centers, "perspective centre")):
+        strangers = [] if each is None else [name for name in each.model_ids if name not in used]
+        if each is None or not strangers:
+            continue
+        number = {name: code for code, name in enumerate(each.model_ids)}
+        rows = np.flatnonzero(np.isin(each.models, [number[name] for name in strangers]))
+        number_of = counted(len(strangers), "model")
+        message = f"{counted(len(rows), what)} of {number_of} in no strip not used: {listed(strangers)}"
+        yield Note("model-in-no-strip", message, file=each.table.file, line=int(each.table.lines[rows[0]]), key="model")
+    centers = set(models.center_rows(photos).tolist())
+    inside = np.array([name in used for name in read.model_ids], bool)[read.models]
+    count: dict[str, int] = {}
+    for row in np.flatnonzero(inside).tolist():
+        if row not in centers:
+            name = read.target_ids[read.targets[row]]
+            count[name] = count.get(name, 0) + 1
+    given = {table.ids[row] for table in control if table is not None for row in np.flatnonzero(table.used).tolist()}
+    for table in control:
+        if table is not None:
+            yield from _switched_off(table)
+            yield from _never_measured(table, count, given, "in any model")
+
+
+def _models_used(models: ModelTables, project: schema.ProjectFile, photos: Sequence[str]) -> set[str]:
+    """Models that stand in strips: those that are listed, or have the centres of two neighbouring photos."""
+    shown = models.centers_of(photos)
+    used: set[str] = set()
+    for strip in project.strips:
+        if strip.models is not None:
+            used |= set(map(str, strip.models))
+            continue
+        flight = [str(photo) for photo in strip.photos]
+        pairs = [{*pair} for pair in pairwise(flight)]
+        used |= {name for name, each in shown.items() if any(pair <= set(each) for pair in pairs)}
+    return used
 
 
 def _cameras_not_used(
@@ -158,6 +207,7 @@ def _first_line(read: Measurements, points: Sequence[str]) -> int:
 
 
 def _switched_off(read: ControlTable) -> Iterator[Note]:
+    """Name control and check points of which nothing counts."""
     off = [name for name, used in zip(read.ids, read.used, strict=True) if not used]
     if off:
         number = counted(len(off), "point is", "points are")
@@ -166,7 +216,9 @@ def _switched_off(read: ControlTable) -> Iterator[Note]:
         yield Note("control-off", message, "note", points=tuple(off), file=read.table.file, line=line, key="use")
 
 
-def _never_measured(read: ControlTable, count: dict[str, int], given: set[str]) -> Iterator[Note]:
+def _never_measured(
+    read: ControlTable, count: dict[str, int], given: set[str], where: str = "on any photo"
+) -> Iterator[Note]:
     """Name control and check points that no photo shows, and measured points that may be them."""
     missing = [name for name, used in zip(read.ids, read.used, strict=True) if used and name not in count]
     if not missing:
@@ -174,7 +226,7 @@ def _never_measured(read: ControlTable, count: dict[str, int], given: set[str]) 
     near = alike(missing, [name for name in count if name not in given])
     verb = "is" if len(missing) == 1 else "are"
     number = counted(len(missing), "control or check point")
-    message = f"{number} {verb} not measured on any photo: {listed(missing)}{_twins(near)}"
+    message = f"{number} {verb} not measured {where}: {listed(missing)}{_twins(near)}"
     file, line, level = (
         read.table.file,
         int(read.table.lines[read.ids.index(missing[0])]),

@@ -34,6 +34,7 @@ from photostrip.project.document import COMMAND_LINE, Node, fault_at
 from photostrip.project.finding_places import placed
 from photostrip.project.hints import hints
 from photostrip.project.merging import override, read_tree, steps
+from photostrip.project.models import check_models, measured_models, named_points
 from photostrip.project.references import check_references
 from photostrip.project.resolved import completed, text_of
 from photostrip.project.schema import json_schema
@@ -41,12 +42,12 @@ from photostrip.project.tables import Tables, check_tables, read_tables
 from photostrip.project.validation import valid_section, validate
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from photostrip.camera import Camera
     from photostrip.geodesy.frame_spec import FrameSpec
     from photostrip.notes import Finding, Note
-    from photostrip.pipeline import Result
+    from photostrip.pipeline import MeasuredModels, Result
     from photostrip.pipeline.inputs import CameraPositions, GivenOrientations
     from photostrip.points import PhotoPoints
 
@@ -105,7 +106,7 @@ class Project:
 
     def placed(self, findings: Iterable[Finding]) -> tuple[Finding, ...]:
         """Give findings the place in the files where they would be put right."""
-        return tuple(placed(findings, self.tree, self.tables, self.inputs.strips))
+        return tuple(placed(findings, self.tree, self.tables, self.inputs.flights))
 
     def result(self, result: Result) -> Result:
         """Give a result whose findings say where, with files as seen from the project's folder."""
@@ -173,6 +174,7 @@ def load_project(path: Path, overrides: Sequence[str] = ()) -> Project:
     check_references(root, findings)
     tables = read_tables(root, name, findings, files)
     check_tables(root, tables, findings)
+    placed_models = {} if tables.models is None else check_models(root, tables.models, findings)
     source = current()
     grid_folder = source.grids if source is not None and source.grids is not None else Path(name).parent
     _check_certificates(root, findings)
@@ -181,7 +183,7 @@ def load_project(path: Path, overrides: Sequence[str] = ()) -> Project:
     if project is None:  # cannot be: validate() had a reason, and stop() told it
         raise InputError(f"{name} is not a valid project")
     project = completed(project, root, name)
-    inputs, notes = _inputs(project, tables, root)
+    inputs, notes = _inputs(project, tables, root, placed_models)
     grids = _grids(inputs)
     read = (*map(Path, files), *(path.parent / grid for grid in grids if (grid_folder / grid).is_file()))
     told = (*findings.notes, *notes)
@@ -250,30 +252,54 @@ def _placed(root: Node, fault: Fault) -> Fault:
     return fault_at(root, steps(fault.key), fault.message, fault.code, expected=fault.expected, fix=fault.fix)
 
 
-def _inputs(project: schema.ProjectFile, tables: Tables, root: Node) -> tuple[Inputs, list[Note]]:
+def _inputs(
+    project: schema.ProjectFile, tables: Tables, root: Node, placed_models: Mapping[int, Sequence[str]]
+) -> tuple[Inputs, list[Note]]:
     """Turn a project without faults into what the pipeline takes."""
     known = cameras(project)
-    photos = {str(photo): known[strip.camera] for strip in project.strips for photo in strip.photos}
+    photos = {str(photo): known[strip.camera] for strip in project.strips if strip.camera for photo in strip.photos}
     control = [read for read in tables.control if read is not None]
-    if tables.observations is None or len(control) != len(project.control):
+    if len(control) != len(project.control):
         raise InputError("a table of the project is missing")
     frames = tuple(frame_spec(each) for each in project.control)
-    given = project.observations
-    system = ImageSystem(given.unit, given.y_axis or "up", given.origin or "center", given.sigma)
     first = first_frame(project)
     output = output_spec(project.output, first)
+    models = _models(project, tables, placed_models)
     inputs = Inputs(
         name=str(project.name),
-        strips=strips(project, known),
-        observations=photo_points(tables.observations, system, photos),
+        strips=strips(project, known) if models is None else (),
+        observations=_observations(project, tables, photos) if models is None else named_points(models),
         control=control_points(control, project.control),
         frames=frames,
         output=(output or first) if not frames else None if output == first else output,
         fiducials=_fiducials(project, tables, photos),
         positions=_positions(project, tables, photos),
         orientations=_orientations(project, tables, photos),
+        models=models,
     )
     return inputs, list(hints(project, tables, root))
+
+
+def _observations(project: schema.ProjectFile, tables: Tables, photos: dict[str, Camera]) -> PhotoPoints:
+    """Image points of the photos of the strips."""
+    given = project.observations
+    if given is None or tables.observations is None:
+        raise InputError("a table of the project is missing")
+    system = ImageSystem(given.unit, given.y_axis or "up", given.origin or "center", given.sigma)
+    return photo_points(tables.observations, system, photos)
+
+
+def _models(
+    project: schema.ProjectFile, tables: Tables, placed_models: Mapping[int, Sequence[str]]
+) -> MeasuredModels | None:
+    """Model coordinates of the strips."""
+    if project.models is None or tables.models is None:
+        return None
+    flights = [
+        (str(strip.id), tuple(map(str, strip.photos)), placed_models[number])
+        for number, strip in enumerate(project.strips)
+    ]
+    return measured_models(tables.models, project.models, flights)
 
 
 def _positions(project: schema.ProjectFile, tables: Tables, photos: dict[str, Camera]) -> CameraPositions | None:
@@ -295,6 +321,6 @@ def _fiducials(project: schema.ProjectFile, tables: Tables, photos: dict[str, Ca
     given = project.fiducial_measurements
     if given is None or tables.fiducials is None:
         return None
-    unit = given.unit or project.observations.unit
+    unit = given.unit or (project.observations.unit if project.observations is not None else "mm")
     system = ImageSystem(unit, given.y_axis or "up", "center", given.sigma)
     return photo_points(tables.fiducials, system, photos)

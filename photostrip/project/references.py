@@ -63,6 +63,7 @@ def check_references(root: Node, findings: Findings) -> None:
     findings : Findings
         Where faults go.
     """
+    _kind_of_measurements(root, findings)
     _strips(root, findings)
     _photos(root, findings)
     _cameras(root, findings)
@@ -71,6 +72,56 @@ def check_references(root: Node, findings: Findings) -> None:
     _curvature(root, findings)
     _needs_of_the_strip_method(root, findings)
     _camera_positions(root, findings)
+
+
+NEEDED = {
+    "cameras": "cameras by name",
+    "observations": "points measured on photos, or `models` measured on a plotter",
+}
+NEEDS_IMAGES = {
+    "adjustment": (("bundle", "covariance"), "polynomial or similarity"),
+    "earth_curvature": (("image",), "auto, model or none"),
+    "refraction": (("true", "yes", "on"), "false"),
+}
+OF_PHOTOS = ("observations", "fiducial_measurements", "camera_positions", "orientations")
+
+
+def _kind_of_measurements(root: Node, findings: Findings) -> None:
+    """Ask for image coordinates and their cameras, or for models; refuse what needs the other kind."""
+    if root.has("models"):
+        _only_models(root, findings)
+    else:
+        _only_photos(root, findings)
+
+
+def _only_photos(root: Node, findings: Findings) -> None:
+    """Ask for what image coordinates need."""
+    for name, expected in NEEDED.items():
+        if not root.has(name):
+            findings.add(fault_at(root, (name,), f"`{name}` is missing", "missing-key", expected=expected))
+    strips = root.find("strips")
+    for number, strip in enumerate(strips.elements if strips is not None else []):
+        if isinstance(strip.value, dict) and not strip.has("camera"):
+            expected = "camera of all its photos, a key of `cameras`"
+            path = ("strips", number, "camera")
+            findings.add(fault_at(root, path, "`camera` is missing", "missing-key", expected=expected))
+        if strip.has("models"):
+            message, fix = "models are listed, and none are measured", "give their coordinates in `models`"
+            findings.add(fault_at(root, ("strips", number, "models"), message, "no-model", fix=fix))
+
+
+def _only_models(root: Node, findings: Findings) -> None:
+    """Refuse what model coordinates exclude."""
+    for name in OF_PHOTOS:
+        if root.has(name):
+            message = f"`{name}` and `models` exclude each other: a strip is made of photos or of models"
+            findings.add(fault_at(root, (name,), message, "photos-and-models", fix="remove one of the two"))
+    for name, (words, expected) in NEEDS_IMAGES.items():
+        word = root.word("processing", name)
+        if word.casefold() in words:
+            message = f"`{name}: {word}` needs image coordinates; the project gives model coordinates"
+            path = ("processing", name)
+            findings.add(fault_at(root, path, message, "needs-image-coordinates", expected=expected))
 
 
 def _strips(root: Node, findings: Findings) -> None:

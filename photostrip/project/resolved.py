@@ -25,6 +25,17 @@ HEADER = (
 )
 AUTO = {"parallax_limit", "flying_height", "ground_height"}  # keys of which no value means `auto`
 EMPTY = {"self_calibration"}  # lists of which none is not the same as no word
+OF_PHOTOS = (
+    "relative",
+    "covariance",
+    "bundle",
+    "scale_transfer",
+    "refraction",
+    "flying_height",
+    "ground_height",
+    "interior",
+)
+OF_MODELS = ("links",)  # what the other kind of measurements has no use for
 LONGEST_LINE = 110
 _NOT_PRINTED = re.compile("[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
 
@@ -46,17 +57,24 @@ def completed(project: ProjectFile, root: Node, path: str) -> ProjectFile:
     ProjectFile
         The same project; only keys for which nothing stands in are left empty. Paths are relative to its folder.
     """
-    observations = project.observations
-    usual = None if project.fiducial_measurements else "top-left" if observations.unit == "px" else "center"
-    observations = observations.model_copy(
-        update={
-            "file": _relative(root, path, "observations"),
-            "y_axis": observations.y_axis or "up",
-            "origin": observations.origin or usual,
-        }
-    )
+    observations, models = project.observations, project.models
+    if observations is not None:
+        usual = None if project.fiducial_measurements else "top-left" if observations.unit == "px" else "center"
+        observations = observations.model_copy(
+            update={
+                "file": _relative(root, path, "observations"),
+                "y_axis": observations.y_axis or "up",
+                "origin": observations.origin or usual,
+            }
+        )
+    if models is not None:
+        centers = models.centers
+        if centers is not None:
+            centers = centers.model_copy(update={"file": _relative(root, path, "models", "centers")})
+        filled_in = {"center_sigma": models.center_sigma or models.sigma, "centers": centers}
+        models = models.model_copy(update={"file": _relative(root, path, "models"), **filled_in})
     marks = project.fiducial_measurements
-    if marks is not None:
+    if marks is not None and observations is not None:
         same = marks.unit in {None, observations.unit}
         update = {
             "file": _relative(root, path, "fiducial_measurements"),
@@ -87,6 +105,7 @@ def completed(project: ProjectFile, root: Node, path: str) -> ProjectFile:
         "name": project.name or Text(Path(path).stem),
         "extends": None,
         "observations": observations,
+        "models": models,
         "fiducial_measurements": marks,
         "control": control,
         **cameras,
@@ -119,7 +138,10 @@ def text_of(project: ProjectFile) -> str:
         YAML that reads as the same project; the same text for the same project everywhere. Texts of the user stand
         between quotation marks, so that other programs read ids as texts, too.
     """
-    return HEADER + "".join(f"{line}\n" for line in _block(_plain(project), ""))
+    plain = _plain(project)
+    for name in OF_PHOTOS if project.models is not None else OF_MODELS:
+        plain["processing"].pop(name, None)
+    return HEADER + "".join(f"{line}\n" for line in _block(plain, ""))
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401 (any value of a project)

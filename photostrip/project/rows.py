@@ -16,8 +16,9 @@ if TYPE_CHECKING:
 
     from photostrip.formats.control import ControlTable
     from photostrip.formats.measurements import Measurements
-    from photostrip.pipeline import Inputs
+    from photostrip.pipeline import Inputs, MeasuredModels
     from photostrip.project.loading import Project
+    from photostrip.project.tables import Tables
 
     Numbers = NDArray[np.intp]
     Document = dict[str, Any]
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 IN_NO_STRIP = "its photo belongs to no strip"
 ONCE = "the point is measured on one photo only"
 NO_NEIGHBOUR = "the point is on no two neighbouring photos of one strip"
+IN_NO_MODEL = "its model belongs to no strip"
+NO_MODEL = "not measured in any model of the strips"
 OFF = "switched off (use: off)"
 NO_BUNDLE = "only the bundle adjustment uses it"
 NOT_MEASURED = "not measured on any photo of the strips"
@@ -88,6 +91,8 @@ def table_rows(project: Project) -> list[Document]:
     """
     tables, inputs = project.tables, project.inputs
     photos = {photo for strip in inputs.strips for photo in strip.photos}
+    if tables.models is not None and inputs.models is not None:
+        return model_rows(tables, inputs.models)
     found = []
     bundle = project.settings.adjustment == "bundle"
     apart = set() if bundle else set(gaps_of(inputs))  # a bundle takes points of any two photos
@@ -101,6 +106,39 @@ def table_rows(project: Project) -> list[Document]:
         count = {name: max(number, 2) for name, number in count.items()}
     found += [_given(read, count, apart) for read in tables.control if read is not None]
     found += [_cameras(read, photos, bundle) for read in (tables.positions, tables.orientations) if read is not None]
+    return found
+
+
+def model_rows(tables: Tables, models: MeasuredModels) -> list[Document]:
+    """Count what became of the rows of each table of a project of independent models.
+
+    Parameters
+    ----------
+    tables : Tables
+        The tables.
+    models : MeasuredModels
+        The models of the strips.
+
+    Returns
+    -------
+    list of dict
+        As :func:`table_rows`.
+    """
+    found = []
+    known = set(models.points.model_ids)
+    read = tables.models
+    for each in () if read is None else (read.points, read.centers):
+        if each is not None:
+            stranger = np.array([name not in known for name in each.model_ids], bool)[each.models]
+            owners = np.array(each.model_ids, object)[each.models]
+            found.append(_block(each.table.file, each.table.lines, [(IN_NO_MODEL, stranger, owners)]))
+    points = set(models.points.point_ids)
+    for control in tables.control:
+        if control is not None:
+            names = np.array(control.ids, object)
+            missing = np.array([name not in points for name in control.ids], bool)
+            reasons = [(OFF, ~control.used, names), (NO_MODEL, control.used & missing, names)]
+            found.append(_block(control.table.file, control.table.lines, reasons))
     return found
 
 

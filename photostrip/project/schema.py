@@ -16,6 +16,7 @@ from pydantic_core import PydanticCustomError
 
 from photostrip.formats.control import CONTROL
 from photostrip.formats.findings import suggestion
+from photostrip.formats.models import MODEL_CENTERS, MODEL_POINTS
 from photostrip.formats.numbers import SMALLEST, NotANumber, shown
 from photostrip.formats.numbers import number as read_number
 from photostrip.formats.observations import FIDUCIALS, OBSERVATIONS
@@ -28,6 +29,7 @@ from photostrip.pipeline import ADJUSTMENTS, Settings
 from photostrip.triangulation.bundle.settings import CALIBRATION, SCREENINGS, TESTS
 from photostrip.triangulation.certificate import PLACES
 from photostrip.triangulation.formation import SCALE_TRANSFERS
+from photostrip.triangulation.models.link_screening import METHODS as LINK_METHODS
 from photostrip.triangulation.plausibility import KINDS
 from photostrip.triangulation.polynomial import DEGREES
 from photostrip.triangulation.screening import METHODS
@@ -194,6 +196,7 @@ SchemaNumber = Annotated[int, *_typed(_schema_number, {"const": SCHEMA_NUMBER})]
 Pair = tuple[Number, Number]
 Axes = Annotated[tuple[str, str, str], *_typed(_axes, _AXES)]
 Unit = Annotated[str, *_choice(("mm", "um", "0.1um", "px"))]
+MODEL_UNITS = ("mm", "um", "m")
 Repeated = Annotated[str, *_choice(REPEATED)]
 Columns = Annotated[dict[str, Words], BeforeValidator(_if_empty)]
 PointColumns = Annotated[Columns, _columns(OBSERVATIONS, *LAYOUTS)]
@@ -316,9 +319,14 @@ class Strip(Section):
     """Photos of one flight line."""
 
     id: Id = key("Id of the strip")
-    camera: Id = key("Camera of all its photos, a key of `cameras`")
+    camera: Id | None = key("Camera of all its photos, a key of `cameras`; not with model coordinates", None)
     photos: Annotated[list[Id], Field(min_length=1)] = key(
         "Photos in flight order: two at least, or one in a bundle adjustment"
+    )
+    models: Annotated[list[Id], Field(min_length=1)] | None = key(
+        "Independent models in flight order, one for every two neighbouring photos. Default: by their perspective"
+        " centres",
+        None,
     )
 
 
@@ -343,6 +351,36 @@ class Observations(Section):
     )
     columns: PointColumns = key(COLUMNS, {})
     sigma: Positive | None = key("Standard deviation of rows without sx, sy", None, unit="the table's unit")
+
+
+Sigma3 = tuple[Positive, Positive, Positive]
+ModelColumns = Annotated[Columns, _columns(MODEL_POINTS)]
+CenterColumns = Annotated[Columns, _columns(MODEL_CENTERS)]
+
+
+class ModelCenters(Section):
+    """Perspective centres in the systems of the models."""
+
+    file: Words = key("Table `model,photo,x,y,z[,sx,sy,sz]`, .csv or .csv.gz")
+    columns: CenterColumns = key(COLUMNS, {})
+
+
+class Models(Section):
+    """Independent models measured on a plotter, in place of image coordinates."""
+
+    file: Words = key(
+        "Table `model,point,x,y,z[,sx,sy,sz]`, .csv or .csv.gz; a point with the id of a photo is its centre"
+    )
+    unit: Annotated[str, *_choice(tuple(MODEL_UNITS))] = key("Unit of the tables: `mm`, `um` or `m`, at model scale")
+    axes: Annotated[str, *_choice(("right-handed", "left-handed"))] = key(
+        "Whether x, y, z of the plotter are `right-handed` or `left-handed`", "right-handed"
+    )
+    centers: ModelCenters | None = key("Perspective centres, when they stand in a table of their own", None)
+    columns: ModelColumns = key(COLUMNS, {})
+    sigma: Sigma3 | None = key("Standard deviations of rows without sx, sy, sz", None, unit="the tables' unit")
+    center_sigma: Sigma3 | None = key(
+        "Standard deviations of perspective centres without their own; default: `sigma`", None, unit="the tables' unit"
+    )
 
 
 class FiducialMeasurements(Section):
@@ -511,6 +549,18 @@ class Relative(Section):
     drop: list[Id] = key("Measurements, `photo/point`, that are left out", [])
 
 
+class Links(Section):
+    """Links of independent models and their search for gross errors."""
+
+    screening: Annotated[str, *_choice(LINK_METHODS)] = key(
+        "How gross errors are searched for: `auto` (points of each link one after the other) or `none`",
+        DEFAULTS.links.screening,
+    )
+    alpha: Fraction = key("Probability of rejecting a good point of a link without gross errors", DEFAULTS.links.alpha)
+    keep: list[Id] = key("Coordinates, `model/point` or `model/photo`, that are used whatever the test says", [])
+    drop: list[Id] = key("Coordinates, `model/point` or `model/photo`, that are left out", [])
+
+
 class Polynomial(Section):
     """Polynomial adjustment of a strip."""
 
@@ -587,6 +637,7 @@ class Processing(Section):
     covariance: Covariance = key("Adjustment of a strip with its own covariance", Covariance.model_construct())
     bundle: Bundle = key("Bundle adjustment", Bundle.model_construct())
     relative: Relative = key("Relative orientation", Relative.model_construct())
+    links: Links = key("Links of independent models", Links.model_construct())
     scale_transfer: Annotated[str, *_choice(SCALE_TRANSFERS)] = key(
         "`least_squares`: all common points with their precision; `distances`: the textbook's mean of ratios",
         DEFAULTS.formation.scale_transfer,
@@ -649,9 +700,12 @@ class ProjectFile(Section):
     photostrip: SchemaNumber = key("Number of this schema")
     name: Words | None = key("Name of the project; default: the file's name without its ending", None)
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
-    cameras: Annotated[dict[str, Camera], BeforeValidator(_if_empty), Field(min_length=1)] = key("Cameras by name")
+    cameras: Annotated[dict[str, Camera], BeforeValidator(_if_empty), Field(min_length=1)] = key(
+        "Cameras by name; needed with `observations`", {}
+    )
     strips: Annotated[list[Strip], Field(min_length=1)] = key("Strips")
-    observations: Observations = key("Points measured on photos")
+    observations: Observations | None = key("Points measured on photos; or `models`", None)
+    models: Models | None = key("Independent models measured on a plotter, in place of `observations`", None)
     fiducial_measurements: FiducialMeasurements | None = key("Fiducial marks measured on photos", None)
     control: list[Control] = key(
         "Lists of given ground coordinates, each in its own frame; a bundle adjustment may do without", []
@@ -677,9 +731,11 @@ def json_schema() -> dict[str, Any]:
     dict
         JSON Schema, draft 2020-12; the same on every call.
     """
-    for section in (Angles, Output, Relative, Bundle, Polynomial, Covariance, Interior, Processing, Tolerances):
+    sections = (Angles, Output, Relative, Links, Bundle, Polynomial, Covariance, Interior, Processing, Tolerances)
+    for section in sections:
         section.model_rebuild()  # early versions of pydantic cannot describe a default of a section not built yet
-    return described(ProjectFile, "photostrip project")
+    measured = {"anyOf": [{"required": ["cameras", "observations"]}, {"required": ["models"]}]}
+    return described(ProjectFile, "photostrip project") | measured
 
 
 def described(kind: type[Section], title: str) -> dict[str, Any]:

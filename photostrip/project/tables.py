@@ -19,6 +19,7 @@ from photostrip.formats.observations import Manner, read_measurements
 from photostrip.geometry.rotation import SYSTEMS
 from photostrip.project.document import fault_at
 from photostrip.project.merging import path_of, told_where_named
+from photostrip.project.models import ModelTables, model_tables, read_model_points
 from photostrip.project.references import listed_photos, marks_of
 
 if TYPE_CHECKING:
@@ -50,6 +51,8 @@ class Tables:
         Measured positions of cameras.
     orientations : OrientationTable or None
         Given exterior orientations.
+    models : ModelTables or None
+        Model coordinates.
     """
 
     observations: Measurements | None
@@ -57,6 +60,7 @@ class Tables:
     control: list[ControlTable | None]
     positions: PositionTable | None = None
     orientations: OrientationTable | None = None
+    models: ModelTables | None = None
 
 
 def read_tables(root: Node, project: str, findings: Findings, files: list[str]) -> Tables:
@@ -98,7 +102,13 @@ def read_tables(root: Node, project: str, findings: Findings, files: list[str]) 
         positions = read_positions(path, _height_column(node), inner, default_sigma=node.has("sigma"))
     for path, inner in _named(root, ("orientations",), project, findings, files):
         orientations = _orientations(path, root.entries["orientations"], inner)
-    return Tables(observations, fiducials, control, positions, orientations)
+    points = centers = None
+    for path, inner in _named(root, ("models",), project, findings, files):
+        points = read_model_points(path, root, inner, centers=False)
+    for path, inner in _named(root, ("models", "centers"), project, findings, files):
+        centers = read_model_points(path, root, inner, centers=True)
+    models = model_tables(points, centers, root)
+    return Tables(observations, fiducials, control, positions, orientations, models)
 
 
 def _manner(root: Node, section: str, photos: frozenset[str]) -> Manner:

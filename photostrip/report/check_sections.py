@@ -50,16 +50,31 @@ def verdict(path: str, faults: int, notes: int) -> str:
 
 
 def _contents(document: Document) -> Section:
-    counts, sigma = document["counts"], document["image_sigma"]
+    counts = document["counts"]
     control = "control {control_plan} in plan, {control_height} in height; check {check_plan} in plan, {check_height}"
     rows = [
         ("project", document["name"]),
         ("photos", f"{counts['photos']} in {counted(counts['strips'], 'strip')}"),
-        ("image points", f"{counts['image_points']} of {counted(counts['points'], 'point')}, {counts['new']} new"),
+        _measured(counts),
         ("given and measured", f"{control.format(**counts)} in height"),
-        ("image sigma", _image_sigma(sigma)),
+        _sigma(document),
     ]
     return Section("Contents", (Facts(tuple(rows)),))
+
+
+def _measured(counts: Document) -> tuple[str, str]:
+    """Say how much was measured, on photos or in models."""
+    points = f"of {counted(counts['points'], 'point')}, {counts['new']} new"
+    if "models" not in counts:
+        return "image points", f"{counts['image_points']} {points}"
+    models, centers = counted(counts["models"], "model"), counted(counts["model_centers"], "perspective center")
+    return "model points", f"{counts['model_points']} {points}, in {models}; {centers}"
+
+
+def _sigma(document: Document) -> tuple[str, str]:
+    """Say what standard deviations the measurements get."""
+    models = document.get("model_sigma")
+    return ("model sigma", _image_sigma(models)) if models else ("image sigma", _image_sigma(document["image_sigma"]))
 
 
 def _image_sigma(sigma: Document) -> str:

@@ -29,7 +29,11 @@ def _decisions(document: Document) -> Iterator[tuple[str, str]]:
         if block["asked"] == "auto":
             label = "polynomial" if len(document["strips"]) == 1 else f"polynomial of {block['strip']}"
             yield label, _degree(block)
-    yield from _screening(document, settings["relative"])
+    if "relative" in settings:
+        yield from _screening(document, settings["relative"])
+    elif settings["links"]["screening"] == "auto":
+        gone = counted(document["counts"]["rejected_in_links"], "point")
+        yield "screening", f"every common point of each link tested as a whole, the worst left out first; {gone} out"
     interior = document["corrections"]["interior"]
     if interior and settings["interior"]["transform"] == "auto":
         what = " and ".join(interior["transforms"])
@@ -37,7 +41,7 @@ def _decisions(document: Document) -> Iterator[tuple[str, str]]:
     curvature = document["corrections"]["earth_curvature"]
     if curvature["asked"] == "auto":
         yield "Earth curvature", f"{curvature['treatment']}; that is what the frame of the control asks for"
-    yield from _heights(document, settings["refinement"])
+    yield from _heights(document, settings.get("refinement", {}))
 
 
 def _degree(block: Document) -> str:

@@ -15,6 +15,7 @@ from photostrip.report import (
     deformation_sections,
     finding_sections,
     ground_sections,
+    model_sections,
     precision_sections,
     strip_sections,
 )
@@ -50,14 +51,24 @@ def sections_of(document: Document, *, everything: bool = False) -> tuple[Sectio
         The verdict first, the notes last.
     """
     several, bundle = len(document["strips"]) > 1, "bundle" in document
+    models = model_sections.of_models(document)
     found = [
         verdict_section(document, everything=everything),
         *finding_sections.findings_sections(document),
         project_section(document),
         decision_sections.decisions_section(document),
         counts_section(document),
-        strip_sections.relative_section(document, everything=everything),
-        strip_sections.junction_section(document, everything=everything),
+        *(
+            [
+                model_sections.links_section(document, everything=everything),
+                model_sections.models_section(document, everything=everything),
+            ]
+            if models
+            else [
+                strip_sections.relative_section(document, everything=everything),
+                strip_sections.junction_section(document, everything=everything),
+            ]
+        ),
         strip_sections.absolute_section(document),
         *([strip_sections.polynomial_section(document, everything=everything)] if document.get("polynomials") else []),
         *(
@@ -72,7 +83,7 @@ def sections_of(document: Document, *, everything: bool = False) -> tuple[Sectio
         ground_sections.control_section(document, everything=everything),
         ground_sections.check_section(document, everything=everything),
         *([ground_sections.ties_section(document, everything=everything)] if several and not bundle else []),
-        ground_sections.image_section(document),
+        *([] if models else [ground_sections.image_section(document)]),
         ground_sections.rejected_section(document, everything=everything),
         ground_sections.not_determined_section(document, everything=everything),
         ground_sections.notes_section(document, everything=everything),
@@ -180,18 +191,24 @@ def _tolerances(tolerances: Sequence[Document]) -> Table:
 def project_section(document: Document) -> Section:
     """Project: what was asked for, and what its numbers mean."""
     meaning = document["conventions"]
+    scale, models = model_sections.scale_word(document), model_sections.of_models(document)
     rows = [
         ("adjustment", _adjustment(document)),
         ("ground frame", document["frame"]["description"]),
         ("differences", meaning["dx, dy, dz"]),
-        ("at photo scale", "metres divided by the denominator of the photo scale, in micrometres (µm)"),
+        (f"at {scale} scale", f"metres divided by the denominator of the {scale} scale, in micrometres (µm)"),
         ("rotations", f"{meaning['angles']}; {meaning['rotation']}"),
         *((f"camera {camera['id']}", _camera(camera)) for camera in document["cameras"]),
-        *_corrections(document["corrections"]),
-        ("screening", _screening(document["settings"]["relative"])),
-        ("scale transfer", document["settings"]["formation"]["scale_transfer"].replace("_", " ")),
+        *_corrections(document["corrections"])[1 if models else 0 :],
+        *(model_sections.project_rows(document) if models else _of_photos(document["settings"])),
     ]
     return Section("Project", (Facts(tuple(rows)),))
+
+
+def _of_photos(settings: Document) -> list[tuple[str, str]]:
+    """Say how photos are made a strip."""
+    transfer = settings["formation"]["scale_transfer"].replace("_", " ")
+    return [("screening", _screening(settings["relative"])), ("scale transfer", transfer)]
 
 
 def _adjustment(document: Document) -> str:
@@ -259,15 +276,18 @@ def counts_section(document: Document) -> Section:
     rows = [
         ("photos", f"{counts['photos']} in {counted(counts['strips'], 'strip')}, {counted(counts['models'], 'model')}"),
         ("points", by_role),
-        ("image points", f"{counts['image_points']} measured, {counts['image_points_used']} used"),
-        (
-            "rejected",
-            _rejections(counts),
+        *(
+            model_sections.measured(document)
+            if model_sections.of_models(document)
+            else (
+                ("image points", f"{counts['image_points']} measured, {counts['image_points_used']} used"),
+                ("rejected", _rejections(counts)),
+            )
         ),
         ("without coordinates", counted(counts["not_determined"], "point")),
     ]
     if len(strips) == 1:
-        rows.append(("photo scale", _scale(strips[0])))
+        rows.append((f"{model_sections.scale_word(document)} scale", _scale(strips[0])))
         return Section("Counts", (Facts(tuple(rows)),))
     return Section("Counts", (Facts(tuple(rows)), _strips(strips)))
 
@@ -282,8 +302,8 @@ def _rejections(counts: Document) -> str:
 
 def _scale(strip: Document) -> str:
     return (
-        f"1:{strip['photo_scale']:.0f}, flying height {strip['flying_height']:.0f} m above ground, "
-        f"base {strip['base']:.0f} m, azimuth {strip['azimuth_deg']:.1f} deg"
+        f"1:{strip['photo_scale'] or strip['model_scale']:.0f}, flying height {fixed(strip['flying_height'], 0)} m "
+        f"above ground, base {fixed(strip['base'], 0)} m, azimuth {strip['azimuth_deg']:.1f} deg"
     )
 
 
@@ -304,9 +324,9 @@ def _strips(strips: Sequence[Document]) -> Table:
             s["id"],
             str(s["photos"]),
             str(s["points"]),
-            f"{s['photo_scale']:.0f}",
-            f"{s['flying_height']:.0f}",
-            f"{s['base']:.0f}",
+            f"{s['photo_scale'] or s['model_scale']:.0f}",
+            fixed(s["flying_height"], 0),
+            fixed(s["base"], 0),
             f"{s['azimuth_deg']:.1f}",
             micrometres(s["sigma0_um"]),
             micrometres(s["image_rms_um"]),

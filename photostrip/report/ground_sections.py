@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from photostrip.notes import before
 from photostrip.report.figures import counted, listed, metres, micrometres, ratio, signed, unit
+from photostrip.report.model_sections import scale_word
 from photostrip.report.parts import DASH, Column, Facts, Part, Section, Table, Words
 from photostrip.report.strip_sections import WORST_SHOWN, worst_first
 
@@ -93,7 +94,8 @@ def _given(document: Document, given: Sequence[Document], role: str, *, everythi
         ),
     )
     other = "the adjustment" if "bundle" in document else "a point of one model"
-    below = f"plan, height: at photo scale; ratio: to the standard deviation of the given point and of {other}"
+    scale = scale_word(document)
+    below = f"plan, height: at {scale} scale; ratio: to the standard deviation of the given point and of {other}"
     return Table(columns, rows, foot, f"{note}; {below}" if note else below)
 
 

@@ -30,11 +30,13 @@ def precision_section(document: Document, *, everything: bool) -> Section:
         Whether every photo is shown.
     """
     block = document["precision"]
+    measured = "model" if "links" in document else "image"
     text = (
-        "Standard deviations carried from the image coordinates and the control through every step of the adjustment. "
-        "They hold for random errors: what a lens, the film or the refraction does to a whole strip is not in them."
+        f"Standard deviations carried from the {measured} coordinates and the control through every step of the "
+        "adjustment. They hold for random errors: what a lens, the film or the refraction does to a whole strip is "
+        "not in them."
     )
-    facts = [("image coordinates", _basis(block["basis"]))]
+    facts = [(f"{measured} coordinates", _basis(block["basis"]))]
     for name, meaning in PARTS:
         part = block["points"][name]
         facts.append(

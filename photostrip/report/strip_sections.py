@@ -181,7 +181,7 @@ def absolute_section(document: Document) -> Section:
         Column("redund."),
         Column("condition", rank=1),
         *(Column(name, "m") for name in GROUND_AXES),
-        Column("base of scale", "m", rank=3),
+        Column("scale", "m per mm", rank=3) if "links" in document else Column("base of scale", "m", rank=3),
         *(Column(name, "deg", rank=2) for name in ("α", "ω", "κ")),
     )
     rows = tuple(

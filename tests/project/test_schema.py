@@ -53,7 +53,8 @@ def test_units_stand_in_the_description_and_by_themselves() -> None:
 def test_editors_are_told_what_is_read() -> None:
     schema = json_schema()
     definitions = schema["$defs"]
-    assert schema["required"] == ["photostrip", "cameras", "strips", "observations"]
+    assert schema["required"] == ["photostrip", "strips"]
+    assert schema["anyOf"] == [{"required": ["cameras", "observations"]}, {"required": ["models"]}]
     assert schema["additionalProperties"] is False
     assert [name for name, each in definitions.items() if each.get("additionalProperties") is not False] == []
     assert definitions["Relative"]["properties"]["parallax_limit"]["default"] == "auto"
@@ -155,6 +156,7 @@ def test_the_model_is_the_contract() -> None:
         "cameras",
         "strips",
         "observations",
+        "models",
         "fiducial_measurements",
         "control",
         "camera_positions",

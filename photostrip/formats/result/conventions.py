@@ -23,14 +23,22 @@ ROTATION = {
     "geocentric": "the geocentric axes X, Y, Z",
     "local": "the axes east, north, up of the local frame",
 }
+OF_PHOTOS, OF_MODELS = ("relative", "formation", "covariance", "interior", "refinement"), ("links",)
 EFFECTS = ("principal point", "distortion", "refraction")
+MEANT_OF_PHOTOS = ("vx_um, vy_um", "q_um")
+MEANT_OF_MODELS = {
+    "_um": "micrometres in the model; of ground differences at model scale",
+    "rotation": "of photos: not known from model coordinates; of models: rows of the matrix that takes model axes to "
+    "the axes along, across, up of the strip",
+    "vx_um, vy_um, vz_um": "model after minus model before at their common points, along the axes of the model before",
+}
 CURVATURE = "earth curvature"  # told with the other ways to treat it
 
 
 def conventions_of(result: Result) -> Document:
     """Give the block ``conventions``: units, axes and signs of everything in the result."""
     frame = result.output
-    return {
+    found: Document = {
         "lengths": "metres, unless the key ends in _mm or _um",
         "x, y, z": f"{', '.join(frame.axes)}; plan in {frame.plan_unit}, heights in {frame.height_unit}",
         "dx, dy, dz": f"adjusted minus given, metres, along {', '.join(frame.axes)}",
@@ -45,6 +53,9 @@ def conventions_of(result: Result) -> Document:
         "rms": "square root of the mean square",
         "order": "photos in flight order, points in natural order of their ids",
     }
+    if not result.linked:
+        return found
+    return {key: value for key, value in found.items() if key not in MEANT_OF_PHOTOS} | MEANT_OF_MODELS
 
 
 def settings_of(result: Result) -> Document:
@@ -54,6 +65,8 @@ def settings_of(result: Result) -> Document:
     for field in fields(settings):
         value = getattr(settings, field.name)
         if field.name in {"bundle", "covariance"} and settings.adjustment != field.name:
+            continue
+        if field.name in (OF_PHOTOS if result.linked else OF_MODELS):
             continue
         if is_dataclass(value) and not isinstance(value, type):
             found[field.name] = asdict(value)
@@ -124,6 +137,6 @@ def _curvature(result: Result) -> Document:
         size, how = 0.0, "none: the local frame is taken as truly Cartesian"
     else:
         a, b = result.output.ellipsoid or (6378137.0, 6356752.3)
-        reach = max(float(np.linalg.norm(s.xyz[:, :2], axis=1).max(initial=0.0)) for s in result.strips)
+        reach = max(float(np.linalg.norm(s.xyz[:, :2], axis=1).max(initial=0.0)) for s in result.flights)
         size, how = reach**2 / (a + b), "carried by the frames: coordinates go through geocentric space"
     return {"asked": wanted, "treatment": how, "largest": rounded(size, GROUND)}

@@ -11,6 +11,7 @@ from photostrip.formats.result import (
     covariance,
     deformation,
     ground,
+    models,
     pairs,
     photos,
     precision,
@@ -61,7 +62,7 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         "settings": conventions.settings_of(result),
         "corrections": conventions.corrections_of(result),
         "cameras": conventions.cameras_of(result),
-        "strips": strips.strips_of(result),
+        "strips": models.strips_of(result) if result.linked else strips.strips_of(result),
         "absolute": strips.absolute_of(result),
         **({"polynomial": polynomials[0], "polynomials": polynomials} if polynomials else {}),
         **covariance.covariances_of(result),
@@ -70,19 +71,23 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         "control": ground.control_of(result, found),
         "misclosures": ground.misclosures_of(result),
         "ties": ground.ties_of(result, rank),
-        "rejected": bundle.with_bundle(result, pairs.rejected_of(result)),
+        "rejected": bundle.with_bundle(result, [*models.rejected_of(result), *pairs.rejected_of(result)]),
         "not_determined": ground.not_determined_of(result),
         "findings": [_finding(each) for each in result.findings],
         "notes": [_note(note) for note in (*notes, *result.notes)],
-        "models": pairs.models_of(result),
+        "models": models.models_of(result) if result.linked else pairs.models_of(result),
+        **({"links": models.links_of(result)} if result.linked else {}),
         **deformation.deformations_of(result),
         "junctions": pairs.junctions_of(result),
-        "photos": [*photos.photos_of(result, images), *photos.single_photos_of(result, singles)],
+        "photos": models.photos_of(result)
+        if result.linked
+        else [*photos.photos_of(result, images), *photos.single_photos_of(result, singles)],
         "points": ground.points_of(result, photos.point_rms(result, [*images, *singles]), rank),
         "residuals": bundle.with_reliability(
             result, [*photos.residuals_of(result, images), *photos.single_residuals_of(result, singles)]
         ),
         "parallaxes": pairs.parallaxes_of(result, rank),
+        **({"link_residuals": models.residuals_of(result, rank)} if result.linked else {}),
     }
     verdict = verdict_of(body)
     head = {

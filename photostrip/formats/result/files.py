@@ -119,6 +119,8 @@ def result_files(document: Document, resolved: str = "") -> dict[str, str]:
     files = {name: table(document) for name, table in TABLES.items()}
     if "bundle" in document:
         files["reliability.csv"] = reliability_csv(document)
+    if "link_residuals" in document:
+        files["links.csv"] = links_csv(document)
     if resolved:
         files["project.resolved.yaml"] = resolved
     return {**files, "result.json": to_json(document)}
@@ -182,7 +184,8 @@ def photos_csv(document: Document) -> str:
         (
             f"{_cell(row['id'])},{_cell(row['strip'])},{place(row)},"
             f"{','.join(map(angle, row['angles']['values'] or (None,) * 3))},"
-            f"{','.join(map(cosine, row['rotation']))},{micrometre(row['image_rms_um'])},{row['points']},"
+            f"{','.join(map(cosine, row['rotation'] or (None,) * 9))},"
+            f"{micrometre(row['image_rms_um'])},{row['points']},"
             f"{_photo_sigmas(row['sigma'], metre, angle)}\n"
             for row in photos
         ),
@@ -194,7 +197,7 @@ def _photo_sigmas(
 ) -> str:
     if sigma is None:
         return ",,,,,"
-    return ",".join([*(metre(sigma[axis]) for axis in "xyz"), *map(angle, sigma["angles"])])
+    return ",".join([*(metre(sigma[axis]) for axis in "xyz"), *map(angle, sigma["angles"] or (None,) * 3)])
 
 
 def residuals_csv(document: Document) -> str:
@@ -205,6 +208,12 @@ def residuals_csv(document: Document) -> str:
 def parallaxes_csv(document: Document) -> str:
     """Give parallaxes.csv: y parallaxes of all points of all pairs."""
     return _table("left,right,point,q_um,used", _grouped(document["parallaxes"], ("left", "right"), ("q_um",)))
+
+
+def links_csv(document: Document) -> str:
+    """Give links.csv: what neighbouring models have in common, after minus before."""
+    groups, numbers = document["link_residuals"], ("vx_um", "vy_um", "vz_um", "test")
+    return _table(f"before,after,point,{','.join(numbers)},used", _grouped(groups, ("before", "after"), numbers))
 
 
 def _grouped(groups: Iterable[Document], heads: Sequence[str], numbers: Sequence[str]) -> Iterable[str]:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.pipeline import Result, StripResult
+    from photostrip.pipeline import LinkedStrip, Result, StripResult
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -117,8 +117,8 @@ def points_of(result: Result, image_rms: Floats, rank: Numbers) -> list[Document
     points, ids = result.points, result.refined.observations.point_ids
     names = [ids[number] for number in points.number]
     models = np.zeros(len(ids), np.intp)
-    for strip in result.strips:
-        models[strip.formed.point] += strip.formed.models
+    for strip in result.flights:
+        models[strip.formed.point] += strip.formed.model_count
     columns = zip(
         names,
         result.roles,
@@ -182,7 +182,7 @@ def _turned(found: Floats, frame: GroundFrame, place: Floats, axes: Floats) -> F
 
 def _expected(result: Result) -> tuple[Floats, Floats, tuple[tuple[str, ...], ...]]:
     """Give standard deviation of the differences, photo scale and strips of every given point."""
-    control, strips = result.inputs.control, result.strips
+    control, strips = result.inputs.control, result.flights
     number = {name: n for n, name in enumerate(result.refined.observations.point_ids)}
     numbers = np.array([number.get(name, -1) for name in control.ids], np.intp)
     held = np.array([np.isin(numbers, strip.formed.point) for strip in strips]).reshape(len(strips), len(control))
@@ -281,12 +281,12 @@ def ties_of(result: Result, rank: Numbers) -> list[Document]:
     ties, ids = result.ties, result.refined.observations.point_ids
     if not len(ties.number):
         return []
-    scale = np.array([s.scale_number for s in result.strips])[ties.strips].mean(axis=1)
+    scale = np.array([s.scale_number for s in result.flights])[ties.strips].mean(axis=1)
     moved = rounded(result.output.user_from_internal(ties.difference), GROUND)
     level = _level_ties(result)
     size = np.column_stack([np.hypot(level[:, 0], level[:, 1]), level[:, 2]])
     metres, in_photo = rounded(size, GROUND), rounded(size / scale[:, None] * 1e6, 1)
-    names = [s.strip.id for s in result.strips]
+    names = [s.strip.id for s in result.flights]
     order = np.lexsort((ties.strips[:, 1], ties.strips[:, 0], rank[ties.number])).tolist()
     return [
         {
@@ -321,7 +321,7 @@ def misclosures_of(result: Result) -> list[Document]:
     Beside them, how far each coordinate is checked by all others, and its share in its own polynomial.
     """
     rows = []
-    for strip in result.strips:
+    for strip in result.flights:
         values = rounded(np.where(strip.control.use, strip.absolute.misclosures, np.nan), GROUND)
         redundancy, detectable = _checked(strip)
         leverage = _leverage(strip)
@@ -340,7 +340,7 @@ def misclosures_of(result: Result) -> list[Document]:
     return rows
 
 
-def _checked(strip: StripResult) -> tuple[Plain, Plain]:
+def _checked(strip: StripResult | LinkedStrip) -> tuple[Plain, Plain]:
     """Redundancy numbers of the control, and the smallest errors that would be found, metres."""
     found, nothing = strip.judged_control, np.full(strip.control.use.shape, np.nan)
     if found is None:
@@ -349,7 +349,7 @@ def _checked(strip: StripResult) -> tuple[Plain, Plain]:
     return rounded(np.where(known, found.redundancy, np.nan), 3), rounded(found.detectable, 3)
 
 
-def _leverage(strip: StripResult) -> Plain:
+def _leverage(strip: StripResult | LinkedStrip) -> Plain:
     """Share of each control point in the polynomials of X, Y, Z at its own place, 0 to 1."""
     nothing = np.full(strip.control.use.shape, np.nan)
     if strip.polynomial is None:

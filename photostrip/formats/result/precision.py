@@ -14,7 +14,7 @@ from photostrip.statistics import chi2_quantile, normal_quantile
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.pipeline import Result, StripResult
+    from photostrip.pipeline import LinkedStrip, Result, StripResult
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -209,7 +209,7 @@ def precision_of(result: Result) -> Document:
     block: Document = {
         "basis": [
             {"strip": strip.strip.id, "sigma_um": micrometres(value), "basis": basis}
-            for strip, value, basis in zip(result.strips, precision.sigma, precision.basis, strict=True)
+            for strip, value, basis in zip(result.flights, precision.sigma, precision.basis, strict=True)
         ],
         "points": {
             name: _summed(column, [ids[number] for number in result.points.number])
@@ -217,7 +217,7 @@ def precision_of(result: Result) -> Document:
         },
         "along": [
             row
-            for strip, photos in zip(result.strips, precision.photos, strict=True)
+            for strip, photos in zip(result.flights, precision.photos, strict=True)
             for row in _along(result, strip, sigma, photos)
         ],
     }
@@ -244,7 +244,7 @@ def _check(result: Result) -> Document:
             "squares": significant(test.squares),
             "p": significant(test.probability),
         }
-        for strip, test in zip(result.strips, result.precision.checks, strict=False)
+        for strip, test in zip(result.flights, result.precision.checks, strict=False)
         if test is not None
     ]
     return {
@@ -296,9 +296,19 @@ def _summed(sigma: Floats, names: list[str]) -> Document:
     return {"rms": rounded(rms(sigma), GROUND), "max": rounded(sigma[worst], GROUND), "worst": names[worst]}
 
 
-def _along(result: Result, strip: StripResult, sigma: Floats, photos: Floats) -> list[Document]:
+def _along(result: Result, strip: StripResult | LinkedStrip, sigma: Floats, photos: Floats) -> list[Document]:
     """Precision along a strip: of the points nearest to each photo, and of its perspective centre."""
-    along, count_of = strip.resection.centers[:, 0], len(strip.resection.centers)
+    centers = strip.centers
+    known = np.isfinite(centers[:, 0])
+    if not known.all():  # a photo without a centre stands at the others' mean distance
+        places = np.arange(len(centers))
+        centers = centers.copy()
+        if not known.any():
+            return []
+        centers[~known] = np.column_stack(
+            [np.interp(places[~known], places[known], column[known]) for column in centers.T]
+        )
+    along, count_of = centers[:, 0], len(centers)
     order = np.argsort(along, kind="stable")
     between = (along[order][1:] + along[order][:-1]) / 2
     nearest = order[np.searchsorted(between, strip.xyz[:, 0])]
@@ -307,7 +317,7 @@ def _along(result: Result, strip: StripResult, sigma: Floats, photos: Floats) ->
     with np.errstate(invalid="ignore"):
         squares = [np.bincount(nearest, sigma[rows, axis] ** 2, count_of) for axis in (0, 1)]
         size = np.sqrt(np.column_stack(squares) / count[:, None])
-    place = strip.intermediate.cartesian_from_intermediate(strip.resection.centers)
+    place = strip.intermediate.cartesian_from_intermediate(centers)
     centres = plan_and_height(turned(photos[:, :3, :3], result.output.level_axes_at(place)))
     columns = zip(
         strip.strip.photos,

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.pipeline import Result, StripResult
+    from photostrip.pipeline import LinkedStrip, Result, StripResult
     from photostrip.triangulation.polynomial import AxisFit, Evidence, Polynomial
 
     Floats = NDArray[np.float64]
@@ -94,10 +94,10 @@ def _scale_change(correction: Polynomial, x: float) -> float:
 
 def absolute_of(result: Result) -> list[Document]:
     """Give the list ``absolute``: the similarity of every strip to its control."""
-    return [_absolute(strip) for strip in result.strips]
+    return [_absolute(strip) for strip in result.flights]
 
 
-def _absolute(strip: StripResult) -> Document:
+def _absolute(strip: StripResult | LinkedStrip) -> Document:
     found, use = strip.absolute, strip.control.use
     misclosures = rounded([rms(column) for column in np.where(use, found.misclosures, np.nan).T], GROUND)
     return {
@@ -131,7 +131,7 @@ def _by_axis(values: Sequence[Plain]) -> Document:
 
 def polynomials_of(result: Result) -> list[Document]:
     """Give the list ``polynomials``: the correction of every strip that has one."""
-    return [_polynomial(strip.strip.id, strip.polynomial) for strip in result.strips if strip.polynomial is not None]
+    return [_polynomial(strip.strip.id, strip.polynomial) for strip in result.flights if strip.polynomial is not None]
 
 
 def _polynomial(strip: str, found: Polynomial) -> Document:

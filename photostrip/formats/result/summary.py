@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.formats.result import models
 from photostrip.formats.result.bundle import image_fit
 from photostrip.formats.result.numbers import GROUND, Document, Plain, micrometres, rms, rounded
 from photostrip.formats.result.pairs import Parallaxes, rejected_by_strip, sigma0
@@ -49,9 +50,9 @@ def counts_of(result: Result, measurements: int) -> Document:
     strips = result.strips
     bundle = None if result.bundle is None else result.bundle.screened.selection
     out = 0 if result.bundle is None else sum(not each.readmitted for each in result.bundle.screened.rejections)
-    return {
-        "strips": len(result.inputs.strips),
-        "photos": sum(len(strip.photos) for strip in result.inputs.strips),
+    found = {
+        "strips": len(result.inputs.flights),
+        "photos": sum(len(strip.photos) for strip in result.inputs.flights),
         "models": sum(len(s.formed.scale) for s in strips),
         "points": len(roles),
         "new_points": roles.count("new"),
@@ -70,6 +71,7 @@ def counts_of(result: Result, measurements: int) -> Document:
         "not_determined": len(result.not_determined),
         "ties": len(result.ties.number),
     }
+    return found | models.counts_of(result) if result.linked else found
 
 
 def summary_of(result: Result, found: Differences) -> Document:
@@ -82,14 +84,26 @@ def summary_of(result: Result, found: Differences) -> Document:
     found : Differences
         What is left at control and check points.
     """
+    document = models.summary_of(result) if result.linked else _of_photos(result)
+    control = result.inputs.control
+    roles = {"control": ~control.check & control.use.any(axis=1), "check": control.check}
+    for role, rows in roles.items():
+        document[f"{role}_rms"] = _axis_rms(found.axes[rows])
+        document[f"{role}_rms_um"] = _axis_rms(found.axes[rows] / found.scale[rows, None] * 1e6, 1)
+        document[f"{role}_mean"] = _axis_mean(found.axes[rows])
+    for role, rows in roles.items():
+        document[role] = _role(result, found, rows)
+    return document
+
+
+def _of_photos(result: Result) -> Document:
+    """Say how good the image coordinates are, and how large the photos."""
     sums = [Parallaxes.of(strip) for strip in result.strips]
     squares = np.concatenate([each.squares for each in sums])
     redundancy = np.concatenate([each.redundancy for each in sums])
     photos = np.array([len(s.strip.photos) for s in result.strips])
     sigma = [result.refined.observations.sigma[s.rows].ravel() for s in result.strips]
     parallax = [float(np.abs(s.orientation.parallax[s.orientation.used]).max()) for s in result.strips]
-    control = result.inputs.control
-    roles = {"control": ~control.check & control.use.any(axis=1), "check": control.check}
     document: Document = {
         "sigma0_um": micrometres(sigma0(squares, redundancy)),
         "sigma_given_um": micrometres(rms(np.concatenate(sigma))),
@@ -107,12 +121,6 @@ def summary_of(result: Result, found: Differences) -> Document:
             "image_rms_um": micrometres(image_rms),
             "sigma0_pairs_um": document["sigma0_um"],
         }
-    for role, rows in roles.items():
-        document[f"{role}_rms"] = _axis_rms(found.axes[rows])
-        document[f"{role}_rms_um"] = _axis_rms(found.axes[rows] / found.scale[rows, None] * 1e6, 1)
-        document[f"{role}_mean"] = _axis_mean(found.axes[rows])
-    for role, rows in roles.items():
-        document[role] = _role(result, found, rows)
     return document
 
 

@@ -64,11 +64,12 @@ def verdict_of(document: Document) -> Document:
 
 def accuracy(summary: Document) -> str:
     """Say in one sentence how good the points are, and from what that is known."""
+    scale = "model" if summary.get("model_scale") else "photo"
     for role, words in (("check", "check points, which took no part"), ("control", "control points; no check points")):
         plan, height = summary[role]["plan"], summary[role]["height"]
         if plan["count"] or height["count"]:
             parts = [
-                f"{part['rms']:.3f} m in {name} ({part['rms_um']:.1f} µm at photo scale, {part['count']} points)"
+                f"{part['rms']:.3f} m in {name} ({part['rms_um']:.1f} µm at {scale} scale, {part['count']} points)"
                 for name, part in (("plan", plan), ("height", height))
                 if part["count"]
             ]
@@ -123,8 +124,9 @@ def _sigma0(document: Document) -> Iterator[str]:
     if found is None or not given or found <= SIGMA0_RATIO * given:
         return
     if (found / given) ** 2 > chi2_quantile(1 - PAIR_LEVEL, summary["redundancy"]) / summary["redundancy"]:
+        kind = "model" if summary.get("model_scale") else "image"
         yield (
-            f"the image coordinates are {found / given:.1f} times worse than stated: sigma0 {found:.1f} µm, "
+            f"the {kind} coordinates are {found / given:.1f} times worse than stated: sigma0 {found:.1f} µm, "
             f"stated {given:.1f} µm"
         )
 

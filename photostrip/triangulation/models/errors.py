@@ -217,8 +217,8 @@ def covariances(errors: ModelErrors) -> Floats:
 
     Notes
     -----
-    A node is displaced by ``B (xi + sum of b_j step_j) + sum of its own coordinates`` with xi the similarity of its first
-    model and b_j the share of its models after link j. xi and the steps correlate with their neighbours only.
+    A node is displaced by ``B (xi + sum of b_j step_j) + sum of its own coordinates`` with xi the similarity of its
+    first model and b_j the share of its models after link j. xi and the steps correlate with their neighbours only.
     """
     steps, mixed = _steps(errors)
     chain = np.zeros((errors.models, PARAMETERS, PARAMETERS))

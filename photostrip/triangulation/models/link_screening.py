@@ -185,7 +185,7 @@ def screen(shared: Common, models: StripModels, settings: Settings, kept: Flags)
 
 def _scatter(value: Floats, freedom: Numbers, solved: Solved) -> float:
     """Variance factor by the median test value; 1 unless the stated precision is contradicted."""
-    known = value[freedom == 3]  # noqa: PLR2004  coordinates of a point
+    known = value[freedom == 3]  # every direction of the point is checked
     independent = solved.redundancy.sum() / 3
     if len(known) < LEFT or independent < LEFT:
         return 1.0

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.geometry.rotation import cross_matrix, from_vector
+from photostrip.geometry.rotation import from_vector
+from photostrip.triangulation.error_rows import PARAMETERS, similarity_rows
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     Numbers = NDArray[np.intp]
     Flags = NDArray[np.bool_]
 
-PARAMETERS = 7
 LEAST_COMMON = 3
 ITERATIONS, CONVERGED = 20, 1e-12
 THIN = 1e-3  # second over first extent of common points below which they stand on one line
@@ -228,7 +228,7 @@ def extents(shared: Common, models: StripModels, used: Flags) -> Floats:
     mean = shared.sums(share[:, None] * a) / np.maximum(shared.sums(share), 1.0)[:, None]
     da = (a - mean[shared.link]) * share[:, None]
     values = np.linalg.svd(shared.sums(da[:, :, None] * da[:, None, :]), compute_uv=False)
-    return np.sqrt(values[:, 1] / np.maximum(values[:, 0], 1e-300))
+    return np.asarray(np.sqrt(values[:, 1] / np.maximum(values[:, 0], 1e-300)), float)
 
 
 def solve(shared: Common, models: StripModels, used: Flags) -> Solved:
@@ -268,7 +268,7 @@ def solve(shared: Common, models: StripModels, used: Flags) -> Solved:
         covariance[:, range(3), range(3)] += variance_a
         weight = np.asarray(np.linalg.inv(covariance), float)
         moved = found.of(shared.link, b)
-        residual, design = a - moved, _design(moved - centroid[shared.link])
+        residual, design = a - moved, similarity_rows(moved - centroid[shared.link], np.zeros(3))
         scaled = design * unit[shared.link][:, None, :]
         weighted = scaled.transpose(0, 2, 1) @ weight * share[:, None, None]
         normal, right = shared.sums(weighted @ scaled), shared.sums(np.einsum("tij,tj->ti", weighted, residual))
@@ -282,15 +282,6 @@ def solve(shared: Common, models: StripModels, used: Flags) -> Solved:
     redundancy = 3 * shared.sums(share).astype(np.intp) - PARAMETERS
     cofactors = inverse * unit[:, :, None] * unit[:, None, :]
     return Solved(found, residual, weight, design, cofactors, centroid, squares, redundancy)
-
-
-def _design(arm: Floats) -> Floats:
-    """Displacements by shift, rotation and logarithm of the scale about the origin of the arms, shape (t, 3, 7)."""
-    rows = np.zeros((len(arm), 3, PARAMETERS))
-    rows[:, :, :3] = np.eye(3)
-    rows[:, :, 3:6] = -cross_matrix(arm)
-    rows[:, :, 6] = arm
-    return rows
 
 
 def _corrected(found: Similarities, step: Floats, centroid: Floats) -> Similarities:

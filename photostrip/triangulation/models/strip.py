@@ -85,6 +85,14 @@ class FormedModels:
         return self.node_models[: self._points]
 
     @property
+    def photo_count(self) -> Numbers:
+        """Number of photos that show each point, shape (q,): two for a model, one more for its neighbour."""
+        rows = np.flatnonzero(self.used & (self.models.node < self.models.points))
+        item, model = np.searchsorted(self.point, self.models.node[rows]), self.models.model[rows]
+        photos = np.unique(np.column_stack([np.repeat(item, 2), (model[:, None] + [0, 1]).ravel()]), axis=0)
+        return np.bincount(photos[:, 0], minlength=len(self.point))
+
+    @property
     def _points(self) -> int:
         return int(np.searchsorted(self.node, self.models.points))
 
@@ -152,15 +160,15 @@ def require_links(shared: Common, models: StripModels, used: Flags, names: Seque
 def _neighbours(models: StripModels, link: int, names: Sequence[str]) -> str:
     """Say which model shares most with the one that could not be joined, when it is not its neighbour."""
     nodes = [set(models.node[models.model == number].tolist()) for number in range(models.count)]
-    own = nodes[link + 1]
-    shares = [len(own & each) if number != link + 1 else 0 for number, each in enumerate(nodes)]
-    best = int(np.argmax(shares))
-    if shares[best] < linking.LEAST_COMMON or best in {link, link + 2}:
-        return ""
-    return (
-        f"; model {names[link + 1]} shares {shares[best]} with model {names[best]}: are the models in the order of the "
-        "flight?"
-    )
+    for own in (link, link + 1):
+        others = [number for number in range(models.count) if number not in {link, link + 1}]
+        best = max(others, key=lambda number: len(nodes[own] & nodes[number]), default=own)
+        number = len(nodes[own] & nodes[best])
+        if best != own and abs(best - own) > 1 and number >= linking.LEAST_COMMON:
+            return (
+                f"; model {names[own]} shares {number} with model {names[best]}: are they in the order of the flight?"
+            )
+    return ""
 
 
 def form(models: StripModels, links: Screened, photos: Numbers) -> FormedModels:
@@ -182,10 +190,10 @@ def form(models: StripModels, links: Screened, photos: Numbers) -> FormedModels:
     """
     places = _chain(links.solved.similarities)
     xyz = places.of(models.model, models.xyz)
-    turn = _upright(models, xyz)
+    used = _counting(models, links, places, xyz)
+    turn = _upright(models, np.where(used[:, None], xyz, np.nan))
     places = linking.Similarities(places.scale, turn @ places.rotation, places.shift @ turn.T)
     xyz = xyz @ turn.T
-    used = _counting(models, links, places, xyz)
     node, inverse = np.unique(models.node[used], return_inverse=True)
     count = np.bincount(inverse, minlength=len(node))
     sums = np.column_stack([np.bincount(inverse, xyz[used, axis], len(node)) for axis in range(3)])
@@ -204,22 +212,23 @@ def _chain(links: Similarities) -> Similarities:
 
 
 def _upright(models: StripModels, xyz: Floats) -> Floats:
-    """Rotation that lays the strip level: X from the first model to the last, Z from the points to the centres."""
-    center = models.node >= models.points
-    first, last = (xyz[models.model == number] for number in (0, models.count - 1))
+    """Rotation that lays the strip level: X from the first model to the last, Z from the points to the centres.
+
+    Rows of NaN do not count.
+    """
+    center, known = models.node >= models.points, np.isfinite(xyz[:, 0])
+    first, last = (xyz[known & (models.model == number)] for number in (0, models.count - 1))
     along = last.mean(axis=0) - first.mean(axis=0)
     if models.count == 1:
-        ends = xyz[center]
-        along = ends[-1] - ends[0] if len(ends) > 1 else np.linalg.svd(xyz - xyz.mean(axis=0))[2][0]
-    if not center.any():
+        ends = xyz[known & center]
+        along = ends[-1] - ends[0] if len(ends) > 1 else np.linalg.svd(first - first.mean(axis=0))[2][0]
+    up = np.zeros(3)
+    for number in range(models.count):  # a model's own centres above its own points: the strip may be bent
+        above, below = (xyz[known & which & (models.model == number)] for which in (center, ~center))
+        if len(above) and len(below):
+            up = up + above.mean(axis=0) - below.mean(axis=0)
+    if not up.any():
         up = np.array([0.0, 0.0, 1.0])
-    else:  # a model's own centres above its own points: the strip may be bent
-        per_model = [
-            xyz[center & (models.model == number)].mean(axis=0) - xyz[~center & (models.model == number)].mean(axis=0)
-            for number in range(models.count)
-            if (center & (models.model == number)).any() and (~center & (models.model == number)).any()
-        ]
-        up = np.sum(per_model, axis=0)
     x = along / np.linalg.norm(along)
     z = up - (up @ x) * x
     if np.linalg.norm(z) < linking.THIN * np.linalg.norm(up):

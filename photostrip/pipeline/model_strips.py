@@ -1,0 +1,373 @@
+"""One strip of independent models, from model coordinates to adjusted points and perspective centres."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import Fault, GeometryError, InputError
+from photostrip.notes import Note
+from photostrip.pipeline import model_precision
+from photostrip.pipeline.model_results import LinkedStrip
+from photostrip.pipeline.strip import control_notes, control_of, polynomial_notes, to_ground, wrong_control_notes
+from photostrip.triangulation import absolute, control_screening, polynomial
+from photostrip.triangulation.error_rows import similarity_rows
+from photostrip.triangulation.models import centers, link_screening, linking
+from photostrip.triangulation.models.strip import FormedModels, form, require_links
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.geodesy.crs import GroundFrame
+    from photostrip.pipeline.inputs import MeasuredModels, ModelStrip, Settings
+    from photostrip.points import ControlPoints, ModelPoints
+    from photostrip.triangulation.models.link_screening import Screened
+    from photostrip.triangulation.models.linking import StripModels
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+    Flags = NDArray[np.bool_]
+
+WEAK = 12.0  # standard deviations of a coordinate by which a link moves the far end of its model
+CENTER = "center of photo "
+ADJUSTMENTS = ("polynomial", "similarity")
+
+
+def adjust_all(
+    models: MeasuredModels, control: ControlPoints, frames: Sequence[GroundFrame], settings: Settings
+) -> tuple[LinkedStrip, ...]:
+    """Take all strips of independent models through the method.
+
+    Parameters
+    ----------
+    models : MeasuredModels
+        Strips and model coordinates.
+    control, frames, settings
+        As for :func:`adjust_models`.
+
+    Returns
+    -------
+    tuple of LinkedStrip
+        In the project's order.
+
+    Raises
+    ------
+    GeometryError, InputError
+        As for :func:`adjust_models`; an adjustment that needs image coordinates is refused.
+    """
+    if settings.adjustment not in ADJUSTMENTS:
+        fault = Fault(
+            f"adjustment {settings.adjustment!r} needs image coordinates; the project gives model coordinates",
+            code="needs-image-coordinates",
+            key="processing.adjustment",
+            expected=" or ".join(ADJUSTMENTS),
+        )
+        raise InputError(fault)
+    return tuple(adjust_models(strip, models.points, control, frames, settings) for strip in models.strips)
+
+
+def adjust_models(
+    strip: ModelStrip, measured: ModelPoints, control: ControlPoints, frames: Sequence[GroundFrame], settings: Settings
+) -> LinkedStrip:
+    """Take one strip of independent models through the method.
+
+    Parameters
+    ----------
+    strip : ModelStrip
+        Photos and models in flight order.
+    measured : ModelPoints
+        Model coordinates of the whole project.
+    control : ControlPoints
+        Measured control of the project, no check points.
+    frames : sequence of GroundFrame
+        Ground frames of the control.
+    settings : Settings
+        What is to be done.
+
+    Returns
+    -------
+    LinkedStrip
+        Every stage.
+
+    Raises
+    ------
+    GeometryError, InputError
+        When a link or the absolute orientation cannot be determined, or model coordinates or control are mirrored; the
+        strip is named.
+    """
+    formed = form_models(strip, measured, settings)
+    spread_at = partial(_precision, formed)
+    here, rows = control_of(formed, control, measured.point_ids)
+    try:
+        intermediate, orientation, spread = to_ground(strip, formed, (here, rows), frames, spread_at)
+    except InputError as error:
+        raise _of_the_other_hand(strip, error) from error
+    wrong: tuple[control_screening.ControlRejection, ...] = ()
+    extent = _extent(formed, orientation)
+    judged = None
+    if settings.links.screening != "none":
+        joint = model_precision.joint(formed, orientation, (here, rows), frames, intermediate)
+        place = control_screening.Setting(formed.xyz[rows], frames, intermediate, spread, *extent, joint)
+        given = here
+        here, wrong = control_screening.screen(given, place)
+        judged = place.judged(given, here)
+    if wrong:
+        intermediate, orientation, spread = to_ground(strip, formed, (here, rows), frames, spread_at)
+        extent = _extent(formed, orientation)
+    xyz = orientation.similarity(formed.xyz)
+    correction = None
+    if settings.adjustment == "polynomial":
+        targets = absolute.Targets(here, frames, intermediate)
+        weight = absolute.weights(targets.turned(xyz[rows]), spread)
+        correction = polynomial.fit(polynomial.Problem(xyz[rows], targets, weight, *extent), settings.polynomial)
+    adjusted = xyz if correction is None else correction(xyz)
+    places = _centers(formed, orientation, correction)
+    return LinkedStrip(
+        strip,
+        formed,
+        spread,
+        intermediate,
+        here,
+        rows,
+        orientation,
+        correction,
+        adjusted,
+        intermediate.cartesian_from_intermediate(adjusted),
+        places,
+        float(np.nanmean(places[:, 2]) - adjusted[:, 2].mean()) if np.isfinite(places).any() else float("nan"),
+        (
+            *_link_notes(strip, measured, formed),
+            *wrong_control_notes(strip, wrong),
+            *control_notes(strip, orientation),
+            *polynomial_notes(strip, correction, adjusted),
+        ),
+        wrong,
+        judged,
+    )
+
+
+def form_models(strip: ModelStrip, measured: ModelPoints, settings: Settings) -> FormedModels:
+    """Link the models of a strip and form it, without any control.
+
+    Parameters
+    ----------
+    strip : ModelStrip
+        Photos and models in flight order.
+    measured : ModelPoints
+        Model coordinates of the whole project.
+    settings : Settings
+        What is to be done.
+
+    Returns
+    -------
+    FormedModels
+        The strip in the scale of its first model.
+
+    Raises
+    ------
+    GeometryError, InputError
+        When a link cannot be determined, or models are mirror images of each other.
+    """
+    models = models_of(strip, measured, settings.links)
+    shared = linking.common(models)
+    try:
+        require_links(shared, models, np.ones(len(shared.link), bool), strip.models)
+    except GeometryError as error:
+        msg = f"strip {strip.id}: {error}"
+        raise GeometryError(msg, photos=strip.photos, code=error.code) from error
+    kept = _named(settings.links.keep, strip, measured, models)
+    links = link_screening.screen(shared, models, settings.links, kept[shared.before] | kept[shared.after])
+    _refuse_reflected(strip, links)
+    number = {photo: node for node, photo in enumerate(measured.photo_ids, len(measured.point_ids))}
+    photos = np.array([number.get(photo, -1) for photo in strip.photos], np.intp)
+    return form(models, links, photos)
+
+
+def models_of(strip: ModelStrip, measured: ModelPoints, settings: link_screening.Settings) -> StripModels:
+    """Take the models of a strip out of those of the project, without what the user drops.
+
+    Parameters
+    ----------
+    strip : ModelStrip
+        The strip.
+    measured : ModelPoints
+        Model coordinates of the project.
+    settings : link_screening.Settings
+        What is dropped.
+
+    Returns
+    -------
+    StripModels
+        Rows in the order of the models, then of the points.
+    """
+    number = {name: k for k, name in enumerate(strip.models)}
+    place = np.array([number.get(name, -1) for name in measured.model_ids], np.intp)[measured.model]
+    rows = np.flatnonzero(place >= 0)
+    rows = rows[np.lexsort((measured.node[rows], place[rows]))]
+    whole = linking.StripModels(
+        len(strip.models),
+        len(measured.point_ids),
+        rows,
+        place[rows],
+        measured.node[rows],
+        measured.xyz[rows],
+        measured.sigma[rows],
+    )
+    left = ~_named(settings.drop, strip, measured, whole)
+    return linking.StripModels(
+        whole.count, whole.points, rows[left], whole.model[left], whole.node[left], whole.xyz[left], whole.sigma[left]
+    )
+
+
+def _named(names: Sequence[str], strip: ModelStrip, measured: ModelPoints, models: StripModels) -> Flags:
+    """Rows that the user names as ``model/point`` or ``model/photo``."""
+    found = np.zeros(len(models.model), bool)
+    wanted = set(names)
+    if wanted:
+        for row, (model, node) in enumerate(zip(models.model.tolist(), models.node.tolist(), strict=True)):
+            found[row] = f"{strip.models[model]}/{measured.name(node).removeprefix(CENTER)}" in wanted
+    return found
+
+
+def _refuse_reflected(strip: ModelStrip, links: Screened) -> None:
+    """Refuse models that are mirror images of their neighbours; the smaller group is named."""
+    if not links.reflected.any():
+        return
+    hand = np.concatenate([[0], np.cumsum(links.reflected)]) % 2
+    minority = hand if 2 * hand.sum() <= len(hand) else 1 - hand
+    names = [name for name, odd in zip(strip.models, minority.tolist(), strict=True) if odd]
+    listed = (
+        f"model {names[0]} is a mirror image" if len(names) == 1 else f"models {', '.join(names)} are mirror images"
+    )
+    fault = Fault(
+        f"strip {strip.id}: {listed} of the others: x and y are exchanged, or one axis has the other sign",
+        code="mirrored-model",
+        key="models.file",
+        expected="all models in axes of the same hand",
+        fix="exchange x and y in the table, or change the sign of one column",
+    )
+    raise InputError(fault)
+
+
+def _of_the_other_hand(strip: ModelStrip, error: InputError) -> InputError:
+    """Say of a strip that fits its control upside down that the models may be left-handed as well."""
+    if all(fault.code != "left-handed-control" for fault in error.faults):
+        return error
+    return InputError(
+        Fault(
+            f"strip {strip.id} fits its control only as a mirror image: the model coordinates or the control are "
+            "left-handed",
+            code="left-handed-models",
+            key="models.axes",
+            expected="right-handed, or left-handed when the axes of the plotter are",
+            fix="set `models.axes: left-handed`, or put the axes of the control in the order of its columns",
+        )
+    )
+
+
+def _precision(formed: FormedModels, scale: float) -> tuple[float, float]:
+    """A-priori standard deviation of a point of one model in plan and height, metres."""
+    models, places = formed.models, formed.places
+    turn = (scale * places.scale)[:, None, None] * places.rotation
+    variance = np.einsum("nij,nj->ni", turn[models.model] ** 2, models.sigma**2) * formed.links.factor
+    point = models.node < models.points
+    plan, height = np.median(variance[point, :2].mean(axis=1)), np.median(variance[point, 2])
+    return float(np.sqrt(plan)), float(np.sqrt(height))
+
+
+def _extent(formed: FormedModels, orientation: absolute.AbsoluteOrientation) -> tuple[float, float]:
+    """Mean base and half width of the strip, metres."""
+    xyz = orientation.similarity(formed.xyz)
+    base = np.linalg.norm(np.diff(orientation.similarity(formed.centers), axis=0), axis=1)
+    length = np.ptp(xyz[:, 0]) / formed.models.count
+    spacing = float(base[np.isfinite(base)].mean()) if np.isfinite(base).any() else float(length)
+    return spacing, max(float(np.quantile(np.abs(xyz[:, 1]), 0.95)), 1e-6)
+
+
+def _centers(
+    formed: FormedModels, orientation: absolute.AbsoluteOrientation, correction: polynomial.Polynomial | None
+) -> Floats:
+    """Perspective centres, moved with the ground below them."""
+    placed = orientation.similarity(formed.centers)
+    known = np.isfinite(placed).all(axis=1)
+    if correction is None or not known.any():
+        return placed
+    here, axes = placed[known], correction.axes
+    above = centers.heights_above(here, orientation.similarity(formed.xyz))
+    rows = centers.displacement_rows(here, above, [axis.terms for axis in axes])
+    placed[known] = here + sum(row @ axis.coefficients for row, axis in zip(rows, axes, strict=True))
+    return placed
+
+
+def _link_notes(strip: ModelStrip, measured: ModelPoints, formed: FormedModels) -> list[Note]:
+    """Say which links are weak, or contradict themselves."""
+    links, shared, models = formed.links, formed.links.shared, formed.models
+    notes = []
+    if links.factor > 1:
+        text = (
+            f"strip {strip.id}: the common points of the models differ {np.sqrt(links.factor):.1f} times as much as "
+            "the standard deviations of the model coordinates allow; gross errors are searched for with larger ones"
+        )
+        notes.append(Note("sigma-contradicted", text, severity="note", strip=strip.id))
+    center = np.bincount(
+        shared.link[links.used & (models.node[shared.before] >= models.points)], minlength=shared.count
+    )
+    far = far_ends(formed)
+    for link in range(shared.count):
+        names = strip.models[link : link + 2]
+        photo = strip.photos[link + 1]
+        if far[link] > WEAK:
+            why = "" if center[link] else f"; the perspective centre of photo {photo} is missing in one of them"
+            text = (
+                f"strip {strip.id}: models {names[0]} and {names[1]} are linked weakly: the far end of the second is "
+                f"uncertain by {far[link]:.0f} times the standard deviation of a model coordinate{why}"
+            )
+            notes.append(Note("weak-link", text, strip=strip.id, photos=(photo,)))
+        elif not center[link]:
+            text = (
+                f"strip {strip.id}: models {names[0]} and {names[1]} are linked without the perspective centre of "
+                f"photo {photo}, which is not measured in both"
+            )
+            notes.append(Note("link-without-center", text, severity="note", strip=strip.id, photos=(photo,)))
+    for rows in links.doubtful:
+        link = int(shared.link[rows[0]])
+        names = strip.models[link : link + 2]
+        points = [measured.name(int(models.node[shared.before[row]])) for row in rows]
+        what = f"one of {', '.join(points)}" if len(points) > 1 else points[0]
+        text = (
+            f"strip {strip.id}: the common points of models {names[0]} and {names[1]} contradict each other: {what} is "
+            "wrong, and it is used all the same; measure more common points"
+        )
+        notes.append(Note("contradicting-link", text, strip=strip.id, points=tuple(points)))
+    return notes
+
+
+def far_ends(formed: FormedModels) -> Floats:
+    """Uncertainty of the far end of the model after each link, in standard deviations of a coordinate.
+
+    Parameters
+    ----------
+    formed : FormedModels
+        The strip.
+
+    Returns
+    -------
+    ndarray, shape (j,)
+        Largest standard deviation of a coordinate over the median one of a coordinate of the model.
+    """
+    models, solved = formed.models, formed.links.solved
+    rows = np.flatnonzero((models.model > 0) & (models.node < models.points))
+    link = models.model[rows] - 1
+    moved = solved.similarities.of(link, models.xyz[rows])
+    design = similarity_rows(moved - solved.centroid[link], np.zeros(3))
+    variance = np.einsum("nij,njk,nik->ni", design, solved.cofactors[link], design).max(axis=1)
+    scale = solved.similarities.scale
+    found = np.zeros(len(scale))
+    np.maximum.at(found, link, variance)
+    own = np.array([np.median(models.sigma[rows[link == number]]) for number in range(len(scale))])
+    ratio: Floats = np.sqrt(found) / np.maximum(scale * own, 1e-300)
+    return ratio

@@ -1,0 +1,288 @@
+"""Model coordinates of a project: reading their tables, and which model stands where in which strip."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.formats.findings import listed, suggestion
+from photostrip.formats.models import read_models
+from photostrip.pipeline import MeasuredModels, ModelStrip
+from photostrip.points import ModelPoints, PhotoPoints
+from photostrip.project.document import fault_at
+from photostrip.project.references import listed_photos
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.errors import Fault
+    from photostrip.formats.findings import Findings
+    from photostrip.formats.models import ModelTable
+    from photostrip.project import schema
+    from photostrip.project.document import Node
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+MILLIMETRES = {"mm": 1.0, "um": 1e-3, "m": 1e3}  # in a unit
+
+
+@dataclass(frozen=True, eq=False)
+class ModelTables:
+    """What the tables of model coordinates hold.
+
+    Parameters
+    ----------
+    points : ModelTable
+        Points; rows whose id is that of a photo are perspective centres, when there is no table of those.
+    centers : ModelTable or None
+        Perspective centres.
+    """
+
+    points: ModelTable
+    centers: ModelTable | None
+
+    def center_rows(self, photos: Sequence[str]) -> Numbers:
+        """Rows of the points' table that are perspective centres: none when these have a table of their own."""
+        if self.centers is not None:
+            return np.zeros(0, np.intp)
+        known = set(photos)
+        flags = np.array([name in known for name in self.points.target_ids], bool)
+        return np.flatnonzero(flags[self.points.targets])
+
+    def centers_of(self, photos: Sequence[str]) -> dict[str, dict[str, int]]:
+        """Give the photos whose centres each model holds, and a row of theirs in the table they stand in."""
+        read = self.points if self.centers is None else self.centers
+        rows = self.center_rows(photos) if self.centers is None else np.arange(len(read.table))
+        found: dict[str, dict[str, int]] = {name: {} for name in read.model_ids}
+        for row in rows.tolist():
+            found[read.model_ids[read.models[row]]][read.target_ids[read.targets[row]]] = row
+        return found
+
+
+def model_tables(points: ModelTable | None, centers: ModelTable | None, root: Node) -> ModelTables | None:
+    """Put the tables together; None when one that the project names could not be read."""
+    named = root.has("models", "centers")
+    return None if points is None or (named and centers is None) else ModelTables(points, centers)
+
+
+def read_model_points(path: str, root: Node, findings: Findings, *, centers: bool) -> ModelTable | None:
+    """Read one of the two tables of model coordinates.
+
+    Parameters
+    ----------
+    path : str
+        The table.
+    root : Node
+        The project, which says what rows without standard deviations get.
+    findings : Findings
+        Where faults go.
+    centers : bool
+        Whether it is the table of perspective centres.
+    """
+    node = root.find("models", "centers") if centers else root.find("models")
+    declared = None if node is None else node.find("columns")
+    columns = {name: each.text for name, each in declared.entries.items() if each.text} if declared else {}
+    has_sigma = root.has("models", "sigma") or (centers and root.has("models", "center_sigma"))
+    return read_models(path, findings, centers=centers, has_sigma=has_sigma, columns=columns)
+
+
+def check_models(root: Node, tables: ModelTables, findings: Findings) -> dict[int, tuple[str, ...]]:
+    """Find the models of every strip, in flight order, and refuse what does not fit.
+
+    Parameters
+    ----------
+    root : Node
+        The project.
+    tables : ModelTables
+        Its model coordinates.
+    findings : Findings
+        Where faults go.
+
+    Returns
+    -------
+    dict of int to tuple of str
+        Models by number of the strip; strips at fault are missing.
+    """
+    photos = [photo.id for photo in listed_photos(root)]
+    centers = tables.centers_of(photos)
+    _refuse_centers(tables, photos, centers, findings)
+    strips = root.find("strips")
+    found: dict[int, tuple[str, ...]] = {}
+    owner: dict[str, int] = {}
+    for number, strip in enumerate(strips.elements if strips is not None else []):
+        listed_here, models = strip.find("photos"), strip.find("models")
+        flight = [each.text for each in listed_here.elements] if listed_here is not None else []
+        named = [each.text for each in models.elements] if models is not None else None
+        faults: list[Fault] = []
+        names = (
+            _by_centers(root, number, flight, centers, faults)
+            if named is None
+            else _as_listed(root, number, (flight, named), (tables, centers), faults)
+        )
+        for place, name in enumerate(names):
+            if owner.setdefault(name, number) != number or names.index(name) != place:
+                message = f"model {name} stands twice in the strips"
+                path = ("strips", number, "photos" if named is None else "models")
+                faults.append(fault_at(root, path, message, "model-twice", fix="list every model once"))
+        findings.add(*faults)
+        if not faults:
+            found[number] = tuple(names)
+    return found
+
+
+def _refuse_centers(
+    tables: ModelTables, photos: Sequence[str], centers: dict[str, dict[str, int]], findings: Findings
+) -> None:
+    """Refuse models with more than two perspective centres, and centres of models that hold nothing else."""
+    read = tables.points if tables.centers is None else tables.centers
+    measured = set(tables.points.model_ids)
+    for name, shown in centers.items():
+        rows = list(shown.values())
+        if len(rows) > 2:
+            message = f"model {name} has {len(rows)} perspective centres: {listed(list(shown))}"
+            fix = "a model has those of its two photos; is one id used twice?"
+            findings.add(read.table.fault(rows[2], read.target, message, "too-many-centers", fix=fix))
+        if rows and name not in measured:
+            message = f"model {name} has perspective centres and no point"
+            fix = suggestion(name, tables.points.model_ids)
+            findings.add(read.table.fault(rows[0], "model", message, "unknown-model", fix=fix))
+    if tables.centers is None:
+        return
+    known = set(photos)
+    for name, shown in centers.items():
+        for photo, row in shown.items():
+            if photo not in known:
+                message = f"photo {photo} of model {name} belongs to no strip"
+                findings.add(read.table.fault(row, "photo", message, "unknown-photo", fix=suggestion(photo, photos)))
+
+
+def _by_centers(
+    root: Node, number: int, flight: Sequence[str], centers: dict[str, dict[str, int]], faults: list[Fault]
+) -> list[str]:
+    """Find the model of each pair of neighbouring photos by its two perspective centres."""
+    found = []
+    for place, pair in enumerate(pairwise(flight)):
+        names = [name for name, shown in centers.items() if set(pair) <= set(shown)]
+        path = ("strips", number, "photos", place + 1)
+        if len(names) > 1:
+            message = f"models {listed(names)} have the perspective centres of photos {pair[0]} and {pair[1]}"
+            faults.append(fault_at(root, path, message, "model-twice", fix="list the models that count in `models`"))
+        elif not names:
+            message = f"no model has the perspective centres of photos {pair[0]} and {pair[1]}"
+            fix = "list the models of the strip in flight order in `models`, or measure both centres"
+            faults.append(fault_at(root, path, message, "no-model", fix=fix))
+        found += names[:1]
+    return found
+
+
+def _as_listed(
+    root: Node,
+    number: int,
+    given: tuple[Sequence[str], Sequence[str]],
+    known: tuple[ModelTables, dict[str, dict[str, int]]],
+    faults: list[Fault],
+) -> list[str]:
+    """Check the models that a strip lists: they exist, are one fewer than photos, and show the right photos."""
+    (flight, named), (tables, centers) = given, known
+    path = ("strips", number, "models")
+    if len(named) != len(flight) - 1:
+        message = f"{len(named)} models are listed for {len(flight)} photos"
+        faults.append(fault_at(root, path, message, "length", expected="one model for every two neighbouring photos"))
+    measured = list(tables.points.model_ids)
+    for place, name in enumerate(named):
+        if name not in measured:
+            fix = suggestion(name, measured) or f"the models of {tables.points.table.file} are {listed(measured, 4)}"
+            message = f"model {name} is not measured"
+            faults.append(fault_at(root, (*path, place), message, "unknown-model", fix=fix))
+            continue
+        pair = flight[place : place + 2]
+        strange = [photo for photo in centers.get(name, {}) if photo not in pair]
+        if strange and len(pair) > 1:
+            message = (
+                f"model {name} stands between photos {pair[0]} and {pair[1]}, and has the perspective centre of "
+                f"{strange[0]}"
+            )
+            fix = "put the models in flight order, or correct the id of the centre"
+            faults.append(fault_at(root, (*path, place), message, "wrong-center", fix=fix))
+    return list(named)
+
+
+# --------------------------------------------------------------------------------------------------- conversion
+
+
+def measured_models(
+    tables: ModelTables, given: schema.Models, strips: Sequence[tuple[str, Sequence[str], Sequence[str]]]
+) -> MeasuredModels:
+    """Bring model coordinates into millimetres and right-handed axes.
+
+    Parameters
+    ----------
+    tables : ModelTables
+        The tables.
+    given : Models
+        What the project says about them.
+    strips : sequence of tuple
+        Id, photos and models of each strip in flight order.
+
+    Returns
+    -------
+    MeasuredModels
+        The models of the strips; others are left out.
+    """
+    photos = [photo for _, names, _ in strips for photo in names]
+    flights = tuple(ModelStrip(name, tuple(shown), tuple(models)) for name, shown, models in strips)
+    wanted = [model for strip in flights for model in strip.models]
+    factor = MILLIMETRES[given.unit]
+    hand = np.array([1.0, -1.0 if given.axes == "left-handed" else 1.0, 1.0])
+    points, centers = tables.points, tables.centers
+    is_center = np.zeros(len(points.table), bool)
+    is_center[tables.center_rows(photos)] = True
+    parts = [
+        _rows(points, np.flatnonzero(~is_center), wanted, given.sigma),
+        _rows(points, np.flatnonzero(is_center), wanted, given.center_sigma or given.sigma),
+    ]
+    if centers is not None:
+        parts.append(_rows(centers, np.arange(len(centers.table)), wanted, given.center_sigma or given.sigma))
+    point_ids = tuple(dict.fromkeys(parts[0][1]))
+    number = {name: k for k, name in enumerate(point_ids)}
+    center = {name: len(point_ids) + k for k, name in enumerate(photos)}
+    node = [number[name] for name in parts[0][1]] + [center[name] for part in parts[1:] for name in part[1]]
+    model = {name: k for k, name in enumerate(wanted)}
+    return MeasuredModels(
+        flights,
+        ModelPoints(
+            tuple(wanted),
+            point_ids,
+            tuple(photos),
+            np.array([model[name] for part in parts for name in part[0]], np.intp),
+            np.array(node, np.intp),
+            np.concatenate([part[2] for part in parts]) * factor * hand,
+            np.concatenate([part[3] for part in parts]) * factor,
+        ),
+    )
+
+
+def _rows(
+    read: ModelTable, rows: Numbers, wanted: Sequence[str], default: Sequence[float] | None
+) -> tuple[list[str], list[str], Floats, Floats]:
+    """Models, ids, coordinates and standard deviations of some rows, as far as their model is in a strip."""
+    known = set(wanted)
+    inside = np.array([name in known for name in read.model_ids], bool)
+    rows = rows[inside[read.models[rows]]]
+    sigma = read.sigma[rows]
+    if default is not None:
+        sigma = np.where(np.isnan(sigma), default, sigma)
+    models = [read.model_ids[code] for code in read.models[rows]]
+    return models, [read.target_ids[code] for code in read.targets[rows]], read.xyz[rows], sigma
+
+
+def named_points(models: MeasuredModels) -> PhotoPoints:
+    """Give a table of image points that holds none and only names the points of the models."""
+    nothing = np.zeros(0, np.intp)
+    return PhotoPoints((), models.points.point_ids, nothing, nothing, np.zeros((0, 2)), np.zeros((0, 2)))
