@@ -12,7 +12,7 @@ from photostrip.statistics import chi2_quantile
 from photostrip.triangulation import absolute, control_errors, control_tests
 from photostrip.triangulation.error_rows import PARAMETERS, Rows, similarity_rows
 from photostrip.triangulation.models import centers, errors
-from photostrip.triangulation.polynomial import POWERS
+from photostrip.triangulation.polynomial_terms import POWERS
 from photostrip.triangulation.precision import A_POSTERIORI, A_PRIORI, LEVEL, CheckTest
 
 if TYPE_CHECKING:
@@ -95,8 +95,7 @@ def of_linked(
     return StripPrecision(
         nodes[:points],
         _of_photos(formed, nodes),
-        axes @ influence[:points],
-        fit.operator,
+        lambda rows, columns: axes @ influence[rows] @ fit.operator[:, columns],
         np.column_stack([formed.point[strip.control_rows][seen.point], seen.axis]),
         seen.variance,
         sigma,

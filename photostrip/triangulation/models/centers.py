@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.triangulation.polynomial import POWERS
+from photostrip.triangulation.polynomial_terms import POWERS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -35,7 +35,7 @@ def displacement_rows(xyz: Floats, above: Floats, terms: Sequence[tuple[str, ...
     above : ndarray, shape (n,)
         Their heights above the ground below them, in the same unit.
     terms : sequence of tuple of str
-        Terms of the three polynomials, names of :data:`photostrip.triangulation.polynomial.POWERS`.
+        Terms of the three polynomials, names of :data:`photostrip.triangulation.polynomial_terms.POWERS`.
 
     Returns
     -------
