@@ -25,8 +25,8 @@ from photostrip.errors import InputError, PhotostripError
 from photostrip.formats.simulation import inputs_of, settings_of
 from photostrip.geometry.rotation import angles, from_angles
 from photostrip.pipeline import plausibility, triangulate
-from photostrip.pipeline.inputs import GivenOrientations
-from photostrip.simulate import DIGITAL, FILM, Control, Flight, GrossError, Ground, Image, Points, Spec, Terrain
+from photostrip.pipeline.inputs import CameraPositions, GivenOrientations
+from photostrip.simulate import DIGITAL, FILM, Control, Film, Flight, GrossError, Ground, Image, Points, Spec, Terrain
 from photostrip.simulate.simulation import simulate
 from photostrip.triangulation.plausibility import KINDS
 
@@ -190,6 +190,20 @@ Planted = tuple["Inputs", frozenset[str]]  # the inputs and the ids that must be
 NOBODY: frozenset[str] = frozenset()
 
 
+def marks_in_micrometres(case: Case) -> Planted | None:
+    """Give fiducial marks, and with them all image coordinates, a thousand times too large or too small."""
+    if not case.spec.camera.fiducials:
+        return None
+    made = simulate(replace(case.spec, film=Film()))
+    inputs = inputs_of(made)
+    if inputs.fiducials is None:
+        return None
+    factor = float(case.rng.choice([1000.0, 0.001, 25.4]))
+    o, marks = inputs.observations, inputs.fiducials
+    changed = (replace(o, xy=o.xy * factor), replace(marks, xy=marks.xy * factor))
+    return replace(inputs, observations=changed[0], fiducials=changed[1]), NOBODY
+
+
 def with_xy(case: Case, xy: Floats) -> Inputs:
     """Give the inputs with other image coordinates."""
     return replace(case.inputs, observations=replace(case.inputs.observations, xy=xy))
@@ -235,6 +249,14 @@ def one_mirrored(case: Case) -> Planted | None:
     photo = str(case.rng.choice(case.photos))
     xy, rows = case.inputs.observations.xy.copy(), rows_of(case, photo)
     xy[rows] = (xy[rows] * [1, -1], xy[rows] * [-1, 1], xy[rows][:, ::-1])[case.rng.integers(3)]
+    return with_xy(case, xy), frozenset({photo})
+
+
+def at_another_height(case: Case) -> Planted | None:
+    """Enlarge one photo inside the strip, as one taken from two thirds of the height or with another lens."""
+    photo = str(case.rng.choice(case.photos[1:-1]))
+    xy = case.inputs.observations.xy.copy()
+    xy[rows_of(case, photo)] *= float(case.rng.choice([1.5, 1 / 1.5]))
     return with_xy(case, xy), frozenset({photo})
 
 
@@ -308,6 +330,14 @@ def moved(case: Case) -> Planted | None:
         return None
     photos.insert(int(case.rng.choice(places)), photo)
     return with_photos(case, photos), frozenset({photo})
+
+
+def shuffled(case: Case) -> Planted | None:
+    """List all photos in a wrong order."""
+    photos = list(case.photos)
+    while photos in (list(case.photos), list(case.photos)[::-1]):
+        case.rng.shuffle(photos)
+    return with_photos(case, photos), NOBODY
 
 
 def no_overlap(case: Case) -> Planted | None:
@@ -453,6 +483,30 @@ def heights_of_another_kind(case: Case) -> Planted | None:
     if step**2 < (3 * critical(3) * case.noise[1]) ** 2:
         return None
     return in_two_lists(case, lambda enu: enu + np.array([0.0, 0.0, step]))
+
+
+def heights_down(case: Case) -> Planted | None:
+    """Count heights downwards."""
+    if kind_of(case) == "geographic" or not seen_in_heights(case, 1.0):
+        return None
+    return with_control(case, enu=case.inputs.control.enu * [1, 1, -1]), NOBODY
+
+
+def height_points_of_another_kind(case: Case) -> Planted | None:
+    """Give every third control point in height only, with heights that differ from the others by a constant."""
+    step = float(case.rng.choice([-1, 1]) * case.rng.uniform(15, 60))
+    if kind_of(case) == "geocentric" or step**2 < (3 * critical(3) * case.noise[1]) ** 2:
+        return None
+    control = case.inputs.control
+    full = np.flatnonzero(
+        control.use.all(axis=1) & ~control.check & np.isin(control.ids, case.inputs.observations.point_ids)
+    )
+    if len(full) < 9:
+        return None
+    use, enu = control.use.copy(), control.enu.copy()
+    use[full[::3], :2] = False
+    enu[full[::3], 2] += step
+    return with_control(case, enu=enu, use=use), NOBODY
 
 
 def heights_in_feet(case: Case) -> Planted | None:
@@ -626,6 +680,46 @@ def angle_system(case: Case) -> Planted | None:
     return inputs, NOBODY
 
 
+def with_positions(case: Case, change: Callable[[Floats], Floats]) -> Inputs | None:
+    """Give positions of the cameras, changed."""
+    if case.spec.ground.crs == "geocentric":
+        return None
+    truth, spec = case.simulation.truth, case.inputs.frames[0]
+    enu = change(truth.centers_ground.copy())
+    n = len(enu)
+    given = CameraPositions(truth.photo_ids, spec, enu, np.ones((n, 3), bool), np.full((n, 3), 0.1), np.full(n, np.nan))
+    return replace(case.inputs, positions=given)
+
+
+def positions_below_ground(case: Case) -> Planted | None:
+    """Give heights of the cameras below the ground, as of another vertical datum or counted downwards."""
+    inputs = with_positions(case, lambda enu: enu - [0.0, 0.0, 1.2 * case.spec.flying_height])
+    return None if inputs is None else (inputs, frozenset(case.photos))
+
+
+def positions_in_feet(case: Case) -> Planted | None:
+    """Give heights of the cameras in feet."""
+    inputs = with_positions(case, lambda enu: enu / [1.0, 1.0, FOOT])
+    return None if inputs is None else (inputs, frozenset(case.photos))
+
+
+def one_position_high(case: Case) -> Planted | None:
+    """Give one camera inside the strip a height that is off by half the flying height."""
+    row = int(case.rng.integers(1, len(case.photos) - 1))
+    step = 0.5 * case.spec.flying_height * float(case.rng.choice([-1, 1]))
+    inputs = with_positions(case, lambda enu: enu + np.outer(np.arange(len(enu)) == row, [0.0, 0.0, step]))
+    return None if inputs is None else (inputs, frozenset({case.simulation.truth.photo_ids[row]}))
+
+
+def positions_exchanged(case: Case) -> Planted | None:
+    """Exchange the positions of two neighbours."""
+    row = int(case.rng.integers(len(case.photos) - 1))
+    order = np.arange(len(case.photos))
+    order[[row, row + 1]] = row + 1, row
+    inputs = with_positions(case, lambda enu: enu[order])
+    return None if inputs is None else (inputs, frozenset(case.simulation.truth.photo_ids[row : row + 2]))
+
+
 # ------------------------------------------------------------------------------------------------------- the table
 
 
@@ -645,13 +739,20 @@ MISTAKES = (
     Mistake("negatives read as positives", negatives, ("P103", "P401")),
     Mistake("x and y of the images exchanged", x_and_y, ("P103", "P401")),
     Mistake("one photo mirrored", one_mirrored, ("P104",)),
+    Mistake("fiducial marks in another unit", marks_in_micrometres, ("P106",)),
     Mistake("principal distance off by 10 or 1000", distance_by_ten, ("P105",)),
     Mistake("principal distance of another lens", distance, ("P105",)),
     Mistake("two neighbours exchanged in the list", pair_exchanged, ("P201",)),
     Mistake("a photo listed elsewhere", moved, ("P201",)),
+    Mistake("all photos out of order", shuffled, ("P201",)),
     Mistake("no overlap from one photo on", no_overlap, ("P202",)),
     Mistake("a photo twice", twice, ("P203",)),
+    Mistake("a photo at another height", at_another_height, ("P205",)),
     Mistake("a photo left out of the list", photo_missing, ("P206",)),
+    Mistake("given perspective centres below ground", positions_below_ground, ("P204",)),
+    Mistake("their heights in feet", positions_in_feet, ("P205",)),
+    Mistake("one given height off by half", one_position_high, ("P205",)),
+    Mistake("two given positions exchanged", positions_exchanged, ("P206", "P207")),
     Mistake("one id for two points", same_id, ("P301",)),
     Mistake("two ids for one point", two_ids, ("P302",)),
     Mistake("axes of the control exchanged", axes_exchanged, ("P401", "P103")),
@@ -661,6 +762,8 @@ MISTAKES = (
     Mistake("one of two lists in feet", list_in_feet, ("P403",)),
     Mistake("one of two lists in another frame", list_in_another_frame, ("P407",)),
     Mistake("heights of two kinds in two lists", heights_of_another_kind, ("P404",)),
+    Mistake("heights of two kinds in one list", height_points_of_another_kind, ("P404",)),
+    Mistake("heights counted downwards", heights_down, ("P401",)),
     Mistake("heights in feet, plan in metres", heights_in_feet, ("P405",)),
     Mistake("slip of a digit, control", lambda case: slip_of_a_digit(case, check=False), ("P406",)),
     Mistake("slip of a digit, check point", lambda case: slip_of_a_digit(case, check=True), ("P406",)),

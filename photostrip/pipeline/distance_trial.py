@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 MISFIT = 2.5  # times what makes sense: heights that fit better need no other principal distance
 BETTER = 0.4  # of that misfit, left with another principal distance that is told
 NO_WORSE = 1.1  # times the sigma0 of the pairs
+MUCH_BETTER = 0.7  # times that sigma0: pairs that ask for the other distance themselves
+SHOWN = 3.0  # times what makes sense: stretch of the relief that no bend explains
 TRIALS = 3  # of forming a strip anew
 GIVEN_UP = 60.0  # misfit after two of them
 LONGEST = 40  # photos: a longer strip would take too long
@@ -55,13 +57,16 @@ def examine(formed: Formed, observations: PhotoPoints, settings: Settings, read:
     list of Finding
         P105, at most one.
     """
-    first = read(formed.whole) if len(formed.strip.photos) <= LONGEST else None
+    # of a badly wrong distance, most control may have been dropped
+    first = read(formed) or read(formed.whole) if len(formed.strip.photos) <= LONGEST else None
     if first is None or first.misfit < MISFIT or abs(first.ratio - 1.0) < control_heights.SCALE_LEAST:
         return []
     for start in (first.ratio, *FIRST):
         ratio, last, pairs = _settled(formed.strip, observations, settings, read, start)
-        if last is not None and last.misfit < BETTER * first.misfit and pairs < NO_WORSE * _pairs(formed):
-            break
+        if last is None or last.misfit > BETTER * first.misfit or pairs > NO_WORSE * _pairs(formed):
+            continue
+        if abs(ratio - 1.0) * first.relief > SHOWN or pairs < MUCH_BETTER * _pairs(formed):
+            break  # else a bend of the strip explains it
     else:
         return []
     numbers: dict[str, float | int | str] = {

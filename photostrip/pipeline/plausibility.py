@@ -14,7 +14,7 @@ import numpy as np
 
 from photostrip.errors import PhotostripError
 from photostrip.geodesy.crs import area_of_use, tie_frames
-from photostrip.pipeline import distance_trial, evidence
+from photostrip.pipeline import distance_trial, evidence, given_cameras
 from photostrip.pipeline.base_directions import closer_look
 from photostrip.triangulation import interior
 from photostrip.triangulation.plausibility import (
@@ -151,6 +151,7 @@ def of_inputs(inputs: Inputs, settings: Settings, directory: Path | None = None)
     examined = replace(before(inputs, settings), light=True)
     strips = _as_they_lie(inputs, examined)
     told = [*examined.findings, *_of_ids(strips, examined)]
+    told += given_cameras.centers(inputs, examined.observations, strips, directory)
     told += _of_control(inputs, examined, strips, [None] * len(strips), directory)
     return accepted(told, settings.accept)
 
@@ -180,7 +181,8 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     told = [*examined.findings, *_of_control(inputs, examined, strips, formed, directory)]
     for each in formed:
         told += _of_strip(each, result.refined.observations)
-    told += _of_rotations(result)
+    told += given_cameras.centers(inputs, examined.observations, _as_they_lie(inputs, examined), directory)
+    told += _of_rotations(result, formed, directory)
     return accepted(told, settings.accept)
 
 
@@ -211,6 +213,8 @@ def of_failure(inputs: Inputs, settings: Settings, directory: Path | None = None
         told = [*examined.findings, *_of_control(inputs, examined, strips, formed, directory)]
         for each in formed:
             told += _of_strip(each, points) if each is not None else []
+        told += given_cameras.centers(inputs, examined.observations, strips, directory)
+        told += given_cameras.angles(inputs, [each for each in formed if each is not None], points, directory)
         told += _of_ids([strip for strip, each in zip(strips, formed, strict=True) if each is None], examined)
         return accepted(told, settings.accept)
     except (PhotostripError, ArithmeticError, LookupError, ValueError):
@@ -356,12 +360,17 @@ def _of_strip(each: evidence.Formed, observations: PhotoPoints) -> list[Finding]
     return told
 
 
-def _of_rotations(result: Result) -> list[Finding]:
-    """Compare given angles with the rotations found."""
+def _of_rotations(result: Result, formed: Sequence[evidence.Formed], directory: Path | None) -> list[Finding]:
+    """Compare given angles with the rotations found; not with those of a bundle that they took part in."""
     given = result.inputs.orientations
     if given is None:
         return []
-    frame = tie_frames([given.frame], result.inputs.output or result.inputs.frames[0])[0][0]
+    if result.bundle is not None:
+        told = given_cameras.angles(result.inputs, formed, result.refined.observations, directory)
+        if told or given.observed:
+            return told
+    target = result.inputs.output or next(iter(result.inputs.frames), given.frame)
+    frame = tie_frames([given.frame], target, directory=directory)[0][0]
     rows = {photo: row for row, photo in enumerate(given.photos)}
     photos, angles, rotations = [], [], []
     for strip in result.strips:

@@ -18,6 +18,7 @@ from photostrip.pipeline import Settings, evidence, plausibility, triangulate
 from photostrip.pipeline.inputs import GivenOrientations
 from photostrip.simulate import DIGITAL, Control, Film, Flight, GrossError, Ground, Image, Spec, Terrain, simulate
 from photostrip.triangulation.plausibility import flight_order
+from tests.pipeline.blocks import positions
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -442,3 +443,53 @@ def test_ids_are_examined_by_the_images_alone() -> None:
     assert finding.evidence["mean_distance_mm"] == pytest.approx(0.004 * np.sqrt(2.0), abs=1e-9)
     apart = replace(copy, xy=np.r_[o.xy, o.xy[rows] + 0.1])
     assert plausibility.of_inputs(replace(inputs, observations=apart), Settings()) == ()
+
+
+# ------------------------------------------------------------------------------------------------- given cameras
+
+
+def with_positions(change: Callable[[Floats], Floats], frame: str = "utm") -> Inputs:
+    """Give the true positions of the cameras, changed."""
+    given = positions(simulation(frame))
+    return replace(inputs_of(simulation(frame)), positions=replace(given, enu=change(given.enu.copy())))
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+def test_given_positions_that_are_right_are_not_told(frame: str) -> None:
+    assert plausibility.of_inputs(with_positions(lambda enu: enu, frame), Settings()) == ()
+
+
+def test_given_positions_below_the_ground_and_in_feet() -> None:
+    (below,) = plausibility.of_inputs(with_positions(lambda enu: enu - [0.0, 0.0, 2000.0]), Settings())
+    assert (below.code, len(below.photos), below.key) == ("P204", 7, "camera_positions")
+    (feet,) = plausibility.of_inputs(with_positions(lambda enu: enu / [1.0, 1.0, FOOT]), Settings())
+    assert feet.code == "P205"
+    ratio = float(feet.evidence["given_above_control_m"]) / float(feet.evidence["by_photo_scale_m"])
+    assert ratio == pytest.approx(1 / FOOT, rel=0.25)  # the ground's own height counts in metres
+    one = plausibility.of_inputs(
+        with_positions(lambda enu: enu + np.outer(np.arange(7) == 3, [0, 0, 700.0])), Settings()
+    )
+    assert [(each.code, each.photos) for each in one] == [("P205", ("1004",))]
+
+
+def test_given_positions_of_other_photos() -> None:
+    findings = plausibility.of_inputs(with_positions(lambda enu: enu[[0, 1, 3, 2, 4, 5, 6]]), Settings())
+    assert ("P207", ("1003", "1004")) in [(each.code, each.photos) for each in findings]
+    assert {each.key for each in findings} == {"camera_positions"}
+
+
+@pytest.mark.parametrize("observed", [False, True])
+@pytest.mark.parametrize(
+    ("read", "code"), [([1, 1, 1], None), ([200 / 180] * 3, "P601"), ([np.pi / 180] * 3, "P601"), ([1, 1, -1], "P602")]
+)
+def test_angles_of_a_bundle_in_another_unit_or_sense(observed: bool, read: list[float], code: str | None) -> None:
+    made = simulation("local")
+    truth, inputs = made.truth, inputs_of(made)
+    values = angles(truth.rotations_local, "omega-phi-kappa") * np.array(read)
+    of_centers, of_angles = (np.full((len(values), 3), size if observed else np.nan) for size in (0.1, 1e-4))
+    photos, frame, centers = truth.photo_ids, inputs.frames[0], truth.centers_ground
+    given = GivenOrientations(
+        photos, frame, centers, values, "omega-phi-kappa", of_centers, of_angles, observed=observed
+    )
+    findings = told(replace(inputs, orientations=given), replace(settings_of(made), adjustment="bundle"))
+    assert codes(findings) == ([] if code is None else [code])

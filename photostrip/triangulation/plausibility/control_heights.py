@@ -120,10 +120,13 @@ class Stretched(NamedTuple):
         Heights given over heights in the strip.
     misfit : float
         What is left of the heights as they are, in units of what makes sense.
+    relief : float
+        Rms of the heights that no tilt and no bend explains, in the same units: what a stretch would show in.
     """
 
     ratio: float
     misfit: float
+    relief: float
 
 
 def stretched(given: Given, seen: Seen) -> Stretched | None:
@@ -159,7 +162,10 @@ def stretched(given: Given, seen: Seen) -> Stretched | None:
     size = np.abs(plain.residual[heights.took_part])
     freedom = max(int(heights.took_part.sum()) - LEAST, 1)
     misfit = float(np.sqrt((np.minimum(size, KEPT * np.median(size)) ** 2).sum() / freedom)) / fitted.floor[1]
-    return Stretched(1.0 + float(free.coefficient[-1]), max(misfit, 1.0))
+    whole, here = np.column_stack(heights.whole)[heights.took_part], heights.deviation[heights.took_part]
+    left = here - whole @ np.linalg.lstsq(whole, here, rcond=None)[0]
+    relief = float(np.sqrt((left**2).mean())) / fitted.floor[1]
+    return Stretched(1.0 + float(free.coefficient[-1]), max(misfit, 1.0), relief)
 
 
 def examine(given: Given, seen: Seen, heights: Heights, fit: Bent, floor: float) -> Iterator[Finding]:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 SCALE_CHANGE = 3e-4  # of a large error: the scale of a map is not the same where the point came to lie
 LEAST_RAYS = 2
+CLEARER = 6.0  # times as large as otherwise a slip must be where a wrong image coordinate explains it as well
 NEAR = 3.5  # standard deviations within which the slip must fit where a wrong image coordinate explains it as well
 SOUND = 4.5  # standard deviations within which the other coordinates of a point with a slip of the pen lie
 UNKNOWN = 1e3  # standard deviations in plan: that of a height that is not given
@@ -127,7 +128,8 @@ def examine_heights(given: Given, seen: Seen, fitted: Fitted, judged: Flags, lef
             if seen.rays_of(given.ids[row]).count > LEAST_RAYS:
                 continue
             # below a photo a wrong height goes with that photo's ray too: two rays cannot tell
-            limit, doubt = min(limit, NEAR * spread), "; or a coordinate along the base is wrong on one of its photos"
+            limit, spread = min(limit, NEAR * spread), CLEARER * spread
+            doubt = "; or a coordinate along the base is wrong on one of its photos"
         yield from _slips(given, seen, row, difference, (spread, limit), (2,), doubt)
 
 

@@ -28,6 +28,7 @@ TURNED_DEG = 30.0  # of a base against its neighbours
 WINDOW = 3  # bases on either side that say what is usual
 FEWEST = 4  # photos
 FEW_STEPS = 0.3  # of a limit: what goes beyond it within the window has a step of that size somewhere
+NAMED = 8
 SHORT_FLIGHT = 30  # photos of which each is looked at
 
 
@@ -53,11 +54,9 @@ def examine(centers: Floats, depth: Floats, up: Floats, photos: Sequence[str], s
         P204 to P207.
     """
     names = (strip,)
-    for number in np.flatnonzero(depth <= 0).tolist():
-        message = f"the perspective centre of photo {photos[number]} lies below the points that it shows"
-        fix = "are x and y of the image coordinates or the axes of the control exchanged?"
-        evidence = {"height_over_usual": float(depth[number] / np.median(np.abs(depth)))}
-        yield found("P204", message, fix, evidence, photos=(photos[number],), strips=names)
+    below = np.flatnonzero(depth <= 0)
+    if len(below):
+        yield _below([photos[number] for number in below.tolist()], depth, below, names)
     if len(photos) < FEWEST:
         return
     flying = float(np.median(np.abs(depth)))
@@ -66,6 +65,19 @@ def examine(centers: Floats, depth: Floats, up: Floats, photos: Sequence[str], s
     bases = bases - (bases @ up)[:, None] * up
     yield from _lengths(np.linalg.norm(bases, axis=1), photos, names)
     yield from _directions(bases, up, photos, names)
+
+
+def _below(photos: Sequence[str], depth: Floats, below: NDArray[np.intp], names: tuple[str, ...]) -> Finding:
+    """Say which perspective centres lie below the ground."""
+    several = ", ".join(photos[:NAMED]) + (f" and {len(photos) - NAMED} more" if len(photos) > NAMED else "")
+    message = (
+        f"the perspective centre of photo {several} lies below the points that it shows"
+        if len(photos) == 1
+        else f"the perspective centres of photos {several} lie below the points that they show"
+    )
+    fix = "are x and y of the image coordinates or the axes of the control exchanged?"
+    evidence = {"lowest_over_usual": float(depth[below].min() / np.median(np.abs(depth)))}
+    return found("P204", message, fix, evidence, photos=photos, strips=names)
 
 
 def _heights(height: Floats, flying: float, photos: Sequence[str], names: tuple[str, ...]) -> Iterator[Finding]:
