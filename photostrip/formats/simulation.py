@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +18,8 @@ from photostrip.formats.findings import counted
 from photostrip.formats.result.numbers import ROTATION, rounded
 from photostrip.geodesy.crs import tie_frames
 from photostrip.geometry.rotation import angles
-from photostrip.pipeline import Inputs, Settings, Strip
+from photostrip.pipeline import Inputs, MeasuredModels, ModelStrip, Settings, Strip
+from photostrip.points import PhotoPoints
 from photostrip.triangulation import refinement
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from photostrip.camera import Camera
     from photostrip.geodesy.frame_spec import FrameSpec
     from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.points import PhotoPoints
+    from photostrip.points import ModelPoints
     from photostrip.simulate import InjectedError, Simulation
 
     Floats = NDArray[np.float64]
@@ -59,6 +60,8 @@ def inputs_of(simulation: Simulation) -> Inputs:
     Inputs
         The same for the pipeline.
     """
+    if simulation.models is not None:
+        return _inputs_of_models(simulation, simulation.models)
     return Inputs(
         simulation.spec.name,
         tuple(Strip(name, simulation.camera, photos) for name, photos in simulation.strips),
@@ -66,6 +69,26 @@ def inputs_of(simulation: Simulation) -> Inputs:
         simulation.control,
         simulation.frames,
         fiducials=simulation.fiducials,
+    )
+
+
+def _inputs_of_models(simulation: Simulation, points: ModelPoints) -> Inputs:
+    """Give the same of a simulation of models; those of left-handed axes are turned over, as a project says it."""
+    if simulation.spec.models is not None and simulation.spec.models.hand == "left-handed":
+        points = replace(points, xyz=points.xyz * (1.0, -1.0, 1.0))
+    flights, first = [], 0
+    for name, photos in simulation.strips:
+        count = len(photos) - 1
+        flights.append(ModelStrip(name, photos, points.model_ids[first : first + count]))
+        first += count
+    nothing = np.zeros(0, np.intp)
+    return Inputs(
+        simulation.spec.name,
+        (),
+        PhotoPoints((), points.point_ids, nothing, nothing, np.zeros((0, 2)), np.zeros((0, 2))),
+        simulation.control,
+        simulation.frames,
+        models=MeasuredModels(tuple(flights), points),
     )
 
 
@@ -102,7 +125,11 @@ def project_files(simulation: Simulation) -> dict[str, str]:
         Content by file name: the tables, ``truth.json``, and ``project.yaml`` last.
     """
     frames, output = tie_frames(simulation.frames)
-    files = {"observations.csv": _measurements(simulation, simulation.observations, "point")}
+    files = {}
+    if simulation.models is None:
+        files["observations.csv"] = _measurements(simulation, simulation.observations, "point")
+    else:
+        files["models.csv"] = _models(simulation, simulation.models)
     if simulation.fiducials is not None:
         files["fiducials.csv"] = _measurements(simulation, simulation.fiducials, "mark")
     for number, frame in enumerate(frames):
@@ -177,6 +204,18 @@ def _measurements(simulation: Simulation, measured: PhotoPoints, target: str) ->
     return _table(f"photo,{target},x,y", rows)
 
 
+def _models(simulation: Simulation, measured: ModelPoints) -> str:
+    """Model coordinates in mm; a centre has the id of its photo."""
+    spec = simulation.spec.models
+    step = IMAGE_STEP if spec is not None and any(spec.sigma_um) else IMAGE_STEP_FREE
+    cells, points = _fixed(measured.xyz, _decimals(step)), len(measured.point_ids)
+    models = [measured.model_ids[k] for k in measured.model.tolist()]
+    names = [measured.point_ids[k] if k < points else measured.photo_ids[k - points] for k in measured.node.tolist()]
+    return _table(
+        "model,point,x,y,z", ((model, name, *row) for model, name, row in zip(models, names, cells, strict=True))
+    )
+
+
 def _ground_decimals(frame: GroundFrame, step: float) -> list[int]:
     """Decimals of ground coordinates in the order of the frame's axes, so that they show a step in metres."""
     plan = frame.plan_factor
@@ -224,7 +263,42 @@ def _gnss(simulation: Simulation, positions: Floats, frame: GroundFrame) -> str:
 def _project(simulation: Simulation) -> str:
     """Write the project file. Every text stands in quotation marks, as JSON writes it, which YAML reads."""
     spec = simulation.spec
-    lines = ["photostrip: 1", f"name: {_flow(spec.name)}", "cameras:", *_camera(spec.camera), "strips:"]
+    lines = ["photostrip: 1", f"name: {_flow(spec.name)}"]
+    lines += _of_photos(simulation) if simulation.models is None else _of_models(simulation, simulation.models)
+    lines += ["control:"]
+    for number, frame in enumerate(simulation.frames):
+        lines += _listed(control_file(number), frame, spec.control.sigma, "  - ", "    ")
+    if spec.gnss is not None and spec.gnss.use:
+        lines += ["camera_positions:", *_listed("gnss.csv", simulation.frames[0], spec.gnss.sigma, "  ", "  ")]
+    if spec.refraction:
+        lines += ["processing:", "  refraction: true"]
+    return "\n".join(lines) + "\n"
+
+
+def _of_models(simulation: Simulation, measured: ModelPoints) -> list[str]:
+    """Lines of strips and models."""
+    lines = ["strips:"]
+    listed, first = simulation.spec.models is not None and not simulation.spec.models.centers, 0
+    for name, photos in simulation.strips:
+        lines += [f"  - id: {_flow(name)}", f"    photos: {_flow(photos)}"]
+        count = len(photos) - 1
+        if listed:  # without centres nothing else tells which photos a model shows
+            lines += [f"    models: {_flow(measured.model_ids[first : first + count])}"]
+        first += count
+    lines += ["models:", "  file: models.csv", "  unit: mm"]
+    if simulation.spec.models is not None and simulation.spec.models.hand != "right-handed":
+        lines += [f"  axes: {simulation.spec.models.hand}"]
+    center = measured.node >= len(measured.point_ids)
+    for key, rows in (("sigma", ~center), ("center_sigma", center)):
+        if rows.any():
+            lines += [f"  {key}: {_flow([float(f'{value:.6g}') for value in measured.sigma[rows][0].tolist()])}"]
+    return lines
+
+
+def _of_photos(simulation: Simulation) -> list[str]:
+    """Lines of cameras, strips and image coordinates."""
+    spec = simulation.spec
+    lines = ["cameras:", *_camera(spec.camera), "strips:"]
     for name, photos in simulation.strips:
         lines += [f"  - id: {_flow(name)}", f"    camera: {_flow(spec.camera.name)}", f"    photos: {_flow(photos)}"]
     unit = _unit(spec.camera, spec.image.unit)
@@ -240,14 +314,7 @@ def _project(simulation: Simulation) -> str:
     lines += [f"  sigma: {sigma:.6g}"]
     if simulation.fiducials is not None:
         lines += ["fiducial_measurements:", "  file: fiducials.csv"]
-    lines += ["control:"]
-    for number, frame in enumerate(simulation.frames):
-        lines += _listed(control_file(number), frame, spec.control.sigma, "  - ", "    ")
-    if spec.gnss is not None and spec.gnss.use:
-        lines += ["camera_positions:", *_listed("gnss.csv", simulation.frames[0], spec.gnss.sigma, "  ", "  ")]
-    if spec.refraction:
-        lines += ["processing:", "  refraction: true"]
-    return "\n".join(lines) + "\n"
+    return lines
 
 
 def _flow(value: object) -> str:
@@ -327,7 +394,8 @@ def truth_text(simulation: Simulation, output: GroundFrame) -> str:
     for name, rows in blocks.items():
         inner = ",\n".join(f"  {row}" for row in rows)
         lines.append(f" {_flow(name)}: [\n{inner}\n ]" if rows else f" {_flow(name)}: []")
-    lines.append(f' "spec": {_flow(asdict(simulation.spec))}')
+    spec = {key: value for key, value in asdict(simulation.spec).items() if key != "models" or value is not None}
+    lines.append(f' "spec": {_flow(spec)}')
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
@@ -380,6 +448,13 @@ def _error(error: InjectedError, output: GroundFrame) -> Document:
     return {"kind": "control", "point": error.point, "axis": axis, "size_m": round(error.size, 6)}
 
 
+def _measured_words(simulation: Simulation) -> str:
+    """Count what was measured."""
+    if simulation.models is None:
+        return counted(len(simulation.observations), "image point")
+    return f"{counted(len(simulation.models), 'point')} of {counted(len(simulation.models.model_ids), 'model')}"
+
+
 def summary(simulation: Simulation) -> str:
     """Say in one line what was simulated.
 
@@ -400,7 +475,7 @@ def summary(simulation: Simulation) -> str:
         counted(len(simulation.truth.photo_ids), "photo"),
         f"scale 1:{spec.scale:.0f}",
         counted(len(simulation.truth.points), "point"),
-        counted(len(simulation.observations), "image point"),
+        _measured_words(simulation),
         counted(len(control) - check, "control point"),
         counted(check, "check point"),
     ]

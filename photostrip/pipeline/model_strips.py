@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.geodesy.crs import GroundFrame
+    from photostrip.geodesy.local_frame import IntermediateFrame
     from photostrip.pipeline.inputs import MeasuredModels, ModelStrip, Settings
     from photostrip.points import ControlPoints, ModelPoints
     from photostrip.triangulation.models.link_screening import Screened
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     Numbers = NDArray[np.intp]
     Flags = NDArray[np.bool_]
 
+LEAST_SOLID = 4  # points that can tell a body from its mirror image
 WEAK = 12.0  # standard deviations of a coordinate by which a link moves the far end of its model
 CENTER = "center of photo "
 ADJUSTMENTS = ("polynomial", "similarity")
@@ -105,7 +107,11 @@ def adjust_models(
     try:
         intermediate, orientation, spread = to_ground(strip, formed, (here, rows), frames, spread_at)
     except InputError as error:
-        raise _of_the_other_hand(strip, error) from error
+        if formed.upright or not _upside_down(error):
+            raise _of_the_other_hand(strip, error) from error
+        formed = formed.overturned()  # without centres nothing has told which way is up
+        intermediate, orientation, spread = to_ground(strip, formed, (here, rows), frames, spread_at)
+    _refuse_other_hand(strip, formed.xyz[rows], (here, frames, intermediate), spread)
     wrong: tuple[control_screening.ControlRejection, ...] = ()
     extent = _extent(formed, orientation)
     judged = None
@@ -253,10 +259,36 @@ def _refuse_reflected(strip: ModelStrip, links: Screened) -> None:
     raise InputError(fault)
 
 
+def _upside_down(error: InputError) -> bool:
+    """Whether a strip fits its control only upside down."""
+    return any(fault.code == "left-handed-control" for fault in error.faults)
+
+
 def _of_the_other_hand(strip: ModelStrip, error: InputError) -> InputError:
     """Say of a strip that fits its control upside down that the models may be left-handed as well."""
-    if all(fault.code != "left-handed-control" for fault in error.faults):
-        return error
+    return _left_handed(strip) if _upside_down(error) else error
+
+
+def _refuse_other_hand(
+    strip: ModelStrip,
+    xyz: Floats,
+    given: tuple[ControlPoints, Sequence[GroundFrame], IntermediateFrame],
+    spread: tuple[float, float],
+) -> None:
+    """Refuse a strip that a mirror image of it would fit far better; flat ground does not tell."""
+    control, frames, intermediate = given
+    full = control.use.all(axis=1)
+    if full.sum() < LEAST_SOLID:
+        return
+    targets = absolute.Targets(control, frames, intermediate).of(xyz)[full]
+    own, other = linking.either_hand(xyz[full], targets)
+    expected = ((control.sigma[full] ** 2).sum(axis=1) + 2 * spread[0] ** 2 + spread[1] ** 2).sum()
+    if own > link_screening.CONSPICUOUS * expected and other < link_screening.REFLECTED * own:
+        raise _left_handed(strip)
+
+
+def _left_handed(strip: ModelStrip) -> InputError:
+    """Say that models and control are of different hands."""
     return InputError(
         Fault(
             f"strip {strip.id} fits its control only as a mirror image: the model coordinates or the control are "

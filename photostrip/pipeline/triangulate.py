@@ -90,18 +90,18 @@ def _triangulated(inputs: Inputs, settings: Settings, directory: Path | None) ->
     block: Block | None = None
     strips: tuple[StripResult, ...] = ()
     linked: tuple[LinkedStrip, ...] = ()
-    if settings.adjustment == "bundle":
+    if inputs.models is not None:
+        from photostrip.pipeline.model_strips import adjust_all  # strips of photos need none of it
+
+        linked = adjust_all(inputs.models, control, frames, settings)
+        points, ties = _join(linked, refined.observations, output)
+    elif settings.adjustment == "bundle":
         from photostrip.pipeline.bundle import adjust_block  # a strip needs none of its libraries
 
         tied = (frames, output, of_positions, of_orientations)
         block = adjust_block(inputs, settings, refined.observations, control, tied)
         refined = replace(refined, observations=block.observations)
         strips, points, ties = block.strips, block.points, Ties.none()
-    elif inputs.models is not None:
-        from photostrip.pipeline.model_strips import adjust_all  # strips of photos need none of it
-
-        linked = adjust_all(inputs.models, control, frames, settings)
-        points, ties = _join(linked, refined.observations, output)
     else:
         strips = tuple(adjust_strip(strip, refined.observations, control, frames, settings) for strip in inputs.strips)
         points, ties = _join(strips, refined.observations, output)

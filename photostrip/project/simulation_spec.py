@@ -47,6 +47,7 @@ if TYPE_CHECKING:
 
 SCHEMA_NUMBER = 1
 USUAL = simulate.Spec()
+USUAL_MODELS = simulate.Models()
 USUAL_FILM, USUAL_GNSS, USUAL_ERROR = simulate.Film(), simulate.Gnss(), simulate.GrossError("image")
 
 
@@ -215,6 +216,17 @@ class Gnss(Section):
     use: Flag = key("Name the file in the project", USUAL_GNSS.use)
 
 
+class Models(Section):
+    """Independent models measured on a plotter, in place of image coordinates."""
+
+    sigma_um: Three = key("Standard deviations of x, y, z of points at model scale", USUAL_MODELS.sigma_um, unit="um")
+    center_sigma_um: Three = key("The same of perspective centres", USUAL_MODELS.center_sigma_um, unit="um")
+    scale: Number | None = key("Mean scale number of the models; default: that of the photos", None)
+    axes: Words = key("`level`: nearly, turned about the vertical; `any`: lying in any way", USUAL_MODELS.axes)
+    hand: Words = key("`right-handed` or `left-handed`", USUAL_MODELS.hand)
+    centers: Flag = key("Measure the perspective centres", USUAL_MODELS.centers)
+
+
 class SimulationFile(Section):
     """A specification: strips of photos to be simulated. Every key has a default."""
 
@@ -233,6 +245,7 @@ class SimulationFile(Section):
     refraction: Flag = key("Bend the rays in the standard atmosphere", USUAL.refraction)
     gross_errors: list[GrossError] = key("Gross errors", [])
     gnss: Gnss | None = key("Measured positions of the cameras; default: none", None)
+    models: Models | None = key("Models measured on a plotter, in place of image coordinates; default: none", None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -338,6 +351,7 @@ def _spec(given: SimulationFile) -> simulate.Spec:
         refraction=given.refraction,
         gross_errors=tuple(simulate.GrossError(**_fields(each)) for each in given.gross_errors),
         gnss=None if given.gnss is None else simulate.Gnss(**_fields(given.gnss)),
+        models=None if given.models is None else simulate.Models(**_fields(given.models)),
     )
 
 

@@ -32,6 +32,7 @@ class Purpose(IntEnum):
     FIDUCIALS = 8
     GROSS = 9
     GNSS = 10
+    MODELS = 11
 
 
 class Draws:

@@ -21,6 +21,7 @@ from photostrip.simulate.gross import spoil_control, spoil_images
 from photostrip.simulate.ground import surface, world
 from photostrip.simulate.imaging import bent, project
 from photostrip.simulate.placement import place
+from photostrip.simulate.plotter import plotted
 from photostrip.simulate.validation import LARGEST_ARC, faults_of
 from photostrip.triangulation.refinement import distort
 
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
     from photostrip.camera import Camera
     from photostrip.geodesy.crs import GroundFrame
-    from photostrip.points import ControlPoints
+    from photostrip.points import ControlPoints, ModelPoints
     from photostrip.simulate.control import Roles
     from photostrip.simulate.film import Sheets
     from photostrip.simulate.flight import Photos
@@ -108,6 +109,8 @@ class Simulation:
         Measured perspective centres east, north, up in the first frame, in its units.
     truth : Truth
         What is true.
+    models : ModelPoints or None
+        Measured models, when they stand in place of image coordinates; the observations then only say what is seen.
     """
 
     spec: Spec
@@ -119,6 +122,7 @@ class Simulation:
     fiducials: PhotoPoints | None
     gnss: Array | None
     truth: Truth
+    models: ModelPoints | None = None
 
 
 def simulate(spec: Spec) -> Simulation:
@@ -164,6 +168,7 @@ def simulate(spec: Spec) -> Simulation:
     offset, control_errors = spoil_control(named, tuple(names[i] for i in chosen.control.tolist()), chosen.use)
     every = PointTable(names, placed.xyz, Frame.CARTESIAN)
     points = PointTable(observations.point_ids, placed.xyz[keep], Frame.CARTESIAN)
+    truth = _truth(output, points, photos, image, image_errors + control_errors)
     return Simulation(
         spec,
         photos.strips,
@@ -173,7 +178,8 @@ def simulate(spec: Spec) -> Simulation:
         tuple(frame.spec for frame in frames),
         _fiducials(spec, photos, film),
         _gnss(spec, photos, output),
-        _truth(output, points, photos, image, image_errors + control_errors),
+        truth,
+        plotted(spec, photos.strips, observations, truth),
     )
 
 

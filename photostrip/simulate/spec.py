@@ -32,6 +32,7 @@ PRESETS = {"film": FILM, "digital": DIGITAL}
 DEFAULT_SCALE = 10_000.0
 LAYOUTS = ("bands", "corners", "corners+centre", "random")
 USES = ("xyz", "xy", "z")
+MODEL_AXES, HANDS = ("level", "any"), ("right-handed", "left-handed")
 ERROR_KINDS = ("image", "control", "swap")
 
 Triple = tuple[float, float, float]
@@ -286,6 +287,33 @@ class Gnss:
 
 
 @dataclass(frozen=True)
+class Models:
+    """Independent models measured on a plotter, in place of image coordinates.
+
+    Parameters
+    ----------
+    sigma_um, center_sigma_um : tuple of float
+        Standard deviations of x, y, z of points and of perspective centres at model scale, micrometres; 0 without
+        errors.
+    scale : float or None
+        Mean scale number of the models; None: that of the photos.
+    axes : str
+        ``level``: the axes of a model are nearly level, turned about the vertical; ``any``: they lie in any way.
+    hand : str
+        ``right-handed`` or ``left-handed``.
+    centers : bool
+        Measure the perspective centres.
+    """
+
+    sigma_um: Triple = (10.0, 10.0, 15.0)
+    center_sigma_um: Triple = (20.0, 20.0, 20.0)
+    scale: float | None = None
+    axes: str = "level"
+    hand: str = "right-handed"
+    centers: bool = True
+
+
+@dataclass(frozen=True)
 class Spec:
     """A whole simulation; the defaults give a film strip of ten photos, 1:10 000, on the real Earth.
 
@@ -307,6 +335,8 @@ class Spec:
         Gross errors to put in.
     gnss : Gnss or None
         Measured positions of the perspective centres.
+    models : Models or None
+        Models measured on a plotter, in place of image coordinates.
     """
 
     name: str = "simulated"
@@ -322,6 +352,7 @@ class Spec:
     refraction: bool = False
     gross_errors: tuple[GrossError, ...] = ()
     gnss: Gnss | None = None
+    models: Models | None = None
 
     @property
     def format(self) -> tuple[float, float]:

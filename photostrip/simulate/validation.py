@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from photostrip.errors import Fault
-from photostrip.simulate.spec import ERROR_KINDS, LAYOUTS, USES
+from photostrip.simulate.spec import ERROR_KINDS, HANDS, LAYOUTS, MODEL_AXES, USES
 from photostrip.triangulation import lens
 
 if TYPE_CHECKING:
@@ -38,7 +38,15 @@ def faults_of(spec: Spec) -> list[Fault]:
     list of Fault
         Faults with the paths of their keys; empty when there is none.
     """
-    found = [*_camera(spec), *_flight(spec), *_terrain(spec), *_points(spec), *_control(spec), *_image(spec)]
+    found = [
+        *_camera(spec),
+        *_flight(spec),
+        *_terrain(spec),
+        *_points(spec),
+        *_control(spec),
+        *_image(spec),
+        *_models(spec),
+    ]
     return [*found, *_errors(spec), *(() if found else _together(spec))]
 
 
@@ -56,6 +64,24 @@ def _range(key: str, value: float, low: float, high: float, unit: str = "") -> I
 def _each(key: str, values: tuple[float, ...] | None, low: float, high: float, unit: str) -> Iterator[Fault]:
     for value in values or ():
         yield from _range(key, value, low, high, unit)
+
+
+def _models(spec: Spec) -> Iterator[Fault]:
+    """Refuse models that no plotter measures, and what belongs to images."""
+    models = spec.models
+    if models is None:
+        return
+    yield from _each("models.sigma_um", models.sigma_um, 0.0, 10_000.0, "um")
+    yield from _each("models.center_sigma_um", models.center_sigma_um, 0.0, 10_000.0, "um")
+    if models.scale is not None:
+        yield from _range("models.scale", models.scale, 1.0, 1e7)
+    for key, word, words in (("axes", models.axes, MODEL_AXES), ("hand", models.hand, HANDS)):
+        if word not in words:
+            yield _fault(f"models.{key}", f"`{word}` is not known", " or ".join(words))
+    of_images = {"film": spec.film is not None, "refraction": spec.refraction}
+    of_images["gross_errors"] = any(error.kind != "control" for error in spec.gross_errors)
+    for key in (key for key, asked in of_images.items() if asked):
+        yield _fault(key, "belongs to image coordinates, and models are measured", fix="remove it, or `models`")
 
 
 def _camera(spec: Spec) -> Iterator[Fault]:

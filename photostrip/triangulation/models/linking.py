@@ -207,6 +207,27 @@ def closed_form(shared: Common, models: StripModels, share: Floats) -> tuple[Sim
     return Similarities(scale, rotation, shift), np.maximum(squares, 0.0)
 
 
+def either_hand(source: Floats, target: Floats) -> tuple[float, float]:
+    """Sum of squares that the best similarity of two sets of points leaves, and the best reflected one.
+
+    Parameters
+    ----------
+    source, target : ndarray, shape (n, 3)
+        Corresponding points.
+
+    Returns
+    -------
+    tuple of float
+        In the unit of the target, squared.
+    """
+    a, b = target - target.mean(axis=0), source - source.mean(axis=0)
+    u, values, vt = np.linalg.svd(a.T @ b)
+    sign = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
+    along = np.array([(values * sign).sum(), (values * sign * [1, 1, -1]).sum()])
+    left = np.maximum((a**2).sum() - along**2 / (b**2).sum(), 0.0)
+    return float(left[0]), float(left[1])
+
+
 def extents(shared: Common, models: StripModels, used: Flags) -> Floats:
     """How far the common points of each link are from a line.
 

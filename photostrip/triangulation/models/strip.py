@@ -9,7 +9,7 @@ Source: [001] for the chain; seven parameters in place of one derived, see docs/
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -83,6 +83,17 @@ class FormedModels:
     def model_count(self) -> Numbers:
         """Number of models of each point, shape (q,)."""
         return self.node_models[: self._points]
+
+    @property
+    def upright(self) -> bool:
+        """Whether perspective centres tell which way is up."""
+        return bool((self.node >= self.models.points).any())
+
+    def overturned(self) -> FormedModels:
+        """Give the strip turned by 180 degrees about its X axis."""
+        turn = np.diag([1.0, -1.0, -1.0])
+        places = linking.Similarities(self.places.scale, turn @ self.places.rotation, self.places.shift @ turn)
+        return replace(self, places=places, model_xyz=self.model_xyz @ turn, node_xyz=self.node_xyz @ turn)
 
     @property
     def photo_count(self) -> Numbers:

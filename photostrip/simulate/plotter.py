@@ -1,0 +1,123 @@
+"""Independent models as a plotter gives them: each pair of photos in a system of its own.
+
+A model holds the points that both its photos show, and their perspective centres. Its coordinates are true ones,
+brought into the system of the instrument, with errors that do not depend on each other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.geometry.rotation import from_vector
+from photostrip.points import ModelPoints
+from photostrip.simulate.draws import Draws, Purpose
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.points import PhotoPoints
+    from photostrip.simulate.simulation import Truth
+    from photostrip.simulate.spec import Models, Spec
+
+    Array = NDArray[np.float64]
+    Rows = NDArray[np.intp]
+
+TILT = np.radians(2.0)  # scatter of the axes of a level model
+SCALES = 0.2  # scatter of the logarithm of the model scales
+REACH = 500.0  # mm from which the origin of a model is drawn
+STATED_UM = 1.0  # stated of model coordinates without errors
+
+
+def plotted(
+    spec: Spec, strips: tuple[tuple[str, tuple[str, ...]], ...], observations: PhotoPoints, truth: Truth
+) -> ModelPoints | None:
+    """Measure the models of all strips; None when none are asked for.
+
+    Parameters
+    ----------
+    spec : Spec
+        The specification.
+    strips : tuple of tuple (str, tuple of str)
+        Id and photos of each strip.
+    observations : PhotoPoints
+        They say which photo shows which point.
+    truth : Truth
+        True places of points and photos.
+
+    Returns
+    -------
+    ModelPoints
+        Models ``M1``, ``M2`` and so on, in flight order, strip by strip; points in the order of the observations, then
+        the two perspective centres.
+
+    Notes
+    -----
+    Random numbers (`Purpose.MODELS`): stream 0, for each model seven numbers, scale, rotation and origin; stream 1, for
+    each row x, y, z.
+    """
+    if spec.models is None:
+        return None
+    wanted, place = spec.models, {name: k for k, name in enumerate(truth.photo_ids)}
+    pairs = [(place[a], place[b]) for _, photos in strips for a, b in pairwise(photos)]
+    systems = Draws(spec.seed, Purpose.MODELS).normal(len(pairs), 7)
+    shows = [np.unique(observations.point[observations.photo == k]) for k in range(len(observations.photo_ids))]
+    number = {name: k for k, name in enumerate(observations.photo_ids)}
+    points = len(observations.point_ids)
+    model, node, xyz = [], [], []
+    for k, pair in enumerate(pairs):
+        left, right = (shows[number[truth.photo_ids[photo]]] for photo in pair)
+        seen = np.intersect1d(left, right)
+        rotation, scale = _system(wanted, spec.scale, truth, pair, systems[k])
+        centers = truth.centers[list(pair)]
+        ground = np.concatenate([truth.points.xyz[seen], centers]) - centers.mean(axis=0)
+        here = [*seen.tolist(), *(points + photo for photo in pair)]
+        model += [k] * len(here)
+        node += here
+        xyz.append(scale * ground @ rotation.T + REACH * systems[k, 4:])
+    rows = ModelPoints(
+        tuple(f"M{k + 1}" for k in range(len(pairs))),
+        observations.point_ids,
+        truth.photo_ids,
+        np.array(model, np.intp),
+        np.array(node, np.intp),
+        np.concatenate(xyz),
+        np.zeros((len(node), 3)),
+    )
+    return _measured(spec, wanted, rows)
+
+
+def _system(
+    wanted: Models, photo_scale: float, truth: Truth, pair: tuple[int, int], drawn: Array
+) -> tuple[Array, float]:
+    """Rotation from the ground to the axes of a model, and its scale in mm per metre."""
+    scale = 1000.0 / (wanted.scale or photo_scale) * float(np.exp(SCALES * drawn[0]))
+    if wanted.axes == "any":
+        return from_vector(np.pi / 2 * drawn[1:4]), scale
+    base = truth.centers[pair[1]] - truth.centers[pair[0]]
+    up = truth.rotations[list(pair)][:, :, 2].sum(axis=0)
+    x = base / np.linalg.norm(base)
+    z = up - (up @ x) * x
+    z = z / np.linalg.norm(z)
+    level = np.array([x, np.cross(z, x), z])
+    return from_vector(np.array([TILT * drawn[1], TILT * drawn[2], np.pi / 2 * drawn[3]])) @ level, scale
+
+
+def _measured(spec: Spec, wanted: Models, rows: ModelPoints) -> ModelPoints:
+    """Add the errors of measurement, the hand of the axes, and what is stated."""
+    center = rows.node >= len(rows.point_ids)
+    sigma = np.where(center[:, None], wanted.center_sigma_um, wanted.sigma_um) / 1000.0
+    noise = Draws(spec.seed, Purpose.MODELS, 1).normal(len(rows), 3)
+    hand = np.array([1.0, -1.0 if wanted.hand == "left-handed" else 1.0, 1.0])
+    stated = np.where(sigma > 0, sigma, STATED_UM / 1000.0)
+    keep = np.flatnonzero(~center) if not wanted.centers else np.arange(len(rows))
+    return replace(
+        rows,
+        model=rows.model[keep],
+        node=rows.node[keep],
+        xyz=((rows.xyz + sigma * noise) * hand)[keep],
+        sigma=stated[keep],
+    )

@@ -1,0 +1,304 @@
+"""Strips of independent models from their coordinates to the ground: truth, precision, what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from photostrip.errors import InputError
+from photostrip.formats.result.document import document_of
+from photostrip.formats.simulation import inputs_of
+from photostrip.geometry.similarity import Similarity
+from photostrip.pipeline import Inputs, LinkedStrip, MeasuredModels, ModelStrip, Settings, triangulate
+from photostrip.pipeline.model_strips import adjust_models, form_models
+from photostrip.report.document import sections_of
+from photostrip.simulate import Control, Flight, Ground, Models, Spec, simulate
+from photostrip.triangulation import polynomial
+from photostrip.triangulation.models import centers, errors, link_screening
+from tests.models import inputs, truth
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.points import ModelPoints
+    from photostrip.triangulation.models.strip import FormedModels
+
+    Floats = NDArray[np.float64]
+
+EXACT = 1e-6  # m
+FREE = (0.0, 0.0, 0.0)
+PLAIN = Settings(adjustment="similarity")
+
+
+def with_points(given: Inputs, points: ModelPoints) -> Inputs:
+    assert given.models is not None
+    return replace(given, models=replace(given.models, points=points))
+
+
+def linked(given: Inputs, settings: Settings = PLAIN) -> LinkedStrip:
+    (strip,) = triangulate(given, settings).linked
+    return strip
+
+
+@pytest.mark.parametrize("crs", ["EPSG:32633", "local", "geocentric"])
+@pytest.mark.parametrize("adjustment", ["similarity", "polynomial"])
+@pytest.mark.parametrize("hand", ["right-handed", "left-handed"])
+def test_models_without_errors_come_back_to_the_truth(crs: str, adjustment: str, hand: str) -> None:
+    axes = ("x", "y", "z") if crs == "geocentric" else ("east", "north", "up")
+    asked = Models(sigma_um=FREE, center_sigma_um=FREE, axes="any", hand=hand)
+    spec = Spec(ground=Ground(crs, axes), flight=Flight(photos=7, strips=2), control=Control(noise=FREE), models=asked)
+    simulated = simulate(spec)
+    result = triangulate(inputs_of(simulated), Settings(adjustment=adjustment))
+    assert np.abs(result.points.cartesian - simulated.truth.points.xyz[result.points.number]).max() < EXACT
+    place = {photo: row for row, photo in enumerate(simulated.truth.photo_ids)}
+    for strip in result.linked:
+        found = strip.intermediate.cartesian_from_intermediate(strip.centers)
+        assert np.abs(found - simulated.truth.centers[[place[photo] for photo in strip.strip.photos]]).max() < EXACT
+    assert len(result.ties.number) > 3
+    assert np.abs(result.ties.difference).max() < EXACT
+
+
+def test_a_bent_strip_takes_its_centers_along() -> None:
+    """A strip that is bent as a beam: the polynomial straightens the ground, and the centres above it with it."""
+    given = truth(8, 3, 2)
+    bend = 2e-7  # 1/m: 2.6 m of height at the ends, and 2.1 m along the strip at the height of the centres
+    middle = given.centers[:, 0].mean()
+
+    def bent(xyz: Floats) -> Floats:
+        x, up = xyz[:, 0] - middle, xyz[:, 2]
+        return np.column_stack([xyz[:, 0] - 2 * bend * x * up, xyz[:, 1], up + bend * x**2])
+
+    beam = replace(given, points=bent(given.points), centers=bent(given.centers))
+    points = beam.measured()
+    settings = Settings(polynomial=polynomial.Settings("2"))
+    plain, strip = (linked(inputs(given, points, bands=9), each) for each in (PLAIN, settings))
+    off = [np.abs(s.intermediate.cartesian_from_intermediate(s.centers) - given.centers).max() for s in (plain, strip)]
+    assert off[0] > 1.0
+    assert off[1] < 0.05
+
+
+def test_the_hand_of_the_axes_is_told() -> None:
+    given = truth(5, 3, 2, relief=3.0)
+    measured = given.measured()
+    mirrored = replace(measured, xyz=measured.xyz * [1.0, -1.0, 1.0])
+    with pytest.raises(InputError) as told:
+        triangulate(inputs(given, mirrored), PLAIN)
+    assert [fault.code for fault in told.value.faults] == ["left-handed-models"]
+    swapped = inputs(given, measured)
+    control = replace(swapped.control, enu=swapped.control.enu[:, [1, 0, 2]])
+    with pytest.raises(InputError) as told:
+        triangulate(replace(swapped, control=control), PLAIN)
+    assert [fault.code for fault in told.value.faults] == ["left-handed-models"]
+
+
+@pytest.mark.parametrize("adjustment", ["covariance", "bundle"])
+def test_adjustments_that_need_images_are_refused(adjustment: str) -> None:
+    given = truth(3)
+    with pytest.raises(InputError, match="image coordinates"):
+        triangulate(inputs(given, given.measured()), Settings(adjustment=adjustment))
+
+
+def test_centers_may_be_missing() -> None:
+    given = truth(5, 4, 2)
+    measured = given.measured()
+    points = len(given.points)
+    for gone in (given.node == points + 2, given.node >= points):
+        rows = np.flatnonzero(~gone)
+        some = replace(
+            measured, model=given.model[rows], node=given.node[rows], xyz=measured.xyz[rows], sigma=measured.sigma[rows]
+        )
+        result = triangulate(inputs(given, some), Settings())
+        assert np.abs(result.points.cartesian - given.points).max() < EXACT
+        document = document_of(result)
+        empty = [photo["id"] for photo in document["photos"] if photo["x"] is None]
+        assert empty == (["103"] if gone.sum() == 2 else list(measured.photo_ids))
+        assert {note["code"] for note in document["notes"]} >= {"link-without-center"}
+        assert len(sections_of(document)) > 10
+
+
+def test_a_wrong_control_point_is_named() -> None:
+    given = truth(8, 3, 4)
+    noise = np.random.default_rng(1).normal(size=(len(given.model), 3))
+    whole = inputs(given, given.measured(noise), bands=5)
+    enu = whole.control.enu.copy()
+    row = int(np.flatnonzero(~whole.control.check)[4])
+    enu[row, 2] += 5.0
+    strip = linked(replace(whole, control=replace(whole.control, enu=enu)))
+    assert [(each.id, each.axes) for each in strip.wrong_control] == [(whole.control.ids[row], ("up",))]
+    assert strip.wrong_control[0].size[2] == pytest.approx(5.0, abs=1.0)
+
+
+def test_a_model_alone_is_a_strip() -> None:
+    given = truth(1, 4, 4)
+    result = triangulate(inputs(given, given.measured(), bands=2), PLAIN)
+    assert np.abs(result.points.cartesian - given.points).max() < EXACT
+    assert len(sections_of(document_of(result))) > 10
+
+
+# ---------------------------------------------------------------------------------------------------- precision
+
+
+def nodes_of(measured: ModelPoints) -> FormedModels:
+    strip = ModelStrip("A", measured.photo_ids, measured.model_ids)
+    return form_models(strip, measured, Settings(links=link_screening.Settings("none")))
+
+
+def test_covariances_are_those_of_a_numerical_jacobian() -> None:
+    given = truth(4, 3, 6)
+    rng = np.random.default_rng(1)
+    measured = given.measured(rng.normal(size=(len(given.model), 3)))
+    formed = nodes_of(measured)
+    similarity = Similarity.from_points(formed.xyz, given.points[formed.point])
+    found = errors.differentiate(formed, similarity)
+    count = len(formed.node)
+
+    def place(xyz: Floats) -> Floats:
+        """Nodes in the system of the first model, brought to the ground as above."""
+        other = nodes_of(replace(measured, xyz=xyz))
+        first = other.places
+        own = (other.node_xyz - first.shift[0]) @ first.rotation[0] / first.scale[0]
+        moved: Floats = similarity(own @ formed.places.rotation[0].T)
+        return moved
+
+    step = 1e-3
+    columns = []
+    for k in range(measured.xyz.size):
+        up, down = measured.xyz.copy(), measured.xyz.copy()
+        up.flat[k] += step
+        down.flat[k] -= step
+        columns.append((place(up) - place(down)).ravel() / (2 * step))
+    jacobian = np.column_stack(columns)
+    full = (jacobian * measured.sigma.ravel() ** 2) @ jacobian.T
+    blocks = np.array([full[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] for k in range(count)])
+    assert np.abs(errors.covariances(found) - blocks).max() < 1e-3 * np.abs(blocks).max()
+    weights = rng.normal(size=(4, count, 3))
+    sums = errors.sums(found, np.arange(count), weights)
+    flat = weights.reshape(4, -1)
+    expected = flat @ full @ flat.T
+    assert np.abs(errors.covariance_of_sums(found, sums) - expected).max() < 1e-3 * np.abs(expected).max()
+    mixed = (full @ flat.T).reshape(count, 3, 4)
+    assert np.abs(errors.with_sums(found, sums) - mixed).max() < 1e-3 * np.abs(mixed).max()
+
+
+def test_centers_follow_the_polynomial_as_a_stiff_body() -> None:
+    """The rows are the polynomial at the ground, tilted by its slope, stretched by its scale: by differences."""
+    rng = np.random.default_rng(3)
+    terms = [("1", "X", "Y", "XY", "X^2", "X^3")] * 3
+    coefficients = rng.normal(size=(3, 6)) * 1e-3
+    place, above, step = np.array([[0.7, -0.4, 2.0]]), np.array([1.5]), 1e-6
+
+    def field(x: float, y: float) -> Floats:
+        return np.asarray(coefficients @ np.array([1.0, x, y, x * y, x**2, x**3]), float)
+
+    x, y = 0.7, -0.4
+    by_x = (field(x + step, y) - field(x - step, y)) / (2 * step)
+    by_y = (field(x, y + step) - field(x, y - step)) / (2 * step)
+    rows = centers.displacement_rows(place, above, terms)
+    found = sum(row[0] @ c for row, c in zip(rows, coefficients, strict=True))
+    tilt = 1.5 * np.array([-by_x[2], -by_y[2], (by_x[0] + by_y[1]) / 2])
+    np.testing.assert_allclose(found, field(x, y) + tilt, atol=1e-9)
+
+
+def straight(adjustment: str) -> Settings:
+    """Settings in which nothing is decided from the data."""
+    return Settings(adjustment, polynomial=polynomial.Settings("1"), links=link_screening.Settings("none"))
+
+
+def test_the_whole_chain_agrees_with_differences() -> None:
+    """Links, similarity, polynomial and centres: model coordinates and control moved one by one."""
+    given, rng = truth(2, 3, 1), np.random.default_rng(5)
+    measured = given.measured(rng.normal(size=(len(given.model), 3)))
+    first = inputs(given, measured, bands=3, sigma=0.05)
+    whole = triangulate(first, straight("polynomial"))
+    assert whole.precision is not None
+    assert whole.linked[0].polynomial is not None
+    assert whole.linked[0].polynomial.degree == 1
+    assert first.models is not None
+    (strip,) = first.models.strips
+    control = first.control.take(~first.control.check)
+
+    def places(xyz: Floats, enu: Floats) -> Floats:
+        moved = replace(measured, xyz=xyz), replace(control, enu=enu)
+        found = adjust_models(strip, *moved, whole.frames, straight("polynomial"))
+        above = found.intermediate.cartesian_from_intermediate(found.centers)
+        return np.concatenate([found.cartesian, above]).ravel()
+
+    columns = []
+    for k, step in [*((k, 1e-3) for k in range(measured.xyz.size)), *((-k - 1, 1e-2) for k in range(control.enu.size))]:
+        ends = []
+        for sign in (1, -1):
+            xyz, enu = measured.xyz.copy(), control.enu.copy()
+            if k >= 0:
+                xyz.flat[k] += sign * step
+            else:
+                enu.flat[-k - 1] += sign * step
+            ends.append(places(xyz, enu))
+        columns.append((ends[0] - ends[1]) / (2 * step))
+    variance = np.concatenate([measured.sigma.ravel() ** 2, control.sigma.ravel() ** 2])
+    jacobian = np.column_stack(columns)
+    full = (jacobian * variance) @ jacobian.T
+    blocks = np.array([full[k : k + 3, k : k + 3] for k in range(0, len(full), 3)])
+    stated = np.concatenate([whole.precision.points, whole.precision.photos[0][:, :3, :3]])
+    assert np.abs(stated - blocks).max() < 0.01 * np.abs(blocks).max()
+
+
+@pytest.mark.slow
+def test_standard_deviations_are_the_scatter_of_repetitions() -> None:
+    repetitions = 1000
+    given, rng = truth(3, 3, 1), np.random.default_rng(5)
+    first = inputs(given, given.measured(rng.normal(size=(len(given.model), 3))), bands=2)
+    whole = triangulate(first, straight("similarity"))
+    assert whole.precision is not None
+    assert whole.precision.basis == ("a-priori",)
+    assert first.models is not None
+    (strip,) = first.models.strips
+    points, places = [], []
+    control = first.control.take(~first.control.check)
+    for _ in range(repetitions):
+        measured = given.measured(rng.normal(size=(len(given.model), 3)))
+        enu = control.enu + rng.normal(0, 0.02, control.enu.shape)
+        found = adjust_models(strip, measured, replace(control, enu=enu), whole.frames, straight("similarity"))
+        points.append(found.cartesian)
+        places.append(found.intermediate.cartesian_from_intermediate(found.centers))
+    for samples, covariances in (
+        (np.array(points), whole.precision.points),
+        (np.array(places), whole.precision.photos[0][:, :3, :3]),
+    ):
+        ratio = samples.std(axis=0, ddof=1) / np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
+        assert ratio.mean() == pytest.approx(1.0, abs=0.05)
+        assert ratio.min() > 0.90  # the scatter of one standard deviation from 1000 repetitions is 2.2 %
+        assert ratio.max() < 1.10
+
+
+def test_check_points_lie_within_what_is_stated() -> None:
+    squares = coordinates = 0.0
+    for seed in range(12):
+        given = truth(8, 3, seed)
+        noise = np.random.default_rng(seed).normal(size=(len(given.model), 3))
+        result = triangulate(inputs(given, given.measured(noise)), PLAIN)
+        assert result.precision is not None
+        (test,) = result.precision.checks
+        assert test is not None
+        squares, coordinates = squares + test.squares, coordinates + test.coordinates
+    assert 0.85 < squares / coordinates < 1.15  # of 650 coordinates
+
+
+def test_precision_of_points_of_two_strips() -> None:
+    spec = Spec(flight=Flight(photos=6, strips=2), models=Models())
+    given = inputs_of(simulate(spec))
+    result = triangulate(given, Settings())
+    assert result.precision is not None
+    assert np.isfinite(result.precision.points).all()
+    assert given.models is not None
+    alone = []
+    for number, strip in enumerate(given.models.strips):
+        only = replace(given, models=MeasuredModels((strip,), given.models.points))
+        alone.append(triangulate(only, Settings()))
+        assert len(alone[number].linked) == 1
+    both = np.intersect1d(alone[0].points.number, alone[1].points.number)
+    assert len(both)
+    size = [np.trace(r.precision.points, axis1=1, axis2=2)[np.isin(r.points.number, both)] for r in (*alone, result)]  # type: ignore[union-attr]
+    assert (size[2] < 0.75 * np.maximum(size[0], size[1])).all()
