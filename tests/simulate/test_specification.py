@@ -11,7 +11,20 @@ from photostrip import simulate
 from photostrip.camera import Distortion
 from photostrip.errors import InputError
 from photostrip.project.simulation_spec import Specification, load_specification
-from photostrip.simulate import DIGITAL, Control, Film, Flight, Gnss, GrossError, Ground, Image, Points, Spec, Terrain
+from photostrip.simulate import (
+    DIGITAL,
+    Control,
+    Film,
+    Flight,
+    Gnss,
+    GrossError,
+    Ground,
+    Image,
+    Models,
+    Points,
+    Spec,
+    Terrain,
+)
 from tests.source_tree import ROOT
 
 EXAMPLES = sorted((ROOT / "configs/simulate").glob("*.yaml"))
@@ -59,6 +72,7 @@ gross_errors:
   - {kind: image, count: 2, size_um: 50, photo: "1003", point: 0012, axis: y}
   - {kind: control, size_m: 3}
 gnss: {sigma: [0.1, 0.1, 0.1], use: true}
+models: {sigma_um: [5, 6, 7], center_sigma_um: [8, 9, 10], scale: 8000, axes: any, hand: left-handed, centers: false}
 """
 
 
@@ -114,6 +128,7 @@ def test_every_key_reaches_its_field(tmp_path: Path) -> None:
         GrossError("control", size_m=3.0),
     )
     assert spec.gnss == Gnss((0.1, 0.1, 0.1), use=True)
+    assert spec.models == Models((5.0, 6.0, 7.0), (8.0, 9.0, 10.0), 8000.0, "any", "left-handed", centers=False)
     assert (spec.name, spec.seed, spec.refraction) == ("all of it", 7, True)
     changed = [part.name for part in fields(Spec) if getattr(spec, part.name) == getattr(Spec(), part.name)]
     assert changed == []
@@ -236,4 +251,4 @@ def test_the_examples_can_be_simulated(file: Path) -> None:
 
 def test_there_is_an_example_of_each_kind() -> None:
     names = [file.stem for file in EXAMPLES]
-    assert names == ["digital-corridor", "film-strip", "gross-errors", "zone-boundary"]
+    assert names == ["digital-corridor", "film-strip", "gross-errors", "independent-models", "zone-boundary"]
