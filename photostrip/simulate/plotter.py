@@ -6,7 +6,7 @@ brought into the system of the instrument, with errors that do not depend on eac
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.points import PhotoPoints
-    from photostrip.simulate.simulation import Truth
     from photostrip.simulate.spec import Models, Spec
 
     Array = NDArray[np.float64]
@@ -32,8 +31,30 @@ REACH = 500.0  # mm from which the origin of a model is drawn
 STATED_UM = 1.0  # stated of model coordinates without errors
 
 
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """True places of points and photos, in the Cartesian frame.
+
+    Parameters
+    ----------
+    photo_ids : tuple of str
+        Photos.
+    points : ndarray, shape (n, 3)
+        Points, in the order of the observations' points, metres.
+    centers : ndarray, shape (m, 3)
+        Perspective centres, metres.
+    rotations : ndarray, shape (m, 3, 3)
+        Image axes to the frame.
+    """
+
+    photo_ids: tuple[str, ...]
+    points: Array
+    centers: Array
+    rotations: Array
+
+
 def plotted(
-    spec: Spec, strips: tuple[tuple[str, tuple[str, ...]], ...], observations: PhotoPoints, truth: Truth
+    spec: Spec, strips: tuple[tuple[str, tuple[str, ...]], ...], observations: PhotoPoints, truth: Scene
 ) -> ModelPoints | None:
     """Measure the models of all strips; None when none are asked for.
 
@@ -45,7 +66,7 @@ def plotted(
         Id and photos of each strip.
     observations : PhotoPoints
         They say which photo shows which point.
-    truth : Truth
+    truth : Scene
         True places of points and photos.
 
     Returns
@@ -73,7 +94,7 @@ def plotted(
         seen = np.intersect1d(left, right)
         rotation, scale = _system(wanted, spec.scale, truth, pair, systems[k])
         centers = truth.centers[list(pair)]
-        ground = np.concatenate([truth.points.xyz[seen], centers]) - centers.mean(axis=0)
+        ground = np.concatenate([truth.points[seen], centers]) - centers.mean(axis=0)
         here = [*seen.tolist(), *(points + photo for photo in pair)]
         model += [k] * len(here)
         node += here
@@ -91,7 +112,7 @@ def plotted(
 
 
 def _system(
-    wanted: Models, photo_scale: float, truth: Truth, pair: tuple[int, int], drawn: Array
+    wanted: Models, photo_scale: float, truth: Scene, pair: tuple[int, int], drawn: Array
 ) -> tuple[Array, float]:
     """Rotation from the ground to the axes of a model, and its scale in mm per metre."""
     scale = 1000.0 / (wanted.scale or photo_scale) * float(np.exp(SCALES * drawn[0]))

@@ -21,7 +21,7 @@ from photostrip.simulate.gross import spoil_control, spoil_images
 from photostrip.simulate.ground import surface, world
 from photostrip.simulate.imaging import bent, project
 from photostrip.simulate.placement import place
-from photostrip.simulate.plotter import plotted
+from photostrip.simulate.plotter import Scene, plotted
 from photostrip.simulate.validation import LARGEST_ARC, faults_of
 from photostrip.triangulation.refinement import distort
 
@@ -179,7 +179,7 @@ def simulate(spec: Spec) -> Simulation:
         _fiducials(spec, photos, film),
         _gnss(spec, photos, output),
         truth,
-        plotted(spec, photos.strips, observations, truth),
+        plotted(spec, photos.strips, observations, Scene(photos.ids, points.xyz, photos.centers, truth.rotations)),
     )
 
 

@@ -1,0 +1,79 @@
+"""Projects of independent models on the command line: run, report, compare, batch, exit codes."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import pytest
+
+from photostrip.cli.main import main
+from photostrip.formats.simulation import project_files
+from photostrip.formats.writing import write_files
+from photostrip.simulate import Flight, Models, Spec, simulate
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    write_files(tmp_path / "plotted", project_files(simulate(Spec(flight=Flight(photos=6), models=Models()))))
+    return tmp_path / "plotted" / "project.yaml"
+
+
+def test_everything_that_is_written(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = project.parent.parent
+    assert main(["run", str(project), "-o", str(folder / "a"), "--html"]) == 0
+    assert main(["run", str(project), "-o", str(folder / "b"), "--quiet"]) == 0
+    assert (folder / "a" / "result.json").read_bytes() == (folder / "b" / "result.json").read_bytes()
+    printed = capsys.readouterr().out
+    document = json.loads((folder / "a" / "result.json").read_text(encoding="utf-8"))
+    assert [photo["rotation"] for photo in document["photos"]] == [None] * 6
+    assert [photo["angles"]["values"] for photo in document["photos"]] == [None] * 6
+    assert all(photo["x"] is not None and photo["sigma"]["x"] > 0 for photo in document["photos"])
+    assert [len(document[name]) for name in ("links", "models", "junctions", "residuals")] == [4, 5, 0, 0]
+    assert (document["summary"]["photo_scale"], document["cameras"]) == (None, [])
+    lines = (folder / "a" / "links.csv").read_text(encoding="utf-8").splitlines()
+    assert lines[0] == "before,after,point,vx_um,vy_um,vz_um,test,used"
+    assert len(lines) == 1 + sum(len(link["points"]) for link in document["link_residuals"])
+    assert (folder / "a" / "photos.csv").read_text(encoding="utf-8").splitlines()[1].count(",") == 24
+    assert "Links of the models" in printed
+    assert "at model scale" in printed
+    assert "Links of the models" in (folder / "a" / "report.html").read_text(encoding="utf-8")
+    for form in ("text", "md", "json"):
+        assert main(["report", str(folder / "a" / "result.json"), "--format", form]) == 0
+    assert main(["compare", str(folder / "a" / "result.json"), str(folder / "b" / "result.json")]) == 0
+
+
+def test_a_changed_coordinate_is_seen_by_compare(project: Path) -> None:
+    folder = project.parent.parent
+    assert main(["run", str(project), "-o", str(folder / "a"), "--quiet"]) == 0
+    again = ["run", str(project), "-o", str(folder / "b"), "--quiet", "--set", "models.sigma=[0.02, 0.02, 0.03]"]
+    assert main(again) == 0
+    assert main(["compare", str(folder / "b" / "result.json"), str(folder / "a" / "result.json")]) == 1
+
+
+def test_batch_and_check_take_models(project: Path) -> None:
+    assert main(["check", str(project)]) == 0
+    assert main(["batch", str(project), "-o", str(project.parent / "all"), "-j", "1"]) == 0
+    assert (project.parent / "all").is_dir()
+
+
+def test_exit_codes(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", str(project), "--quiet", "--set", "processing.adjustment=bundle"]) == 2
+    assert "needs image coordinates" in capsys.readouterr().err
+    table = project.parent / "models.csv"
+    lines = table.read_text(encoding="utf-8").splitlines()
+    exchanged = [f"{m},{p},{y},{x},{z}" for m, p, x, y, z in (line.split(",") for line in lines[1:])]
+    table.write_text("\n".join([lines[0], *exchanged]) + "\n", encoding="utf-8")
+    assert main(["run", str(project), "--quiet"]) == 2
+    assert "left-handed" in capsys.readouterr().err
+    assert main(["run", str(project), "--quiet", "--set", "models.axes=left-handed"]) == 0
+    shared = {line.split(",")[1] for line in lines if line.startswith("M2,")} & {
+        line.split(",")[1] for line in lines if line.startswith("M3,")
+    }
+    kept = [line for line in lines if not (line.startswith("M3,") and line.split(",")[1] in shared - {"1003"})]
+    table.write_text("\n".join(kept) + "\n", encoding="utf-8")
+    assert main(["run", str(project), "--quiet"]) == 3
+    assert "models M2 and M3 have 1 points in common" in capsys.readouterr().err
