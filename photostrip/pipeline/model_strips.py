@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     Flags = NDArray[np.bool_]
 
 LEAST_SOLID = 4  # points that can tell a body from its mirror image
+ODD_SCALE = 30.0  # ratio of the scale of a model to that of the others
+ANOTHER_UNIT, NOTHING = 100.0, 1e-5  # ratio of residuals to what is stated; below the second there are no errors at all
 WEAK = 12.0  # standard deviations of a coordinate by which a link moves the far end of its model
 CENTER = "center of photo "
 ADJUSTMENTS = ("polynomial", "similarity")
@@ -69,7 +71,47 @@ def adjust_all(
             expected=" or ".join(ADJUSTMENTS),
         )
         raise InputError(fault)
+    require_named(settings.links, models.points)
     return tuple(adjust_models(strip, models.points, control, frames, settings) for strip in models.strips)
+
+
+def require_named(settings: link_screening.Settings, measured: ModelPoints) -> None:
+    """Refuse entries of ``keep`` and ``drop`` that name nothing, and those in both.
+
+    Parameters
+    ----------
+    settings : link_screening.Settings
+        The lists.
+    measured : ModelPoints
+        Model coordinates.
+
+    Raises
+    ------
+    InputError
+        With a fault for each such entry.
+    """
+    if not (settings.keep or settings.drop):
+        return
+    nodes = [measured.name(node).removeprefix(CENTER) for node in measured.node.tolist()]
+    known = {f"{measured.model_ids[k]}/{name}" for k, name in zip(measured.model.tolist(), nodes, strict=True)}
+    faults = [
+        Fault(
+            f"`{entry}` names no measurement",
+            code="no-such-measurement",
+            key=f"processing.links.{key}",
+            expected="model/point or model/photo, as in the table of models",
+        )
+        for key, entries in (("keep", settings.keep), ("drop", settings.drop))
+        for entry in entries
+        if entry not in known
+    ]
+    faults += [
+        Fault(f"`{entry}` is to be kept and dropped", code="kept-and-dropped", key="processing.links.drop")
+        for entry in settings.drop
+        if entry in settings.keep
+    ]
+    if faults:
+        raise InputError(faults)
 
 
 def adjust_models(
@@ -338,7 +380,7 @@ def _centers(
 def _link_notes(strip: ModelStrip, measured: ModelPoints, formed: FormedModels) -> list[Note]:
     """Say which links are weak, or contradict themselves."""
     links, shared, models = formed.links, formed.links.shared, formed.models
-    notes = []
+    notes = _unit_notes(strip, formed)
     if links.factor > 1:
         text = (
             f"strip {strip.id}: the common points of the models differ {np.sqrt(links.factor):.1f} times as much as "
@@ -375,6 +417,29 @@ def _link_notes(strip: ModelStrip, measured: ModelPoints, formed: FormedModels) 
             "wrong, and it is used all the same; measure more common points"
         )
         notes.append(Note("contradicting-link", text, strip=strip.id, points=tuple(points)))
+    return notes
+
+
+def _unit_notes(strip: ModelStrip, formed: FormedModels) -> list[Note]:
+    """Say where a model, or the standard deviations, seem to stand in another unit than they should."""
+    notes = []
+    scale = formed.places.scale / np.median(formed.places.scale)
+    for number in np.flatnonzero(np.abs(np.log(scale)) > np.log(ODD_SCALE)).tolist():
+        times = f"{1 / scale[number]:.3g} times smaller" if scale[number] < 1 else f"{scale[number]:.3g} times larger"
+        text = (
+            f"strip {strip.id}: the scale number of model {strip.models[number]} is {times} than that of the others: "
+            "are its coordinates in another unit?"
+        )
+        notes.append(Note("odd-scale", text, strip=strip.id, photos=strip.photos[number : number + 2]))
+    solved = formed.links.solved
+    redundancy = int(solved.redundancy.sum())
+    ratio = float(np.sqrt(solved.squares.sum() / redundancy)) if redundancy else 1.0
+    if ratio > ANOTHER_UNIT or NOTHING < ratio < 1 / ANOTHER_UNIT:
+        text = (
+            f"strip {strip.id}: the models fit each other with {ratio:.3g} times the standard deviations that are "
+            "stated: are these in another unit?"
+        )
+        notes.append(Note("sigma-unit", text, strip=strip.id, key="models.sigma"))
     return notes
 
 

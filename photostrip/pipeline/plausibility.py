@@ -14,7 +14,7 @@ import numpy as np
 
 from photostrip.errors import PhotostripError
 from photostrip.geodesy.crs import area_of_use, tie_frames
-from photostrip.pipeline import distance_trial, evidence, given_cameras
+from photostrip.pipeline import distance_trial, evidence, given_cameras, model_evidence
 from photostrip.pipeline.base_directions import closer_look
 from photostrip.triangulation import interior
 from photostrip.triangulation.plausibility import (
@@ -37,11 +37,13 @@ if TYPE_CHECKING:
 
     from photostrip.geodesy.crs import GroundFrame
     from photostrip.notes import Finding
-    from photostrip.pipeline.inputs import Inputs, Settings, Strip
+    from photostrip.pipeline.inputs import Inputs, MeasuredModels, Settings, Strip
     from photostrip.pipeline.results import Result
     from photostrip.points import ControlPoints, PhotoPoints
     from photostrip.triangulation.plausibility.control_strip import Given, Seen
     from photostrip.triangulation.plausibility.flight_order import Arranged
+
+OF_CAMERAS = ("P105",)  # findings on principal distances: models have none
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,6 +150,8 @@ def of_inputs(inputs: Inputs, settings: Settings, directory: Path | None = None)
     tuple of Finding
         By code.
     """
+    if inputs.models is not None:
+        return accepted(_of_models(inputs, inputs.models, settings, directory), settings.accept)
     examined = replace(before(inputs, settings), light=True)
     strips = _as_they_lie(inputs, examined)
     told = [*examined.findings, *_of_ids(strips, examined)]
@@ -173,7 +177,7 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     """
     inputs, settings = result.inputs, result.settings
     if inputs.models is not None:
-        return ()
+        return accepted(_of_models(inputs, inputs.models, settings, directory), settings.accept)
     examined = replace(before(inputs, settings), observations=result.refined.observations)
     stages = result.strips if result.bundle is None else result.bundle.start.strips  # as they were formed
     formed = [evidence.Formed(each.strip, each.orientation, each.formed) for each in stages]
@@ -203,9 +207,9 @@ def of_failure(inputs: Inputs, settings: Settings, directory: Path | None = None
     tuple of Finding
         By code; empty when the evidence cannot be put together either.
     """
-    if inputs.models is not None:
-        return ()
     try:
+        if inputs.models is not None:
+            return accepted(_of_models(inputs, inputs.models, settings, directory), settings.accept)
         examined = before(inputs, settings)
         strips = _as_they_lie(inputs, examined)
         points = evidence.ideal(examined.observations, strips, settings)
@@ -329,6 +333,38 @@ def _by_heights(
     rows, seen = evidence.sighted(formed, examined.observations, control, examined.steps)
     given = given_points.level(control.take(rows), frames)
     return None if given is None else control_heights.stretched(given, seen)
+
+
+def _of_models(inputs: Inputs, models: MeasuredModels, settings: Settings, directory: Path | None) -> list[Finding]:
+    """Examine strips of models: given points by themselves and in each strip, perspective centres."""
+    control = inputs.control
+    try:
+        frames, _ = tie_frames(inputs.frames, inputs.output, directory=directory)
+    except PhotostripError:
+        return []  # what is wrong with the frames is told elsewhere
+    told: list[Finding] = []
+    sure: list[bool | None] = []
+    nowhere = False
+    for number, frame in enumerate(frames):
+        rows = (control.frame == number) & control.use[:, 0]
+        area = area_of_use(inputs.frames[number], directory=directory)
+        place = control_place.examine(frame, area, control.enu[rows], number)
+        told += place.findings
+        sure.append(place.sure)
+        nowhere |= not place.inside
+    axes_are_right = sure[0] if len(set(sure)) == 1 else None
+    for sight in model_evidence.sights(models, control, settings):
+        here = control.take(sight.rows)
+        told += _read(here, sight.seen, frames, as_written=nowhere, axes_are_right=axes_are_right)
+        told += flight.examine(sight.centers, sight.depth, model_evidence.UP, sight.photos, sight.strip.id)
+        counts = here.use[:, 0] & ~here.check
+        given = given_points.level(here.take(counts), frames)
+        if given is not None:
+            plan = given.level[:, :2]
+            breadth = sight.breadth * float(np.linalg.norm(np.ptp(plan, axis=0)))
+            photos, ids = sight.strip.photos, here.take(counts).ids
+            told += layout.examine(sight.place[counts], plan, breadth, photos, sight.strip.id, ids)
+    return [finding for finding in told if finding.code not in OF_CAMERAS]
 
 
 def _held(strip: Strip, examined: Examined, control: ControlPoints, frames: Sequence[GroundFrame]) -> list[Finding]:

@@ -15,7 +15,7 @@ from photostrip.geometry.similarity import Similarity
 from photostrip.pipeline import Inputs, LinkedStrip, MeasuredModels, ModelStrip, Settings, triangulate
 from photostrip.pipeline.model_strips import adjust_models, form_models
 from photostrip.report.document import sections_of
-from photostrip.simulate import Control, Flight, Ground, Models, Spec, simulate
+from photostrip.simulate import Control, Flight, Ground, Models, Points, Spec, simulate
 from photostrip.triangulation import polynomial
 from photostrip.triangulation.models import centers, errors, link_screening
 from tests.models import inputs, truth
@@ -129,6 +129,18 @@ def test_a_wrong_control_point_is_named() -> None:
     strip = linked(replace(whole, control=replace(whole.control, enu=enu)))
     assert [(each.id, each.axes) for each in strip.wrong_control] == [(whole.control.ids[row], ("up",))]
     assert strip.wrong_control[0].size[2] == pytest.approx(5.0, abs=1.0)
+
+
+def test_entries_that_name_nothing_are_refused() -> None:
+    given = truth(3)
+    lists = link_screening.Settings(keep=("M1/P001", "M9/P001"), drop=("M1/P001", "M2/104", "M2/102"))
+    with pytest.raises(InputError) as told:
+        triangulate(inputs(given, given.measured()), Settings(links=lists))
+    assert [(fault.key, fault.message.split("`")[1]) for fault in told.value.faults] == [
+        ("processing.links.keep", "M9/P001"),
+        ("processing.links.drop", "M2/104"),
+        ("processing.links.drop", "M1/P001"),
+    ]
 
 
 def test_a_model_alone_is_a_strip() -> None:
@@ -302,3 +314,72 @@ def test_precision_of_points_of_two_strips() -> None:
     assert len(both)
     size = [np.trace(r.precision.points, axis1=1, axis2=2)[np.isin(r.points.number, both)] for r in (*alone, result)]  # type: ignore[union-attr]
     assert (size[2] < 0.75 * np.maximum(size[0], size[1])).all()
+
+
+# ------------------------------------------------------------------------------------------------- mistakes
+
+
+def mistaken(kind: str) -> Inputs:
+    """A strip with one mistake in it."""
+    given = inputs_of(
+        simulate(Spec(seed=4, flight=Flight(photos=10), points=Points(extra_per_model=4), models=Models()))
+    )
+    assert given.models is not None
+    points, control = given.models.points, given.control
+    xyz, enu, sigma = points.xyz.copy(), control.enu.copy(), points.sigma
+    inside = points.node < len(points.point_ids)
+    twice = [k for k in np.flatnonzero((points.model == 3) & inside) if (points.node == points.node[k]).sum() == 2]
+    if kind == "a model in metres":
+        xyz[points.model == 2] /= 1000
+    elif kind == "one id for two points":
+        xyz[twice[0]] = xyz[twice[-1]] + [3.0, -2.0, 0.1]
+    elif kind == "sigma in mm":
+        sigma = sigma * 1000
+    elif kind == "sigma in m":
+        sigma = sigma / 1000
+    elif kind == "centers below":
+        for model in range(len(points.model_ids)):
+            rows = points.model == model
+            ground = xyz[rows & inside, 2].mean()
+            xyz[rows & ~inside, 2] = 2 * ground - xyz[rows & ~inside, 2]
+    elif kind == "control swapped":
+        enu = enu[:, [1, 0, 2]]
+    elif kind == "a digit":
+        enu[np.flatnonzero(~control.check)[3], 0] += 1000.0
+    elif kind == "heights in feet":
+        enu[:, 2] /= 0.3048
+    whole = replace(given, control=replace(control, enu=enu))
+    return with_points(whole, replace(points, xyz=xyz, sigma=sigma))
+
+
+@pytest.mark.parametrize(
+    ("kind", "notes", "findings"),
+    [
+        ("nothing", set(), set()),
+        ("a model in metres", {"odd-scale"}, set()),
+        ("sigma in mm", {"sigma-unit"}, set()),
+        ("sigma in m", {"sigma-unit", "sigma-contradicted"}, set()),
+        ("a digit", {"control-rejected"}, {"P406"}),
+        ("heights in feet", set(), {"P405"}),
+    ],
+)
+def test_mistakes_that_a_result_tells(kind: str, notes: set[str], findings: set[str]) -> None:
+    result = triangulate(mistaken(kind), Settings(precision=False))
+    assert {note.code for note in result.notes} - {"weak-link"} == notes
+    assert {finding.code for finding in result.findings} == findings
+
+
+@pytest.mark.parametrize(("kind", "finding"), [("control swapped", "P401"), ("centers below", "P401")])
+def test_mistakes_that_stop_a_run(kind: str, finding: str) -> None:
+    with pytest.raises(InputError) as told:
+        triangulate(mistaken(kind), Settings(precision=False))
+    assert [fault.code for fault in told.value.faults] == ["left-handed-models"]
+    assert finding in {each.code for each in told.value.findings}
+
+
+def test_one_id_for_two_points_is_told() -> None:
+    result = triangulate(mistaken("one id for two points"), Settings(precision=False))
+    (row,) = [row for row in document_of(result)["rejected"] if row["stage"] == "link"]
+    assert "as where one id stands for two points" in row["reason"]
+    assert row["models"] in (["M3", "M4"], ["M4", "M5"])
+    assert row["point"] in result.not_determined

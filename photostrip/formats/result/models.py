@@ -19,7 +19,7 @@ from photostrip.formats.result.numbers import (
     rounded,
     significant,
 )
-from photostrip.formats.result.pairs import PPM
+from photostrip.formats.result.pairs import PPM, from_control
 from photostrip.formats.result.precision import UPPER
 from photostrip.pipeline.model_strips import far_ends
 from photostrip.triangulation.models.link_screening import detectable
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 DIRECTIONS = ("along", "across", "up")
 AXES = ("x", "y", "z")
 MICROMETRES = 1000.0  # in a millimetre
+ANOTHER_POINT = 0.05  # of the extent of a model: an error as large is one of identity
 
 
 def _directed(values: Plain, names: Sequence[str] = DIRECTIONS) -> Document:
@@ -275,7 +276,7 @@ def residuals_of(result: Result, rank: Numbers) -> list[Document]:
 
 
 def rejected_of(result: Result) -> list[Document]:
-    """Give what was taken out of links, as in the list ``rejected``."""
+    """Give what was taken out of links and control, as in the list ``rejected``."""
     found = []
     for strip in result.linked:
         shared, formed, names = strip.formed.links.shared, strip.formed, strip.strip.models
@@ -283,6 +284,7 @@ def rejected_of(result: Result) -> list[Document]:
             link = each.link
             before, after = shared.before[each.row], shared.after[each.row]
             size = float(np.linalg.norm(each.error)) * MICROMETRES
+            guilty = _guilty((names[link], names[link + 1]), (formed.used[before], formed.used[after]))
             parts = ", ".join(
                 f"{axis} {value * MICROMETRES:+.0f}" for axis, value in zip(AXES, each.error, strict=True)
             )
@@ -302,12 +304,21 @@ def rejected_of(result: Result) -> list[Document]:
                     "size": rounded(size, 2),
                     "size_unit": "um",
                     "readmitted": False,
-                    "reason": f"models {names[link]} and {names[link + 1]} contradict each other by {parts} µm; "
-                    f"{_guilty((names[link], names[link + 1]), (formed.used[before], formed.used[after]))}",
+                    "reason": f"models {names[link]} and {names[link + 1]} contradict each other by {parts} µm"
+                    f"{_other_point(strip, int(before), size / MICROMETRES)}; {guilty}",
                     "models": [names[link], names[link + 1]],
                 }
             )
+        found += [from_control(strip, wrong) for wrong in strip.wrong_control]
     return found
+
+
+def _other_point(strip: LinkedStrip, row: int, size: float) -> str:
+    """Say that a difference is of the size of the model, as where one id stands for two points."""
+    models = strip.formed.models
+    xyz = models.xyz[models.model == models.model[row]]
+    extent = float(np.linalg.norm(xyz - xyz.mean(axis=0), axis=1).max())
+    return ", as where one id stands for two points" if size > ANOTHER_POINT * extent else ""
 
 
 def _guilty(names: tuple[str, str], used: tuple[bool, bool]) -> str:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.pipeline import Result, StripResult
+    from photostrip.pipeline import LinkedStrip, Result, StripResult
     from photostrip.points import PhotoPoints
     from photostrip.triangulation.control_screening import ControlRejection
     from photostrip.triangulation.screening import Rejection
@@ -245,7 +245,7 @@ def rejected_of(result: Result) -> list[Document]:
         found += [_from_pair(strip, rejection, result.refined.observations) for rejection in gone]
         found += [_from_joint(strip, int(row), ids) for row in np.flatnonzero(~strip.formed.junctions.used)]
         found += _from_rays(strip, result.refined.observations)
-        found += [_from_control(strip, wrong) for wrong in strip.wrong_control]
+        found += [from_control(strip, wrong) for wrong in strip.wrong_control]
     return found
 
 
@@ -369,7 +369,8 @@ def rejected_by_strip(strip: StripResult) -> Flags:
     return news
 
 
-def _from_control(strip: StripResult, wrong: ControlRejection) -> Document:
+def from_control(strip: StripResult | LinkedStrip, wrong: ControlRejection) -> Document:
+    """Give an entry of ``rejected``: wrong control."""
     sizes = dict(zip(AXES, wrong.size, strict=True))
     reason = "; ".join(f"{axis} by about {sizes[axis]:+.2f} m" for axis in wrong.axes)
     if wrong.exchanged_with:

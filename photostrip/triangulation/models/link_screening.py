@@ -52,7 +52,7 @@ class Settings:
     """
 
     screening: str = "auto"
-    alpha: float = 0.01
+    alpha: float = 0.001
     keep: tuple[str, ...] = ()
     drop: tuple[str, ...] = ()
 
