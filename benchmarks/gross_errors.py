@@ -63,9 +63,11 @@ class Run:
         Errors of the new points in the intermediate frame, metres.
     own : ndarray of bool, shape (n,)
         Points with a wrong measurement of their own.
-    good, lost, alone, other_lost, wrong, found : int
-        Good image points, those of them that took no part in anything, good ones that are alone on their point, lost
-        ones whose point has no wrong ray, wrong image points, those of them that place no point.
+    unused : frozenset of tuple
+        Photo and point of the good image points that took no part in anything.
+    good, alone, other_lost, wrong, found : int
+        Good image points, those of them that are alone on their point, unused ones whose point has no wrong ray, wrong
+        image points, those of them that place no point.
     control_found : bool or None
         Whether the wrong control coordinate was named; None without one, or when its point has no place in the strip.
     alarms : int
@@ -76,8 +78,8 @@ class Run:
 
     errors: Floats
     own: Flags
+    unused: frozenset[tuple[str, str]]
     good: int
-    lost: int
     alone: int
     other_lost: int
     wrong: int
@@ -110,7 +112,8 @@ def adjusted(simulation: Simulation, settings: Settings, wrong_rows: set[tuple[s
     spoiled = {name for _, name in wrong_rows}
     photo = [observations.photo_ids[number] for number in observations.photo]
     point = [observations.point_ids[number] for number in observations.point]
-    bad = np.array([key in injected for key in zip(photo, point, strict=True)])
+    keys = list(zip(photo, point, strict=True))
+    bad = np.array([key in injected for key in keys])
     used, placing = np.zeros(len(bad), bool), np.zeros(len(bad), bool)
     for strip in result.strips:
         oriented = strip.orientation
@@ -128,10 +131,11 @@ def adjusted(simulation: Simulation, settings: Settings, wrong_rows: set[tuple[s
     other = lost & ~np.isin(point, list(spoiled))
     rays = np.bincount(observations.point[~bad], minlength=len(observations.point_ids))
     alone = ~bad & (rays[observations.point] == 1)
-    flags = (~bad, lost, alone, other, bad, bad & ~placing)
-    good, gone, single, spared, wrong, found = (int(each.sum()) for each in flags)
+    flags = (~bad, alone, other, bad, bad & ~placing)
+    good, single, spared, wrong, found = (int(each.sum()) for each in flags)
     enough = supported(result, wrong_rows)
-    return Run(local, own, good, gone, single, spared, wrong, found, named, alarms, enough)
+    unused = frozenset(keys[row] for row in np.flatnonzero(lost).tolist())
+    return Run(local, own, unused, good, single, spared, wrong, found, named, alarms, enough)
 
 
 def wrong_measurements(simulation: Simulation) -> set[tuple[str, str]]:
@@ -172,7 +176,7 @@ class Table:
     @classmethod
     def empty(cls) -> Table:
         """Begin with nothing."""
-        names = ["good", "lost", "alone", "other lost", "wrong", "found", "clean good", "clean lost"]
+        names = ["good", "lost", "searched away", "alone", "other lost", "wrong", "found", "clean good", "clean lost"]
         names += ["control", "control found", "alarms", "clean alarms"]
         return cls(
             {kind: np.zeros(3) for kind in KINDS},
@@ -188,13 +192,14 @@ class Table:
         self.squares[kind] += (sound**2).sum(axis=0)
         self.points[kind] += len(sound)
         if kind == KINDS[1]:
-            for name in ("good", "lost", "alone", "other_lost", "wrong", "found", "alarms"):
+            self.counts["lost"] += len(run.unused)
+            for name in ("good", "alone", "other_lost", "wrong", "found", "alarms"):
                 self.counts[name.replace("_", " ")] += getattr(run, name)
             self.counts["control"] += run.control_found is not None
             self.counts["control found"] += bool(run.control_found)
         elif kind == KINDS[0]:
             self.counts["clean good"] += run.good
-            self.counts["clean lost"] += run.lost
+            self.counts["clean lost"] += len(run.unused)
             self.counts["clean alarms"] += run.alarms > 0
         return float(np.sqrt((sound**2).sum(axis=1).mean()))
 
@@ -212,9 +217,12 @@ class Table:
         c = self.counts
         print(f"\nratio of a strip's rms: median {middle:.3f}, 95 % below {most:.3f}, largest {max(self.ratios):.3f}")
         print(f"wrong image points that place no point: {c['found']} of {c['wrong']}")
-        percent = {name: 100 * c[name] / c["good"] for name in ("lost", "alone", "other lost")}
-        print(f"good image points lost: {percent['lost']:.2f} %; alone on their point: {percent['alone']:.2f} %")
-        print(f"    of points without a wrong ray: {percent['other lost']:.3f} %")
+        percent = {name: 100 * c[name] / c["good"] for name in ("lost", "searched away", "alone", "other lost")}
+        print(f"good image points that took no part: {percent['lost']:.2f} %, that is")
+        print(f"    {percent['searched away']:.2f} % that would have taken part if the errors were known")
+        print(f"    {percent['lost'] - percent['searched away']:.2f} % that knowledge cannot use either")
+        print(f"good ones alone on their point: {percent['alone']:.2f} %; lost", end=" ")
+        print(f"of points without a wrong ray: {percent['other lost']:.3f} %")
         print(f"the same in strips without errors: {c['clean lost']} of {c['clean good']}")
         print(f"wrong control coordinates named: {c['control found']} of {c['control']}; others named: {c['alarms']}")
         print(f"strips without errors of which control is named: {c['clean alarms']}\n", flush=True)
@@ -256,6 +264,8 @@ def main(strips: int) -> None:
             rms = {kind: table.add(kind, run) for kind, run in runs.items()}
             for kind in failed:
                 table.failed[kind] += 1
+            if KINDS[1] in runs and KINDS[3] in runs:
+                table.counts["searched away"] += len(runs[KINDS[1]].unused - runs[KINDS[3]].unused)
             if KINDS[1] in rms:
                 table.ratios.append(rms[KINDS[1]] / rms[KINDS[0]])
         if KINDS[1] in rms and table.ratios[-1] > CONSPICUOUS:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 Document = dict[str, Any]
 
 AXES = ("x", "y", "z")
+LETTERS = {"east": "x", "north": "y", "up": "z"}  # of `use`
 IDS_NAMED = 12
 WORST_POINTS = 8
 
@@ -29,6 +30,11 @@ def control_section(document: Document, *, everything: bool) -> Section:
         "Adjusted minus given. The adjustment has seen these points: what is left here is smaller than the errors "
         "between them."
     )
+    if any(row.get("rejected", "") for row in rows):
+        text += (
+            " Coordinates with a minus in the column `use` were found wrong and took no part; the last lines leave "
+            "them out."
+        )
     parts: list[Part] = [Words(text), _given(document, rows, "control", everything=everything), *_unused(document)]
     return Section("Control points", tuple(parts))
 
@@ -59,7 +65,7 @@ def _given(document: Document, given: Sequence[Document], role: str, *, everythi
     rows = tuple(
         (
             row["id"],
-            row["use"],
+            _used(row),
             *(signed(row[key]) for key in ("dx", "dy", "dz")),
             micrometres(row["plan_um"]),
             micrometres(row["height_um"]),
@@ -86,7 +92,7 @@ def _given(document: Document, given: Sequence[Document], role: str, *, everythi
         (
             "largest",
             "",
-            *(_largest(given, key) for key in ("dx", "dy", "dz")),
+            *(_largest(given, key, axis) for key, axis in zip(("dx", "dy", "dz"), axes, strict=True)),
             micrometres(plan["max_um"]),
             micrometres(height["max_um"]),
             _most(given),
@@ -99,12 +105,23 @@ def _given(document: Document, given: Sequence[Document], role: str, *, everythi
     return Table(columns, rows, foot, f"{note}; {below}" if note else below)
 
 
-def _largest(rows: Sequence[Document], key: str) -> str:
+def _used(row: Document) -> str:
+    """Coordinates that count, then with a minus those that were found wrong."""
+    if not row.get("rejected", ""):
+        return str(row["use"])
+    kept = "".join(letter for letter in row["use"] if letter not in row.get("rejected", ""))
+    return f"{kept} -{row['rejected']}".strip()
+
+
+def _largest(rows: Sequence[Document], key: str, axis: str) -> str:
+    letter = LETTERS.get(axis, axis)
+    rows = [row for row in rows if letter not in row.get("rejected", "")]
     return signed(max((row[key] for row in rows if row[key] is not None), key=abs, default=None))
 
 
 def _most(rows: Sequence[Document]) -> str:
-    return ratio(max((row["normalised"] for row in rows if row["normalised"] is not None), default=None))
+    known = (row["normalised"] for row in rows if row["normalised"] is not None and not row.get("rejected", ""))
+    return ratio(max(known, default=None))
 
 
 def _unused(document: Document) -> list[Part]:

@@ -20,9 +20,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.errors import PhotostripError
+from photostrip.errors import GeometryError, PhotostripError
 from photostrip.statistics import t_quantile
-from photostrip.triangulation import absolute, control_tests, polynomial, polynomial_terms
+from photostrip.triangulation import absolute, control_subsets, control_tests, polynomial, polynomial_terms
 from photostrip.triangulation.absolute import Targets
 
 if TYPE_CHECKING:
@@ -40,12 +40,13 @@ if TYPE_CHECKING:
 ALPHA = 0.01  # of rejecting anything in a strip without wrong control
 LEAST_REDUNDANCY = 3  # of plan and of height, for a test
 SEEN = 0.05  # redundancy number below which a coordinate cannot be judged
-LARGEST_SHARE = 0.34  # of the control coordinates of plan or height that may be rejected
+LARGEST_SHARE = 0.45  # of the control coordinates of plan or height that may be rejected
 CONSPICUOUS = 6.0  # largest over median misclosure that asks for a robust start
 GROSS = 12.0  # standard deviations from the median, in the robust start
 ROBUST_STEPS = 20
 SETTLED = 0.1  # of the median misclosure: the robust start is to find large errors, not digits
 NORMAL = 1.4826
+BETTER = 0.5  # ratio of standard deviations of unit weight for which another half of the control is believed
 EXCHANGED = 0.2  # misclosures left by an exchange, over those before
 AXES = ("east", "north", "up")
 PLAN = slice(0, 2)
@@ -151,7 +152,7 @@ def screen(control: ControlPoints, setting: Setting) -> tuple[ControlPoints, tup
         What was rejected, in order of the control.
     """
     try:
-        start = _without(control, _gross(control, setting))
+        start = _without(control, _far(control, setting))
         setting, kept = _snooped(start, setting)
         if np.array_equal(kept.use, control.use):
             return control, ()
@@ -164,6 +165,32 @@ def screen(control: ControlPoints, setting: Setting) -> tuple[ControlPoints, tup
 
 def _without(control: ControlPoints, out: Flags) -> ControlPoints:
     return replace(control, use=control.use & ~out)
+
+
+def _far(control: ControlPoints, setting: Setting) -> Flags:
+    """Find coordinates with large errors.
+
+    Where the covariance of the strip does not explain what the start by absolute misclosures leaves, the better half of
+    the control is looked for; it is believed when it fits much better.
+    """
+    out = _gross(control, setting)
+    fit = _fit(control, out, setting)
+    if not fit > control_tests.BENT:
+        return out
+    targets = Targets(control, setting.frames, setting.intermediate)
+    try:
+        first = absolute.orient(setting.strip, targets, (control.use & ~out).astype(float))
+        weight = absolute.weights(targets.turned(first.similarity(setting.strip)), setting.precision)
+        other, _ = control_subsets.far(setting.strip, targets, weight, first.similarity)
+    except GeometryError:
+        return out
+    return other if _enough(control, other) and _fit(control, other, setting) < BETTER * fit else out
+
+
+def _fit(control: ControlPoints, out: Flags, setting: Setting) -> float:
+    """Give the standard deviation of unit weight of the rest by the covariance of the strip; 0 when it is not known."""
+    found = setting.judged(control, _without(control, out))
+    return 0.0 if found is None or not np.isfinite(found.sigma0) else found.sigma0
 
 
 def _gross(control: ControlPoints, setting: Setting) -> Flags:

@@ -161,13 +161,26 @@ def _told(start: Decision, doubted: _Doubted) -> Decision:
         found = np.asarray(possible.any(axis=1), bool)
         for place in np.flatnonzero(found).tolist():
             point = doubted.number[place]
-            best = int(left[place].argmin())
-            # where it cannot be told, each ray gets the error that it would have
-            chosen = [best] if told[place] else np.flatnonzero(possible[place]).tolist() if out == 1 else []
-            for each in chosen:
-                size[point, list(sets[each])] = tried[each][1][place]
-            weight[point, list(sets[best]) if told[place] else slice(None)] = 0.0
+            if told[place]:
+                best = int(left[place].argmin())
+                size[point, list(sets[best])] = tried[best][1][place]
+                weight[point, list(sets[best])] = 0.0
+            else:
+                size[point] = _apparent(sets, np.where(possible[place], left[place], np.inf), tried, place)
+                weight[point] = 0.0
             kind[point] = RAY if told[place] else RAYS
+        if out == r - 2:
+            for place in np.flatnonzero(~found).tolist():
+                size[doubted.number[place]] = _apparent(sets, left[place], tried, place)
         doubted = doubted.take(~found)
     weight[doubted.number], kind[doubted.number] = 0.0, NONE
     return replace(start, weight=weight, kind=kind, size=size)
+
+
+def _apparent(sets: list[tuple[int, ...]], left: Floats, tried: list[tuple[Floats, Floats]], place: int) -> Floats:
+    """Error that each ray of a point would have in the likeliest set with it; 0 for a ray in none that is possible."""
+    size = np.zeros((max(max(rays) for rays in sets) + 1, 2))
+    for number in np.argsort(-left, kind="stable").tolist():
+        if np.isfinite(left[number]):
+            size[list(sets[number])] = tried[number][1][place]
+    return size

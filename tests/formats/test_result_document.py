@@ -676,7 +676,16 @@ def test_a_wrong_check_point_is_worth_a_look_and_changes_nothing() -> None:
 def test_wrong_control_is_worth_a_look() -> None:
     document = displaced("control", 23.4)
     assert document["status"] == "look"
-    assert document["verdict"]["look_at"][0].startswith("the control points fit ")
+    (text,) = document["verdict"]["look_at"]
+    assert text.startswith("control point G03 contradicts the strip and the other control: east by about +23.")
+    (row,) = (row for row in document["control"] if row["rejected"])
+    assert (row["id"], row["rejected"], row["use"]) == ("G03", "xy", "xyz")
+    assert row["dx"] == pytest.approx(-23.4, abs=0.5)
+    # what is left at control that was found wrong says nothing about the fit
+    summary = document["summary"]
+    assert max(summary["control_rms"].values()) < 0.5
+    assert summary["control"]["plan"]["count"] == summary["control"]["height"]["count"] - 1
+    assert summary["control"]["normalised"] < 5
 
 
 def test_coordinates_worse_than_stated_are_worth_a_look() -> None:

@@ -8,19 +8,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from photostrip.formats.result.document import document_of
+from photostrip.geodesy.crs import tie_frames
 from photostrip.pipeline import Settings, triangulate
-from photostrip.triangulation import formation, relative, scale_screening
-from tests.strips import MICROMETRE, control_points, fly, project
+from photostrip.pipeline.strip import adjust_strip
+from photostrip.triangulation import control_screening, formation, relative, scale_screening
+from tests.strips import LOCAL, MICROMETRE, control_points, fly, project
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.pipeline import Result
+    from photostrip.points import ControlPoints
     from photostrip.triangulation.relative import Orientation
     from tests.strips import Flown
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
+    Flags = NDArray[np.bool_]
 
 SIGMA = 5 * MICROMETRE
 STATIONS = (0, 3, 6, 9, 12)
@@ -173,3 +178,83 @@ def test_the_result_is_as_good_as_without_the_wrong_control() -> None:
 def test_good_control_is_left_alone() -> None:
     alarms = [bool(adjusted(flown(seed)).strips[0].wrong_control) for seed in range(40)]
     assert sum(alarms) <= 3  # level 1 % a strip
+
+
+# --------------------------------------------------------------------------------------------------------- the log
+
+
+def test_rejected_control_stands_in_the_log() -> None:
+    wrong = {"p3_1": (0.0, 8.0, 0.0), "p6_0": (0.0, 0.0, 4.0)}
+    result = adjusted(flown(), wrong)
+    rows = {row["point"]: row for row in document_of(result)["rejected"] if row["stage"] == "control"}
+    assert set(rows) == set(wrong)
+    for name, size in (("p3_1", 8.0), ("p6_0", 4.0)):
+        row = rows[name]
+        assert row["size"] == pytest.approx(size, abs=0.3)
+        assert row["size_unit"] == "m"
+        assert row["value"] > row["limit"] > 2
+        assert not row["readmitted"]
+    assert "north by about +" in rows["p3_1"]["reason"]
+    assert "up by about +" in rows["p6_0"]["reason"]
+
+
+def test_control_that_others_no_longer_contradict_is_named_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A coordinate was rejected; what was taken back after it predicts it within its limit. The log must hold it."""
+    strip = flown()
+    sound = triangulate(
+        project(strip, control_points({n: strip.xyz[strip.at[n]] for n in strip.bands(*STATIONS)}, sigma=0.02)),
+        Settings(),
+    )
+    assert not sound.strips[0].wrong_control
+    monkeypatch.setattr(control_screening, "_taken_back", lambda *given: _without_first(given[1]))
+    result = adjusted(strip, {"p6_0": (0.0, 0.0, 4.0)})
+    found = {each.id: each for each in result.strips[0].wrong_control}
+    first = result.inputs.control.ids[0]
+    assert found[first].axes == ("east", "north", "up")
+    assert found[first].value < found[first].limit
+    assert np.abs(found[first].size).max() < 0.5
+    rows = [row for row in document_of(result)["rejected"] if row["stage"] == "control"]
+    assert {row["point"] for row in rows} == {first, "p6_0"}
+
+
+def _without_first(control: ControlPoints) -> ControlPoints:
+    use = control.use.copy()
+    use[0] = False
+    return replace(control, use=use)
+
+
+# -------------------------------------------------------------------------------------------- much wrong control
+
+
+def scattered(strip: Flown, seed: int, share: float) -> tuple[ControlPoints, Flags]:
+    """Control anywhere in a strip, a fifth each in plan only and in height only; a share of it 5 to 100 m wrong."""
+    rng = np.random.default_rng(seed)
+    o = strip.observations
+    several = np.flatnonzero(np.bincount(o.point, minlength=len(o.point_ids)) > 1)
+    names = [o.point_ids[number] for number in rng.choice(several, int(rng.integers(14, 20)), replace=False)]
+    kinds = rng.choice(["xy", "z", "xyz", "xyz", "xyz"], len(names)).tolist()
+    given = {name: strip.xyz[strip.at[name]] + rng.normal(0, 0.02, 3) for name in names}
+    wrong: dict[str, str] = {}
+    for name, kind in zip(names, kinds, strict=True):
+        part = "z" if kind == "z" else "xy" if kind == "xy" or rng.random() < 0.6 else "z"
+        carrying = [kind for kind in kinds if part in kind]
+        if list(wrong.values()).count(part) + 1 <= share * len(carrying):
+            wrong[name] = part
+            error = rng.normal(size=3) * ([1, 1, 0] if part == "xy" else [0, 0, 1])
+            given[name] = given[name] + error / np.linalg.norm(error) * np.exp(rng.uniform(np.log(5), np.log(100)))
+    control = control_points(given, dict(zip(names, kinds, strict=True)), sigma=0.02)
+    parts = [wrong.get(name, "") for name in control.ids]
+    return control, np.array([[axis in part for axis in "xyz"] for part in parts])
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_two_fifths_of_wrong_control_come_out_and_nothing_else(seed: int) -> None:
+    strip = flown(seed % 2)
+    control, bad = scattered(strip, seed, 0.4)
+    for columns, fewest in ((bad[:, 0], 4), (bad[:, 2], 3)):
+        assert columns.sum() >= fewest
+    inputs, (frames, _) = project(strip, control), tie_frames([LOCAL])
+    kept = adjust_strip(inputs.strips[0], inputs.observations, control, frames, Settings()).control
+    row_of = {name: row for row, name in enumerate(control.ids)}
+    rows = [row_of[name] for name in kept.ids]
+    assert np.array_equal(kept.use, control.use[rows] & ~bad[rows])

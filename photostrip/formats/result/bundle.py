@@ -357,7 +357,8 @@ def with_bundle(result: Result, rejected: list[Document]) -> list[Document]:
     for each in rejected:
         photos = [photo for photo in (each["photo"], each["other_photo"]) if photo is not None]
         back = all((photo, each["point"]) in used for photo in photos) if photos else each["point"] in control
-        rows.append({**each, "readmitted": True, "reason": "used by the bundle adjustment"} if back else each)
+        after_all = {"readmitted": True, "blamed": [], "reason": "used by the bundle adjustment"}
+        rows.append({**each, **after_all} if back else each)
     return rows + [_rejection(found, each) for each in found.screened.rejections]
 
 
@@ -399,6 +400,7 @@ def _rejection(found: Bundle, each: Rejection) -> Document:
         "size": size,
         "size_unit": unit,
         "readmitted": each.readmitted,
+        "blamed": [photo] if photo is not None and point is not None and not each.readmitted else [],
         "reason": reason,
     }
 

@@ -233,12 +233,13 @@ def rejected_csv(document: Document) -> str:
     """Give rejected.csv: measurements that were taken out, and why."""
     number = _number(2)
     return _table(
-        "strip,photo,other_photo,point,stage,test,value,limit,unit,reason,zone,size,size_unit,readmitted",
+        "strip,photo,other_photo,point,stage,test,value,limit,unit,reason,zone,size,size_unit,readmitted,blamed",
         (
             f"{_cell(row['strip'])},{_cell(row['photo'])},{_cell(row['other_photo'])},"
             f"{_cell(row['point'])},{row['stage']},{row['test']},{number(row['value'])},{number(row['limit'])},"
             f"{row['unit']},{_cell(row['reason'])},{row.get('zone') or ''},{number(row.get('size'))},"
-            f"{row.get('size_unit', '')},{int(row.get('readmitted', False))}\n"
+            f"{row.get('size_unit', '')},{int(row.get('readmitted', False))},"
+            f"{_cell(';'.join(row.get('blamed', ())) or None)}\n"
             for row in document["rejected"]
         ),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
+    Flags = NDArray[np.bool_]
 
 CONTROL = "control"  # kind of observations of a bundle adjustment
 LEAST_SHARE = 0.1  # of its standard deviation that a control point shows of itself at least
@@ -43,6 +44,8 @@ class Differences:
         Denominator of the photo scale at the point; NaN where it has no coordinates.
     strips : tuple of tuple of str
         Strips that hold the point.
+    rejected : ndarray of bool, shape (c, 3)
+        Coordinates east, north, up of the control that were found wrong and not used.
     """
 
     axes: Floats
@@ -51,6 +54,7 @@ class Differences:
     normalised: Floats
     scale: Floats
     strips: tuple[tuple[str, ...], ...]
+    rejected: Flags
 
     @property
     def plan(self) -> Floats:
@@ -171,7 +175,50 @@ def differences(result: Result) -> Differences:
     with np.errstate(invalid="ignore"):
         ratio = np.abs(result.control_differences) / sigma
     normalised = np.where(np.isnan(ratio).all(axis=1), np.nan, np.nan_to_num(ratio).max(axis=1, initial=0.0))
-    return Differences(result.output.user_from_internal(axes), parts, sigma, normalised, scale, strips)
+    rejected = _rejected(result)
+    return Differences(result.output.user_from_internal(axes), parts, sigma, normalised, scale, strips, rejected)
+
+
+def of_used(result: Result, found: Differences) -> Differences:
+    """Give the differences without those at control that was rejected: they say nothing about the fit.
+
+    Parameters
+    ----------
+    result : Result
+        The result.
+    found : Differences
+        Differences at every given point.
+
+    Returns
+    -------
+    Differences
+        NaN in the place of rejected coordinates; the whole point where its axes are neither plan nor height.
+    """
+    out = found.rejected
+    if not out.any():
+        return found
+    whole = np.repeat(out.any(axis=1, keepdims=True), 3, axis=1)
+    mixed = np.array([frame.kind == "geocentric" for frame in result.frames])[result.inputs.control.frame, None]
+    of_parts = np.where(mixed, whole, out)
+    of_axes = of_parts if result.output.kind != "geocentric" else whole
+    axes = np.where(result.output.user_from_internal(of_axes) > 0, np.nan, found.axes)
+    return replace(found, axes=axes, parts=np.where(of_parts, np.nan, found.parts))
+
+
+def _rejected(result: Result) -> Flags:
+    """Control coordinates that were given for use and that nothing used."""
+    control = result.inputs.control
+    row_of = {name: row for row, name in enumerate(control.ids)}
+    held, used = np.zeros((len(control), 1), bool), np.zeros(control.use.shape, bool)
+    if result.bundle is not None:
+        problem, selection = result.bundle.screened.problem, result.bundle.screened.selection
+        rows = [row_of[problem.point_name(int(point))] for point in problem.control.point]
+        held[rows], used[rows] = True, selection.control
+    for strip in result.strips if result.bundle is None else ():
+        rows = [row_of[name] for name in strip.control.ids]
+        held[rows] = True
+        used[rows] |= strip.control.use
+    return np.asarray(control.use & held & ~used & ~control.check[:, None], bool)
 
 
 def _turned(found: Floats, frame: GroundFrame, place: Floats, axes: Floats) -> Floats:
@@ -247,6 +294,7 @@ def control_of(result: Result, found: Differences) -> list[Document]:
             "id": control.ids[row],
             "role": "check" if control.check[row] else "control",
             "use": _use(control.use[row].tolist()),
+            "rejected": _use(found.rejected[row].tolist()) if found.rejected[row].any() else "",
             "measured": bool(result.control_rows[row] >= 0),
             "dx": moved[row][0], "dy": moved[row][1], "dz": moved[row][2],
             "plan": size[row][0], "height": size[row][1],

@@ -13,12 +13,13 @@ from photostrip.formats.result.numbers import (
     GROUND,
     Document,
     micrometres,
-    natural_rank,
+    natural,
     rounded,
     significant,
 )
 from photostrip.triangulation.control_screening import AXES
 from photostrip.triangulation.relative import ELEMENTS, MINIMUM_POINTS
+from photostrip.triangulation.scale_screening import depths
 from photostrip.triangulation.strip_screening import BOTH, SEVERAL, TOLD
 
 if TYPE_CHECKING:
@@ -235,15 +236,17 @@ def discrepancies(strip: StripResult) -> Floats:
 def rejected_of(result: Result) -> list[Document]:
     """Give the list ``rejected``: what was taken out of pairs, scale transfers, points and control, in flight order.
 
-    A measurement that was taken back in the end is in it, marked.
+    Within a pair or a joint they stand in natural order of the points: the order of the tables does not show. A
+    measurement that was taken back in the end is in it, marked.
     """
     ids = result.refined.observations.point_ids
     found = []
     for strip in result.strips:
         oriented = strip.orientation
-        gone = sorted(strip.rejections, key=lambda rejection: int(oriented.pairs.pair[rejection.row]))
+        pair, point = oriented.pairs.pair, oriented.point
+        gone = sorted(strip.rejections, key=lambda each: (int(pair[each.row]), natural(ids[point[each.row]])))
         found += [_from_pair(strip, rejection, result.refined.observations) for rejection in gone]
-        found += [_from_joint(strip, int(row), ids) for row in np.flatnonzero(~strip.formed.junctions.used)]
+        found += _from_joints(strip, ids)
         found += _from_rays(strip, result.refined.observations)
         found += [from_control(strip, wrong) for wrong in strip.wrong_control]
     return found
@@ -262,9 +265,11 @@ def _from_pair(strip: StripResult, rejection: Rejection, observations: PhotoPoin
     if rejection.readmitted:
         reason = "taken back: the pair or the strip oriented on the other points predicts it, or the user keeps it"
     told = [row for row in _told(strip) if row in strip.orientation.rows[rejection.row]]
-    if told and not rejection.readmitted:
-        wrong = ", ".join(observations.photo_ids[observations.photo[row]] for row in told)
-        reason += f"; the wrong ray is that of photo {wrong}: the others of the point meet without it"
+    blamed = [observations.photo_ids[observations.photo[row]] for row in told]
+    if blamed and not rejection.readmitted:
+        reason += f"; the wrong ray is that of photo {', '.join(blamed)}: the others of the point meet without it"
+    elif rejection.test != "in front" and not rejection.readmitted:
+        reason += "; which of its two rays is wrong cannot be told"
     return {
         "strip": strip.strip.id,
         "photo": left,
@@ -280,6 +285,7 @@ def _from_pair(strip: StripResult, rejection: Rejection, observations: PhotoPoin
         "size": rounded(size, 2),
         "size_unit": "um",
         "readmitted": rejection.readmitted,
+        "blamed": [] if rejection.readmitted else blamed,
         "reason": reason,
     }
 
@@ -290,38 +296,54 @@ def _told(strip: StripResult) -> list[int]:
     return [int(row) for row, kind in zip(found.wrong, found.kind, strict=True) if kind == TOLD]
 
 
-def _from_joint(strip: StripResult, row: int, ids: Sequence[str]) -> Document:
-    joined = strip.formed.junctions
-    joint = int(joined.joint[row])
-    value = abs(joined.ratio[row] / joined.factor[joint] - 1) * PPM
-    return {
-        "strip": strip.strip.id,
-        "photo": strip.strip.photos[joint + 1],
-        "other_photo": None,
-        "point": ids[joined.point[row]],
-        "stage": "scale_transfer",
-        "test": "ratio",
-        "value": rounded(value, RATIO_DECIMALS),
-        "limit": rounded(joined.limit[row] * PPM, RATIO_DECIMALS),
-        "unit": "ppm",
-        "parallax_um": None,
-        "zone": None,
-        "size": rounded((joined.ratio[row] / joined.factor[joint] - 1) * PPM, RATIO_DECIMALS),
-        "size_unit": "ppm",
-        "readmitted": False,
-        "reason": f"scale ratio {value:.0f} ppm from that of the other pass points",
-    }
+def _from_joints(strip: StripResult, ids: Sequence[str]) -> list[Document]:
+    """Pass points that did not belong in a scale transfer; the error as that of an x parallax in one of the models."""
+    joined, zone = strip.formed.junctions, strip.screened.zone
+    out = np.flatnonzero(~joined.used).tolist()
+    rows = np.array(
+        sorted(out, key=lambda row: (int(joined.joint[row]), natural(ids[int(joined.point[row])]))), np.intp
+    )
+    joint = joined.joint[rows]
+    base, _ = strip.orientation.relative
+    deviation = joined.ratio[rows] / joined.factor[joint] - 1
+    depth = depths(strip.formed.vectors[joined.after[rows]], base[joint + 1])
+    size = deviation * strip.orientation.pairs.focal / depth * 1000
+    return [
+        {
+            "strip": strip.strip.id,
+            "photo": strip.strip.photos[joined.joint[row] + 1],
+            "other_photo": None,
+            "point": ids[joined.point[row]],
+            "stage": "scale_transfer",
+            "test": "ratio",
+            "value": rounded(abs(off) * PPM, RATIO_DECIMALS),
+            "limit": rounded(joined.limit[row] * PPM, RATIO_DECIMALS),
+            "unit": "ppm",
+            "parallax_um": None,
+            "zone": int(zone[joined.after[row]]),
+            "size": rounded(shift, 2),
+            "size_unit": "um",
+            "readmitted": False,
+            "blamed": [],
+            "reason": f"scale ratio {abs(off) * PPM:.0f} ppm from that of the other pass points: an x parallax wrong "
+            f"by {shift:.1f} µm would explain it",
+        }
+        for row, off, shift in zip(rows.tolist(), deviation.tolist(), size.tolist(), strict=True)
+    ]
 
 
 def _from_rays(strip: StripResult, observations: PhotoPoints) -> list[Document]:
-    """Rays that contradict the others of their point, in natural order of the points, then of the observations.
+    """Rays that contradict the others of their point, in natural order of the points, then in flight order.
 
     A ray that all its pairs have rejected stands with those.
     """
     found, news = strip.contradictions, rejected_by_strip(strip)
+    zone = _zones_of(strip, len(observations))
     names = [observations.point_ids[number] for number in found.point]
+    place = {photo: number for number, photo in enumerate(strip.strip.photos)}
+    position = [place[observations.photo_ids[observations.photo[row]]] for row in found.wrong]
     rows = []
-    for number in np.argsort(natural_rank(names), kind="stable").tolist():
+    for number in sorted(range(len(names)), key=lambda each: (natural(names[each]), position[each])):
         kind = found.kind[number]
         if not news[number]:
             continue
@@ -339,14 +361,23 @@ def _from_rays(strip: StripResult, observations: PhotoPoints) -> list[Document]:
                 "limit": rounded(found.limit[number], 2),
                 "unit": "",
                 "parallax_um": None,
-                "zone": None,
+                "zone": int(zone[found.wrong[number]]) or None,
                 "size": rounded(largest * 1000, 2) if np.isfinite(largest) else None,
                 "size_unit": "um" if np.isfinite(largest) else "",
                 "readmitted": False,
+                "blamed": [observations.photo_ids[observations.photo[found.wrong[number]]]] if kind == TOLD else [],
                 "reason": REASONS[kind],
             }
         )
     return rows
+
+
+def _zones_of(strip: StripResult, rays: int) -> Numbers:
+    """Give the standard zone of each image point in the pair with the next photo or the one before; 0 in none."""
+    zone = np.zeros(rays, np.intp)
+    for side in (1, 0):
+        zone[strip.orientation.rows[:, side]] = strip.screened.zone
+    return zone
 
 
 def rejected_by_strip(strip: StripResult) -> Flags:
@@ -390,5 +421,6 @@ def from_control(strip: StripResult | LinkedStrip, wrong: ControlRejection) -> D
         "size": rounded(max((sizes[axis] for axis in wrong.axes), key=abs, default=0.0), GROUND),
         "size_unit": "m",
         "readmitted": False,
+        "blamed": [],
         "reason": f"given coordinates contradict the strip and the other control: {reason}",
     }

@@ -8,6 +8,7 @@ import numpy as np
 
 from photostrip.formats.result import models
 from photostrip.formats.result.bundle import image_fit
+from photostrip.formats.result.ground import of_used
 from photostrip.formats.result.numbers import GROUND, Document, Plain, micrometres, rms, rounded
 from photostrip.formats.result.pairs import Parallaxes, rejected_by_strip, sigma0
 from photostrip.formats.result.strips import AXES
@@ -82,8 +83,9 @@ def summary_of(result: Result, found: Differences) -> Document:
     result : Result
         The result.
     found : Differences
-        What is left at control and check points.
+        What is left at control and check points; rejected control does not count.
     """
+    found = of_used(result, found)
     document = models.summary_of(result) if result.linked else _of_photos(result)
     control = result.inputs.control
     roles = {"control": ~control.check & control.use.any(axis=1), "check": control.check}
@@ -162,7 +164,8 @@ def _part(values: Floats, scale: Floats, rows: Flags, ids: tuple[str, ...]) -> D
 
 def _normalised(result: Result, found: Differences, rows: Flags) -> float:
     """Root mean square of the differences in units of what control and one model let expect."""
-    return rms((result.control_differences[rows] / found.sigma[rows]).ravel())
+    counted = np.where(found.rejected, np.nan, result.control_differences)
+    return rms((counted[rows] / found.sigma[rows]).ravel())
 
 
 def tolerances_of(result: Result, summary: Document) -> list[Document]:

@@ -1,0 +1,144 @@
+"""What is rejected depends on the measurements alone: not on the order of rows, on names, or on threads."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from photostrip.formats.result.document import document_of
+from photostrip.formats.result.files import rejected_csv
+from photostrip.formats.simulation import inputs_of, project_files, settings_of
+from photostrip.pipeline import triangulate
+from photostrip.simulate.simulation import simulate
+from photostrip.simulate.spec import Control, Flight, GrossError, Points, Spec
+from tests.source_tree import ROOT
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from photostrip.pipeline import Inputs
+    from photostrip.simulate.simulation import Simulation
+
+STAGES = {"relative", "rays", "control"}
+
+
+@cache
+def flown() -> Simulation:
+    """A strip of eight photos with gross errors of all sizes and a wrong control coordinate."""
+    errors = [GrossError("image", count=3, size_um=size) for size in (60.0, 500.0, 8000.0)]
+    return simulate(
+        Spec(
+            seed=5,
+            flight=Flight(photos=8),
+            points=Points(extra_per_model=8),
+            control=Control(layout="bands", bands=4, per_band=3),
+            gross_errors=(*errors, GrossError("control", size_m=6.0)),
+        )
+    )
+
+
+def rejected(inputs: Inputs) -> str:
+    """Give rejected.csv."""
+    return rejected_csv(document_of(triangulate(inputs, settings_of(flown()))))
+
+
+def rows(text: str) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def shuffled(inputs: Inputs, seed: int) -> Inputs:
+    """Give the same measurements and control in another order, photos and points numbered anew."""
+    rng = np.random.default_rng(seed)
+    o, control = inputs.observations, inputs.control
+    order = rng.permutation(len(o.point))
+    photo, point = rng.permutation(len(o.photo_ids)), rng.permutation(len(o.point_ids))
+    moved = replace(
+        o,
+        photo_ids=tuple(o.photo_ids[number] for number in photo),
+        point_ids=tuple(o.point_ids[number] for number in point),
+        photo=np.argsort(photo)[o.photo[order]],
+        point=np.argsort(point)[o.point[order]],
+        xy=o.xy[order],
+        sigma=o.sigma[order],
+    )
+    return replace(inputs, observations=moved, control=control.take(rng.permutation(len(control))))
+
+
+def renamed(inputs: Inputs) -> tuple[Inputs, dict[str, str]]:
+    """Give every photo and every point another name, so that the order of the names is turned round."""
+    o, control = inputs.observations, inputs.control
+    names = sorted({*o.photo_ids, *o.point_ids, *control.ids})
+    new = {name: f"n{len(names) - number:04d}" for number, name in enumerate(names)}
+
+    def told(ids: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(new[name] for name in ids)
+
+    strips = tuple(replace(strip, photos=told(strip.photos)) for strip in inputs.strips)
+    observations = replace(o, photo_ids=told(o.photo_ids), point_ids=told(o.point_ids))
+    return replace(inputs, strips=strips, observations=observations, control=replace(control, ids=told(control.ids))), {
+        after: before for before, after in new.items()
+    }
+
+
+def test_there_is_something_to_reject() -> None:
+    found = rows(rejected(inputs_of(flown())))
+    assert {row["stage"] for row in found} >= STAGES
+    for row in found:
+        assert float(row["size"]) != 0 or row["stage"] == "rays"
+        assert row["size_unit"] == ("m" if row["stage"] == "control" else "um")
+        assert (row["zone"] == "") == (row["stage"] == "control")
+        assert row["readmitted"] in "01"
+        assert row["value"]
+        assert row["limit"]
+    injected = {(error.photo, error.point) for error in flown().truth.errors if error.kind == "image"}
+    blamed = {(row["blamed"], row["point"]) for row in found if row["blamed"]}
+    assert len(blamed) >= 3
+    assert blamed <= injected  # nobody else is blamed
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_order_of_rows_does_not_decide(seed: int) -> None:
+    inputs = inputs_of(flown())
+    assert rejected(shuffled(inputs, seed)) == rejected(inputs)
+
+
+def test_names_do_not_decide() -> None:
+    inputs, old = renamed(inputs_of(flown()))
+    columns = ("photo", "other_photo", "point", "blamed")
+    found = [
+        {key: old.get(value, value) if key in columns else value for key, value in row.items() if key != "reason"}
+        for row in rows(rejected(inputs))
+    ]
+    expected = [
+        {key: value for key, value in row.items() if key != "reason"} for row in rows(rejected(inputs_of(flown())))
+    ]
+    assert sorted(found, key=repr) == sorted(expected, key=repr)
+
+
+@pytest.mark.slow
+def test_threads_do_not_decide(tmp_path: Path) -> None:
+    for name, text in project_files(flown()).items():
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    tables = []
+    for threads in ("1", "2"):
+        out = tmp_path / threads
+        command = [sys.executable, "-m", "photostrip", "run", str(tmp_path / "project.yaml"), "-q", "-o", str(out)]
+        environment = os.environ | {
+            "PYTHONPATH": str(ROOT),
+            "OPENBLAS_NUM_THREADS": threads,
+            "OMP_NUM_THREADS": threads,
+        }
+        done = subprocess.run(command, env=environment, capture_output=True, check=False)
+        assert done.returncode == 0, done.stderr
+        tables.append((out / "rejected.csv").read_bytes())
+    assert tables[0] == tables[1]
+    assert len(tables[0].splitlines()) > 10
