@@ -40,13 +40,14 @@ if TYPE_CHECKING:
 ALPHA = 0.01  # of rejecting anything in a strip without wrong control
 LEAST_REDUNDANCY = 3  # of plan and of height, for a test
 SEEN = 0.05  # redundancy number below which a coordinate cannot be judged
-LARGEST_SHARE = 0.45  # of the control coordinates of plan or height that may be rejected
+LARGEST_SHARE = 0.45  # of the control coordinates of plan or height that may be far off
+LARGEST_TESTED = 0.34  # of the others that single tests may reject
 CONSPICUOUS = 6.0  # largest over median misclosure that asks for a robust start
 GROSS = 12.0  # standard deviations from the median, in the robust start
 ROBUST_STEPS = 20
 SETTLED = 0.1  # of the median misclosure: the robust start is to find large errors, not digits
 NORMAL = 1.4826
-BETTER = 0.5  # ratio of standard deviations of unit weight for which another half of the control is believed
+ROUGH = 5.0  # standard deviations left by a polynomial beyond which there is more than a bend
 EXCHANGED = 0.2  # misclosures left by an exchange, over those before
 AXES = ("east", "north", "up")
 PLAN = slice(0, 2)
@@ -152,8 +153,8 @@ def screen(control: ControlPoints, setting: Setting) -> tuple[ControlPoints, tup
         What was rejected, in order of the control.
     """
     try:
-        start = _without(control, _far(control, setting))
-        setting, kept = _snooped(start, setting)
+        start = _without(control, _gross(control, setting))
+        setting, kept = _snooped(control, start, setting)
         if np.array_equal(kept.use, control.use):
             return control, ()
         kept = _taken_back(control, kept, setting)
@@ -165,32 +166,6 @@ def screen(control: ControlPoints, setting: Setting) -> tuple[ControlPoints, tup
 
 def _without(control: ControlPoints, out: Flags) -> ControlPoints:
     return replace(control, use=control.use & ~out)
-
-
-def _far(control: ControlPoints, setting: Setting) -> Flags:
-    """Find coordinates with large errors.
-
-    Where the covariance of the strip does not explain what the start by absolute misclosures leaves, the better half of
-    the control is looked for; it is believed when it fits much better.
-    """
-    out = _gross(control, setting)
-    fit = _fit(control, out, setting)
-    if not fit > control_tests.BENT:
-        return out
-    targets = Targets(control, setting.frames, setting.intermediate)
-    try:
-        first = absolute.orient(setting.strip, targets, (control.use & ~out).astype(float))
-        weight = absolute.weights(targets.turned(first.similarity(setting.strip)), setting.precision)
-        other, _ = control_subsets.far(setting.strip, targets, weight, first.similarity)
-    except GeometryError:
-        return out
-    return other if _enough(control, other) and _fit(control, other, setting) < BETTER * fit else out
-
-
-def _fit(control: ControlPoints, out: Flags, setting: Setting) -> float:
-    """Give the standard deviation of unit weight of the rest by the covariance of the strip; 0 when it is not known."""
-    found = setting.judged(control, _without(control, out))
-    return 0.0 if found is None or not np.isfinite(found.sigma0) else found.sigma0
 
 
 def _gross(control: ControlPoints, setting: Setting) -> Flags:
@@ -228,10 +203,10 @@ def _together(axis: int) -> list[int]:
     return [0, 1] if axis < 2 else [axis]
 
 
-def _enough(control: ControlPoints, out: Flags) -> bool:
+def _enough(control: ControlPoints, out: Flags, share: float = LARGEST_SHARE) -> bool:
     """Whether few enough coordinates of plan and of height are suspected."""
     given, suspected = control.use, control.use & out
-    return all(suspected[:, axes].sum() <= LARGEST_SHARE * given[:, axes].sum() for axes in (PLAN, slice(2, 3)))
+    return all(suspected[:, axes].sum() <= share * given[:, axes].sum() for axes in (PLAN, slice(2, 3)))
 
 
 def _richest(problem: polynomial.Problem) -> polynomial.Polynomial | None:
@@ -289,16 +264,51 @@ def judged(problem: polynomial.Problem, fit: polynomial.Polynomial) -> tuple[Flo
     return np.where(seen, value, 0.0), np.broadcast_to(limit, value.shape), size, redundancy
 
 
-def _snooped(control: ControlPoints, setting: Setting) -> tuple[Setting, ControlPoints]:
-    """Take out what is wrong; by polynomials where the covariance does not explain the misclosures of most control."""
-    kept = _snoop(control, setting)
-    if setting.joint is None:
-        return setting, kept
-    found = control_tests.judge(setting.joint, setting.misclosures(kept), kept.use, ALPHA)
-    if found.sigma0 < control_tests.BENT:
+def _snooped(control: ControlPoints, start: ControlPoints, setting: Setting) -> tuple[Setting, ControlPoints]:
+    """Take out what is wrong; by polynomials where the covariance does not explain the misclosures of most control.
+
+    Where neither the covariance nor a polynomial explains what is left, more may be wrong than single tests can find:
+    the better half of the control is looked for, and believed when the covariance explains it.
+    """
+    kept = _snoop(start, setting)
+    if setting.joint is None or _fit(kept, setting) < control_tests.BENT:
         return setting, kept
     bent = replace(setting, joint=None)
-    return bent, _snoop(control, bent)
+    by_polynomial = _snoop(start, bent)
+    if _smooth(by_polynomial, bent):
+        return bent, by_polynomial
+    half = _better_half(control, kept, setting)
+    return (bent, by_polynomial) if half is None else (setting, half)
+
+
+def _fit(kept: ControlPoints, setting: Setting) -> float:
+    """Give the standard deviation of unit weight of control by the covariance of the strip."""
+    return control_tests.judge(_joint(setting), setting.misclosures(kept), kept.use, ALPHA).sigma0
+
+
+def _smooth(kept: ControlPoints, setting: Setting) -> bool:
+    """Whether a polynomial explains the misclosures, or nobody can tell."""
+    problem = setting.problem(kept)
+    fit = _richest(problem)
+    if fit is None:
+        return True
+    expected = 1 / np.sqrt(problem.weight.max(axis=0))
+    return all(axis.sigma0 < ROUGH * float(expected[k]) for k, axis in enumerate(fit.axes))
+
+
+def _better_half(control: ControlPoints, kept: ControlPoints, setting: Setting) -> ControlPoints | None:
+    """Control that agrees with the similarity that suits most of it; None when the covariance does not explain it."""
+    targets = Targets(control, setting.frames, setting.intermediate)
+    first = absolute.orient(setting.strip, targets, kept.use.astype(float))
+    weight = absolute.weights(targets.turned(first.similarity(setting.strip)), setting.precision)
+    try:
+        out, _ = control_subsets.far(setting.strip, targets, weight, first.similarity)
+        if not _enough(control, out):
+            return None
+        half = _snoop(_without(control, out), setting)
+        return half if _fit(half, setting) < control_tests.BENT else None
+    except GeometryError:
+        return None
 
 
 def _snoop(control: ControlPoints, setting: Setting) -> ControlPoints:
@@ -309,7 +319,7 @@ def _snoop(control: ControlPoints, setting: Setting) -> ControlPoints:
         row = int(ratio.max(axis=1).argmax())
         out = np.zeros(kept.use.shape, bool)
         out[row, _together(int(ratio[row].argmax()))] = True
-        if ratio.max() <= 1 or not _enough(control, ~kept.use | out):
+        if ratio.max() <= 1 or not _enough(control, ~kept.use | out, LARGEST_TESTED):
             return kept
         kept = _without(kept, out)
 
