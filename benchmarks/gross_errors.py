@@ -12,7 +12,9 @@ with a wrong measurement of their own are therefore counted apart.
 
 from __future__ import annotations
 
+import os
 import sys
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -252,24 +254,31 @@ def four_runs(seed: int) -> tuple[dict[str, Run], list[str]]:
     return runs, failed
 
 
+def _add(tables: tuple[Table, Table], number: list[int], seed: int, runs: dict[str, Run], failed: list[str]) -> None:
+    """Count one strip in the table of all and, when it has enough good points, in that of those."""
+    enough = KINDS[0] in runs and runs[KINDS[0]].supported
+    number[1] += enough
+    for table in tables if enough else tables[:1]:
+        rms = {kind: table.add(kind, run) for kind, run in runs.items()}
+        for kind in failed:
+            table.failed[kind] += 1
+        if KINDS[1] in runs and KINDS[3] in runs:
+            table.counts["searched away"] += len(runs[KINDS[1]].unused - runs[KINDS[3]].unused)
+        if KINDS[1] in rms:
+            table.ratios.append(rms[KINDS[1]] / rms[KINDS[0]])
+    if KINDS[1] in rms and table.ratios[-1] > CONSPICUOUS:
+        print(f"strip {seed}: {table.ratios[-1]:.2f} times the rms without errors; enough good points: {enough}")
+
+
 def main(strips: int) -> None:
     """Adjust all strips and print the tables: of all, and of those with enough good points."""
     tables = Table.empty(), Table.empty()
     number = [strips, 0]
-    for seed in range(1, strips + 1):
-        runs, failed = four_runs(seed)
-        enough = KINDS[0] in runs and runs[KINDS[0]].supported
-        number[1] += enough
-        for table in tables if enough else tables[:1]:
-            rms = {kind: table.add(kind, run) for kind, run in runs.items()}
-            for kind in failed:
-                table.failed[kind] += 1
-            if KINDS[1] in runs and KINDS[3] in runs:
-                table.counts["searched away"] += len(runs[KINDS[1]].unused - runs[KINDS[3]].unused)
-            if KINDS[1] in rms:
-                table.ratios.append(rms[KINDS[1]] / rms[KINDS[0]])
-        if KINDS[1] in rms and table.ratios[-1] > CONSPICUOUS:
-            print(f"strip {seed}: {table.ratios[-1]:.2f} times the rms without errors; enough good points: {enough}")
+    seeds = range(1, strips + 1)
+    with ProcessPoolExecutor(os.cpu_count()) as pool:
+        found = pool.map(four_runs, seeds)
+        for seed, (runs, failed) in zip(seeds, found, strict=True):
+            _add(tables, number, seed, runs, failed)
     for title, table, count in zip(
         ("All strips", "Strips with a good point in every zone and two at every joint"), tables, number, strict=True
     ):
