@@ -3,11 +3,12 @@
 For each layout of control and each method the standard deviations that `photostrip plan strip` predicts stand beside
 the scatter of adjusted points over all repetitions of whole runs (the bundle: over repetitions of its adjustment). The
 part on one model does the same for `photostrip plan model`, with the exact relative orientation, intersection and
-absolute orientation of every repetition. The part
-on flown strips tells how well the ideal geometry of a plan speaks for strips with tilts, relief and scattered points.
+absolute orientation of every repetition. The part on flown strips tells how well the ideal geometry of a plan speaks
+for strips with tilts, relief and scattered points. The part on reliability gives the worst control point of each layout
+the smallest error that the plan calls detectable, and counts how often the test of the adjustment finds it.
 
-Usage: python benchmarks/planning.py [--part model strip flown] [--repeat N] [--models N] [--layouts NAME ...]
-       [--methods NAME ...] [--workers N]
+Usage: python benchmarks/planning.py [--part model strip flown reliability] [--repeat N] [--models N]
+       [--layouts NAME ...] [--methods NAME ...] [--workers N]
 """
 
 from __future__ import annotations
@@ -28,8 +29,10 @@ limit_threads()  # before numpy is imported, also in the processes that are star
 import numpy as np  # noqa: E402
 
 from photostrip.formats.simulation import inputs_of  # noqa: E402
+from photostrip.geodesy.crs import tie_frames  # noqa: E402
 from photostrip.geodesy.frame_spec import FrameSpec  # noqa: E402
 from photostrip.pipeline import Inputs, Settings, Strip, triangulate  # noqa: E402
+from photostrip.pipeline.strip import adjust_formed, form_strip  # noqa: E402
 from photostrip.planning.control_layout import Layout, Spot, numbers_of, spots_of  # noqa: E402
 from photostrip.planning.ideal_strip import StripGeometry, ideal_strip  # noqa: E402
 from photostrip.planning.model_plan import (  # noqa: E402
@@ -45,6 +48,7 @@ from photostrip.planning.model_plan import (  # noqa: E402
 from photostrip.planning.single_model import Control, orientation_operator  # noqa: E402
 from photostrip.planning.strip_methods import (  # noqa: E402
     BUNDLE,
+    COVARIANCE,
     DEGREES,
     METHODS,
     accuracy,
@@ -74,18 +78,29 @@ FOCAL = 153.0
 MODEL_REPETITIONS = 4000
 FLOWN_SHARE = 10  # repetitions for each strip that is flown differently
 SIGMA = (0.05, 0.05, 0.05)
-LAYOUTS = {
-    "bands every 4": Layout("bands every 4", every=4, sigma=SIGMA),
-    "3 bands": Layout("3 bands", bands=3, sigma=SIGMA),
-    "corners": Layout("corners", kind="corners", sigma=SIGMA),
-    "corners+centre": Layout("corners+centre", kind="corners+centre", sigma=SIGMA),
-    "mixed": Layout(
-        "mixed",
-        kind="corners",
-        spots=(Spot(3, 3, "z"), Spot(5, 1, "xy"), Spot(5, 5, "z"), Spot(7, 3)),
-        sigma=(0.03, 0.03, 0.05),
-    ),
-}
+GNSS = (0.05, 0.05, 0.08)
+OFFSET = (0.3, -0.2, 0.5)  # m, of measured perspective centres, which the bundle is to find
+LIMIT = 3.29  # of a test at 0.1 %
+
+
+def layouts(photos: int) -> dict[str, Layout]:
+    """Layouts of control by name, for a strip of so many photos."""
+    middle, third, last = (photos + 1) // 2, 1 + (photos - 1) // 3, photos - (photos - 1) // 3
+    heights = tuple(Spot(photo, row, "z") for photo in (third, last) for row in (1, 5))
+    return {
+        "bands every 4": Layout("bands every 4", every=4, sigma=SIGMA),
+        "3 bands": Layout("3 bands", bands=3, sigma=SIGMA),
+        "corners": Layout("corners", kind="corners", sigma=SIGMA),
+        "corners+centre": Layout("corners+centre", kind="corners+centre", sigma=SIGMA),
+        "corners, heights": Layout("corners, heights", kind="corners+centre", spots=heights, sigma=SIGMA),
+        "mixed": Layout(
+            "mixed",
+            kind="corners",
+            spots=(Spot(third, 3, "z"), Spot(middle, 1, "xy"), Spot(middle, 5, "z"), Spot(last, 3)),
+            sigma=(0.03, 0.03, 0.05),
+        ),
+        "corners, GNSS": Layout("corners, GNSS", kind="corners", sigma=SIGMA, gnss=GNSS),
+    }
 
 
 # ------------------------------------------------------------------------------------------------------- strips
@@ -93,35 +108,54 @@ LAYOUTS = {
 
 @dataclass(frozen=True)
 class Task:
-    """Some repetitions of one layout."""
+    """Some repetitions of some layouts."""
 
     geometry: StripGeometry
-    layout: Layout
+    layouts: tuple[Layout, ...]
     methods: tuple[str, ...]
     first: int
     count: int
 
 
-def repetitions(task: Task) -> dict[str, tuple[Floats, Floats]]:
-    """Sum and sum of squares of the errors of all points over some repetitions, by method, (q, 3) each."""
+def methods_for(layout: Layout, methods: Sequence[str]) -> tuple[str, ...]:
+    """Methods that use what a layout gives: perspective centres are for the bundle alone."""
+    return tuple(each for each in methods if layout.gnss is None or each == BUNDLE)
+
+
+def repetitions(task: Task) -> dict[tuple[str, str], tuple[Floats, Floats]]:
+    """Sum and sum of squares of the errors of all points over some repetitions, (q, 3) each, by layout and method.
+
+    Every strip is formed once from its measurements, and taken to the ground by all layouts and methods.
+    """
     strip = ideal_strip(task.geometry)
-    spots = spots_of(task.layout, task.geometry.photos, task.geometry.points.rows)
-    found = {method: (np.zeros_like(strip.xyz), np.zeros_like(strip.xyz)) for method in task.methods}
+    chosen = [(layout, method) for layout in task.layouts for method in methods_for(layout, task.methods)]
+    found = {(layout.name, method): (np.zeros_like(strip.xyz), np.zeros_like(strip.xyz)) for layout, method in chosen}
+    spots = {layout.name: spots_of(layout, task.geometry.photos, task.geometry.points.rows) for layout in task.layouts}
+    frames, _ = tie_frames([FrameSpec("local", ("east", "north", "up"))])
     for number in range(task.first, task.first + task.count):
         rng = np.random.default_rng([SEED, number])
-        inputs = measured(strip, spots, task.layout, rng)
-        for method in task.methods:
-            solved = bundled(strip, task.layout, inputs) if method == BUNDLE else adjusted(strip, inputs, method)
+        noise = rng.normal(size=strip.observations.xy.shape) * strip.observations.sigma
+        formed = None
+        for layout, method in chosen:
+            drawn = np.random.default_rng([SEED, number, 1])  # the control of a layout is the same for all methods
+            inputs = measured(strip, spots[layout.name], layout, noise, drawn)
+            if method == BUNDLE:
+                solved = bundled(strip, layout, inputs, drawn)
+            else:
+                wanted = run_settings(method)
+                formed = formed or form_strip(inputs.strips[0], inputs.observations, wanted)
+                solved = adjust_formed(formed, inputs.observations, inputs.control, frames, wanted).cartesian
             error = solved - strip.xyz
-            found[method][0][:] += error
-            found[method][1][:] += error**2
+            found[layout.name, method][0][:] += error
+            found[layout.name, method][1][:] += error**2
     return found
 
 
-def measured(strip: IdealStrip, spots: tuple[ControlSpot, ...], layout: Layout, rng: np.random.Generator) -> Inputs:
+def measured(
+    strip: IdealStrip, spots: tuple[ControlSpot, ...], layout: Layout, noise: Floats, rng: np.random.Generator
+) -> Inputs:
     """Give a strip as it would be measured: errors in the image coordinates and in the control."""
     observed = strip.observations
-    noise = rng.normal(size=observed.xy.shape) * observed.sigma
     control = control_of(strip, spots, layout.sigma)
     names = tuple(observed.point_ids[strip.formed.point[number]] for number in numbers_of(strip, spots))
     given = control.enu + rng.normal(size=control.enu.shape) * control.sigma
@@ -134,14 +168,6 @@ def measured(strip: IdealStrip, spots: tuple[ControlSpot, ...], layout: Layout, 
     )
 
 
-def adjusted(strip: IdealStrip, inputs: Inputs, method: str) -> Floats:
-    """Coordinates of the points of the strip by a whole run."""
-    result = triangulate(inputs, run_settings(method))
-    order = np.searchsorted(result.points.number, strip.formed.point)
-    xyz: Floats = result.points.cartesian[order]
-    return xyz
-
-
 def run_settings(method: str) -> Settings:
     """Give settings of a run by one of the methods, without a search for gross errors."""
     return Settings(
@@ -151,7 +177,7 @@ def run_settings(method: str) -> Settings:
     )
 
 
-def bundled(strip: IdealStrip, layout: Layout, inputs: Inputs) -> Floats:
+def bundled(strip: IdealStrip, layout: Layout, inputs: Inputs, rng: np.random.Generator) -> Floats:
     """Coordinates of the points of the strip by a bundle adjustment that starts at the truth."""
     control = inputs.control
     names = [inputs.observations.point_ids[number] for number in strip.formed.point]
@@ -164,27 +190,31 @@ def bundled(strip: IdealStrip, layout: Layout, inputs: Inputs) -> Floats:
         images=replace(problem.images, xy=inputs.observations.xy[seen]),
         control=replace(problem.control, xyz=given),
     )
+    if layout.gnss is not None:
+        positions = strip.centers + OFFSET + rng.normal(size=strip.centers.shape) * layout.gnss
+        problem = replace(problem, positions=replace(problem.positions, xyz=positions))
     xyz: Floats = solve(problem).points
     return xyz
 
 
-def compare(geometry: StripGeometry, layout: Layout, methods: Sequence[str], options: argparse.Namespace) -> None:
-    """Print one line for each method."""
+def compare(geometry: StripGeometry, chosen: tuple[Layout, ...], options: argparse.Namespace) -> None:
+    """Print one line for each layout and method."""
     strip = ideal_strip(geometry)
-    spots = spots_of(layout, geometry.photos, geometry.points.rows)
     share = -(-options.repeat // (4 * options.workers))
     starts = range(0, options.repeat, share)
-    tasks = [Task(geometry, layout, tuple(methods), k, min(share, options.repeat - k)) for k in starts]
+    tasks = [Task(geometry, chosen, tuple(options.methods), k, min(share, options.repeat - k)) for k in starts]
     if options.workers > 1:
         with get_context("spawn").Pool(options.workers) as pool:
             parts = pool.map(repetitions, tasks, chunksize=1)
     else:
         parts = list(map(repetitions, tasks))
-    for method in methods:
-        total, squares = (sum(part[method][k] for part in parts) for k in range(2))
-        scatter = np.sqrt(squares / options.repeat - (total / options.repeat) ** 2)
-        expected = accuracy(strip, layout, spots, method)
-        print(line(f"{layout.name:<16} {method:<11}", expected.sigmas[expected.new], scatter[expected.new]))
+    for layout in chosen:
+        spots = spots_of(layout, geometry.photos, geometry.points.rows)
+        for method in methods_for(layout, options.methods):
+            total, squares = (sum(part[layout.name, method][k] for part in parts) for k in range(2))
+            scatter = np.sqrt(squares / options.repeat - (total / options.repeat) ** 2)
+            expected = accuracy(strip, layout, spots, method)
+            print(line(f"{layout.name:<16} {method:<11}", expected.sigmas[expected.new], scatter[expected.new]))
 
 
 def line(head: str, expected: Floats, scatter: Floats) -> str:
@@ -206,8 +236,8 @@ def strips(options: argparse.Namespace) -> None:
     geometry = StripGeometry(replace(FILM, principal_distance=FOCAL, fiducials={}), options.models + 1)
     print(f"{options.models} models, 60 % overlap, 1:10000, 5 um; {options.repeat} repetitions; metres")
     print(f"{'control':<16} {'method':<11} {HEAD}")
-    for name in options.layouts:
-        compare(geometry, LAYOUTS[name], options.methods, options)
+    known = layouts(options.models + 1)
+    compare(geometry, tuple(known[name] for name in options.layouts), options)
 
 
 # -------------------------------------------------------------------------------------------------- flown strips
@@ -310,16 +340,66 @@ def measured_models(spec: ModelSpec, places: Floats, count: int) -> Floats:
     return scatter
 
 
-PARTS = {"model": models, "strip": strips, "flown": flown}
+# -------------------------------------------------------------------------------------------------- reliability
+
+
+def reliability(options: argparse.Namespace) -> None:
+    """Print how often the smallest detectable error of the worst control point is found, by axis."""
+    geometry = StripGeometry(replace(FILM, principal_distance=FOCAL, fiducials={}), options.models + 1)
+    strip = ideal_strip(geometry)
+    print(
+        f"{options.models} models, covariance; the detectable error at the worst control point; {options.repeat} times"
+    )
+    print(f"{'control':<16} {'axis':<8} {'error, m':>8} {'found':>8}   80 % expected")
+    for layout in (layouts(geometry.photos)[name] for name in options.layouts):
+        if layout.gnss is not None:
+            continue
+        spots = spots_of(layout, geometry.photos, geometry.points.rows)
+        sizes = accuracy(strip, layout, spots, COVARIANCE).detectable
+        for axis, name in enumerate(("along", "across", "up")):
+            point = int(np.nanargmax(np.where(np.isfinite(sizes[:, axis]), sizes[:, axis], np.nan)))
+            size = float(sizes[point, axis])
+            share = found_share(strip, layout, spots, (point, axis, size), options.repeat)
+            print(f"{layout.name:<16} {name:<8} {size:8.3f} {100 * share:6.1f} %")
+
+
+def found_share(
+    strip: IdealStrip,
+    layout: Layout,
+    spots: tuple[ControlSpot, ...],
+    wrong: tuple[int, int, float],
+    repeat: int,
+) -> float:
+    """Share of repetitions in which the test value of a wrong control coordinate exceeds its limit."""
+    point, axis, size = wrong
+    frames, _ = tie_frames([FrameSpec("local", ("east", "north", "up"))])
+    wanted, seen = run_settings(COVARIANCE), 0
+    for number in range(repeat):
+        rng = np.random.default_rng([SEED, number])
+        noise = rng.normal(size=strip.observations.xy.shape) * strip.observations.sigma
+        inputs = measured(strip, spots, layout, noise, rng)
+        given = inputs.control.enu.copy()
+        given[point, axis] += size
+        control = replace(inputs.control, enu=given)
+        formed = form_strip(inputs.strips[0], inputs.observations, wanted)
+        own = adjust_formed(formed, inputs.observations, control, frames, wanted).covariance
+        assert own is not None  # noqa: S101
+        row = np.flatnonzero((own.control.point == point) & (own.control.axis == axis))
+        seen += bool(np.abs(own.tested.normalised[row]) > LIMIT)
+    return seen / repeat
+
+
+PARTS = {"model": models, "strip": strips, "flown": flown, "reliability": reliability}
 
 
 def main() -> None:
     """Print the tables."""
+    known = layouts(9)
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--part", nargs="+", default=list(PARTS), choices=list(PARTS))
     parser.add_argument("--repeat", type=int, default=1000)
     parser.add_argument("--models", type=int, default=8)
-    parser.add_argument("--layouts", nargs="+", default=list(LAYOUTS), choices=list(LAYOUTS))
+    parser.add_argument("--layouts", nargs="+", default=list(known), choices=list(known))
     parser.add_argument("--methods", nargs="+", default=list(METHODS), choices=list(METHODS))
     parser.add_argument("--workers", type=int, default=1)
     options = parser.parse_args()
