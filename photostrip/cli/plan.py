@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
@@ -11,7 +13,9 @@ from photostrip.cli.options import Silent
 from photostrip.cli.terrestrial_output import Form, hand_out, told
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
+
+    from photostrip.errors import Fault
 
 Document = dict[str, Any]
 Command = TypeVar("Command", bound="Callable[..., None]")
@@ -34,7 +38,7 @@ PlanFile = Annotated[
 Assignments = Annotated[
     list[str] | None,
     typer.Option(
-        "--set", metavar="KEY=VALUE", help="Set a key of the plan, as in control.layout=six; may be repeated."
+        "--set", metavar="KEY=VALUE", help="Set a key of the plan, as in end_lap_percent=70; may be repeated."
     ),
 ]
 Output = Annotated[
@@ -65,14 +69,62 @@ def _command(name: str, *examples: str) -> Callable[[Command], Command]:
     return plan.command(name, context_settings=HELP_NAMES, epilog=text)
 
 
+# ------------------------------------------------------------------------------------------------------- options
+
+Options = dict[str, tuple[str, str | None]]  # by the key that it sets: name of an option, and its value
+
+
 def listed(value: str | None) -> str | None:
     """Turn ``a,b`` into a list of YAML."""
     return None if value is None else f"[{value}]"
 
 
-def as_assignments(options: dict[str, str | None], assignments: list[str] | None) -> list[str]:
+def _flown(*values: str | None) -> Options:
+    """Give the options that every plan of something flown has."""
+    camera, distance, photo_format, overlap, scale, height, sigma = values
+    return {
+        "camera.preset": ("--camera", camera),
+        "camera.principal_distance": ("--principal-distance", distance),
+        "camera.format": ("--photo-format", listed(photo_format)),
+        "end_lap_percent": ("--overlap", overlap),
+        "scale": ("--scale", scale),
+        "flying_height": ("--flying-height", height),
+        "image_sigma_um": ("--sigma-um", sigma),
+    }
+
+
+def as_assignments(options: Options, assignments: list[str] | None) -> list[str]:
     """Turn options into assignments to keys; those of ``--set`` come last and win."""
-    return [f"{key}={value}" for key, value in options.items() if value is not None] + (assignments or [])
+    return [f"{key}={value}" for key, (_, value) in options.items() if value is not None] + (assignments or [])
+
+
+@contextmanager
+def told_by_option(options: Options, assignments: list[str] | None) -> Iterator[None]:
+    """Tell faults of the command line by the option that they came from; ``--set`` wins over an option."""
+    from photostrip.errors import InputError
+
+    overruled = {each.partition("=")[0] for each in assignments or []}
+    names = {
+        key.replace('"', ""): name
+        for key, (name, value) in options.items()
+        if value is not None and key not in overruled
+    }
+    try:
+        yield
+    except InputError as error:
+        raise InputError(_by_option(fault, names) for fault in error.faults) from None
+
+
+def _by_option(fault: Fault, names: dict[str, str]) -> Fault:
+    """Name the option in place of ``--set`` and the key that it stands for."""
+    from photostrip.project.document import COMMAND_LINE
+
+    key = fault.key.replace('"', "")
+    found = [name for each, name in names.items() if key and (key.startswith(each) or each.startswith(f"{key}."))]
+    return replace(fault, file=found[-1], key="") if fault.file == COMMAND_LINE and found else fault
+
+
+# ------------------------------------------------------------------------------------------------------ commands
 
 
 @_command("model", "--camera film --overlap 60 --scale 10000 --control corners", "model.yaml -o model.svg")
@@ -97,23 +149,20 @@ def model(  # noqa: PLR0913, PLR0917 (an argument for each option)
 ) -> None:
     """Compute the expected errors all over one model, and what each source of errors does alone."""
     with told(form):
-        from dataclasses import replace
-
         from photostrip.formats.plans import model_document
         from photostrip.planning.model_plan import plan_model
-        from photostrip.project.plan_files import load_model_plan
+        from photostrip.project.plan_model_file import load_model_plan
 
         options = {
-            "camera.preset": camera, "camera.principal_distance": principal_distance,
-            "camera.format": listed(photo_format), "end_lap_percent": overlap, "scale": scale,
-            "flying_height": flying_height, "image_sigma_um": sigma_um, "control.layout": control,
-            "control.sigma": listed(control_sigma),
-        }  # fmt: skip
-        _require_output(depfile, output)
-        given = load_model_plan(file, as_assignments(options, assignments))
-        document = model_document(given.name, given.camera, plan_model(given.spec))
-        fine = document
-        if _is_picture(output):
+            **_flown(camera, principal_distance, photo_format, overlap, scale, flying_height, sigma_um),
+            "control.layout": ("--control", control),
+            "control.sigma": ("--control-sigma", listed(control_sigma)),
+        }
+        drawn = _require_output(depfile, output)
+        with told_by_option(options, assignments):
+            given = load_model_plan(file, as_assignments(options, assignments))
+        document = fine = model_document(given.name, given.camera, plan_model(given.spec))
+        if drawn:
             fine = model_document(given.name, given.camera, plan_model(replace(given.spec, grid=(FINE, FINE))))
         deliver(document, form, output, fine, quiet=quiet)
         _tell_make(depfile, output, given.files)
@@ -163,28 +212,36 @@ def strip(  # noqa: PLR0913, PLR0917 (an argument for each option)
     """Compute the expected accuracy along a strip, for layouts of control and methods of adjustment."""
     with told(form):
         from photostrip.formats.plan_strip import strip_document
-        from photostrip.project.plan_strip_file import layout_assignment, load_strip_plan
+        from photostrip.project.plan_strip_file import layout_option, load_strip_plan
 
         options = {
-            "camera.preset": camera, "camera.principal_distance": principal_distance,
-            "camera.format": listed(photo_format), "models": models, "end_lap_percent": overlap, "scale": scale,
-            "flying_height": flying_height, "image_sigma_um": sigma_um, "control_sigma": listed(control_sigma),
-            "gnss": listed(gnss), "methods": listed(methods), "place.points": place, "place.into": into,
+            **_flown(camera, principal_distance, photo_format, overlap, scale, flying_height, sigma_um),
+            "models": ("--models", models),
+            "control_sigma": ("--control-sigma", listed(control_sigma)),
+            "gnss": ("--gnss", listed(gnss)),
+            "methods": ("--methods", listed(methods)),
+            "place.points": ("--place", place),
+            "place.into": ("--into", into),
+            **{key: ("--control", value) for key, value in map(layout_option, control or [])},
             **_required(required),
-        }  # fmt: skip
-        _is_picture(output)  # refused before anything is computed
+        }
+        if into is not None and place is None and file is None:
+            raise typer.BadParameter("nothing is to be placed: give --place as well", param_hint="--into")
         _require_output(depfile, output)
-        layouts = [layout_assignment(word) for word in control or []]
-        given = load_strip_plan(file, [*layouts, *as_assignments(options, assignments)])
-        document = strip_document(given.name, given.worked_out())
+        with told_by_option(options, assignments):
+            given = load_strip_plan(file, as_assignments(options, assignments))
+            document = strip_document(given.name, given.worked_out())
         deliver(document, form, output, document, quiet=quiet)
         _tell_make(depfile, output, given.files)
 
 
-def _required(text: str | None) -> dict[str, str | None]:
+def _required(text: str | None) -> Options:
     """Split ``PLAN,HEIGHT``; either may be empty."""
     in_plan, _, in_height = (text or "").partition(",")
-    return {"required.plan": in_plan.strip() or None, "required.height": in_height.strip() or None}
+    return {
+        "required.plan": ("--required", in_plan.strip() or None),
+        "required.height": ("--required", in_height.strip() or None),
+    }
 
 
 @_command("camera", "cameras.yaml", "--source-table")
@@ -203,7 +260,7 @@ def camera(
     with told(form):
         from photostrip.errors import Fault, InputError
         from photostrip.formats.plans import camera_document, source_document
-        from photostrip.project.plan_files import load_camera_plan
+        from photostrip.project.plan_camera_file import load_camera_plan
 
         if source_table == (file is not None):
             message = "a list of cameras and --source-table exclude each other" if file else "no cameras are given"
@@ -236,10 +293,12 @@ def _is_picture(output: Path | None) -> bool:
     return False
 
 
-def _require_output(depfile: Path | None, output: Path | None) -> None:
+def _require_output(depfile: Path | None, output: Path | None) -> bool:
+    """Refuse what cannot be written before anything is computed; tell whether a picture is wanted."""
     if depfile is not None and output is None:
         message = "a rule for make needs a target: give --output as well"
         raise typer.BadParameter(message, param_hint="--depfile")
+    return _is_picture(output)
 
 
 def _tell_make(depfile: Path | None, output: Path | None, files: tuple[str, ...]) -> None:

@@ -109,7 +109,7 @@ def spots_of(layout: Layout, photos: int, rows: int) -> tuple[Spot, ...]:
     chosen = {(photo, row): Spot(photo + 1, row + 1, layout.use) for photo, row in places}
     for spot in layout.spots:
         if not (1 <= spot.photo <= photos and 1 <= spot.row <= rows):
-            message = f"layout `{layout.name}`: there is no row {spot.row} at photo {spot.photo}"
+            message = f"there is no row {spot.row} at photo {spot.photo}"
             expected = f"photos 1 to {photos}, rows 1 to {rows}"
             raise InputError(Fault(message, "plan-place", key="layouts", expected=expected))
         chosen[spot.photo - 1, spot.row - 1] = spot
@@ -122,7 +122,7 @@ def _stations(layout: Layout, last: int) -> list[int]:
         return sorted({*range(0, last + 1, layout.every), last})
     count = layout.bands
     if not 1 <= count <= last + 1:
-        message = f"layout `{layout.name}`: {count} bands do not fit {last + 1} photos"
+        message = f"{count} bands do not fit {last + 1} photos"
         raise InputError(Fault(message, "plan-place", key="layouts", expected=f"1 to {last + 1} bands"))
     return sorted({round(place) for place in np.linspace(0, last, count).tolist()}) if count > 1 else [last // 2]
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.errors import GeometryError
+from photostrip.errors import GeometryError, InputError
 from photostrip.planning.control_layout import Layout, Spot, spots_of
 from photostrip.planning.ideal_strip import IdealStrip, StripGeometry, ideal_strip
 from photostrip.planning.placement import Placed, Placement, Required, best_places, worst
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import NDArray
+
+    from photostrip.errors import Fault
 
     Floats = NDArray[np.float64]
 
@@ -137,6 +139,7 @@ def plan_strip(design: Design) -> Report:
         When there can be no such strip, or a layout does not fit it.
     """
     strip = ideal_strip(design.geometry)
+    _require_places(design)
     outcomes = tuple(
         outcome(strip, layout, method) for layout in design.layouts for method in methods_of(design, layout)
     )
@@ -148,6 +151,19 @@ def plan_strip(design: Design) -> Report:
         into = next(layout for layout in design.layouts if layout.name == design.placement.into)
         placed = best_places(strip, into, design.placement, design.required)
     return Report(design, strip, outcomes, needed, placed)
+
+
+def _require_places(design: Design) -> None:
+    """Refuse all layouts that do not fit the strip."""
+    faults: list[Fault] = []
+    # the same layout may stand here twice, without and with perspective centres
+    for layout in {replace(each, name="", gnss=None): each for each in reversed(design.layouts)}.values():
+        try:
+            spots_of(layout, design.geometry.photos, design.geometry.points.rows)
+        except InputError as error:
+            faults += [replace(fault, key=f'layouts."{layout.name}"') for fault in error.faults]
+    if faults:
+        raise InputError(reversed(faults))
 
 
 def methods_of(design: Design, layout: Layout) -> tuple[str, ...]:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from photostrip.project.plan_files import CameraPlanFile, ModelPlanFile
+from photostrip.project.plan_camera_file import CameraPlanFile
+from photostrip.project.plan_model_file import ModelPlanFile
 from photostrip.project.plan_strip_file import StripPlanFile
 from photostrip.project.schema import Section, described
 

@@ -13,12 +13,12 @@ from photostrip.planning.control_layout import LAYOUTS, USES, Layout, Spot
 from photostrip.planning.ideal_strip import LEAST_PHOTOS, StripGeometry
 from photostrip.planning.placement import Placement, Required
 from photostrip.planning.strip_design import Design, plan_strip
-from photostrip.planning.strip_methods import METHODS
+from photostrip.planning.strip_methods import BUNDLE, METHODS
 from photostrip.project.document import fault_at
 from photostrip.project.merging import steps
-from photostrip.project.plan_files import SCHEMA_NUMBER, Percent, Sigmas, SigmaUm, read_plan
+from photostrip.project.plan_reading import SCHEMA_NUMBER, Flown, Sigmas, read_plan
 from photostrip.project.schema import Flag, Id, Positive, Section, Words, key, wrong
-from photostrip.project.simulation_spec import SimulatedCamera, Whole, camera_of
+from photostrip.project.simulation_spec import Whole, camera_of
 from photostrip.project.terrestrial_presets import one_of
 from photostrip.project.terrestrial_ranges import Range, bounded
 from photostrip.simulate import Points
@@ -74,8 +74,8 @@ def _layout(value: object) -> object:
     return {name.strip(): number.strip()} if equals else {"layout": value}
 
 
-def layout_assignment(word: str) -> str:
-    """Give the assignment that adds a layout to a plan.
+def layout_option(word: str) -> tuple[str, str]:
+    """Give the key and the value that add a layout to a plan.
 
     Parameters
     ----------
@@ -84,12 +84,12 @@ def layout_assignment(word: str) -> str:
 
     Returns
     -------
-    str
-        ``layouts."3 bands"="bands=3"``: a name without an equals sign, and the word.
+    key, value : str
+        ``layouts."3 bands"``: a name without an equals sign, and the word, ``"bands=3"``.
     """
     kind, equals, number = word.partition("=")
-    name = f"{number} bands" if kind == "bands" else f"{kind} {number}"
-    return f'layouts."{name if equals else word}"="{word}"'
+    name = f"{number} band{'' if number == '1' else 's'}" if kind == "bands" else f"{kind} {number}"
+    return f'layouts."{name if equals else word}"', f'"{word}"'
 
 
 class StripLayout(Section):
@@ -113,6 +113,12 @@ class StripLayout(Section):
     )
     gnss_offset: Flag = key("Whether these have a constant offset to be determined", USUAL_LAYOUT.gnss_offset)
 
+    @model_validator(mode="after")
+    def _one_way_to_space_bands(self) -> Self:
+        if self.every is not None and "bands" in self.model_fields_set:
+            raise wrong("the number of bands and their distance are both given", at="every", fix="remove one")
+        return self
+
 
 class StripRequired(Section):
     """The accuracy that every point must reach."""
@@ -130,19 +136,13 @@ class StripPlacement(Section):
     use: Annotated[Words, AfterValidator(one_of(*USES))] = key("`xyz`, `xy` or `z`", "xyz")
 
 
-class StripPlanFile(Section):
+class StripPlanFile(Flown):
     """A strip and layouts of its control. Every key but the first has a default."""
 
     photostrip_plan_strip: Annotated[Words, AfterValidator(one_of(SCHEMA_NUMBER))] = key("Number of this schema: 1")
-    extends: Words | None = key("Another file whose keys are taken where this one has none", None)
     name: Words = key("Name of the plan", "strip")
-    camera: SimulatedCamera = key("Camera; its lens counts as ideal", SimulatedCamera.model_construct())
     models: Annotated[Whole, AfterValidator(bounded(MODELS))] = key("Models of the strip, one less than photos", 10)
-    end_lap_percent: Percent = key("Overlap of neighbouring photos", StripGeometry.end_lap_percent, unit="%")
-    scale: Positive | None = key("Denominator of the photo scale; default: 10000", None)
-    flying_height: Positive | None = key("Height above the ground, instead of `scale`", None, unit="m")
     points: StripPoints = key("Pass points", StripPoints.model_construct())
-    image_sigma_um: SigmaUm = key("Standard deviation of an image coordinate", 5.0, unit="um")
     control_sigma: Sigmas = key("Standard deviations along, across and in height", USUAL_LAYOUT.sigma, unit="m")
     gnss: Sigmas | None = key(
         "Standard deviations of measured perspective centres: each layout is compared with and without them",
@@ -159,15 +159,17 @@ class StripPlanFile(Section):
     place: StripPlacement | None = key("Further points to be placed as well as possible", None)
 
     @model_validator(mode="after")
-    def _one_scale(self) -> Self:
-        if self.scale is not None and self.flying_height is not None:
-            raise wrong("photo scale and flying height are both given", at="flying_height", fix="remove one")
+    def _names_and_methods_fit(self) -> Self:
         into = self.place.into if self.place is not None else None
         names = list(self.layouts or DEFAULT_LAYOUTS)
         if into is not None and into not in names:
             message = f"there is no layout `{into}` that points could be added to"
             fix = suggestion(into, names)
             raise wrong(message, code="unknown-layout", at="place", expected=f"one of {', '.join(names)}", fix=fix)
+        measured = self.gnss is not None or any(each.gnss is not None for each in (self.layouts or {}).values())
+        if measured and BUNDLE not in self.methods:
+            message = "measured perspective centres are of use to the bundle alone, which is not among the methods"
+            raise wrong(message, at="methods", fix="add `bundle`, or leave `gnss` out")
         return self
 
 
@@ -237,10 +239,14 @@ def load_strip_plan(path: Path | None, assignments: Sequence[str]) -> StripPlan:
     """
     given, files, root = read_plan(StripPlanFile, path, assignments)
     camera = camera_of(given.camera)
-    scale = given.scale or (given.flying_height or 0.0) / camera.principal_distance * 1000.0 or StripGeometry.scale
     points = Points(given.points.rows, given.points.reach_percent, 0.0, given.points.extra_per_model)
     geometry = StripGeometry(
-        camera, given.models + 1, given.end_lap_percent, scale, points, given.image_sigma_um / 1000.0
+        camera,
+        given.models + 1,
+        given.end_lap_percent,
+        given.scale_of(camera),
+        points,
+        given.image_sigma_um / 1000.0,
     )
     usual = {name: StripLayout.model_validate(_layout(word)) for name, word in DEFAULT_LAYOUTS.items()}
     chosen = (given.layouts or usual).items()

@@ -230,13 +230,32 @@ def test_the_report_of_a_strip(capsys: pytest.CaptureFixture[str], tmp_path: Pat
         ("--set=methods=[cubic]", 2, "`cubic` is not known"),
         ("--set=place={points: 2, into: nowhere}", 2, "no layout `nowhere`"),
         ("--models=1", 2, "1 is out of range"),
-        ("--overlap=30", 2, "error: --set: end_lap_percent: an end lap of 30 %"),
+        ("--overlap=30", 2, "error: --overlap: an end lap of 30 %"),
+        ("--control=bunds", 2, "error: --control: `bunds` is not known"),
+        ("--control=bands=12", 2, "error: --control: 12 bands do not fit 11 photos"),
+        ("--required=a,0.1", 2, "error: --required: `a` is not a number"),
+        ("--into=corners", 2, "Invalid value for --into: nothing is to be placed"),
+        ("--set=layouts.a={bands: 3, every: 4}", 2, "layouts.a.every: the number of bands and their distance"),
+        ("--set=layouts.a={gnss: [1, 1, 1]}", 0, ""),
     ],
 )
 def test_a_wrong_strip_is_refused(change: str, code: int, message: str, capsys: pytest.CaptureFixture[str]) -> None:
     name, _, value = change.partition("=")
     assert main(["plan", "strip", name, value]) == code
     assert message in capsys.readouterr().err
+
+
+def test_all_faults_of_a_strip_are_told_where_they_stand(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    plan = tmp_path / "strip.yaml"
+    layouts = "  a: bands=20\n  b: {per_band: 9}\n  c: {layout: points, points: [[99, 1]]}\n"
+    plan.write_text(f"photostrip_plan_strip: 1\ngnss: [0.1, 0.1, 0.1]\nlayouts:\n{layouts}", encoding="utf-8")
+    assert main(["plan", "strip", str(plan)]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.split(": ")[1].rsplit(":", 2)[1] for line in lines] == ["4", "5", "6"]
+    assert main(["plan", "strip", str(plan), "--methods", "covariance"]) == 2
+    assert "of use to the bundle alone" in capsys.readouterr().err
+    assert main(["plan", "model", str(plan)]) == 2
+    assert capsys.readouterr().err.endswith("this is a plan for `photostrip plan strip`\n")
 
 
 def test_every_layout_with_and_without_perspective_centres(capsys: pytest.CaptureFixture[str]) -> None:
