@@ -110,10 +110,10 @@ def test_expected_precision_is_the_scatter_of_whole_runs() -> None:
     strip = ideal_strip(geometry)
     methods = (SIMILARITY, COVARIANCE)
     count = 100
-    found = repetitions(Task(geometry, layout, methods, 0, count))
+    found = repetitions(Task(geometry, (layout,), methods, 0, count))
     for method in methods:
         expected = accuracy(strip, layout, spots_of(layout, 8, 5), method)
-        total, squares = found[method]
+        total, squares = found[layout.name, method]
         scatter = np.sqrt(squares / count - (total / count) ** 2)[expected.new]
         ratio = expected.sigmas[expected.new] / scatter
         # 100 repetitions know the rms over all points to about 5 %, single coordinates to 7 %
