@@ -43,7 +43,8 @@ LONG_STRIP = 25  # models; beyond it polynomials fall far behind a rigorous adju
 POLYNOMIAL_MODELS = 15  # models from which on, and
 POLYNOMIAL_BANDS = 4  # bands of control below which the adjustment with the covariance is proposed
 LEVEL = 0.01  # of the test of the whole
-MOST_PASSES = 5
+MOST_PASSES = 10
+FRESH = 0.05  # radians that a strip may turn before its derivatives are made afresh
 ENOUGH = 0.1  # of the angle that an image coordinate's standard deviation spans: what squares of turns may leave
 
 
@@ -151,9 +152,11 @@ def adjust(
     given = _Given(strip, control, observations, measured(strip, observations), settings)
     factor, basis = image_variance(formed[0], sigma)
     one, passes = _first(given, formed, factor), 1
-    enough = ENOUGH * sigma / strip.camera.principal_distance
-    while passes < MOST_PASSES and strip_passes.remainder(one.system, one.length) > enough:
-        one, passes = _next(given, one, factor), passes + 1
+    turn = rate = strip_passes.largest_turn(one.system, one.length)
+    while passes < MOST_PASSES and turn * rate / 2 > ENOUGH * sigma / strip.camera.principal_distance:
+        one, fresh = _next(given, one, factor, fresh=turn > FRESH), turn > FRESH
+        turn = strip_passes.largest_turn(one.system, one.length)
+        passes, rate = passes + 1, turn if fresh else rate
     things = [one.errors.points, photo_rows(one.errors)]
     (points, photos), cofactors = strip_covariance.predict(one.errors, one.conditions, one.local, one.system, things)
     known = [strip_passes.displacements(one.errors, rows, one.images) for rows in things]
@@ -215,22 +218,41 @@ def _first(given: _Given, formed: tuple[Orientation, FormedStrip, AbsoluteOrient
     return _solved(given, formed, errors, np.zeros((len(errors.images.row), 2)), factor)
 
 
-def _next(given: _Given, before: _Pass, factor: float) -> _Pass:
-    """Form the strip from corrected image coordinates, and adjust it with the whole errors as unknowns again."""
+def _next(given: _Given, before: _Pass, factor: float, *, fresh: bool) -> _Pass:
+    """Form the strip from corrected image coordinates, and adjust it with the whole errors as unknowns again.
+
+    The derivatives of the pass before will do, unless the strip has turned too much; then they are made afresh.
+    """
     images = strip_passes.image_errors(before.errors, before.conditions, before.system)
     seen = before.errors.images
     xy = given.observations.xy.copy()
     xy[seen.row] -= images * seen.sigma
-    observations = replace(given.observations, xy=xy)
     orientation = reforming.oriented_again(before.orientation, xy)
+    observations = replace(given.observations, xy=xy)
     formed = reforming.formed_again(before.formed, orientation, observations, given.strip.photos)
     targets, rows = given.control
     # the strip fits its control by now: weights do not matter to where it lies
-    similarity = absolute.orient(formed.xyz[rows], targets, targets.control.use.astype(float), formed.xyz)
-    errors = strip_errors.strip_errors(
-        orientation, formed, similarity.similarity, given.position, given.observations.sigma
+    oriented = absolute.orient(formed.xyz[rows], targets, targets.control.use.astype(float), formed.xyz)
+    if fresh:
+        position, sigma = given.position, given.observations.sigma
+        formed = replace(formed, model_xyz=np.where(np.isnan(before.formed.model_xyz), np.nan, formed.model_xyz))
+        errors = strip_errors.strip_errors(orientation, formed, oriented.similarity, position, sigma)
+        return _solved(given, (orientation, formed, oriented), errors, images, factor)
+    found, wanted = before.control, before.conditions
+    control = oriented.misclosures[found.point, found.axis]
+    value = strip_conditions.misclosures_at(wanted, formed, oriented.similarity, control)
+    value += strip_passes.displacements(before.errors, wanted.rows, images)[:, 0]
+    formed = replace(formed, model_xyz=np.where(np.isnan(before.formed.model_xyz), np.nan, formed.model_xyz))
+    system = replace(before.system, solution=before.system.solved_for(value))
+    return replace(
+        before,
+        orientation=orientation,
+        formed=formed,
+        absolute=oriented,
+        images=images,
+        conditions=replace(wanted, value=value),
+        system=system,
     )
-    return _solved(given, (orientation, formed, similarity), errors, images, factor)
 
 
 def _solved(

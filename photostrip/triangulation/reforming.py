@@ -65,13 +65,12 @@ def formed_again(
     Returns
     -------
     FormedStrip
-        The same points and joints.
+        The same points and joints; ``model_xyz`` holds the points that were left out, too.
     """
     vectors, gap, _ = formation.model_points(orientation)
     junctions = _joined(formed.junctions, orientation, vectors)
     there = np.asarray(np.isfinite(formed.model_xyz).all(axis=1), bool)
     again = formation.placed(orientation, vectors, gap, junctions, orientation.used & there)
-    again = formation.without(again, orientation, np.logical_not(there))
     if not len(formed.bridging):
         return again
     return bridging.bridge(again, observations, photos, orientation.pairs.focal, formed.bridging)

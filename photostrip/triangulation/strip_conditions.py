@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from photostrip.geometry.similarity import Similarity
     from photostrip.triangulation.control_errors import Misclosures
     from photostrip.triangulation.formation import FormedStrip
     from photostrip.triangulation.relative import Orientation
@@ -134,6 +135,38 @@ def conditions(
     if distances:
         parts.append(_distances(errors, *strip, max(slots, 2)))
     return _sorted(parts, max(slots, 2))
+
+
+def misclosures_at(wanted: Conditions, formed: FormedStrip, similarity: Similarity, control: Floats) -> Floats:
+    """Misclosures of the same conditions in the strip as it is formed from other image coordinates.
+
+    Parameters
+    ----------
+    wanted : Conditions
+        The conditions.
+    formed : FormedStrip
+        The strip, with the same joints.
+    similarity : Similarity
+        From there to the ground.
+    control : ndarray, shape (w,)
+        Strip minus given of the control coordinates, metres.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Misclosures, metres.
+    """
+    result = np.zeros(len(wanted.value))
+    is_control, is_distance = wanted.kind == CONTROL, wanted.kind == DISTANCE
+    result[is_control] = control[wanted.source[is_control]]
+    rows = wanted.source[is_distance]
+    joined = formed.junctions
+    center = formed.centers[joined.joint[rows] + 1]
+    before, after = (formed.model_xyz[side[rows]] - center for side in (joined.before, joined.after))
+    ray = before / np.linalg.norm(before, axis=1)[:, None] + after / np.linalg.norm(after, axis=1)[:, None]
+    along = ((after - before) * ray).sum(axis=1) / np.linalg.norm(ray, axis=1)
+    result[is_distance] = similarity.scale * along
+    return result
 
 
 def _sorted(parts: Sequence[Conditions], slots: int) -> Conditions:

@@ -1,7 +1,9 @@
 """What an adjusted strip says about its measurements, and whether its linear equations were good enough.
 
 The adjustment is linear in the errors of the image coordinates. In a long strip these turn the last models by so much
-that squares of the turns count; the strip is then formed once more from corrected image coordinates.
+that squares of the turns count. The strip is then formed once more from corrected image coordinates, and the
+misclosures it has there go through the equations that were eliminated already: Newton's method with the first
+derivatives, which lessens what is left by the size of the turns at every pass.
 
 Source: derived; see docs/precision.md.
 """
@@ -93,24 +95,23 @@ def displacements(errors: StripErrors, rows: Rows, images: Floats) -> Floats:
     return result
 
 
-def remainder(found: System, length: float) -> float:
-    """Estimate how far off the linear equations are.
+def largest_turn(found: System, length: float) -> float:
+    """Give the largest turn and change of scale of a model.
 
     Parameters
     ----------
     found : System
         The solved system, with the unknowns of each model about its left photo.
     length : float
-        Length by which rotations and scales are multiplied in them, metres.
+        Length by which rotations and scales are multiplied in it, metres.
 
     Returns
     -------
     float
-        Half the square of the largest turn and change of scale of a model, radians: what they leave at a point, seen
-        from its photo.
+        Root of the sum of their squares, radians.
     """
     layout = found.layout
     models = np.arange(len(layout.start))
     columns = layout.unknown[:, None] + np.arange(3, PARAMETERS)
     unknowns = found.solution[(models // layout.width)[:, None], columns] / length
-    return float(np.square(unknowns).sum(axis=1).max() / 2)
+    return float(np.sqrt(np.square(unknowns).sum(axis=1).max()))

@@ -8,7 +8,7 @@ Source: derived; see docs/precision.md.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -263,6 +263,24 @@ class System:
     factors: block_tridiagonal.Factors
     solution: Floats
 
+    def solved_for(self, value: Floats) -> Floats:
+        """Solve for other misclosures.
+
+        Parameters
+        ----------
+        value : ndarray, shape (n,)
+            Misclosures of all conditions, metres.
+
+        Returns
+        -------
+        ndarray, shape (g, b)
+            As ``solution``.
+        """
+        layout = self.layout
+        right = np.zeros((layout.blocks, layout.height, 1))
+        right[layout.block, layout.position, 0] = value
+        return np.asarray(self.factors.solve(right)[:, :, 0], float)
+
 
 def system(errors: StripErrors, wanted: Conditions, factor: float) -> System:
     """Build, eliminate and solve the system of all conditions and unknowns.
@@ -295,10 +313,9 @@ def system(errors: StripErrors, wanted: Conditions, factor: float) -> System:
     matrix.diagonal[layout.block, layout.position, layout.position] += wanted.noise / factor
     blocks, places = layout.empty()
     matrix.diagonal[blocks, places, places] = 1.0
-    right = np.zeros((layout.blocks, layout.height, 1))
-    right[layout.block, layout.position, 0] = wanted.value
     factors = block_tridiagonal.eliminate(matrix.diagonal, matrix.beside)
-    return System(layout, padded, factors, factors.solve(right)[:, :, 0])
+    eliminated = System(layout, padded, factors, np.zeros((layout.blocks, layout.height)))
+    return replace(eliminated, solution=eliminated.solved_for(wanted.value))
 
 
 def _add_covariances(matrix: Matrix, layout: Layout, padded: Padded, rows: Rows) -> None:
