@@ -10,6 +10,7 @@ Source: [001] for the elements; condition, derivatives, start values and retries
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -474,7 +475,7 @@ class Orientation:
         """Number of points that took part, by pair."""
         return self.pairs.sums(self.used.astype(float)).astype(np.intp)
 
-    @property
+    @cached_property
     def relative(self) -> tuple[Floats, Floats]:
         """Base direction (p, 3) and rotation of the right photo (p, 3, 3), both in the left photo's frame."""
         al1, ka1, al2, om2, ka2 = self.elements.T

@@ -152,6 +152,7 @@ def parallaxes_of(result: Result, rank: Numbers) -> list[Document]:
         values, used = micrometres(oriented.parallax[order]), oriented.used[order].tolist()
         redundancy = rounded(np.where(oriented.used, oriented.redundancy, np.nan)[order], 3)
         detectable = rounded(1000 * strip.screened.detectable[order], 1)
+        zone = strip.screened.zone[order].tolist()
         ends = [*oriented.pairs.starts.tolist(), len(names)]
         found += [
             {
@@ -161,6 +162,7 @@ def parallaxes_of(result: Result, rank: Numbers) -> list[Document]:
                 "points": names[ends[n] : ends[n + 1]],
                 "q_um": values[ends[n] : ends[n + 1]],
                 "used": used[ends[n] : ends[n + 1]],
+                "zone": zone[ends[n] : ends[n + 1]],
                 "redundancy": redundancy[ends[n] : ends[n + 1]],
                 "detectable_um": detectable[ends[n] : ends[n + 1]],
             }
