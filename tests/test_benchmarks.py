@@ -81,3 +81,20 @@ def test_planning_prints_predicted_and_actual_deviations() -> None:
     ratios = [float(value) for row in rows for value in (row[2].split()[2], row[2].split()[5])]
     assert len(ratios) == 20
     assert all(0.7 < ratio < 1.4 for ratio in ratios)
+
+
+@pytest.mark.slow
+def test_independent_models_prints_three_tables() -> None:
+    out = printed("independent_models.py", "--strips", "1", "--repetitions", "3")
+    assert (
+        len(
+            re.findall(
+                r"^\| (?:6|12|20) \| (?:similarity|polynomial) \|(?: \d+\.\d / \d+\.\d \|){3}", out, re.MULTILINE
+            )
+        )
+        == 6
+    )
+    assert (
+        len(re.findall(r"^\| [38] \| (?:similarity|degree [12]) \|(?: \d\.\d+ \(.*?\) \|){2}$", out, re.MULTILINE)) == 6
+    )
+    assert re.search(r"^\| 1000 \| 100 % \| 100 % \|", out, re.MULTILINE)

@@ -1,4 +1,7 @@
-"""Model coordinates measured on a plotter: tables ``model,point,x,y,z[,sx,sy,sz]`` and ``model,photo,x,y,z[,...]``."""
+"""Model coordinates measured on a plotter: tables ``model,point,x,y,z[,sx,sy,sz]`` and ``model,photo,x,y,z[,...]``.
+
+Files of blocks, a model's id, lines ``point x y z`` and -99, are read as well.
+"""
 
 from __future__ import annotations
 
@@ -30,6 +33,7 @@ COORDINATES = (
         for axis in AXES
     ),
 )
+END = "-99"  # of a model, in a file of blocks
 MODEL_POINTS = (MODEL, POINT, *COORDINATES)
 MODEL_CENTERS = (MODEL, PHOTO, *COORDINATES)
 
@@ -91,7 +95,9 @@ def read_models(
         What could be read; None when the header is wrong.
     """
     target = "photo" if centers else "point"
-    table = read_table(file, MODEL_CENTERS if centers else MODEL_POINTS, findings, columns=columns)
+    rewritten = None if centers else rows_of_blocks
+    layout = MODEL_CENTERS if centers else MODEL_POINTS
+    table = read_table(file, layout, findings, columns=columns, rewritten=rewritten)
     if table is None:
         return None
     read = ModelTable(
@@ -108,6 +114,41 @@ def read_models(
         _refuse_without_sigma(read, findings)
     _refuse_repeated(read, findings)
     return read
+
+
+def rows_of_blocks(data: bytes) -> bytes:
+    """Make a table of a file of blocks, as programs for independent models write it: model, ``point x y z``, -99.
+
+    Parameters
+    ----------
+    data : bytes
+        A file: each model begins with a line that has its id alone, holds lines of a point, three coordinates and
+        whatever else, parted by blanks, and ends with -99.
+
+    Returns
+    -------
+    bytes
+        A table with each row in the line of its point; any other file as it is.
+    """
+    lines = data.decode().splitlines()
+    filled = [line.split() for line in lines if line.strip()]
+    if not filled or len(filled[0]) != 1 or "," in filled[0][0] or not any(each == [END] for each in filled):
+        return data
+    found, model, header = [], "", ",".join(column.name for column in MODEL_POINTS if column.required)
+    for fields in (line.split() for line in lines):
+        text = ""
+        if fields == [END]:
+            model = ""
+        elif fields and not model:
+            model, text, header = fields[0], header, ""
+        elif fields:
+            text = ",".join(_quoted(each) for each in (model, *fields[:4]))
+        found.append(text)
+    return "\n".join(found).encode()
+
+
+def _quoted(text: str) -> str:
+    return '"' + text.replace('"', '""') + '"' if '"' in text or "," in text else text
 
 
 def _refuse_without_sigma(read: ModelTable, findings: Findings) -> None:

@@ -23,7 +23,7 @@ from photostrip.formats.table_text import TableText, content
 from photostrip.notes import Note
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -173,6 +173,7 @@ def read_table(
     *,
     others: Sequence[Sequence[Column]] = (),
     columns: Mapping[str, str] | None = None,
+    rewritten: Callable[[bytes], bytes] | None = None,
 ) -> Table | None:
     """Read a table.
 
@@ -188,6 +189,8 @@ def read_table(
         Other layouts of the same kind of table; that of which the header has most is taken, the first when in doubt.
     columns : mapping of str to str, optional
         Names in the header of columns that the user calls otherwise.
+    rewritten : callable, optional
+        Makes a table, line for line, of the text of another layout; gives a table as it is.
 
     Returns
     -------
@@ -202,6 +205,7 @@ def read_table(
         return None
     if marked:
         findings.notes.append(Note("byte-order-mark", BYTE_ORDER_MARK, "note", file=file, line=1))
+    data = data if rewritten is None else rewritten(data)
     layouts = [_renamed(each, columns or {}) for each in (layout, *others)]
     return _Reader(TableText(file, data), layouts, findings).read()
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.pipeline import Result
+    from photostrip.pipeline.model_results import LinkedStrip
     from photostrip.pipeline.replay import PairRound, SimilarityStep
     from photostrip.pipeline.results import StripResult
 
@@ -66,7 +67,22 @@ def trace_of(result: Result) -> Document:
         "name": result.inputs.name,
         "angles": unit,
         "symbols": SYMBOLS,
-        "strips": [_strip(result, strip, UNITS[unit]) for strip in result.strips],
+        "strips": [
+            *(_strip(result, strip, UNITS[unit]) for strip in result.strips),
+            *(_linked(result, strip, UNITS[unit]) for strip in result.linked),
+        ],
+    }
+
+
+def _linked(result: Result, strip: LinkedStrip, factor: float) -> Document:
+    """Give a strip of independent models: its links are in the result, the way to the ground is as for photos."""
+    return {
+        "strip": strip.strip.id,
+        "pairs": [],
+        "chain": [],
+        "scale_transfer": [],
+        "absolute": _absolute(result, strip, factor),
+        "polynomial": _polynomial(result, strip),
     }
 
 
@@ -219,7 +235,7 @@ def _scale_transfer(result: Result, strip: StripResult) -> list[Document]:
 # ---------------------------------------------------------------------------------------------------- the ground
 
 
-def _absolute(result: Result, strip: StripResult, factor: float) -> Document:
+def _absolute(result: Result, strip: StripResult | LinkedStrip, factor: float) -> Document:
     """Absolute orientation: the frame, the control in it, the steps, the similarity."""
     steps = similarity_steps(result, strip)
     similarity, frame = strip.absolute.similarity, strip.intermediate
@@ -264,7 +280,7 @@ def _similarity_step(number: int, step: SimilarityStep, factor: float) -> Docume
     }
 
 
-def _polynomial(result: Result, strip: StripResult) -> Document | None:
+def _polynomial(result: Result, strip: StripResult | LinkedStrip) -> Document | None:
     """Polynomials of a strip: coefficients by term, free terms and residuals at the control."""
     found = strip.polynomial
     if found is None:

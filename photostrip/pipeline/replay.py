@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.geometry.similarity import Similarity
+    from photostrip.pipeline.model_results import LinkedStrip
     from photostrip.pipeline.results import Result, StripResult
     from photostrip.triangulation.relative import Pairs
 
@@ -145,14 +146,14 @@ def _round(start: Floats, pairs: Pairs) -> list[PairRound]:
     return [PairRound(*each) for each in zip(counts, map(tuple, steps), ends, strict=True)]
 
 
-def similarity_steps(result: Result, strip: StripResult) -> list[SimilarityStep]:
+def similarity_steps(result: Result, strip: StripResult | LinkedStrip) -> list[SimilarityStep]:
     """Repeat the absolute orientation of a strip on the control that was used.
 
     Parameters
     ----------
     result : Result
         What the run found.
-    strip : StripResult
+    strip : StripResult or LinkedStrip
         One of its strips.
 
     Returns

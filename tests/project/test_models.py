@@ -124,6 +124,32 @@ def test_other_names_of_columns_and_rows_of_their_own(tmp_path: Path) -> None:
     assert found.points.sigma[3].tolist() == [0.01, 0.02, 0.03]
 
 
+def blocks() -> str:
+    lines: list[str] = []
+    for model in ("12", "23"):
+        rows = [line.split(",")[1:] for line in MODELS.splitlines() if line.startswith(f"{model},")]
+        lines += [f"{model} ", *("  ".join([*row, "1"]) for row in rows), "-99"]
+    return "\n".join(lines) + "\n"
+
+
+def test_a_file_of_blocks_is_the_same(tmp_path: Path) -> None:
+    given = sample(tmp_path, {**FILES, M: blocks()}).load().inputs.models
+    plain = sample(tmp_path / "plain", FILES).load().inputs.models
+    assert given is not None
+    assert plain is not None
+    assert given.points.xyz.tolist() == plain.points.xyz.tolist()
+    assert given.points.node.tolist() == plain.points.node.tolist()
+
+
+def test_faults_of_blocks_have_their_line(tmp_path: Path) -> None:
+    with pytest.raises(InputError) as told:
+        sample(tmp_path, {**FILES, M: blocks().replace("B2  89.000000", "B2  89,0")}).load()
+    lines = blocks().splitlines()
+    assert {fault.line for fault in told.value.faults} == {
+        k for k, line in enumerate(lines, 1) if line.startswith("B2  89")
+    }
+
+
 def without(*starts: str) -> str:
     return "\n".join(line for line in MODELS.splitlines() if not line.startswith(starts)) + "\n"
 
