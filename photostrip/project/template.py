@@ -63,6 +63,12 @@ output:
 #   earth_curvature: auto           # auto | model | none
 #   refraction: false
 # tolerances: {{check_rms_xy: 0.40, check_rms_z: 0.60}}     # metres; exceeded: exit code 1
+#
+# Model coordinates measured on a plotter stand in place of cameras and observations (docs/independent-models.md):
+# models:
+#   file: models.csv                # model,point,x,y,z; a point with the id of a photo is its perspective centre
+#   unit: mm                        # mm | um | m
+#   sigma: [0.010, 0.010, 0.015]    # standard deviations of x, y, z, in `unit`
 """
 OBSERVATIONS = "photo,point,x,y\n"
 CONTROL = "point,x,y,z,use,role\n"
