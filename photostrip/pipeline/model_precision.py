@@ -82,8 +82,7 @@ def of_linked(
     seen, fit = _fit_to_control(strip, found, frames)
     factor, basis = variance_factor(formed)
     influence = _influence(strip, fit)
-    by_control = errors.sums(found, *_weights(seen, strip.control_rows))
-    by_parameters = np.einsum("tw,wri->tri", fit.operator, by_control)
+    by_parameters = errors.sums(found, *_weights(seen, strip.control_rows, fit.operator))
     spread = errors.covariance_of_sums(found, by_parameters)
     spread += (fit.operator * (seen.variance / factor)) @ fit.operator.T
     mixed = errors.with_sums(found, by_parameters) @ influence.transpose(0, 2, 1)
@@ -136,7 +135,7 @@ def joint(
         Frame of the adjustment.
     """
     control, rows = given
-    if control.use.sum() > control_tests.LARGEST:
+    if control.use.sum() > control_tests.LARGEST or len(formed.photos) > control_tests.LONGEST:
         return None
     found = errors.differentiate(formed, orientation.similarity)
     xyz = orientation.similarity(formed.xyz[rows])
@@ -171,11 +170,13 @@ def _misclosures(control: ControlPoints, axes: Floats, xyz: Floats, origin: Floa
     return control_errors.Misclosures(point, axis, direction, control.sigma[point, axis] ** 2, rows)
 
 
-def _weights(seen: Misclosures, rows: Numbers) -> tuple[Numbers, Floats]:
-    """Nodes of given points, and the direction of each coordinate as a weighted sum of theirs."""
-    weights = np.zeros((len(seen.point), len(rows), 3))
-    weights[np.arange(len(seen.point)), seen.point] = seen.direction
-    return rows, weights
+def _weights(seen: Misclosures, rows: Numbers, operator: Floats | None = None) -> tuple[Numbers, Floats]:
+    """Nodes of given points, and sums of their coordinates as weighted sums of the nodes; by default each one."""
+    if operator is None:
+        operator = np.eye(len(seen.point))
+    weights = np.zeros((len(rows), len(operator), 3))
+    np.add.at(weights, seen.point, operator.T[:, :, None] * seen.direction[:, None, :])
+    return rows, weights.transpose(1, 0, 2)
 
 
 def _influence(strip: LinkedStrip, fit: Correction) -> Floats:
@@ -220,7 +221,7 @@ def _check(
     difference = targets.misclosures(xyz)[seen.point, seen.axis]
     taken = np.einsum("wi,wit->wt", seen.direction, influence[rows][seen.point]) @ fit.operator
     own = errors.sums(found, *_weights(seen, rows))
-    own = own - np.einsum("ws,sri->wri", taken, errors.sums(found, *_weights(control, strip.control_rows)))
+    own = own - errors.sums(found, *_weights(control, strip.control_rows, taken))
     spread = errors.covariance_of_sums(found, own) * factor + (taken * control.variance) @ taken.T
     squares = float(difference @ np.linalg.solve(spread + np.diag(seen.variance), difference))
     return CheckTest(len(points), len(difference), squares)
