@@ -104,14 +104,26 @@ def examine(
 
 
 def _steps(links: mosaic.Links, order: Sequence[int]) -> tuple[complex, ...]:
-    """Half of the way from the photo before to the one behind, on each photo: a tilt of its own does not count."""
-    steps = []
-    for before, here, after in zip((-1, *order), order, (*order[1:], -1), strict=False):
-        ways = [links.toward(here, after) if after >= 0 else complex("nan")]
-        ways += [-links.toward(here, before)] if before >= 0 else []
-        known = [way for way in ways if np.isfinite(way)]
-        steps.append(sum(known) / len(known) if known else complex("nan"))
-    return tuple(steps)
+    """Way to the next photo on each photo: slope of the line through the centres of all photos linked with it.
+
+    A tilt moves single centres by as much as a base; those of photos farther on say more of it.
+    """
+    rank = np.full(max((*order, int(links.photo.max(initial=0)))) + 1, -1)
+    rank[list(order)] = np.arange(len(order))
+    here, other = (np.concatenate([links.photo[:, k], links.photo[:, 1 - k]]) for k in (0, 1))
+    way, count = np.concatenate(links.bases), np.tile(links.count, 2)
+    lag = rank[other] - rank[here]
+    near = np.abs(lag) == 1  # a link of two points serves where there is no better one
+    use = (rank[here] >= 0) & (rank[other] >= 0) & np.isfinite(way) & (near | (count >= SURE_COUNT))
+    at, lag, way = rank[here[use]], lag[use], way[use]
+    size = len(order)
+    number = np.bincount(at, minlength=size) + 1.0  # with its own centre
+    first, second = np.bincount(at, lag, size), np.bincount(at, lag.astype(float) ** 2, size)
+    total = np.bincount(at, way.real, size) + 1j * np.bincount(at, way.imag, size)
+    mixed = np.bincount(at, lag * way.real, size) + 1j * np.bincount(at, lag * way.imag, size)
+    below = number * second - first**2
+    slope = np.where(below > 0, (number * mixed - first * total) / np.where(below > 0, below, 1.0), np.nan)
+    return tuple(slope.tolist())
 
 
 # ------------------------------------------------------------------------------- photos unlike their neighbours
