@@ -175,6 +175,21 @@ def test_a_wrong_unit_of_all_coordinates_is_named(factor: float, word: str) -> N
     assert factors == {made.camera.name: pytest.approx(1 / factor)}
 
 
+@pytest.mark.parametrize(("measured", "word"), [(1000.0, "micrometres"), (1e-3, "millimetres"), (1 / 25.4, "inches")])
+def test_marks_in_another_unit_are_named_with_the_unit(measured: float, word: str) -> None:
+    scales = np.array([1.0, 1.002, 1.0 / measured, 0.998 / measured])  # calibrated over measured distances
+    (finding,) = units.of_marks(scales, ["1", "2", "3", "4"])
+    assert (finding.code, finding.severity, finding.photos) == ("P106", "warning", ("3", "4"))
+    assert finding.evidence["measured_over_calibrated"] == pytest.approx(measured, rel=0.002)
+    assert word in finding.message
+    assert finding.key == "fiducial_measurements.unit"
+
+
+@given(st.lists(st.floats(0.6, 1.6), min_size=1, max_size=8))
+def test_scans_and_old_paper_are_no_other_unit(scales: list[float]) -> None:
+    assert units.of_marks(np.array(scales), [f"{number}" for number in range(len(scales))]) == []
+
+
 def test_pixels_read_as_millimetres() -> None:
     made = simulation()
     camera = replace(made.camera, pixel_size=0.006)
