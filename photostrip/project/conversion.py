@@ -449,6 +449,8 @@ def settings(project: schema.ProjectFile) -> Settings:
         interior=replace(usual.interior, **wanted.interior.model_dump()),
         refinement=replace(
             usual.refinement,
+            principal_point=wanted.principal_point,
+            distortion=wanted.distortion,
             refraction=wanted.refraction,
             flying_height=wanted.flying_height,
             ground_height=wanted.ground_height,

@@ -30,6 +30,8 @@ OF_PHOTOS = (
     "covariance",
     "bundle",
     "scale_transfer",
+    "principal_point",
+    "distortion",
     "refraction",
     "flying_height",
     "ground_height",

@@ -651,6 +651,10 @@ class Processing(Section):
         "Radius of the Earth for `earth_curvature: model` and `image`", DEFAULTS.absolute.earth_radius, unit="m"
     )
     precision: Flag = key("Compute standard deviations and covariances of points and photos", DEFAULTS.precision)
+    principal_point: Flag = key(
+        "Reduce image coordinates to the principal point of the camera", DEFAULTS.refinement.principal_point
+    )
+    distortion: Flag = key("Take out the lens distortion of the camera", DEFAULTS.refinement.distortion)
     refraction: Flag = key("Correct for atmospheric refraction", DEFAULTS.refinement.refraction)
     flying_height: NumberOrAuto = key(
         "Mean height of the cameras above sea level, for refraction and curvature; `auto`: derived",

@@ -14,7 +14,7 @@ the other way and is the exact inverse.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeGuard
 
 import numpy as np
@@ -49,10 +49,12 @@ ITERATIONS = 20
 
 @dataclass(frozen=True)
 class Settings:
-    """Which corrections beyond principal point and lens distortion are applied.
+    """Which corrections are applied.
 
     Parameters
     ----------
+    principal_point, distortion : bool
+        Reduce to the principal point of the camera; take out its lens distortion.
     refraction : bool
         Correct for atmospheric refraction.
     flying_height, ground_height : float or None
@@ -62,10 +64,28 @@ class Settings:
         Radius of the Earth in metres for the correction in image space; None: none.
     """
 
+    principal_point: bool = True
+    distortion: bool = True
     refraction: bool = False
     flying_height: float | None = None
     ground_height: float | None = None
     earth_radius: float | None = None
+
+    def seen_by(self, camera: Camera) -> Camera:
+        """Give a camera without what is not to be corrected.
+
+        Parameters
+        ----------
+        camera : Camera
+            As it is calibrated.
+
+        Returns
+        -------
+        Camera
+            The same one, with its principal point in the middle or without distortion where that is switched off.
+        """
+        point = camera.principal_point if self.principal_point else (0.0, 0.0)
+        return replace(camera, principal_point=point, distortion=camera.distortion if self.distortion else None)
 
     @property
     def needs_heights(self) -> bool:
@@ -147,6 +167,7 @@ def refine(
         a point lies beyond the radii of a distortion table: with photo, point and radius.
     """
     cameras = {camera_of_photo[photo].name: camera_of_photo[photo] for photo in observations.photo_ids}
+    cameras = {name: settings.seen_by(camera) for name, camera in cameras.items()}
     number = {name: row for row, name in enumerate(cameras)}
     camera_of_row = np.array([number[camera_of_photo[photo].name] for photo in observations.photo_ids], np.intp)[
         observations.photo

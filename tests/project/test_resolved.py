@@ -75,6 +75,8 @@ processing:
   earth_curvature: auto
   earth_radius: 6371000.0
   precision: true
+  principal_point: true
+  distortion: true
   refraction: false
   flying_height: auto
   ground_height: auto

@@ -555,3 +555,18 @@ def test_nothing_to_do_costs_nothing_and_a_big_strip_little() -> None:
     start = time.perf_counter()
     refinement.refine(measured, dict.fromkeys(photos, full), Settings())
     assert time.perf_counter() - start < 2.0  # 0.03 s measured
+
+
+@pytest.mark.parametrize(("off", "effect"), [("principal_point", "principal point"), ("distortion", "distortion")])
+def test_each_correction_has_its_switch(off: str, effect: str) -> None:
+    camera = replace(PLAIN, principal_point=(0.012, -0.004), distortion=brown(FORWARD, (1.2e-8, 0.0, 0.0)))
+    points = observed(np.array([[80.0, -60.0], [-90.0, 10.0]]), ("1",))
+    both = refinement.refine(points, {"1": camera}, Settings())
+    one = refinement.refine(points, {"1": camera}, replace(Settings(), **{off: False}))
+    assert set(both.largest_um) - set(one.largest_um) == {effect}
+    without = (
+        replace(camera, principal_point=(0.0, 0.0)) if off == "principal_point" else replace(camera, distortion=None)
+    )
+    expected = refinement.refine(points, {"1": without}, Settings())
+    assert np.array_equal(one.observations.xy, expected.observations.xy)
+    assert both.largest_um[effect] == pytest.approx(12.6 if off == "principal_point" else 12.0, rel=0.03)
