@@ -253,10 +253,10 @@ def one_mirrored(case: Case) -> Planted | None:
 
 
 def at_another_height(case: Case) -> Planted | None:
-    """Enlarge one photo inside the strip, as one taken from two thirds of the height or with another lens."""
+    """Reduce one photo inside the strip, as one taken from one and a half times the height or with another lens."""
     photo = str(case.rng.choice(case.photos[1:-1]))
     xy = case.inputs.observations.xy.copy()
-    xy[rows_of(case, photo)] *= float(case.rng.choice([1.5, 1 / 1.5]))
+    xy[rows_of(case, photo)] /= 1.5
     return with_xy(case, xy), frozenset({photo})
 
 
