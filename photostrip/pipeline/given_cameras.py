@@ -86,6 +86,8 @@ def centers(
     control = inputs.control
     for key, given, whole in _lists(inputs):
         spec, photos, enu = given
+        if not len(whole):
+            continue
         try:
             tied, target = tie_frames([spec, *inputs.frames], inputs.output or spec, directory=directory)
             rows = np.flatnonzero(control.use.all(axis=1) & ~control.check)
@@ -143,7 +145,7 @@ def _of_strip(
     told = list(flight.examine(xyz, depth, np.array([0.0, 0.0, 1.0]), photos, strip.id))
     below = {photo for each in told if each.code == "P204" for photo in each.photos}
     wanted = scale * strip.camera.principal_distance
-    known = np.isfinite(wanted) & (depth > 0) & np.isfinite(height)
+    known = (wanted > 0) & (depth > 0) & np.isfinite(height)
     if not below and known.sum() >= FEWEST_HEIGHTS:
         ratio = float(np.median(depth[known] / wanted[known]))
         if not 1.0 / HIGHER < ratio < HIGHER:

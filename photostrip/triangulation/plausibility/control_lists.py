@@ -68,7 +68,7 @@ def examine(given: Given, seen: Seen, level: Level, took_part: Flags) -> tuple[l
 def _own(given: Given, level: Level, rows: Flags) -> Laid | None:
     """Lay the strip on one list alone; of two points their distance says the scale, if nothing else."""
     w, plan = level.w[rows], given.plan[rows]
-    if len(w) == PAIR and abs(w[1] - w[0]) > 0:
+    if len(w) == PAIR and min(abs(w[1] - w[0]), abs(plan[1] - plan[0])) > 0:
         turn = complex(abs(plan[1] - plan[0]) / abs(w[1] - w[0]))
         return Laid(turn, 0j, level.laid.mirrored, 0.0)
     return lay(w, plan, mirrored=level.laid.mirrored)

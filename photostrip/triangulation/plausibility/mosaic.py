@@ -73,7 +73,8 @@ class Links:
     @cached_property
     def bases(self) -> tuple[Complex, Complex]:
         """Centre of the second photo as it would lie on the first, and of the first on the second."""
-        back = -self.shift / np.where(np.abs(self.turn) > SMALL, self.turn, np.nan)
+        with np.errstate(invalid="ignore"):
+            back = -self.shift / np.where(np.abs(self.turn) > SMALL, self.turn, np.nan)
         return np.where(self.mirrored, np.conj(back), back), self.shift
 
     @cached_property
