@@ -255,6 +255,14 @@ def test_a_wrong_image_coordinate_is_no_slip_of_a_digit(seed: int, name: str, ra
     assert "P406" in codes(told(slipped))
 
 
+@pytest.mark.parametrize("step", [2000.0, 7000.0, 30000.0])
+def test_a_height_above_the_cameras_is_a_slip_all_the_same(step: float) -> None:
+    inputs = inputs_of(simulation("utm"))
+    row = int(control_rows(inputs)[1])
+    (finding,) = told(with_control(inputs, lambda enu: enu + np.outer(np.arange(len(enu)) == row, [0.0, 0.0, step])))
+    assert (finding.code, finding.points) == ("P406", (inputs.control.ids[row],))
+
+
 def test_two_control_points_exchanged() -> None:
     inputs = inputs_of(simulation("utm"))
     one, other = control_rows(inputs)[[1, 7]]

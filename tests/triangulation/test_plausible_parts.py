@@ -200,6 +200,8 @@ def test_image_residuals_and_how_a_step_moves_them() -> None:
     rays = Rays(xy, np.full(4, 0.005), centers, rotations, 153.0)
     residual, jacobian = rays.residuals(place)
     assert np.abs(residual).max() < 1e-10
+    assert rays.shown(place)
+    assert not rays.shown(np.array([1.3, 0.4, 5.0]))  # above the cameras
     for axis in range(3):
         step = 1e-6 * np.eye(3)[axis]
         numeric = (rays.residuals(place + step)[0] - rays.residuals(place - step)[0]) / 2e-6

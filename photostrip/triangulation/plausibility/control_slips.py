@@ -27,6 +27,7 @@ LEAST_RAYS = 2
 CLEARER = 6.0  # times as large as otherwise a slip must be where a wrong image coordinate explains it as well
 NEAR = 3.5  # standard deviations within which the slip must fit where a wrong image coordinate explains it as well
 SOUND = 4.5  # standard deviations within which the other coordinates of a point with a slip of the pen lie
+RIDGE = 1e-9  # of a variance: no computer knows them better
 UNKNOWN = 1e3  # standard deviations in plan: that of a height that is not given
 EARTH_RADIUS = 6.37e6  # metres
 
@@ -140,17 +141,21 @@ def _one_ray_is_wrong(given: Given, seen: Seen, fitted: Fitted, left: Left, row:
         return False
     plan, (height, spread) = left.plan.residual[row], left.heights()
     off = np.array([plan.real, plan.imag, height[row]])
-    residual, jacobian = rays.residuals(seen.xyz[row] + fitted.strip_from_level @ np.nan_to_num(off))
+    place = seen.xyz[row] + fitted.strip_from_level @ np.nan_to_num(off)
+    if not rays.shown(place):
+        return False  # off by more than the flying height
+    residual, jacobian = rays.residuals(place)
     of_plan = float(left.plan.spread[row])
     of_height = float(spread[row]) if np.isfinite(spread[row]) else UNKNOWN * of_plan
     # what chance moves all rays of a point by: the strip under it; and each ray by itself
     common = (jacobian @ fitted.strip_from_level).reshape(-1, 3) * [of_plan, of_plan, of_height]
     covariance = common @ common.T + np.diag(np.repeat(rays.sigma**2, 2))
+    size = np.sqrt(np.diag(covariance))
+    test, within = residual.ravel() / size, covariance / np.outer(size, size) + RIDGE * np.eye(len(size))
     limit = float(left.plan.limit[row] / of_plan) ** 2
     for ray in range(rays.count):
         others = np.delete(np.arange(2 * rays.count), [2 * ray, 2 * ray + 1])
-        rest = residual.ravel()[others]
-        if rest @ np.linalg.solve(covariance[np.ix_(others, others)], rest) < limit:
+        if test[others] @ np.linalg.solve(within[np.ix_(others, others)], test[others]) < limit:
             return True
     return False
 

@@ -26,6 +26,7 @@ FOOT, SURVEY_FOOT = 0.3048, 1200.0 / 3937.0  # metres; they differ by 2 ppm
 FEET_NEAR = 0.04  # relative, of a ratio to that of foot and metre
 SIMPLE = 2.5  # times what makes sense that a fit may leave before bending is taken out
 SPARE = 2  # redundancy that must be left then
+FRONT = 0.1  # of the distance of a point from a photo, along its axis: within 84 degrees of it
 AXES = ("east", "north", "up")
 
 
@@ -100,6 +101,23 @@ class Rays:
     def count(self) -> int:
         """Number of photos."""
         return len(self.xy)
+
+    def shown(self, xyz: Floats) -> bool:
+        """Whether a place in the strip lies in front of all photos, within 84 degrees of their axes.
+
+        Parameters
+        ----------
+        xyz : ndarray, shape (3,)
+            A place in the strip.
+
+        Returns
+        -------
+        bool
+            True where all photos could show it.
+        """
+        away = xyz - self.centers
+        ahead = -np.einsum("rj,rj->r", self.rotations[:, :, 2], away)
+        return bool((ahead > FRONT * np.linalg.norm(away, axis=1)).all())
 
     def residuals(self, xyz: Floats) -> tuple[Floats, Floats]:
         """Give image residuals of a place, and how a step of it moves its images.
