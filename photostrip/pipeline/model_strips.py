@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.notes import Note
 from photostrip.pipeline import model_precision
+from photostrip.pipeline.model_notes import link_notes
 from photostrip.pipeline.model_results import LinkedStrip
 from photostrip.pipeline.strip import control_notes, control_of, polynomial_notes, to_ground, wrong_control_notes
 from photostrip.triangulation import absolute, control_screening, polynomial
-from photostrip.triangulation.error_rows import similarity_rows
 from photostrip.triangulation.models import centers, link_screening, linking
 from photostrip.triangulation.models.strip import FormedModels, form, require_links
 
@@ -34,9 +33,6 @@ if TYPE_CHECKING:
     Flags = NDArray[np.bool_]
 
 LEAST_SOLID = 4  # points that can tell a body from its mirror image
-ODD_SCALE = 30.0  # ratio of the scale of a model to that of the others
-ANOTHER_UNIT, NOTHING = 100.0, 1e-5  # ratio of residuals to what is stated; below the second there are no errors at all
-WEAK = 12.0  # standard deviations of a coordinate by which a link moves the far end of its model
 CENTER = "center of photo "
 ADJUSTMENTS = ("polynomial", "similarity")
 
@@ -188,7 +184,7 @@ def adjust_models(
         places,
         float(np.nanmean(places[:, 2]) - adjusted[:, 2].mean()) if np.isfinite(places).any() else float("nan"),
         (
-            *_link_notes(strip, measured, formed),
+            *link_notes(strip, measured, formed),
             *wrong_control_notes(strip, wrong),
             *control_notes(strip, orientation),
             *polynomial_notes(strip, correction, adjusted),
@@ -375,96 +371,3 @@ def _centers(
     rows = centers.displacement_rows(here, above, [axis.terms for axis in axes])
     placed[known] = here + sum(row @ axis.coefficients for row, axis in zip(rows, axes, strict=True))
     return placed
-
-
-def _link_notes(strip: ModelStrip, measured: ModelPoints, formed: FormedModels) -> list[Note]:
-    """Say which links are weak, or contradict themselves."""
-    links, shared, models = formed.links, formed.links.shared, formed.models
-    notes = _unit_notes(strip, formed)
-    if links.factor > 1:
-        text = (
-            f"strip {strip.id}: the common points of the models differ {np.sqrt(links.factor):.1f} times as much as "
-            "the standard deviations of the model coordinates allow; gross errors are searched for with larger ones"
-        )
-        notes.append(Note("sigma-contradicted", text, severity="note", strip=strip.id))
-    center = np.bincount(
-        shared.link[links.used & (models.node[shared.before] >= models.points)], minlength=shared.count
-    )
-    far = far_ends(formed)
-    for link in range(shared.count):
-        names = strip.models[link : link + 2]
-        photo = strip.photos[link + 1]
-        if far[link] > WEAK:
-            why = "" if center[link] else f"; the perspective centre of photo {photo} is missing in one of them"
-            text = (
-                f"strip {strip.id}: models {names[0]} and {names[1]} are linked weakly: the far end of the second is "
-                f"uncertain by {far[link]:.0f} times the standard deviation of a model coordinate{why}"
-            )
-            notes.append(Note("weak-link", text, strip=strip.id, photos=(photo,)))
-        elif not center[link]:
-            text = (
-                f"strip {strip.id}: models {names[0]} and {names[1]} are linked without the perspective centre of "
-                f"photo {photo}, which is not measured in both"
-            )
-            notes.append(Note("link-without-center", text, severity="note", strip=strip.id, photos=(photo,)))
-    for rows in links.doubtful:
-        link = int(shared.link[rows[0]])
-        names = strip.models[link : link + 2]
-        points = [measured.name(int(models.node[shared.before[row]])) for row in rows]
-        what = f"one of {', '.join(points)}" if len(points) > 1 else points[0]
-        text = (
-            f"strip {strip.id}: the common points of models {names[0]} and {names[1]} contradict each other: {what} is "
-            "wrong, and it is used all the same; measure more common points"
-        )
-        notes.append(Note("contradicting-link", text, strip=strip.id, points=tuple(points)))
-    return notes
-
-
-def _unit_notes(strip: ModelStrip, formed: FormedModels) -> list[Note]:
-    """Say where a model, or the standard deviations, seem to stand in another unit than they should."""
-    notes = []
-    scale = formed.places.scale / np.median(formed.places.scale)
-    for number in np.flatnonzero(np.abs(np.log(scale)) > np.log(ODD_SCALE)).tolist():
-        times = f"{1 / scale[number]:.3g} times smaller" if scale[number] < 1 else f"{scale[number]:.3g} times larger"
-        text = (
-            f"strip {strip.id}: the scale number of model {strip.models[number]} is {times} than that of the others: "
-            "are its coordinates in another unit?"
-        )
-        notes.append(Note("odd-scale", text, strip=strip.id, photos=strip.photos[number : number + 2]))
-    solved = formed.links.solved
-    redundancy = int(solved.redundancy.sum())
-    ratio = float(np.sqrt(solved.squares.sum() / redundancy)) if redundancy else 1.0
-    if ratio > ANOTHER_UNIT or NOTHING < ratio < 1 / ANOTHER_UNIT:
-        text = (
-            f"strip {strip.id}: the models fit each other with {ratio:.3g} times the standard deviations that are "
-            "stated: are these in another unit?"
-        )
-        notes.append(Note("sigma-unit", text, strip=strip.id, key="models.sigma"))
-    return notes
-
-
-def far_ends(formed: FormedModels) -> Floats:
-    """Uncertainty of the far end of the model after each link, in standard deviations of a coordinate.
-
-    Parameters
-    ----------
-    formed : FormedModels
-        The strip.
-
-    Returns
-    -------
-    ndarray, shape (j,)
-        Largest standard deviation of a coordinate over the median one of a coordinate of the model.
-    """
-    models, solved = formed.models, formed.links.solved
-    rows = np.flatnonzero((models.model > 0) & (models.node < models.points))
-    link = models.model[rows] - 1
-    moved = solved.similarities.of(link, models.xyz[rows])
-    design = similarity_rows(moved - solved.centroid[link], np.zeros(3))
-    variance = np.einsum("nij,njk,nik->ni", design, solved.cofactors[link], design).max(axis=1)
-    scale = solved.similarities.scale
-    found = np.zeros(len(scale))
-    np.maximum.at(found, link, variance)
-    own = np.array([np.median(models.sigma[rows[link == number]]) for number in range(len(scale))])
-    ratio: Floats = np.sqrt(found) / np.maximum(scale * own, 1e-300)
-    return ratio

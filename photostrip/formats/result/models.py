@@ -21,7 +21,7 @@ from photostrip.formats.result.numbers import (
 )
 from photostrip.formats.result.pairs import PPM, from_control
 from photostrip.formats.result.precision import UPPER
-from photostrip.pipeline.model_strips import far_ends
+from photostrip.pipeline.model_notes import far_ends
 from photostrip.triangulation.models.link_screening import detectable
 
 if TYPE_CHECKING:
