@@ -14,7 +14,7 @@ import numpy as np
 
 from photostrip.errors import PhotostripError
 from photostrip.geodesy.crs import area_of_use, tie_frames
-from photostrip.pipeline import distance_trial, evidence, given_cameras, model_evidence
+from photostrip.pipeline import distance_trial, evidence, given_cameras
 from photostrip.pipeline.base_directions import closer_look
 from photostrip.triangulation import interior
 from photostrip.triangulation.plausibility import (
@@ -342,6 +342,8 @@ def _of_models(inputs: Inputs, models: MeasuredModels, settings: Settings, direc
         frames, _ = tie_frames(inputs.frames, inputs.output, directory=directory)
     except PhotostripError:
         return []  # what is wrong with the frames is told elsewhere
+    from photostrip.pipeline import model_evidence  # strips of photos need none of it
+
     told: list[Finding] = []
     sure: list[bool | None] = []
     nowhere = False

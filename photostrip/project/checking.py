@@ -17,7 +17,6 @@ from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.findings import Findings
 from photostrip.geodesy.crs import tie_frames
 from photostrip.pipeline import overruling, plausibility
-from photostrip.pipeline.model_strips import require_named
 from photostrip.pipeline.triangulate import require_whole
 from photostrip.project.document import fault_at
 from photostrip.project.loading import load_project
@@ -112,6 +111,8 @@ def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
         return Checked(str(path), error.faults, (), (), {})
     faults = _refused(project, partial(overruling.require, project.settings.relative, project.inputs.observations))
     if project.inputs.models is not None:
+        from photostrip.pipeline.model_strips import require_named  # strips of photos need none of it
+
         faults += _refused(project, partial(require_named, project.settings.links, project.inputs.models.points))
     notes = list(project.hints)
     notes += _image_coordinates(project, faults)

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photostrip.errors import GeometryError, InputError
-from photostrip.pipeline.model_strips import form_models
 from photostrip.project.document import fault_at, key_path
 
 if TYPE_CHECKING:
@@ -38,6 +37,8 @@ def links_of_models(project: Project) -> Iterator[Fault]:
     Fault
         One for each strip at most.
     """
+    from photostrip.pipeline.model_strips import form_models  # strips of photos need none of it
+
     models = project.inputs.models
     for number, strip in enumerate(() if models is None else models.strips):
         try:

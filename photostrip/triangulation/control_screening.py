@@ -48,6 +48,7 @@ ROBUST_STEPS = 20
 SETTLED = 0.1  # of the median misclosure: the robust start is to find large errors, not digits
 NORMAL = 1.4826
 ROUGH = 5.0  # standard deviations left by a polynomial beyond which there is more than a bend
+ALIKE = 0.1  # spread of misclosures of a band over their mean, below which they are one bend
 EXCHANGED = 0.2  # misclosures left by an exchange, over those before
 AXES = ("east", "north", "up")
 PLAN = slice(0, 2)
@@ -121,12 +122,14 @@ class Setting:
         orientation = absolute.orient(self.strip, targets, weight)
         return polynomial.Problem(orientation.similarity(self.strip), targets, weight, self.spacing, self.breadth)
 
+    def placed(self, kept: ControlPoints) -> Floats:
+        """Give all control points after a similarity on what is kept, intermediate frame, metres."""
+        targets = Targets(kept, self.frames, self.intermediate)
+        return absolute.orient(self.strip, targets, kept.use.astype(float)).similarity(self.strip)
+
     def misclosures(self, kept: ControlPoints, control: ControlPoints | None = None) -> Floats:
         """Misclosures of all control after a similarity on what is kept, metres along the ground axes."""
-        targets = Targets(kept, self.frames, self.intermediate)
-        first = absolute.orient(self.strip, targets, kept.use.astype(float))
-        whole = Targets(control or kept, self.frames, self.intermediate)
-        return whole.misclosures(first.similarity(self.strip))
+        return Targets(control or kept, self.frames, self.intermediate).misclosures(self.placed(kept))
 
     def judged(self, control: ControlPoints, kept: ControlPoints) -> control_tests.Judged | None:
         """Judge all control by what is kept with the covariance of the strip; None without one."""
@@ -306,9 +309,23 @@ def _better_half(control: ControlPoints, kept: ControlPoints, setting: Setting) 
         if not _enough(control, out):
             return None
         half = _snoop(_without(control, out), setting)
-        return half if _fit(half, setting) < control_tests.BENT else None
+        believed = _fit(half, setting) < control_tests.BENT and not _bends(control, half, setting)
     except GeometryError:
         return None
+    return half if believed else None
+
+
+def _bends(control: ControlPoints, half: ControlPoints, setting: Setting) -> bool:
+    """Whether a whole band of two points or more is rejected, and its misclosures agree: a bend, not an error."""
+    gap = setting.misclosures(half, control)
+    band = polynomial_terms.bands(setting.placed(half)[:, 0], setting.spacing)
+    for number in range(int(band.max()) + 1):
+        for axis in range(3):
+            rows = (band == number) & control.use[:, axis]
+            size = gap[rows, axis]
+            if len(size) > 1 and not half.use[rows, axis].any() and np.ptp(size) < ALIKE * abs(size.mean()):
+                return True
+    return False
 
 
 def _snoop(control: ControlPoints, setting: Setting) -> ControlPoints:

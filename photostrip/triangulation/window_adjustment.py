@@ -95,7 +95,9 @@ class Conditions:
         right = (self.misfit[:, None, :] @ weighted)[:, 0]
         size = np.arange(normal.shape[1])
         diagonal = normal[:, size, size]
-        scale = 1 / np.sqrt(np.maximum(diagonal, 1e-12 * diagonal.max(axis=1, keepdims=True)))
+        largest = diagonal.max(axis=1, keepdims=True)
+        # a window without any condition moves nothing
+        scale = 1 / np.sqrt(np.maximum(diagonal, np.where(largest > 0, 1e-12 * largest, 1.0)))
         normal *= scale[:, :, None]
         normal *= scale[:, None, :]
         normal[:, size, size] += RIDGE

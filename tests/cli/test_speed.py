@@ -1,4 +1,4 @@
-"""``photostrip check`` on a thousand photos: a second at most, and little memory."""
+"""``photostrip check`` on a thousand photos: a small multiple of loading the libraries, and little memory."""
 
 from __future__ import annotations
 
@@ -17,8 +17,13 @@ from tests.source_tree import ROOT
 if TYPE_CHECKING:
     from pathlib import Path
 
-SECONDS = 1.0
+RATIO = 4.0  # to loading the libraries, which takes 0.25 to 0.35 s of the processor
 MEMORY_MB = 200
+LIBRARIES = """
+import numpy, pydantic, pyproj, typer, yaml
+class Model(pydantic.BaseModel):
+    number: int
+"""
 # A small process starts the command: the system counts the memory of the process that starts one as its own at first.
 MEASURED = """
 import json, os, subprocess, sys
@@ -30,8 +35,8 @@ print(json.dumps([os.waitstatus_to_exitcode(status), used.ru_utime + used.ru_sti
 
 
 @pytest.mark.slow
-def test_a_thousand_photos_are_checked_in_a_second(tmp_path: Path) -> None:
-    """Seconds of the processor, the best of three: what else the machine does hardly shows there."""
+def test_a_thousand_photos_are_checked_in_about_a_second(tmp_path: Path) -> None:
+    """Seconds of the processor, the best of three, in units of loading the libraries in turn with it."""
     spec = Spec(
         name="big",
         flight=Flight(photos=250, strips=4, side_lap_percent=30.0),
@@ -40,14 +45,23 @@ def test_a_thousand_photos_are_checked_in_a_second(tmp_path: Path) -> None:
     )
     path = write_project(tmp_path / "big", spec)
     assert (path.parent / "observations.csv").read_text(encoding="utf-8").count("\n") > 30_000
-    command = [sys.executable, "-c", MEASURED, str(tmp_path / "out.txt"), sys.executable, "-m", "photostrip", "check"]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    taken = []
+    program = [sys.executable, "-m", "photostrip", "check", str(path)]
+    libraries = [sys.executable, "-c", LIBRARIES]
+    taken, unit = [], []
     for _ in range(3):
-        done = subprocess.run([*command, str(path)], env=environment, capture_output=True, text=True, check=True)
-        code, seconds, kilobytes = json.loads(done.stdout)
-        assert code == 0
+        seconds, kilobytes = measured(program, tmp_path / "out.txt")
         taken.append(seconds)
         assert kilobytes < MEMORY_MB * 1024
+        unit.append(measured(libraries, tmp_path / "none.txt")[0])
     assert "1000 in 4 strips" in (tmp_path / "out.txt").read_text(encoding="utf-8")
-    assert min(taken) < SECONDS
+    assert min(taken) < RATIO * min(unit)
+
+
+def measured(command: list[str], out: Path) -> tuple[float, int]:
+    """Run a command that must succeed: seconds of the processor, and kilobytes."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    call = [sys.executable, "-c", MEASURED, str(out), *command]
+    done = subprocess.run(call, env=environment, capture_output=True, text=True, check=True)
+    code, seconds, kilobytes = json.loads(done.stdout)
+    assert code == 0
+    return seconds, kilobytes
