@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypedDict
 
 import numpy as np
 
@@ -247,19 +247,9 @@ def _of_control(
         frames, _ = tie_frames(inputs.frames, inputs.output, directory=directory)
     except PhotostripError:
         return []  # what is wrong with the frames is told elsewhere
-    told: list[Finding] = []
-    sure: list[bool | None] = []
-    nowhere = False
-    for number, frame in enumerate(frames):
-        rows = (control.frame == number) & control.use[:, 0]
-        area = area_of_use(inputs.frames[number], directory=directory)
-        place = control_place.examine(frame, area, control.enu[rows], number)
-        told += place.findings
-        sure.append(place.sure)
-        nowhere |= not place.inside
-    axes_are_right = sure[0] if len(set(sure)) == 1 else None
+    told, reading = _placed(inputs, frames, directory)
     for strip, each in zip(strips, formed, strict=True):
-        here = _on_strip(strip, each, examined, control, frames, as_written=nowhere, axes_are_right=axes_are_right)
+        here = _on_strip(strip, each, examined, control, frames, **reading)
         if not any(finding.is_error for finding in here) and not examined.light:
             read = partial(_by_heights, examined=examined, control=control, frames=frames)
             points, settings = examined.observations, examined.settings
@@ -335,15 +325,16 @@ def _by_heights(
     return None if given is None else control_heights.stretched(given, seen)
 
 
-def _of_models(inputs: Inputs, models: MeasuredModels, settings: Settings, directory: Path | None) -> list[Finding]:
-    """Examine strips of models: given points by themselves and in each strip, perspective centres."""
-    control = inputs.control
-    try:
-        frames, _ = tie_frames(inputs.frames, inputs.output, directory=directory)
-    except PhotostripError:
-        return []  # what is wrong with the frames is told elsewhere
-    from photostrip.pipeline import model_evidence  # strips of photos need none of it
+class _Reading(TypedDict):
+    """How coordinates are read, by where they lie: whether only as written, and whether their axes are right."""
 
+    as_written: bool
+    axes_are_right: bool | None
+
+
+def _placed(inputs: Inputs, frames: Sequence[GroundFrame], directory: Path | None) -> tuple[list[Finding], _Reading]:
+    """Examine where given points lie on the Earth."""
+    control = inputs.control
     told: list[Finding] = []
     sure: list[bool | None] = []
     nowhere = False
@@ -354,10 +345,22 @@ def _of_models(inputs: Inputs, models: MeasuredModels, settings: Settings, direc
         told += place.findings
         sure.append(place.sure)
         nowhere |= not place.inside
-    axes_are_right = sure[0] if len(set(sure)) == 1 else None
+    return told, _Reading(as_written=nowhere, axes_are_right=sure[0] if len(set(sure)) == 1 else None)
+
+
+def _of_models(inputs: Inputs, models: MeasuredModels, settings: Settings, directory: Path | None) -> list[Finding]:
+    """Examine strips of models: given points by themselves and in each strip, perspective centres."""
+    control = inputs.control
+    try:
+        frames, _ = tie_frames(inputs.frames, inputs.output, directory=directory)
+    except PhotostripError:
+        return []  # what is wrong with the frames is told elsewhere
+    from photostrip.pipeline import model_evidence  # strips of photos need none of it
+
+    told, reading = _placed(inputs, frames, directory)
     for sight in model_evidence.sights(models, control, settings):
         here = control.take(sight.rows)
-        told += _read(here, sight.seen, frames, as_written=nowhere, axes_are_right=axes_are_right)
+        told += _read(here, sight.seen, frames, **reading)
         told += flight.examine(sight.centers, sight.depth, model_evidence.UP, sight.photos, sight.strip.id)
         counts = here.use[:, 0] & ~here.check
         given = given_points.level(here.take(counts), frames)
