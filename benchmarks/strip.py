@@ -39,13 +39,14 @@ from photostrip.formats.result.document import document_of  # noqa: E402
 from photostrip.formats.result.files import result_files  # noqa: E402
 from photostrip.formats.simulation import inputs_of, project_files  # noqa: E402
 from photostrip.formats.writing import write_files  # noqa: E402
-from photostrip.pipeline import triangulate  # noqa: E402
+from photostrip.pipeline import plausibility, precision, triangulate  # noqa: E402
 from photostrip.project.loading import load_project  # noqa: E402
 from photostrip.report import chosen_sections, console, title_of  # noqa: E402
 from photostrip.simulate.simulation import simulate  # noqa: E402
 from photostrip.simulate.spec import Control, Flight, Points, Spec  # noqa: E402
 from photostrip.triangulation import (  # noqa: E402
     absolute,
+    control_screening,
     exterior,
     formation,
     polynomial,
@@ -145,6 +146,7 @@ class Stopwatch:
     """Seconds by name, collected while functions run."""
 
     seconds: dict[str, float] = field(default_factory=dict)
+    inside: bool = False
 
     @contextmanager
     def on(self, name: str) -> Iterator[None]:
@@ -170,8 +172,14 @@ class Stopwatch:
     def _timed(self, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
         @wraps(function)
         def timed(*arguments: Any, **named: Any) -> Any:  # noqa: ANN401 (whatever the function takes and gives)
-            with self.on(name):
+            if self.inside:  # the time belongs to the stage that calls
                 return function(*arguments, **named)
+            self.inside = True
+            try:
+                with self.on(name):
+                    return function(*arguments, **named)
+            finally:
+                self.inside = False
 
         return timed
 
@@ -184,12 +192,15 @@ STAGES = (
     ("screening of pairs", screening, "examine"),
     ("strip formation", formation, "form"),
     ("screening of the strip", strip_screening, "examine"),
+    ("screening of control", control_screening, "screen"),
     ("absolute orientation", absolute, "orient"),
     ("polynomial", polynomial, "fit"),
     ("resection", exterior, "resect"),
     ("points of all strips", pipeline, "_join"),
     ("differences at given points", pipeline, "_at_given_points"),
     ("points without coordinates", pipeline, "_not_determined"),
+    ("standard deviations", precision, "of_strip"),
+    ("search for mistakes", plausibility, "of_result"),
 )
 WHOLE = "triangulate"
 FILES = "writing files"
