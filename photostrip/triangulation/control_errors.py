@@ -174,8 +174,8 @@ def correction(
     result = Correction(similarity, tuple(terms), reach, breadth, origin)
     if not any(terms):
         return result
-    left = np.eye(len(found.point)) - design @ similarity
-    operator = np.concatenate([similarity, _polynomials(found, weight, xyz, result) @ left])
+    after = _polynomials(found, weight, xyz, result)  # by misclosures that the similarity has left
+    operator = np.concatenate([similarity, after - after @ design @ similarity])
     return Correction(operator, result.terms, reach, breadth, origin)
 
 
