@@ -219,7 +219,10 @@ def of_failure(inputs: Inputs, settings: Settings, directory: Path | None = None
             told += _of_strip(each, points) if each is not None else []
         told += given_cameras.centers(inputs, examined.observations, strips, directory)
         told += given_cameras.angles(inputs, [each for each in formed if each is not None], points, directory)
-        told += _of_ids([strip for strip, each in zip(strips, formed, strict=True) if each is None], examined)
+        broken = [strip for strip, each in zip(strips, formed, strict=True) if each is None]
+        told += _of_ids(broken, examined)
+        for strip in broken:
+            told += flight_order.other_scale(examined.observations, strip.id, strip.photos)
         return accepted(told, settings.accept)
     except (PhotostripError, ArithmeticError, LookupError, ValueError):
         return ()  # the failure itself is what must be told

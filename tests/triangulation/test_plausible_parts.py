@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from photostrip.triangulation.plausibility import flight, layout, rotations
+from photostrip.formats.simulation import inputs_of
+from photostrip.simulate.simulation import simulate
+from photostrip.simulate.spec import Flight, Spec, Terrain
+from photostrip.triangulation.plausibility import flight, flight_order, layout, rotations
 from photostrip.triangulation.plausibility.control_fit import bend, lay, upright
 from photostrip.triangulation.plausibility.control_strip import Rays
 from photostrip.triangulation.plausibility.digits import slip
@@ -90,6 +94,18 @@ def test_a_usual_flight_has_no_finding(seed: int) -> None:
     rng = np.random.default_rng(seed)
     centers = straight(10) + rng.normal(0.0, [5.0, 5.0, 3.0], (10, 3)).clip(-12, 12)
     assert flown(centers) == []
+
+
+@pytest.mark.parametrize(("factor", "photos"), [(1.0, []), (1 / 1.5, [("1003",)]), (1.5, [("1003",)])])
+def test_a_photo_at_another_scale_is_named_by_the_images_alone(factor: float, photos: list[tuple[str]]) -> None:
+    done = simulate(Spec(flight=Flight(photos=6, attitude_sigma_deg=(1.0, 1.0, 1.0)), terrain=Terrain(relief=60.0)))
+    observations = done.observations
+    xy = observations.xy.copy()
+    xy[observations.photo == observations.photo_ids.index("1003")] *= factor
+    strip = inputs_of(done).strips[0]
+    found = list(flight_order.other_scale(replace(observations, xy=xy), strip.id, strip.photos))
+    assert [each.photos for each in found] == photos
+    assert all(each.evidence["scale_over_neighbours"] == pytest.approx(factor, rel=0.1) for each in found)
 
 
 def test_what_does_not_go_with_its_neighbours_is_named() -> None:

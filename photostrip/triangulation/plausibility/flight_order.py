@@ -34,6 +34,7 @@ SAME_PLACE = 0.03  # of the median base: two photos from one place
 NAMED = 8
 LOOKED_AT = 24  # photos that are looked at closer; a list that is wrong at more places needs no closer look
 FEWEST = 3  # photos that have an order
+OTHER_SCALE = 1.25  # ratio to both neighbours that tilts and relief do not make
 
 
 @dataclass(frozen=True)
@@ -101,6 +102,38 @@ def examine(
     size = {photos[number]: float(layout.size[number]) for number in _other_size(layout)}
     changed = bool(twice or moved or mirrored or size)
     return told, Arranged(tuple(photos[number] for number in order), _steps(links, order), mirrored, size, changed)
+
+
+def other_scale(observations: PhotoPoints, strip: str, photos: Sequence[str]) -> Iterator[Finding]:
+    """Look for photos at another scale than both their neighbours, by the images alone: for strips that are not formed.
+
+    Parameters
+    ----------
+    observations : PhotoPoints
+        Image points of the project, in any unit.
+    strip : str
+        Id of the strip.
+    photos : sequence of str
+        Its photos in flight order.
+
+    Yields
+    ------
+    Finding
+        P205.
+    """
+    links = mosaic.link(observations, photos)
+    for number in range(1, len(photos) - 1):
+        rows = [links.index.get((number - 1, number)), links.index.get((number, number + 1))]
+        if rows[0] is None or rows[1] is None:
+            continue
+        before, after = abs(links.turn[rows[0]]), abs(links.turn[rows[1]])
+        ratio = np.array([before, 1.0 / max(after, mosaic.SMALL)])  # of this photo to both
+        if (ratio > OTHER_SCALE).all() or (ratio < 1 / OTHER_SCALE).all():
+            size = float(np.sqrt(ratio.prod()))
+            message = f"things are {size:.2f} times as large on photo {photos[number]} as on both its neighbours"
+            fix = "does it have another principal distance, unit, or flight?"
+            evidence = {"scale_over_neighbours": size}
+            yield found("P205", message, fix, evidence, photos=(photos[number],), strips=(strip,))
 
 
 def _steps(links: mosaic.Links, order: Sequence[int]) -> tuple[complex, ...]:
