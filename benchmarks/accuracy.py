@@ -28,13 +28,13 @@ limit_threads()  # before numpy is imported, also in the processes that are star
 
 import numpy as np  # noqa: E402
 
-from photostrip.formats.simulation import inputs_of, settings_of  # noqa: E402
+from photostrip.formats.output.simulation import inputs_of, settings_of  # noqa: E402
 from photostrip.geodesy.crs import tie_frames  # noqa: E402
 from photostrip.geometry.rotation import from_vector  # noqa: E402
 from photostrip.pipeline import triangulate  # noqa: E402
 from photostrip.simulate.simulation import simulate  # noqa: E402
 from photostrip.simulate.spec import FILM, Control, Flight, Points, Spec  # noqa: E402
-from photostrip.triangulation import polynomial, polynomial_terms  # noqa: E402
+from photostrip.triangulation.polynomial import correction, terms  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -176,7 +176,7 @@ def run(task: Task) -> Outcome:
         wanted = replace(
             settings,
             adjustment="similarity" if simple else "polynomial",
-            polynomial=polynomial.Settings(AUTO if simple else choice),
+            polynomial=correction.Settings(AUTO if simple else choice),
         )
         result = triangulate(inputs, wanted)
         squares[choice] = mean_squares(simulation, result, result.points.cartesian)
@@ -202,7 +202,7 @@ def _degrees(result: Result) -> tuple[int, int]:
     found = result.strips[0].polynomial
     if found is None:
         return 0, 0
-    plan, _, height = ([polynomial_terms.POWERS[term][0] for term in axis.terms] for axis in found.axes)
+    plan, _, height = ([terms.POWERS[term][0] for term in axis.terms] for axis in found.axes)
     return max(plan, default=0), max(height, default=0)
 
 

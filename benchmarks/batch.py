@@ -59,8 +59,8 @@ print(json.dumps([codes, seconds, used.ru_utime + used.ru_stime, used.ru_maxrss 
 
 def write_strip(arguments: tuple[Path, int, int]) -> None:
     """Write one simulated strip."""
-    from photostrip.formats.simulation import project_files
-    from photostrip.formats.writing import write_files
+    from photostrip.formats.output.simulation import project_files
+    from photostrip.formats.text.writing import write_files
     from photostrip.simulate.simulation import simulate
     from photostrip.simulate.spec import Control, Flight, Points, Spec
 
@@ -85,10 +85,10 @@ def write_strips(folder: Path, strips: int, photos: int) -> list[Path]:
 
 def plain_loop(folders: Sequence[str]) -> dict[str, float]:
     """Compute strips one after the other; give seconds of computing: of the loop, of adjusting alone, at the start."""
-    from photostrip.formats.result.document import document_of
-    from photostrip.formats.result.files import result_files
+    from photostrip.formats.output.result_files import result_files
     from photostrip.pipeline import triangulate
     from photostrip.project.loading import load_project
+    from photostrip.result.document import document_of
 
     begin, adjusting = time.process_time(), 0.0
     gc.disable()  # as every command does

@@ -28,13 +28,13 @@ import numpy as np  # noqa: E402
 from benchmarks import peers  # noqa: E402
 from photostrip.simulate import Control, Flight, Ground, Points, Spec, Terrain, simulate  # noqa: E402
 from photostrip.simulate.bundle import problem_of  # noqa: E402
-from photostrip.triangulation.bundle.precision import precision  # noqa: E402
+from photostrip.triangulation.bundle.quality.precision import precision  # noqa: E402
 from photostrip.triangulation.bundle.solve import solve  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from photostrip.triangulation.bundle.problem import Problem
+    from photostrip.triangulation.bundle.observations.problem import Problem
     from photostrip.triangulation.bundle.solution import Precision, Solution
 
 LIMITS = {"whole": 0.5, "block": 1.0, "solver": 0.8, "colmap": 0.25, "covariances": 1.0}

@@ -28,7 +28,7 @@ limit_threads()  # as the command does, before numpy is imported
 import numpy as np  # noqa: E402
 
 from photostrip.errors import PhotostripError  # noqa: E402
-from photostrip.formats.simulation import inputs_of, settings_of  # noqa: E402
+from photostrip.formats.output.simulation import inputs_of, settings_of  # noqa: E402
 from photostrip.pipeline import triangulate  # noqa: E402
 from photostrip.simulate.simulation import simulate  # noqa: E402
 from photostrip.simulate.spec import Control, Flight, GrossError, Points, Spec  # noqa: E402

@@ -22,14 +22,16 @@ limit_threads()  # as the command does, before numpy is imported
 
 import numpy as np  # noqa: E402
 
-from photostrip.formats.simulation import inputs_of  # noqa: E402
+from photostrip.formats.output.simulation import inputs_of  # noqa: E402
 from photostrip.geometry.rotation import from_vector  # noqa: E402
 from photostrip.pipeline import Inputs, MeasuredModels, ModelStrip, Settings, triangulate  # noqa: E402
-from photostrip.pipeline.model_strips import adjust_models, form_models  # noqa: E402
+from photostrip.pipeline.models.model_strips import adjust_models, form_models  # noqa: E402
 from photostrip.points import ModelPoints, PhotoPoints  # noqa: E402
 from photostrip.simulate import Control, Flight, Image, Models, Points, Simulation, Spec, simulate  # noqa: E402
-from photostrip.triangulation import formation, polynomial, relative  # noqa: E402
-from photostrip.triangulation.models import link_screening  # noqa: E402
+from photostrip.triangulation.independent_models import link_screening  # noqa: E402
+from photostrip.triangulation.polynomial import correction  # noqa: E402
+from photostrip.triangulation.relative_orientation import relative  # noqa: E402
+from photostrip.triangulation.strip_formation import formation  # noqa: E402
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -123,7 +125,7 @@ def precision(repetitions: int) -> None:
         for degree in ("", "1", "2"):
             settings = Settings(
                 "polynomial" if degree else "similarity",
-                polynomial=polynomial.Settings(degree or "auto"),
+                polynomial=correction.Settings(degree or "auto"),
                 links=link_screening.Settings("none"),
             )
             ratios = scatter(models, settings, repetitions)

@@ -24,7 +24,7 @@ limit_threads()  # before numpy is imported
 
 import numpy as np  # noqa: E402
 
-from photostrip.formats.simulation import inputs_of, settings_of  # noqa: E402
+from photostrip.formats.output.simulation import inputs_of, settings_of  # noqa: E402
 from photostrip.pipeline import triangulate  # noqa: E402
 from photostrip.simulate import Control, Flight, Points, Spec, simulate  # noqa: E402
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import pycolmap
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.bundle.problem import Problem
+    from photostrip.triangulation.bundle.observations.problem import Problem
 
     Floats = NDArray[np.float64]
 
@@ -176,7 +176,7 @@ def by_colmap(problem: Problem) -> Peer:
     Parameters
     ----------
     problem : Problem
-        As for :func:`by_ceres`.
+        As for ``by_ceres``.
 
     Returns
     -------

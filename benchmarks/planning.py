@@ -28,7 +28,7 @@ limit_threads()  # before numpy is imported, also in the processes that are star
 
 import numpy as np  # noqa: E402
 
-from photostrip.formats.simulation import inputs_of  # noqa: E402
+from photostrip.formats.output.simulation import inputs_of  # noqa: E402
 from photostrip.geodesy.crs import tie_frames  # noqa: E402
 from photostrip.geodesy.frame_spec import FrameSpec  # noqa: E402
 from photostrip.pipeline import Inputs, Settings, Strip, triangulate  # noqa: E402
@@ -59,8 +59,10 @@ from photostrip.points import ControlPoints  # noqa: E402
 from photostrip.simulate import Control as SimulatedControl  # noqa: E402
 from photostrip.simulate import Flight, Ground, Image, Spec, simulate  # noqa: E402
 from photostrip.simulate.spec import FILM  # noqa: E402
-from photostrip.triangulation import formation, gruber, polynomial, relative  # noqa: E402
 from photostrip.triangulation.bundle.solve import solve  # noqa: E402
+from photostrip.triangulation.polynomial import correction  # noqa: E402
+from photostrip.triangulation.relative_orientation import relative, six_points  # noqa: E402
+from photostrip.triangulation.strip_formation import formation  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -172,7 +174,7 @@ def run_settings(method: str) -> Settings:
     """Give settings of a run by one of the methods, without a search for gross errors."""
     return Settings(
         relative=relative.Settings(screening="none"),
-        polynomial=polynomial.Settings(DEGREES.get(method, "auto")),
+        polynomial=correction.Settings(DEGREES.get(method, "auto")),
         adjustment="polynomial" if method in DEGREES else method,
     )
 
@@ -322,7 +324,7 @@ def measured_models(spec: ModelSpec, places: Floats, count: int) -> Floats:
     pairs = relative.Pairs(np.arange(count) * n, np.repeat(np.arange(count), n), left, right, weight, spec.focal)
     oriented, _ = relative.attempt(pairs, np.tile(np.arange(n), count), np.zeros((count * n, 2), np.intp))
     vectors, _, _ = formation.model_points(oriented)
-    direction, _ = gruber.dependent_pair(oriented.elements)
+    direction, _ = six_points.dependent_pair(oriented.elements)
     model = vectors.reshape(count, n, 3) * (spec.base / direction[:, :1])[:, :, None]
     error = (model - np.column_stack([every, np.full(n, -spec.focal)]))[:, len(six) :]
     control = Control(

@@ -22,10 +22,11 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from anywhere, installed or not
 
 from photostrip.errors import InputError, PhotostripError
-from photostrip.formats.simulation import inputs_of, settings_of
+from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.geometry.rotation import angles, from_angles
-from photostrip.pipeline import plausibility, triangulate
+from photostrip.pipeline import triangulate
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations
+from photostrip.pipeline.plausibility import gate
 from photostrip.simulate import DIGITAL, FILM, Control, Film, Flight, GrossError, Ground, Image, Points, Spec, Terrain
 from photostrip.simulate.simulation import simulate
 from photostrip.triangulation.plausibility import KINDS
@@ -783,7 +784,7 @@ def told(inputs: Inputs, settings: Settings) -> tuple[dict[str, set[str]], dict[
     except PhotostripError as error:
         findings = error.findings
     try:
-        before = plausibility.of_inputs(inputs, settings)
+        before = gate.of_inputs(inputs, settings)
     except PhotostripError:
         before = ()
     both = []

@@ -33,12 +33,14 @@ import numpy as np  # noqa: E402
 
 from benchmarks import accuracy  # noqa: E402
 from photostrip.camera import Camera  # noqa: E402
-from photostrip.formats.simulation import inputs_of  # noqa: E402
+from photostrip.formats.output.simulation import inputs_of  # noqa: E402
 from photostrip.pipeline import Settings, triangulate  # noqa: E402
 from photostrip.pipeline.strip import adjust_formed, form_strip  # noqa: E402
 from photostrip.simulate.simulation import simulate  # noqa: E402
 from photostrip.simulate.spec import FILM, Control, Flight, Image, Points, Spec, Terrain  # noqa: E402
-from photostrip.triangulation import polynomial, relative, strip_conditions  # noqa: E402
+from photostrip.triangulation.covariance_adjustment import conditions  # noqa: E402
+from photostrip.triangulation.polynomial import correction  # noqa: E402
+from photostrip.triangulation.relative_orientation import relative  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -142,9 +144,9 @@ def settings(method: str, *, screening: str = "none", precision: bool = True) ->
     adjustments = {"similarity": "similarity", "covariance": "covariance", ALONE: "covariance"}
     return Settings(
         adjustment=adjustments.get(method, "polynomial"),
-        covariance=strip_conditions.Settings(distances=method != ALONE),
+        covariance=conditions.Settings(distances=method != ALONE),
         relative=relative.Settings(screening=screening),
-        polynomial=polynomial.Settings(degree),
+        polynomial=correction.Settings(degree),
         precision=precision,
     )
 

@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from anywher
 
 from photostrip import simulate
 from photostrip.cli.main import main as photostrip
-from photostrip.formats.simulation import project_files
+from photostrip.formats.output.simulation import project_files
 from photostrip.simulate.simulation import simulate as simulated
 
 CONFIGS = Path(__file__).resolve().parents[1] / "configs"

@@ -20,12 +20,18 @@ limit_threads()  # as the command does, before numpy is imported
 
 import numpy as np  # noqa: E402
 
-from photostrip.formats.simulation import inputs_of  # noqa: E402
+from photostrip.formats.output.simulation import inputs_of  # noqa: E402
 from photostrip.simulate.simulation import simulate  # noqa: E402
 from photostrip.simulate.spec import Flight, GrossError, Points, Spec  # noqa: E402
 from photostrip.statistics import chi2_quantile  # noqa: E402
-from photostrip.triangulation import deletion, formation, relative, scale_screening, screening, settling  # noqa: E402
-from photostrip.triangulation.relative import Pairs, Settings  # noqa: E402
+from photostrip.triangulation.gross_errors.pairs import deletion, screening  # noqa: E402
+from photostrip.triangulation.gross_errors.rays import settling  # noqa: E402
+from photostrip.triangulation.relative_orientation import relative  # noqa: E402
+from photostrip.triangulation.relative_orientation.relative import Pairs, Settings  # noqa: E402
+from photostrip.triangulation.strip_formation import (
+    formation,  # noqa: E402
+    scale_ratios,  # noqa: E402
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -301,8 +307,8 @@ def stages(inputs: Inputs) -> Floats:
     joined, joints = formed.junctions, pairs.size - 1
     begin = time.process_time()
     places = (joined.joint, joined.before, joined.after)
-    spreads = scale_screening.spreads(screened.orientation, formed.vectors, places, scatter)
-    scale_screening.screen(joined.ratio, np.ones(len(joined.ratio)), spreads, joined.joint, joints)
+    spreads = scale_ratios.spreads(screened.orientation, formed.vectors, places, scatter)
+    scale_ratios.screen(joined.ratio, np.ones(len(joined.ratio)), spreads, joined.joint, joints)
     ratios = time.process_time() - begin
     measured = settling.Measured(observations, strip.photos, pairs.weight, scatter, sigma, nothing)
     begin = time.process_time()

@@ -35,26 +35,27 @@ limit_threads()  # as the command does, before numpy is imported
 
 import numpy as np  # noqa: E402
 
-from photostrip.formats.result.document import document_of  # noqa: E402
-from photostrip.formats.result.files import result_files  # noqa: E402
-from photostrip.formats.simulation import inputs_of, project_files  # noqa: E402
-from photostrip.formats.writing import write_files  # noqa: E402
-from photostrip.pipeline import plausibility, precision, triangulate  # noqa: E402
+from photostrip.formats.output.result_files import result_files  # noqa: E402
+from photostrip.formats.output.simulation import inputs_of, project_files  # noqa: E402
+from photostrip.formats.text.writing import write_files  # noqa: E402
+from photostrip.pipeline import triangulate  # noqa: E402
+from photostrip.pipeline.plausibility import gate  # noqa: E402
+from photostrip.pipeline.precision import strip_precision  # noqa: E402
 from photostrip.project.loading import load_project  # noqa: E402
-from photostrip.report import chosen_sections, console, title_of  # noqa: E402
+from photostrip.report import chosen_sections, title_of  # noqa: E402
+from photostrip.report.page import console  # noqa: E402
+from photostrip.result.document import document_of  # noqa: E402
 from photostrip.simulate.simulation import simulate  # noqa: E402
 from photostrip.simulate.spec import Control, Flight, Points, Spec  # noqa: E402
-from photostrip.triangulation import (  # noqa: E402
-    absolute,
-    control_screening,
-    exterior,
-    formation,
-    polynomial,
-    refinement,
-    relative,
-    screening,
-    strip_screening,
-)
+from photostrip.triangulation import absolute_orientation  # noqa: E402
+from photostrip.triangulation.gross_errors.control import control_screening  # noqa: E402
+from photostrip.triangulation.gross_errors.pairs import screening  # noqa: E402
+from photostrip.triangulation.gross_errors.rays import strip_screening  # noqa: E402
+from photostrip.triangulation.image_coordinates import corrections  # noqa: E402
+from photostrip.triangulation.polynomial import correction  # noqa: E402
+from photostrip.triangulation.relative_orientation import relative  # noqa: E402
+from photostrip.triangulation.resection import resection  # noqa: E402
+from photostrip.triangulation.strip_formation import formation  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -184,23 +185,23 @@ class Stopwatch:
         return timed
 
 
-pipeline = import_module("photostrip.pipeline.triangulate")  # the module; the package gives the function
+pipeline = import_module("photostrip.pipeline.run")  # the module; the package gives the function
 STAGES = (
-    ("image coordinates", refinement, "refine"),
+    ("image coordinates", corrections, "refine"),
     ("collecting pairs", relative, "collect_pairs"),
     ("relative orientation", relative, "attempt"),
     ("screening of pairs", screening, "examine"),
     ("strip formation", formation, "form"),
     ("screening of the strip", strip_screening, "examine"),
     ("screening of control", control_screening, "screen"),
-    ("absolute orientation", absolute, "orient"),
-    ("polynomial", polynomial, "fit"),
-    ("resection", exterior, "resect"),
+    ("absolute orientation", absolute_orientation, "orient"),
+    ("polynomial", correction, "fit"),
+    ("resection", resection, "resect"),
     ("points of all strips", pipeline, "_join"),
     ("differences at given points", pipeline, "_at_given_points"),
     ("points without coordinates", pipeline, "_not_determined"),
-    ("standard deviations", precision, "of_strip"),
-    ("search for mistakes", plausibility, "of_result"),
+    ("standard deviations", strip_precision, "of_strip"),
+    ("search for mistakes", gate, "of_result"),
 )
 WHOLE = "triangulate"
 FILES = "writing files"
@@ -307,9 +308,8 @@ def print_start(repeat: int) -> float:
         spent = process(["-m", "photostrip", option], 3 * repeat)
         over = spent.wall - bare.wall
         line(f"photostrip {option}, over that", f"{over:.3f} s", "0.25 s", over / TARGETS["start"])
-    modules = (
-        "photostrip.cli.run, photostrip.project.loading, photostrip.formats.result.files, photostrip.report.console"
-    )
+    rooms = ("cli.commands.run", "project.loading", "formats.output.result_files", "report.page.console")
+    modules = ", ".join(f"photostrip.{room}" for room in rooms)
     loaded = process(["-c", f"import {modules}"], 3 * repeat)
     line("importing everything that a run needs, over that", f"{loaded.wall - bare.wall:.3f} s")
     print()

@@ -6,8 +6,8 @@ The tree::
     ├── InputError                 exit  2  wrong usage, project file or data; carries every fault found
     └── GeometryError              exit  3  too weak, singular or not converging; names photos and points
 
-A :class:`Fault` says what is wrong, where, what was expected and what would fix it. Readers collect
-faults and raise one :class:`InputError` for all of them; mathematics raises :class:`GeometryError`
+A ``Fault`` says what is wrong, where, what was expected and what would fix it. Readers collect
+faults and raise one ``InputError`` for all of them; mathematics raises ``GeometryError``
 with the ids of the photos and points concerned.
 """
 

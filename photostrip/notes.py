@@ -1,6 +1,6 @@
 """What a run has to say beside its numbers: warnings and remarks, each with a stable code.
 
-A :class:`Note` says what was noticed. A :class:`Finding` says that the data themselves seem to be wrong, with the
+A ``Note`` says what was noticed. A ``Finding`` says that the data themselves seem to be wrong, with the
 numbers that say so.
 """
 
@@ -61,7 +61,7 @@ def before(file: str, line: int, column: int) -> str:
 
 @dataclass(frozen=True)
 class Finding:
-    """One mistake that the data seem to have; see :mod:`photostrip.triangulation.plausibility`.
+    """One mistake that the data seem to have; see ``plausibility``.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """Quantiles and critical values of the tests, and nothing else.
 
-The distribution functions themselves are in :mod:`photostrip.distributions`.
+The distribution functions themselves are in ``distributions``.
 """
 
 from __future__ import annotations

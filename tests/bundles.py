@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.bundle.problem import Positions, Problem
+    from photostrip.triangulation.bundle.observations.problem import Positions, Problem
     from photostrip.triangulation.bundle.solution import Solution
 
     Floats = NDArray[np.float64]

@@ -7,20 +7,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.formats.simulation import inputs_of
+from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline import Settings, triangulate
-from photostrip.pipeline.propagation import Propagation, propagation
+from photostrip.pipeline.precision.propagation import Propagation, propagation
 from photostrip.simulate.simulation import simulate
 from photostrip.simulate.spec import Control, Flight, Image, Points, Spec
-from photostrip.triangulation import relative
+from photostrip.triangulation.relative_orientation import relative
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.geodesy.local_frame import IntermediateFrame
     from photostrip.pipeline import Inputs, Result
-    from photostrip.triangulation.error_rows import Rows
-    from photostrip.triangulation.strip_errors import StripErrors
+    from photostrip.triangulation.error_propagation.derivatives import Rows
+    from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
     Floats = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from photostrip.simulate.bundle import problem_of
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
-    from photostrip.triangulation.bundle.problem import Problem
+    from photostrip.triangulation.bundle.observations.problem import Problem
 
 FILE = ROOT / "tests" / "data" / "bundle_by_ceres.json"
 TIGHT = 1e-16

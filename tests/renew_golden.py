@@ -9,12 +9,12 @@ import os
 from pathlib import Path
 
 from photostrip.compare import baseline_of
-from photostrip.formats.result.document import document_of
-from photostrip.formats.result.files import to_json
-from photostrip.formats.simulation import project_files
+from photostrip.formats.output.result_files import to_json
+from photostrip.formats.output.simulation import project_files
 from photostrip.pipeline import triangulate
 from photostrip.project.loading import load_project
 from photostrip.project.simulation_spec import load_specification
+from photostrip.result.document import document_of
 from tests.source_tree import ROOT
 
 SAMPLES = tuple(sorted(path.parent.name for path in (ROOT / "sample_data").glob("*/project.yaml")))

@@ -12,11 +12,11 @@ from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING
 
-from photostrip.formats.result.files import to_json
-from photostrip.formats.simulation import inputs_of
+from photostrip.formats.output.result_files import to_json
+from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline import Settings
 from photostrip.report import sections_of, title_of
-from photostrip.report.text import to_markdown, to_text
+from photostrip.report.page.text import to_markdown, to_text
 from photostrip.simulate.simulation import simulate
 from photostrip.simulate.spec import GrossError
 from tests.results import solved, spec

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from photostrip.formats.result.document import document_of
-from photostrip.formats.simulation import inputs_of, project_files
+from photostrip.formats.output.simulation import inputs_of, project_files
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.pipeline import Settings, triangulate
+from photostrip.result.document import document_of
 from photostrip.simulate.simulation import simulate
 from photostrip.simulate.spec import Control, Flight, GrossError, Ground, Image, Points, Spec
 

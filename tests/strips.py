@@ -14,16 +14,16 @@ from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.local_frame import IntermediateFrame
 from photostrip.pipeline import Inputs, Strip
 from photostrip.points import ControlPoints, PhotoPoints
-from photostrip.triangulation import relative
-from photostrip.triangulation.absolute import Targets
-from photostrip.triangulation.relative import Pairs
+from photostrip.triangulation.absolute_orientation import Targets
+from photostrip.triangulation.relative_orientation import relative
+from photostrip.triangulation.relative_orientation.relative import Pairs
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
-    from photostrip.triangulation.relative import Orientation
+    from photostrip.triangulation.relative_orientation.relative import Orientation
 
     Floats = NDArray[np.float64]
     Flags = NDArray[np.bool_]

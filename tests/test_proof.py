@@ -1,7 +1,7 @@
 """The whole method against known truth: free of errors it comes back exactly, with errors as theory says, and what must
 not influence the result does not.
 
-The photos are made by the collinearity equations in geocentric space (:mod:`photostrip.simulate`, which has its own
+The photos are made by the collinearity equations in geocentric space (``simulate``, which has its own
 proof against formulas written apart); nothing of the method is used in making them.
 """
 
@@ -18,11 +18,11 @@ from hypothesis import strategies as st
 from pyproj import Proj
 
 from photostrip.camera import Camera, Distortion
-from photostrip.formats.result.document import document_of
-from photostrip.formats.simulation import inputs_of, settings_of
+from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.geometry.rotation import angle_between
 from photostrip.pipeline import Inputs, Settings, triangulate
 from photostrip.points import ControlPoints, PhotoPoints
+from photostrip.result.document import document_of
 from photostrip.simulate import (
     DIGITAL,
     FILM,
@@ -37,7 +37,9 @@ from photostrip.simulate import (
     Terrain,
     simulate,
 )
-from photostrip.triangulation import formation, polynomial, relative
+from photostrip.triangulation.polynomial import correction
+from photostrip.triangulation.relative_orientation import relative
+from photostrip.triangulation.strip_formation import formation
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -238,7 +240,7 @@ def test_any_control_that_determines_the_strip_brings_it_back(control: Control, 
 @pytest.mark.parametrize("degree", ["1", "2", "3"])
 def test_no_adjustment_spoils_what_is_exact(adjustment: str, degree: str) -> None:
     spec = exact(Spec(flight=Flight(photos=15), control=Control(bands=4)))
-    asked = Settings(adjustment=adjustment, polynomial=polynomial.Settings(degree))
+    asked = Settings(adjustment=adjustment, polynomial=correction.Settings(degree))
     found = recovered(spec, asked)
     assert_exact(found)
     used = found.result.strips[0].polynomial
@@ -390,7 +392,7 @@ def rms(spec: Spec, seeds: int, *choices: str) -> dict[str, Floats]:
             simple = choice == "similarity"
             asked = Settings(
                 adjustment="similarity" if simple else "polynomial",
-                polynomial=polynomial.Settings("auto" if simple else choice),
+                polynomial=correction.Settings("auto" if simple else choice),
                 precision=False,
             )
             squares[choice].append(Recovery(done, triangulate(inputs_of(done), asked)).along_across_up())

@@ -18,14 +18,14 @@ import numpy as np
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.formats.result.document import document_of
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.pipeline import triangulate
 from photostrip.pipeline.inputs import Strip
 from photostrip.points import ControlPoints
 from photostrip.project.loading import Project, load_project
-from photostrip.triangulation import absolute
+from photostrip.result.document import document_of
+from photostrip.triangulation import absolute_orientation
 from tests.renew_golden import SAMPLES, baseline, kept, simulated
 from tests.source_tree import ROOT
 
@@ -383,7 +383,7 @@ def on_a_plane(radius: float | None = None) -> tuple[Floats, Floats, Result]:
     inputs = given.inputs
     plane = FrameSpec("local", ("east", "north", "up"))
     inputs = replace(inputs, control=replace(inputs.control, enu=ground), frames=(plane,), output=None)
-    curvature = absolute.Settings() if radius is None else absolute.Settings("model", radius)
+    curvature = absolute_orientation.Settings() if radius is None else absolute_orientation.Settings("model", radius)
     found = triangulate(inputs, replace(with_settings(APOLLO), absolute=curvature))
     return ground, found.control_differences, found
 

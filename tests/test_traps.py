@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 from photostrip.errors import EXIT_GEOMETRY, EXIT_INPUT, GeometryError, InputError
-from photostrip.formats.simulation import inputs_of, settings_of
+from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.geodesy.crs import tie_frames
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.pipeline import Inputs, Settings, triangulate
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.simulate import Control, Flight, Ground, Image, Simulation, Spec, Terrain, simulate
-from photostrip.triangulation import absolute, polynomial
+from photostrip.triangulation import absolute_orientation
+from photostrip.triangulation.polynomial import correction
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,11 +28,11 @@ if TYPE_CHECKING:
 CUBIC = ("1", "X", "Y", "XY", "X^2", "X^3")
 SIMILARITY = Settings(adjustment="similarity")
 LOCAL = FrameSpec("local", ("east", "north", "up"))
-PLANE_MAP = replace(Settings(), absolute=absolute.Settings(earth_curvature="model"))  # curvature by eq. 153
+PLANE_MAP = replace(Settings(), absolute=absolute_orientation.Settings(earth_curvature="model"))  # curvature by eq. 153
 
 
 def degree(asked: str) -> Settings:
-    return Settings(polynomial=polynomial.Settings(asked))
+    return Settings(polynomial=correction.Settings(asked))
 
 
 def errors(simulation: Simulation, result: Result) -> Floats:
@@ -79,7 +80,10 @@ def test_six_points_fit_a_cubic_perfectly_and_say_nothing_between(seed: int) -> 
     done, inputs = six_points(seed)
     strip = triangulate(inputs, SIMILARITY).strips[0]
     control = strip.xyz[strip.control_rows]
-    wanted = absolute.Targets(strip.control, tie_frames(inputs.frames)[0], strip.intermediate).of(control) - control
+    wanted = (
+        absolute_orientation.Targets(strip.control, tie_frames(inputs.frames)[0], strip.intermediate).of(control)
+        - control
+    )
     coefficients = np.linalg.solve(cubic_columns(control), wanted)
     assert np.abs(cubic_columns(control) @ coefficients - wanted).max() < 1e-9
     bent = strip.xyz + cubic_columns(strip.xyz) @ coefficients - true_places(done, strip)
@@ -126,19 +130,19 @@ def east_west_strip() -> tuple[Simulation, StripResult, Result]:
     xy = inputs.observations.xy
     radius = np.hypot(*xy.T)[:, None]
     bad = replace(inputs, observations=replace(inputs.observations, xy=xy * (1 + 2e-8 * radius**2)))  # 20 um at 100 mm
-    result = triangulate(bad, replace(SIMILARITY, polynomial=polynomial.Settings("3")))
+    result = triangulate(bad, replace(SIMILARITY, polynomial=correction.Settings("3")))
     return done, result.strips[0], result
 
 
-def corrected_in(azimuth: float, strip: StripResult, result: Result) -> tuple[Floats, polynomial.Polynomial]:
+def corrected_in(azimuth: float, strip: StripResult, result: Result) -> tuple[Floats, correction.Polynomial]:
     """Fit a cubic in a frame with its X axis in some azimuth; points come back in the Cartesian frame."""
     frame = strip.intermediate.with_azimuth(azimuth)
     xyz = frame.intermediate_from_cartesian(strip.cartesian)
-    targets = absolute.Targets(strip.control, result.frames, frame)
-    weight = absolute.weights(strip.control, strip.precision)
+    targets = absolute_orientation.Targets(strip.control, result.frames, frame)
+    weight = absolute_orientation.weights(strip.control, strip.precision)
     breadth = float(np.quantile(np.abs(xyz[:, 1]), 0.95))
-    problem = polynomial.Problem(xyz[strip.control_rows], targets, weight, spacing=850.0, breadth=breadth)
-    found = polynomial.fit(problem, polynomial.Settings("3"))
+    problem = correction.Problem(xyz[strip.control_rows], targets, weight, spacing=850.0, breadth=breadth)
+    found = correction.fit(problem, correction.Settings("3"))
     return frame.cartesian_from_intermediate(found(xyz)), found
 
 

@@ -21,12 +21,12 @@ from urllib.parse import urlsplit
 
 from photostrip.batch.crew import TICK, ignored
 from photostrip.batch.folder import program
+from photostrip.batch.packing import pack
 from photostrip.batch.remote import compute
 from photostrip.batch.tasks import BROKEN, Answer, failure
 from photostrip.batch.work import evaluate
 from photostrip.batch.worker import WORK
 from photostrip.errors import Fault, InputError
-from photostrip.project.packing import pack
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -90,7 +90,7 @@ class Cluster:
         self._done: queue.SimpleQueue[str] = queue.SimpleQueue()
 
     def answers(self, tasks: Iterator[Task | None], stopped: Callable[[], bool]) -> Iterator[Answer]:
-        """Compute tasks; see :class:`photostrip.batch.crew.Executor`."""
+        """Compute tasks; see ``crew.Executor``."""
         more, looking = True, False
         try:
             while not stopped():

@@ -95,7 +95,7 @@ class Crew:
             self.workers.pop().end()
 
     def answers(self, tasks: Iterator[Task | None], stopped: Callable[[], bool]) -> Iterator[Answer]:
-        """Compute tasks; see :class:`Executor`."""
+        """Compute tasks; see ``Executor``."""
         queue: deque[Task] = deque()
         heard: deque[Answer] = deque()
         more = True

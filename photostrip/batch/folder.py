@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 
 from photostrip import __version__
 from photostrip.errors import Fault, InputError
-from photostrip.formats.batch import SCHEMA, parsed_record, record_text
-from photostrip.formats.source import digest
-from photostrip.formats.writing import write_files
+from photostrip.formats.output.batch import SCHEMA, parsed_record, record_text
+from photostrip.formats.text.source import digest
+from photostrip.formats.text.writing import write_files
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -54,7 +54,7 @@ def program() -> dict[str, str]:
 
 
 class Folder:
-    """The folder of a batch; make it with :func:`opened`.
+    """The folder of a batch; make it with ``opened``.
 
     Parameters
     ----------

@@ -40,7 +40,7 @@ def compute(task: Task, limits: Limits, work: str = WORK) -> tuple[Answer, dict[
     answer : Answer
         What became of it.
     program : dict of str to str
-        What computed it, as :func:`photostrip.batch.folder.program` gives it.
+        What computed it, as ``folder.program`` gives it.
     """
     key = limits, work
     with _lock:

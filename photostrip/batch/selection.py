@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from photostrip.errors import Fault, InputError
-from photostrip.formats.files import MEGABYTE, decode, read_bytes
+from photostrip.formats.text.files import MEGABYTE, decode, read_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from photostrip.errors import EXIT_GEOMETRY, EXIT_INPUT, EXIT_INTERNAL, EXIT_TOLERANCE, Fault, InputError
-from photostrip.report.messages import findings_of, line_of
+from photostrip.report.page.messages import findings_of, line_of
 
 if TYPE_CHECKING:
+    from photostrip.batch.packing import Parcel
     from photostrip.errors import GeometryError
-    from photostrip.project.packing import Parcel
 
 Document = dict[str, Any]
 
@@ -69,7 +69,7 @@ class Answer:
     number : int
         That of the task.
     outcome : dict
-        Its line in the summary, see :func:`outcome_of` and :func:`failure`.
+        Its line in the summary, see ``outcome_of`` and ``failure``.
     files : dict of str to str
         Content of its result files by name; none after a failure.
     inputs : dict of str to str or None
@@ -115,7 +115,7 @@ def outcome_of(document: Document, findings: list[Document]) -> Document:
     document : dict
         The document of the result.
     findings : list of dict
-        Its verdict and notes as :func:`photostrip.report.messages.result_findings` gives them.
+        Its verdict and notes as ``messages.result_findings`` gives them.
 
     Returns
     -------

@@ -8,15 +8,15 @@ import traceback
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from photostrip.batch.packing import unpack_grids
 from photostrip.batch.tasks import BROKEN, FAULTY, WEAK, Answer, failure, out_of_memory, outcome_of
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.formats.result.document import document_of
-from photostrip.formats.result.files import result_files
-from photostrip.formats.source import Source, digest, reading_from
+from photostrip.formats.output.result_files import result_files
+from photostrip.formats.text.source import Source, digest, reading_from
 from photostrip.pipeline import triangulate
 from photostrip.project.loading import load_project
-from photostrip.project.packing import unpack_grids
-from photostrip.report.messages import result_findings
+from photostrip.report.page.messages import result_findings
+from photostrip.result.document import document_of
 
 if TYPE_CHECKING:
     from photostrip.batch.tasks import Document, Task

@@ -15,12 +15,12 @@ from photostrip.batch.selection import choose
 from photostrip.cli.showing import BatchFormat, Format
 from photostrip.cli.talking import as_fault, failures_as
 from photostrip.errors import InputError, PhotostripError
-from photostrip.formats import batch as formats
-from photostrip.formats.writing import make_rule, write_text
-from photostrip.report import console, layout, messages, text
-from photostrip.report.batch import batch_junit, batch_sections, outcome_line
-from photostrip.report.figures import counted
-from photostrip.report.progress import batch_table
+from photostrip.formats.output import batch as formats
+from photostrip.formats.text.writing import make_rule, write_text
+from photostrip.report.commands.batch import batch_junit, batch_sections, outcome_line
+from photostrip.report.page import console, layout, messages, text
+from photostrip.report.page.figures import counted
+from photostrip.report.page.progress import batch_table
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from photostrip.batch.folder import Folder
     from photostrip.batch.run import Batch
     from photostrip.batch.tasks import Answer, Limits, Task
-    from photostrip.report.progress import BatchTable
+    from photostrip.report.page.progress import BatchTable
 
     Document = dict[str, Any]
 

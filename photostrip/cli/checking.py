@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 from photostrip import __version__
 from photostrip.cli.showing import Format
-from photostrip.report import console, messages
-from photostrip.report.check_sections import check_sections, verdict
-from photostrip.report.text import to_markdown
+from photostrip.report.commands.check_sections import check_sections, verdict
+from photostrip.report.page import console, messages
+from photostrip.report.page.text import to_markdown
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from photostrip.project.checking import Checked
+    from photostrip.project.checks.checking import Checked
 
 SCHEMA = 1
 

@@ -35,67 +35,67 @@ class Entry(NamedTuple):
 
 COMMANDS = {
     "init": Entry(
-        "photostrip.cli.init",
+        "photostrip.cli.commands.init",
         "Write a commented project file and the headers of its tables.",
         "photostrip init strip-a",
     ),
     "check": Entry(
-        "photostrip.cli.check",
+        "photostrip.cli.commands.check",
         "Check projects without adjusting them, and name all faults.",
         "photostrip check project.yaml",
     ),
     "run": Entry(
-        "photostrip.cli.run",
+        "photostrip.cli.commands.run",
         "Adjust the strips of a project and report the accuracy.",
         "photostrip run project.yaml -o result",
     ),
     "batch": Entry(
-        "photostrip.cli.batch",
+        "photostrip.cli.commands.batch",
         "Adjust many projects, on all cores or many machines.",
         "photostrip batch strips/* -o results -j 4",
     ),
     "report": Entry(
-        "photostrip.cli.report",
+        "photostrip.cli.commands.report",
         "Print the accuracy report of a saved result again.",
         "photostrip report result/result.json",
     ),
     "compare": Entry(
-        "photostrip.cli.compare",
+        "photostrip.cli.commands.compare",
         "Compare a result with a baseline, within tolerances.",
         "photostrip compare result baseline.json --tol exact.yaml",
     ),
     "simulate": Entry(
-        "photostrip.cli.simulate",
+        "photostrip.cli.commands.simulate",
         "Write a synthetic project with known truth, ready to run.",
         "photostrip simulate strip.yaml -o simulated",
     ),
     "plan": Entry(
-        "photostrip.cli.plan",
+        "photostrip.cli.commands.plan",
         "Expected accuracy and design, before any photo is taken.",
         "photostrip plan model --overlap 60 --control corners",
     ),
     "terrestrial": Entry(
-        "photostrip.cli.terrestrial",
+        "photostrip.cli.commands.terrestrial",
         "Directions of a phototheodolite, displacements between epochs.",
         "photostrip terrestrial displacement survey.yaml -o result",
     ),
     "schema": Entry(
-        "photostrip.cli.schema",
+        "photostrip.cli.commands.schema",
         "Print the JSON Schema of the project file, for editors.",
         "photostrip schema -o photostrip.schema.json",
     ),
     "completion": Entry(
-        "photostrip.cli.completion",
+        "photostrip.cli.commands.completion",
         "Print the script that makes a shell complete commands.",
         "photostrip completion bash >> ~/.bashrc",
     ),
     "man": Entry(
-        "photostrip.cli.man",
+        "photostrip.cli.commands.man",
         "Print a manual page, or write all of them.",
         "photostrip man -o ~/.local/share/man/man1",
     ),
     "info": Entry(
-        "photostrip.cli.info",
+        "photostrip.cli.commands.info",
         "Print versions and formats, and how to get what is missing.",
         "photostrip info --format json",
     ),
@@ -269,7 +269,7 @@ def _exit_code(error: BaseException, *, debug: bool) -> int:
     for message in messages:
         _complain(message)
     if isinstance(error, InputError | GeometryError) and error.findings:
-        from photostrip.report.messages import finding_of, line_of
+        from photostrip.report.page.messages import finding_of, line_of
 
         sys.stderr.writelines(f"{line_of(finding_of(each))}\n" for each in error.findings)
     return code

@@ -8,22 +8,22 @@ from typing import TYPE_CHECKING
 from photostrip.cli.showing import Format
 from photostrip.cli.talking import Talk, failures_as, no_collector
 from photostrip.errors import EXIT_DONE, GeometryError, InputError
-from photostrip.formats.result.document import document_of
-from photostrip.formats.result.files import result_files, to_json
-from photostrip.formats.result.methods import methods_document
-from photostrip.formats.writing import write_files
+from photostrip.formats.output.result_files import result_files, to_json
+from photostrip.formats.text.writing import write_files
 from photostrip.pipeline import ADJUSTMENTS, triangulate
 from photostrip.project.loading import load_project
-from photostrip.report import console, layout, text
-from photostrip.report.methods import methods_sections
-from photostrip.report.progress import progress
+from photostrip.report.commands.methods import methods_sections
+from photostrip.report.page import console, layout, text
+from photostrip.report.page.progress import progress
+from photostrip.result.document import document_of
+from photostrip.result.methods import methods_document
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
     from photostrip.errors import PhotostripError
-    from photostrip.formats.result.numbers import Document
+    from photostrip.result.numbers import Document
 
 
 def compare_methods(

@@ -54,7 +54,8 @@ def show(document: dict[str, Any], form: Format, width: int | None, *, quiet: bo
     verbose : bool
         Whether long tables are printed whole.
     """
-    from photostrip.report import chosen_sections, console, title_of
+    from photostrip.report import chosen_sections, title_of
+    from photostrip.report.page import console
 
     if form is Format.TEXT:
         sections = chosen_sections(document, quiet=quiet, everything=verbose)
@@ -81,7 +82,7 @@ def rendered(
     Parameters
     ----------
     document, form, width, quiet, verbose
-        As for :func:`show`; without a width the text is 100 characters wide.
+        As for ``show``; without a width the text is 100 characters wide.
     ascii_only : bool
         Whether the text may have ASCII letters only; ids in Markdown keep theirs.
 
@@ -90,14 +91,15 @@ def rendered(
     str
         The report.
     """
-    from photostrip.report import chosen_sections, layout, text, title_of
+    from photostrip.report import chosen_sections, title_of
+    from photostrip.report.page import layout, text
 
     if form is Format.JSON:
-        from photostrip.formats.result.files import to_json
+        from photostrip.formats.output.result_files import to_json
 
         return to_json(document, ascii_only=ascii_only)
     if form is Format.GITHUB:
-        from photostrip.report.messages import annotated, result_findings
+        from photostrip.report.page.messages import annotated, result_findings
 
         return annotated(result_findings(document))
     title, sections = "" if quiet else title_of(document), chosen_sections(document, quiet=quiet, everything=verbose)
@@ -122,15 +124,15 @@ def traced(result: Result, form: Format) -> str:
     str
         The trace.
     """
-    from photostrip.formats.trace import trace_of
-    from photostrip.report import layout, text
-    from photostrip.report.trace_sections import trace_sections, trace_title
+    from photostrip.report.commands.trace_sections import trace_sections, trace_title
+    from photostrip.report.page import layout, text
+    from photostrip.result.trace.trace import trace_of
 
     if result.bundle is not None:  # what has stages to be traced is the strip method that started it
         result = replace(result, strips=result.bundle.start.strips, frames=(*result.frames, result.output))
     document = trace_of(result)
     if form is Format.JSON:
-        from photostrip.formats.result.files import to_json
+        from photostrip.formats.output.result_files import to_json
 
         return to_json(document)
     title, sections = trace_title(document), trace_sections(document)

@@ -75,7 +75,7 @@ def failures_as(form: Format) -> Iterator[None]:
     except (InputError, GeometryError, OSError) as error:
         if form not in {Format.JSON, Format.GITHUB}:
             raise
-        from photostrip.report import console, messages
+        from photostrip.report.page import console, messages
 
         told = as_fault(error) if isinstance(error, OSError) else error
         findings = messages.findings_of(told)

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
     from photostrip.notes import Note
-    from photostrip.report.parts import Section
+    from photostrip.report.page.parts import Section
 
 Document = dict[str, Any]
 Form = Literal["text", "md", "json", "csv"]
@@ -47,11 +47,11 @@ def hand_out(
     table : callable
         Makes CSV of the document.
     """
-    from photostrip.report import console, layout, text
+    from photostrip.report.page import console, layout, text
 
     ascii_only = not console.speaks_unicode(sys.stdout)
     if form == "json":
-        from photostrip.formats.result.files import to_json
+        from photostrip.formats.output.result_files import to_json
 
         sys.stdout.write(to_json(document, ascii_only=ascii_only))
     elif form == "csv":

@@ -1,9 +1,9 @@
 """Two results beside each other: what differs by more than is allowed, for regression checks.
 
-- :mod:`photostrip.compare.tolerances`: what is allowed for each kind of quantity;
-- :mod:`photostrip.compare.ground`: how far two ground points are apart, in plan and in height;
-- :mod:`photostrip.compare.quantities`: the numbers of a result, each with its kind, id and unit;
-- :mod:`photostrip.compare.comparison`: the comparison, as one plain document.
+- ``tolerances``: what is allowed for each kind of quantity;
+- ``ground``: how far two ground points are apart, in plan and in height;
+- ``quantities``: the numbers of a result, each with its kind, id and unit;
+- ``comparison``: the comparison, as one plain document.
 """
 
 from photostrip.compare.comparison import baseline_of, compare_results

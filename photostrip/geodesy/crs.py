@@ -1,7 +1,7 @@
 """Coordinate reference systems as the user names them, and the frames of a project tied together.
 
 A strip is adjusted in Cartesian space. Control lists come in map projections, longitudes and latitudes, geocentric
-or local coordinates, each list in a frame of its own; results go out in one. :func:`tie_frames` ties all of them to
+or local coordinates, each list in a frame of its own; results go out in one. ``tie_frames`` ties all of them to
 the geocentric frame of the output's datum (or to the local frame). Frames of one datum are tied exactly, by the
 formulas of the ellipsoid; between datums an operation of PROJ is used, never a guessed one ("ballpark") and never
 one whose grid file is missing.
@@ -526,7 +526,7 @@ def area_of_use(spec: FrameSpec, *, directory: Path | None = None) -> tuple[floa
     spec : FrameSpec
         Frame of a control list.
     directory : Path, optional
-        As for :func:`tie_frames`.
+        As for ``tie_frames``.
 
     Returns
     -------

@@ -80,7 +80,7 @@ class Refusal(Exception):  # noqa: N818 (not an error of its own: it carries one
     Parameters
     ----------
     message, code, expected, fix : str
-        As in :class:`photostrip.errors.Fault`.
+        As in ``errors.Fault``.
     key : str
         Key of the control list that is at fault.
     """

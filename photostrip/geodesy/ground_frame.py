@@ -84,7 +84,7 @@ class DatumShift:
         return geodetic if self.operation.idle else self._apply(geodetic, inverse=False)
 
     def inverse(self, geodetic: Array) -> Array:
-        """Undo :meth:`forward`.
+        """Undo ``forward``.
 
         PROJ inverts a seven-parameter shift to first order in its angles, 0.1 mm for one arc second and centimetres
         for ten; one step of iteration makes the way back exact.
@@ -106,7 +106,7 @@ def _wrapped(angle: Array) -> Array:
 class GroundFrame:
     """One frame of ground coordinates, tied to the project's Cartesian frame.
 
-    Made by :func:`tie_frames`. All arrays of ground coordinates are in the internal order east, north, up
+    Made by ``tie_frames``. All arrays of ground coordinates are in the internal order east, north, up
     (longitude, latitude, height; X, Y, Z) and in the CRS's own units.
 
     Parameters
@@ -354,7 +354,7 @@ class GroundFrame:
         Returns
         -------
         ndarray, shape (n, 3, 3)
-            Rows are unit vectors: :meth:`axes_at`, but true east, north and the normal for ``geocentric``.
+            Rows are unit vectors: ``axes_at``, but true east, north and the normal for ``geocentric``.
         """
         return self._true_axes(self.geodetic(xyz)) if self.kind == "geocentric" else self.axes_at(xyz)
 

@@ -236,7 +236,7 @@ class IntermediateFrame:
         cartesian_control : array_like, shape (n, 3)
             Geocentric coordinates of the control points, metres; their mean is the origin.
         lat, lon : float
-            Mean latitude and longitude (:func:`mean_position`), radians; they give only the directions.
+            Mean latitude and longitude (``mean_position``), radians; they give only the directions.
         azimuth : float
             Azimuth of the X axis, clockwise from north, radians.
 

@@ -36,12 +36,12 @@ def rotation_x(angle: ArrayLike) -> NDArray[np.float64]:
 
 
 def rotation_y(angle: ArrayLike) -> NDArray[np.float64]:
-    """Rotation about the y axis, right-hand rule; see :func:`rotation_x`."""
+    """Rotation about the y axis, right-hand rule; see ``rotation_x``."""
     return _elementary(angle, 2, 0)
 
 
 def rotation_z(angle: ArrayLike) -> NDArray[np.float64]:
-    """Rotation about the z axis, right-hand rule; see :func:`rotation_x`."""
+    """Rotation about the z axis, right-hand rule; see ``rotation_x``."""
     return _elementary(angle, 0, 1)
 
 
@@ -133,7 +133,7 @@ def angles(matrix: ArrayLike, system: str) -> NDArray[np.float64]:
     matrix : array_like, shape (..., 3, 3)
         Rotation matrices, photo to object.
     system : str
-        One of :data:`SYSTEMS`; the angles come in the order of the name.
+        One of ``SYSTEMS``; the angles come in the order of the name.
 
     Returns
     -------
@@ -161,14 +161,14 @@ def angles(matrix: ArrayLike, system: str) -> NDArray[np.float64]:
 
 
 def from_angles(values: ArrayLike, system: str) -> NDArray[np.float64]:
-    """Rotation from angles in the named system; the inverse of :func:`angles`.
+    """Rotation from angles in the named system; the inverse of ``angles``.
 
     Parameters
     ----------
     values : array_like, shape (..., 3)
         Angles in radians, in the order of the system's name.
     system : str
-        One of :data:`SYSTEMS`.
+        One of ``SYSTEMS``.
 
     Returns
     -------
@@ -192,7 +192,7 @@ def angle_rates(values: ArrayLike, system: str) -> NDArray[np.float64]:
     values : array_like, shape (..., 3)
         Angles in radians, in the order of the system's name.
     system : str
-        One of :data:`SYSTEMS`.
+        One of ``SYSTEMS``.
 
     Returns
     -------
@@ -284,7 +284,7 @@ def angle_between(first: ArrayLike, second: ArrayLike) -> NDArray[np.float64]:
 
 
 def to_vector(matrix: ArrayLike) -> NDArray[np.float64]:
-    """Vector of a rotation; the inverse of :func:`from_vector`.
+    """Vector of a rotation; the inverse of ``from_vector``.
 
     Parameters
     ----------

@@ -91,7 +91,7 @@ class Similarity:
         -------
         Similarity
             The similarity that makes the weighted sum of squared residuals smallest. With points on a line
-            the rotation about that line is arbitrary; :func:`collinearity` tells.
+            the rotation about that line is arbitrary; ``collinearity`` tells.
 
         Notes
         -----

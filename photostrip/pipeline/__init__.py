@@ -1,9 +1,9 @@
 """The method from measured coordinates to the result: no disk, no YAML, no printing."""
 
 from photostrip.pipeline.inputs import ADJUSTMENTS, Inputs, MeasuredModels, ModelStrip, Settings, Strip
-from photostrip.pipeline.model_results import LinkedStrip
+from photostrip.pipeline.models.model_results import LinkedStrip
 from photostrip.pipeline.results import CHECK, CONTROL, NEW, Adjusted, Precision, Result, StripResult, Ties
-from photostrip.pipeline.triangulate import triangulate
+from photostrip.pipeline.run import triangulate
 
 __all__ = [
     "ADJUSTMENTS",

@@ -5,9 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from photostrip.triangulation import absolute, formation, interior, polynomial, refinement, relative, strip_conditions
+from photostrip.triangulation import absolute_orientation as absolute
 from photostrip.triangulation.bundle import settings as bundle
-from photostrip.triangulation.models import link_screening
+from photostrip.triangulation.covariance_adjustment import conditions
+from photostrip.triangulation.image_coordinates import corrections as refinement
+from photostrip.triangulation.image_coordinates import interior
+from photostrip.triangulation.independent_models import link_screening
+from photostrip.triangulation.polynomial import correction as polynomial
+from photostrip.triangulation.relative_orientation import relative
+from photostrip.triangulation.strip_formation import formation
 
 if TYPE_CHECKING:
     import numpy as np
@@ -201,7 +207,7 @@ class Settings:
     Parameters
     ----------
     adjustment : str
-        One of :data:`ADJUSTMENTS`.
+        One of ``ADJUSTMENTS``.
     relative, formation, links, absolute, polynomial, covariance, bundle, interior, refinement
         Settings of the operations.
     precision : bool
@@ -220,7 +226,7 @@ class Settings:
     links: link_screening.Settings = field(default_factory=link_screening.Settings)
     absolute: absolute.Settings = field(default_factory=absolute.Settings)
     polynomial: polynomial.Settings = field(default_factory=polynomial.Settings)
-    covariance: strip_conditions.Settings = field(default_factory=strip_conditions.Settings)
+    covariance: conditions.Settings = field(default_factory=conditions.Settings)
     bundle: bundle.Settings = field(default_factory=bundle.Settings)
     interior: interior.Settings = field(default_factory=interior.Settings)
     refinement: refinement.Settings = field(default_factory=refinement.Settings)

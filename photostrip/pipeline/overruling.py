@@ -9,7 +9,7 @@ import numpy as np
 
 from photostrip.errors import Fault, InputError
 from photostrip.notes import Note
-from photostrip.triangulation import relative
+from photostrip.triangulation.relative_orientation import relative
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.points import PhotoPoints
-    from photostrip.triangulation.relative import Pairs
-    from photostrip.triangulation.screening import Screened
+    from photostrip.triangulation.gross_errors.pairs.screening import Screened
+    from photostrip.triangulation.relative_orientation.relative import Pairs
 
     Numbers = NDArray[np.intp]
     Flags = NDArray[np.bool_]
@@ -133,7 +133,7 @@ def without(pairs: Pairs, point: Numbers, rows: Numbers, gone: Flags) -> tuple[P
     Parameters
     ----------
     pairs, point, rows
-        As :func:`relative.collect_pairs` gives them.
+        As ``relative.collect_pairs`` gives them.
     gone : ndarray of bool, shape (m,)
         Rows to leave out; each pair must keep one.
 

@@ -13,29 +13,25 @@ if TYPE_CHECKING:
     from photostrip.geodesy.crs import GroundFrame
     from photostrip.geodesy.local_frame import IntermediateFrame
     from photostrip.notes import Finding, Note
-    from photostrip.pipeline.covariance import CovarianceAdjustment
+    from photostrip.pipeline.covariance_adjustment import CovarianceAdjustment
     from photostrip.pipeline.inputs import Inputs, Settings, Strip
-    from photostrip.pipeline.model_results import LinkedStrip
+    from photostrip.pipeline.models.model_results import LinkedStrip
     from photostrip.points import ControlPoints
-    from photostrip.triangulation import (
-        absolute,
-        control_screening,
-        control_tests,
-        exterior,
-        formation,
-        interior,
-        polynomial,
-        refinement,
-        relative,
-        screening,
-        strip_screening,
-    )
-    from photostrip.triangulation.bundle import reliability, self_calibration, variance_components
-    from photostrip.triangulation.bundle.correlations import Correlation
-    from photostrip.triangulation.bundle.problem import Problem
+    from photostrip.triangulation import absolute_orientation as absolute
+    from photostrip.triangulation.bundle.observations.problem import Problem
+    from photostrip.triangulation.bundle.quality import reliability, self_calibration, variance_components
+    from photostrip.triangulation.bundle.quality.correlations import Correlation
     from photostrip.triangulation.bundle.selection import Selection
     from photostrip.triangulation.bundle.snooping import Screened
-    from photostrip.triangulation.precision import CheckTest
+    from photostrip.triangulation.error_propagation.covariances import CheckTest
+    from photostrip.triangulation.gross_errors.control import control_screening, control_significance
+    from photostrip.triangulation.gross_errors.pairs import screening
+    from photostrip.triangulation.gross_errors.rays import strip_screening
+    from photostrip.triangulation.image_coordinates import corrections, interior
+    from photostrip.triangulation.polynomial import correction as polynomial
+    from photostrip.triangulation.relative_orientation import relative
+    from photostrip.triangulation.resection import resection as exterior
+    from photostrip.triangulation.strip_formation import formation
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -90,7 +86,7 @@ class StripResult:
         Control coordinates that were not used; ``control`` says so in its ``use``.
     covariance : CovarianceAdjustment or None
         The adjustment with the strip's own covariance; None with other adjustments.
-    judged_control : control_tests.Judged or None
+    judged_control : control_significance.Judged or None
         What the covariance of the strip says of each coordinate of ``control``; None without.
     """
 
@@ -114,7 +110,7 @@ class StripResult:
     contradictions: strip_screening.Verdict
     wrong_control: tuple[control_screening.ControlRejection, ...]
     covariance: CovarianceAdjustment | None = None
-    judged_control: control_tests.Judged | None = None
+    judged_control: control_significance.Judged | None = None
 
     @property
     def centers(self) -> Floats:
@@ -303,7 +299,7 @@ class Bundle:
     singles : tuple of SinglePhoto
         Photos that are strips of their own.
     photo_covariances : ndarray, shape (m, 6, 6)
-        Covariances of all photos, strip by strip, as in :class:`photostrip.pipeline.results.Precision`.
+        Covariances of all photos, strip by strip, as in ``results.Precision``.
     unit : float
         Standard deviation of unit weight behind the covariances: sigma0, or 1 with Baarda's test.
     """
@@ -335,7 +331,7 @@ class Result:
         Ground frame of the result.
     interior : interior.InteriorOrientation or None
         Interior orientation of the photos.
-    refined : refinement.Refined
+    refined : corrections.Refined
         Ideal image coordinates and the size of each correction.
     strips : tuple of StripResult
         The strips.
@@ -367,7 +363,7 @@ class Result:
     frames: tuple[GroundFrame, ...]
     output: GroundFrame
     interior: interior.InteriorOrientation | None
-    refined: refinement.Refined
+    refined: corrections.Refined
     strips: tuple[StripResult, ...]
     points: Adjusted
     control_rows: Numbers

@@ -11,24 +11,18 @@ import numpy as np
 from photostrip.errors import GeometryError
 from photostrip.geodesy.local_frame import IntermediateFrame, mean_position, strip_azimuth
 from photostrip.notes import Note
-from photostrip.pipeline import covariance, overruling
+from photostrip.pipeline import covariance_adjustment as covariance
+from photostrip.pipeline import overruling
 from photostrip.pipeline.results import StripResult
-from photostrip.triangulation import (
-    absolute,
-    control_errors,
-    control_screening,
-    control_tests,
-    error_rows,
-    exterior,
-    formation,
-    polynomial,
-    precision,
-    relative,
-    screening,
-    settling,
-    strip_errors,
-    strip_screening,
-)
+from photostrip.triangulation import absolute_orientation
+from photostrip.triangulation.error_propagation import control_errors, covariances, derivatives, strip_errors
+from photostrip.triangulation.gross_errors.control import control_screening, control_significance
+from photostrip.triangulation.gross_errors.pairs import screening
+from photostrip.triangulation.gross_errors.rays import settling, strip_screening
+from photostrip.triangulation.polynomial import correction as polynomial
+from photostrip.triangulation.relative_orientation import relative
+from photostrip.triangulation.resection import resection as exterior
+from photostrip.triangulation.strip_formation import formation
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -38,7 +32,7 @@ if TYPE_CHECKING:
     from photostrip.geodesy.crs import GroundFrame
     from photostrip.pipeline.inputs import ModelStrip, Settings, Strip
     from photostrip.points import ControlPoints, PhotoPoints
-    from photostrip.triangulation.models.strip import FormedModels
+    from photostrip.triangulation.independent_models.formation import FormedModels
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -149,7 +143,7 @@ def adjust_formed(
     stage : Formed
         The formed strip.
     observations, control, frames, settings
-        As for :func:`adjust_strip`.
+        As for ``adjust_strip``.
 
     Returns
     -------
@@ -180,13 +174,13 @@ def adjust_formed(
     xyz = orientation.similarity(formed.xyz)
     correction = None
     if settings.adjustment == "polynomial":
-        targets = absolute.Targets(here, frames, intermediate)
-        weight = absolute.weights(targets.turned(xyz[rows]), spread)
+        targets = absolute_orientation.Targets(here, frames, intermediate)
+        weight = absolute_orientation.weights(targets.turned(xyz[rows]), spread)
         problem = polynomial.Problem(xyz[rows], targets, weight, *_extent(formed, orientation))
         correction = polynomial.fit(problem, settings.polynomial)
     own = None
     if settings.adjustment == "covariance":
-        targets = absolute.Targets(here, frames, intermediate)
+        targets = absolute_orientation.Targets(here, frames, intermediate)
         whole = (oriented, formed, orientation)
         own = covariance.adjust(strip, whole, (targets, rows), observations, sigma, settings.covariance)
     adjusted = own.xyz if own is not None else xyz if correction is None else correction(xyz)
@@ -229,12 +223,12 @@ def _joint(
     formed: formation.FormedStrip,
     given: tuple[ControlPoints, Numbers, Sequence[GroundFrame]],
     intermediate: IntermediateFrame,
-    orientation: absolute.AbsoluteOrientation,
+    orientation: absolute_orientation.AbsoluteOrientation,
     sigma: float,
-) -> control_tests.Joint | None:
+) -> control_significance.Joint | None:
     """Covariance of all misclosures at the control; None where there are too many to form it as a whole."""
     control, rows, frames = given
-    if control.use.sum() > control_tests.LARGEST or len(strip.photos) > control_tests.LONGEST:
+    if control.use.sum() > control_significance.LARGEST or len(strip.photos) > control_significance.LONGEST:
         return None
     place = {photo: number for number, photo in enumerate(strip.photos)}
     position = np.array([place.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo]
@@ -242,17 +236,19 @@ def _joint(
         screened.orientation, formed, orientation.similarity, position, observations.sigma
     )
     xyz = orientation.similarity(formed.xyz[rows])
-    targets = absolute.Targets(control, frames, intermediate)
+    targets = absolute_orientation.Targets(control, frames, intermediate)
     found = control_errors.misclosures(errors.points, targets.turned(xyz), rows, targets.axes(xyz))
     # image coordinates are taken as good as stated, or as bad as the pairs have proved
     factor = max(1.0, float(np.median(screened.scatter.by_pair)) ** 2 / (2 * sigma**2))
-    covariance = precision.fitted(errors, found, np.eye(len(found.point)), factor).parameters * factor
-    moved = error_rows.similarity_rows(xyz[found.point], errors.origin)
+    covariance = covariances.fitted(errors, found, np.eye(len(found.point)), factor).parameters * factor
+    moved = derivatives.similarity_rows(xyz[found.point], errors.origin)
     design = np.einsum("wi,wij->wj", found.direction, moved)
-    return control_tests.Joint(found.point, found.axis, design, covariance)
+    return control_significance.Joint(found.point, found.axis, design, covariance)
 
 
-def _extent(formed: formation.FormedStrip, orientation: absolute.AbsoluteOrientation) -> tuple[float, float]:
+def _extent(
+    formed: formation.FormedStrip, orientation: absolute_orientation.AbsoluteOrientation
+) -> tuple[float, float]:
     """Mean base and half width of the strip, metres."""
     centers, xyz = orientation.similarity(formed.centers), orientation.similarity(formed.xyz)
     spacing = float(np.linalg.norm(np.diff(centers, axis=0), axis=1).mean())
@@ -316,7 +312,7 @@ def to_ground(
     given: tuple[ControlPoints, Numbers],
     frames: Sequence[GroundFrame],
     spread_at: Callable[[float], tuple[float, float]],
-) -> tuple[IntermediateFrame, absolute.AbsoluteOrientation, tuple[float, float]]:
+) -> tuple[IntermediateFrame, absolute_orientation.AbsoluteOrientation, tuple[float, float]]:
     """Intermediate frame with X along the strip, and the similarity into it.
 
     A provisional similarity in the frame of azimuth 0 gives the direction of the strip and its scale, hence the
@@ -351,19 +347,21 @@ def to_ground(
         raise GeometryError(msg, photos=strip.photos, code="no-control")
     try:
         provisional_frame = middle_frame(control, frames)
-        provisional = absolute.orient(
+        provisional = absolute_orientation.orient(
             formed.xyz[rows],
-            absolute.Targets(control, frames, provisional_frame),
+            absolute_orientation.Targets(control, frames, provisional_frame),
             control.use.astype(float),
             formed.xyz,
         )
         ends = provisional.similarity(formed.ends)
         intermediate = provisional_frame.with_azimuth(strip_azimuth(ends[0], ends[1]))
         spread = spread_at(provisional.similarity.scale)
-        targets = absolute.Targets(control, frames, intermediate)
+        targets = absolute_orientation.Targets(control, frames, intermediate)
         cartesian = provisional_frame.cartesian_from_intermediate(provisional.similarity(formed.xyz[rows]))
         turned = targets.turned(intermediate.intermediate_from_cartesian(cartesian))
-        final = absolute.orient(formed.xyz[rows], targets, absolute.weights(turned, spread), formed.xyz)
+        final = absolute_orientation.orient(
+            formed.xyz[rows], targets, absolute_orientation.weights(turned, spread), formed.xyz
+        )
     except GeometryError as error:
         msg = f"strip {strip.id}: {error}"
         raise GeometryError(msg, photos=strip.photos, points=error.points, code=error.code) from error
@@ -434,7 +432,7 @@ def _orient_photos(
     oriented: relative.Orientation,
     formed: formation.FormedStrip,
     adjusted: Floats,
-    orientation: absolute.AbsoluteOrientation,
+    orientation: absolute_orientation.AbsoluteOrientation,
     own: covariance.CovarianceAdjustment | None,
 ) -> tuple[exterior.Resection, Numbers]:
     """Orient every photo on its adjusted points, so that orientations and points belong together.
@@ -486,7 +484,7 @@ def _notes(
     strip: Strip,
     oriented: relative.Orientation,
     formed: formation.FormedStrip,
-    orientation: absolute.AbsoluteOrientation,
+    orientation: absolute_orientation.AbsoluteOrientation,
     correction: polynomial.Polynomial | None,
     adjusted: Floats,
     resection: exterior.Resection,
@@ -582,7 +580,7 @@ def _joint_notes(strip: Strip, formed: formation.FormedStrip) -> list[Note]:
     ]
 
 
-def control_notes(strip: Strip | ModelStrip, orientation: absolute.AbsoluteOrientation) -> list[Note]:
+def control_notes(strip: Strip | ModelStrip, orientation: absolute_orientation.AbsoluteOrientation) -> list[Note]:
     """Say where the control hardly checks itself, or hardly holds the strip."""
     notes = []
     if orientation.redundancy < 3:
@@ -591,7 +589,7 @@ def control_notes(strip: Strip | ModelStrip, orientation: absolute.AbsoluteOrien
             "control hardly show"
         )
         notes.append(Note("little-control", text, strip=strip.id))
-    if orientation.condition > 1 / absolute.WEAK_LIMIT:
+    if orientation.condition > 1 / absolute_orientation.WEAK_LIMIT:
         text = (
             f"strip {strip.id}: the control is nearly on one line: errors of some motion of the strip are "
             f"{orientation.condition:.0f} times those of the others"

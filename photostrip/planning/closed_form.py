@@ -1,6 +1,6 @@
 """The same deformation of an oriented model in closed form, for level ground: sums over the control, no operators.
 
-Its only purpose is to check, and to be checked by, the operators of :mod:`photostrip.planning.single_model`; the
+Its only purpose is to check, and to be checked by, the operators of ``single_model``; the
 source prints this form.
 
 Source: [000] eq. 9-11 with nine corrections, each listed in docs/sources.md and shown to be necessary by a test.

@@ -15,7 +15,7 @@ import numpy as np
 
 from photostrip.errors import GeometryError
 from photostrip.statistics import normal_quantile, t_quantile
-from photostrip.triangulation import gruber
+from photostrip.triangulation.relative_orientation import six_points
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -181,7 +181,7 @@ def rigorous_factors(xy: ArrayLike, focal: float, width: float, base: float) -> 
     """
     place = np.asarray(xy, float)
     rows = np.stack([parallax_error(place, unit, focal, base) for unit in np.eye(5)], axis=-1)
-    found: Array = np.einsum("...i,ij,...j->...", rows, gruber.cofactors(focal, width, base), rows) + 2
+    found: Array = np.einsum("...i,ij,...j->...", rows, six_points.cofactors(focal, width, base), rows) + 2
     return found
 
 
@@ -191,7 +191,7 @@ def rigorous_constants(xy: ArrayLike, focal: float, width: float, base: float) -
     Parameters
     ----------
     xy, focal, width, base
-        As for :func:`rigorous_factors`.
+        As for ``rigorous_factors``.
 
     Returns
     -------

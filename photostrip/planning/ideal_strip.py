@@ -14,16 +14,17 @@ from photostrip.errors import Fault, InputError
 from photostrip.geometry.similarity import Similarity
 from photostrip.points import PhotoPoints
 from photostrip.simulate import Control, Flight, Ground, Image, Points, Spec, Terrain, simulate
-from photostrip.triangulation import formation, relative
-from photostrip.triangulation.strip_errors import StripErrors, strip_errors
+from photostrip.triangulation.error_propagation.strip_errors import StripErrors, strip_errors
+from photostrip.triangulation.relative_orientation import relative
+from photostrip.triangulation.strip_formation import formation
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.camera import Camera
     from photostrip.simulate import Simulation
-    from photostrip.triangulation.formation import FormedStrip
-    from photostrip.triangulation.relative import Orientation
+    from photostrip.triangulation.relative_orientation.relative import Orientation
+    from photostrip.triangulation.strip_formation.formation import FormedStrip
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import GeometryError
-from photostrip.triangulation import gruber
+from photostrip.triangulation.relative_orientation import six_points
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -127,7 +127,7 @@ def free_influence(points: ArrayLike, base: float) -> Array:
     Parameters
     ----------
     points, base
-        As for :func:`influence`.
+        As for ``influence``.
 
     Returns
     -------
@@ -226,7 +226,7 @@ def element_covariance(points: ArrayLike, base: float, sigma: float) -> Array:
             code="plan-orientation",
         )
     inverse = np.linalg.inv((rows / size).T @ (rows / size)) / np.outer(size, size)
-    turn = gruber.dependent_from_base(base)
+    turn = six_points.dependent_from_base(base)
     return sigma**2 * turn @ inverse @ turn.T
 
 

@@ -16,20 +16,15 @@ from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.local_frame import IntermediateFrame
 from photostrip.planning.control_layout import USES, Layout, Spot, numbers_of
 from photostrip.points import ControlPoints
-from photostrip.triangulation import (
-    absolute,
-    control_errors,
-    polynomial,
-    polynomial_terms,
-    precision,
-    strip_conditions,
-    strip_covariance,
-    strip_system,
-)
-from photostrip.triangulation.bundle import problem as bundle
-from photostrip.triangulation.bundle.precision import precision as bundle_precision
+from photostrip.triangulation import absolute_orientation
+from photostrip.triangulation.bundle.observations import problem as bundle
+from photostrip.triangulation.bundle.quality.precision import precision as bundle_precision
 from photostrip.triangulation.bundle.solve import solve
-from photostrip.triangulation.screening import DETECTABLE
+from photostrip.triangulation.covariance_adjustment import conditions, prediction, system
+from photostrip.triangulation.error_propagation import control_errors, covariances
+from photostrip.triangulation.gross_errors.pairs.screening import DETECTABLE
+from photostrip.triangulation.polynomial import correction
+from photostrip.triangulation.polynomial import terms as polynomial_terms
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -170,7 +165,7 @@ class _Fit:
 
     numbers: Numbers
     control: ControlPoints
-    targets: absolute.Targets
+    targets: absolute_orientation.Targets
     weight: Floats
     xyz: Floats
 
@@ -179,9 +174,9 @@ def _oriented(strip: IdealStrip, numbers: Numbers, control: ControlPoints) -> _F
     """Orient the strip on its control, which refuses control that leaves it a motion."""
     frames, _ = tie_frames([FrameSpec("local", ("east", "north", "up"))])
     intermediate = IntermediateFrame.at_local_centre(strip.xyz[numbers[control.use[:, 0]]], np.pi / 2)
-    targets = absolute.Targets(control, frames, intermediate)
-    weight = absolute.weights(control, _precision(strip))
-    absolute.orient(strip.formed.xyz[numbers], targets, weight, strip.formed.xyz)
+    targets = absolute_orientation.Targets(control, frames, intermediate)
+    weight = absolute_orientation.weights(control, _precision(strip))
+    absolute_orientation.orient(strip.formed.xyz[numbers], targets, weight, strip.formed.xyz)
     return _Fit(numbers, control, targets, weight, intermediate.intermediate_from_cartesian(strip.xyz))
 
 
@@ -199,15 +194,15 @@ def _fitted(strip: IdealStrip, ground: _Fit, method: str) -> Accuracy:
     )
     terms: list[tuple[str, ...]] = [(), (), ()]
     if method in DEGREES:
-        problem = polynomial.Problem(xyz[numbers], targets, weight, strip.geometry.base, _breadth(xyz))
-        terms = [axis.terms for axis in polynomial.fit(problem, polynomial.Settings(DEGREES[method])).axes]
+        problem = correction.Problem(xyz[numbers], targets, weight, strip.geometry.base, _breadth(xyz))
+        terms = [axis.terms for axis in correction.fit(problem, correction.Settings(DEGREES[method])).axes]
     axes = targets.axes(xyz[numbers])
     found = control_errors.misclosures(strip.errors.points, control, numbers, axes)
     shift = targets.intermediate.intermediate_from_cartesian(strip.errors.origin[None])[0]
     fit = control_errors.correction(found, weight, xyz[numbers], terms, shift)
-    parameters = precision.fitted(strip.errors, found, fit.operator)
+    parameters = covariances.fitted(strip.errors, found, fit.operator)
     influence = fit.influence(xyz)
-    covariance = precision.covariances(strip.errors, strip.errors.points, parameters, influence)
+    covariance = covariances.covariances(strip.errors, strip.errors.points, parameters, influence)
     share = np.einsum("wi,wit,tw->w", found.direction, influence[numbers[found.point]], fit.operator)
     variance = np.diagonal(covariance, axis1=1, axis2=2)[numbers[found.point], found.axis]
     residual = variance + found.variance * (1 - 2 * share)
@@ -247,12 +242,12 @@ def _predicted(strip: IdealStrip, ground: _Fit) -> Accuracy:
     axes = np.broadcast_to(np.eye(3), (len(numbers), 3, 3))
     found = control_errors.misclosures(errors.points, ground.control, numbers, axes)
     length = float(np.linalg.norm(errors.pairs.reach, axis=1).mean())
-    local = strip_conditions.Local.about(strip_conditions.centers_of(errors)[:-1], length)
+    local = conditions.Local.about(conditions.centers_of(errors)[:-1], length)
     given = np.zeros(len(found.point))
-    wanted = strip_conditions.conditions(errors, (strip.orientation, strip.formed), (found, given), local)
-    solved = strip_system.system(errors, wanted, 1.0)
-    (points,), cofactors = strip_covariance.predict(errors, wanted, local, solved, [errors.points])
-    rows = np.flatnonzero(wanted.kind == strip_conditions.CONTROL)
+    wanted = conditions.conditions(errors, (strip.orientation, strip.formed), (found, given), local)
+    solved = system.system(errors, wanted, 1.0)
+    (points,), cofactors = prediction.predict(errors, wanted, local, solved, [errors.points])
+    rows = np.flatnonzero(wanted.kind == conditions.CONTROL)
     redundant = cofactors[rows] * wanted.noise[rows]
     with np.errstate(divide="ignore", invalid="ignore"):
         size = np.where(redundant > TINY, DETECTABLE / np.sqrt(cofactors[rows]), np.inf)

@@ -15,18 +15,18 @@ from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec
 from photostrip.pipeline import Settings, Strip
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations
 from photostrip.points import ControlPoints, PhotoPoints
-from photostrip.triangulation import certificate
+from photostrip.triangulation.image_coordinates import certificate
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from photostrip.formats.control import ControlTable
-    from photostrip.formats.exterior import OrientationTable, PositionTable
-    from photostrip.formats.measurements import Measurements
-    from photostrip.project import schema
-    from photostrip.triangulation.certificate import Certificate
+    from photostrip.formats.measured.control import ControlTable
+    from photostrip.formats.measured.exterior import OrientationTable, PositionTable
+    from photostrip.formats.measured.measurements import Measurements
+    from photostrip.project.yaml import schema
+    from photostrip.triangulation.image_coordinates.certificate import Certificate
 
     Floats = NDArray[np.float64]
 

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.project.merging import steps
+from photostrip.project.yaml.merging import steps
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from photostrip.notes import Finding
     from photostrip.pipeline import ModelStrip, Strip
-    from photostrip.project.document import Node
     from photostrip.project.tables import Tables
+    from photostrip.project.yaml.document import Node
 
 
 def placed(

@@ -7,24 +7,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.formats.findings import counted, listed
+from photostrip.formats.text.findings import counted, listed
 from photostrip.notes import Note
 from photostrip.project.conversion import certificate_of
-from photostrip.project.document import key_path
 from photostrip.project.tables import alike, rays
-from photostrip.triangulation.certificate import POOR_FIT
+from photostrip.project.yaml.document import key_path
+from photostrip.triangulation.image_coordinates.certificate import POOR_FIT
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from photostrip.formats.control import ControlTable
-    from photostrip.formats.exterior import OrientationTable, PositionTable
-    from photostrip.formats.measurements import Measurements
-    from photostrip.project import schema
-    from photostrip.project.document import Node
+    from photostrip.formats.measured.control import ControlTable
+    from photostrip.formats.measured.exterior import OrientationTable, PositionTable
+    from photostrip.formats.measured.measurements import Measurements
     from photostrip.project.models import ModelTables
     from photostrip.project.tables import Tables
-    from photostrip.triangulation.certificate import Certificate
+    from photostrip.project.yaml import schema
+    from photostrip.project.yaml.document import Node
+    from photostrip.triangulation.image_coordinates.certificate import Certificate
 
 NEAR_NAMED = 3
 

@@ -1,6 +1,6 @@
 """A project file and its tables, read and checked: plain inputs and settings for the pipeline.
 
-Everything that is wrong with any of the files is told in one go; see :class:`photostrip.errors.Fault`.
+Everything that is wrong with any of the files is told in one go; see ``errors.Fault``.
 """
 
 from __future__ import annotations
@@ -11,11 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.formats.findings import Findings
-from photostrip.formats.source import current, seen_from
+from photostrip.formats.text.findings import Findings
+from photostrip.formats.text.source import current, seen_from
 from photostrip.geodesy.crs import grid_names, tie_frames
 from photostrip.pipeline import Inputs, Settings
-from photostrip.project import schema
 from photostrip.project.conversion import (
     ImageSystem,
     camera_positions,
@@ -30,16 +29,17 @@ from photostrip.project.conversion import (
     settings,
     strips,
 )
-from photostrip.project.document import COMMAND_LINE, Node, fault_at
 from photostrip.project.finding_places import placed
 from photostrip.project.hints import hints
-from photostrip.project.merging import override, read_tree, steps
 from photostrip.project.models import check_models, measured_models, named_points
-from photostrip.project.references import check_references
 from photostrip.project.resolved import completed, text_of
-from photostrip.project.schema import json_schema
 from photostrip.project.tables import Tables, check_tables, read_tables
-from photostrip.project.validation import valid_section, validate
+from photostrip.project.yaml import schema
+from photostrip.project.yaml.document import COMMAND_LINE, Node, fault_at
+from photostrip.project.yaml.merging import override, read_tree, steps
+from photostrip.project.yaml.references import check_references
+from photostrip.project.yaml.schema import json_schema
+from photostrip.project.yaml.validation import valid_section, validate
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence

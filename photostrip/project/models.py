@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.formats.findings import listed, suggestion
-from photostrip.formats.models import read_models
+from photostrip.formats.measured.models import read_models
+from photostrip.formats.text.findings import listed, suggestion
 from photostrip.pipeline import MeasuredModels, ModelStrip
 from photostrip.points import ModelPoints, PhotoPoints
-from photostrip.project.document import fault_at
-from photostrip.project.references import listed_photos
+from photostrip.project.yaml.document import fault_at
+from photostrip.project.yaml.references import listed_photos
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.errors import Fault
-    from photostrip.formats.findings import Findings
-    from photostrip.formats.models import ModelTable
-    from photostrip.project import schema
-    from photostrip.project.document import Node
+    from photostrip.formats.measured.models import ModelTable
+    from photostrip.formats.text.findings import Findings
+    from photostrip.project.yaml import schema
+    from photostrip.project.yaml.document import Node
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]

@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel
 
-from photostrip.formats.source import seen_from
+from photostrip.formats.text.source import seen_from
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES
 from photostrip.project.conversion import first_frame, output_spec
-from photostrip.project.merging import path_of
-from photostrip.project.schema import Distortion, Ellipsoid, ProjectFile, Text
+from photostrip.project.yaml.merging import path_of
+from photostrip.project.yaml.schema import Distortion, Ellipsoid, ProjectFile, Text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from photostrip.project.document import Node
+    from photostrip.project.yaml.document import Node
 
 HEADER = (
     "# A project of photostrip with all defaults filled in. Paths are relative to the folder of the project file.\n"

@@ -1,6 +1,6 @@
 """Specifications of simulations: the YAML file, its keys, and the places of what is wrong with it.
 
-The keys are the fields of the classes of :mod:`photostrip.simulate`, whose defaults hold here too. Types are checked
+The keys are the fields of the classes of ``simulate``, whose defaults hold here too. Types are checked
 here, values there.
 """
 
@@ -13,12 +13,12 @@ from pydantic import AfterValidator, BeforeValidator, PlainValidator, WithJsonSc
 
 from photostrip import camera, simulate
 from photostrip.errors import InputError
-from photostrip.formats.findings import Findings, suggestion
-from photostrip.formats.numbers import NotANumber, shown
-from photostrip.formats.numbers import number as read_number
-from photostrip.project.document import fault_at
-from photostrip.project.merging import override, read_tree, steps
-from photostrip.project.schema import (
+from photostrip.formats.text.findings import Findings, suggestion
+from photostrip.formats.text.numbers import NotANumber, shown
+from photostrip.formats.text.numbers import number as read_number
+from photostrip.project.yaml.document import fault_at
+from photostrip.project.yaml.merging import override, read_tree, steps
+from photostrip.project.yaml.schema import (
     CRS,
     Axes,
     Distortion,
@@ -36,14 +36,14 @@ from photostrip.project.schema import (
     key,
     wrong,
 )
-from photostrip.project.validation import checked
+from photostrip.project.yaml.validation import checked
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
     from photostrip.errors import Fault
-    from photostrip.project.document import Node
+    from photostrip.project.yaml.document import Node
 
 SCHEMA_NUMBER = 1
 USUAL = simulate.Spec()

@@ -10,24 +10,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.formats.control import ControlTable, read_control, refuse_repeated
-from photostrip.formats.exterior import OrientationTable, PositionTable, read_orientations, read_positions
-from photostrip.formats.findings import Findings, listed, suggestion
-from photostrip.formats.numbers import NotANumber
-from photostrip.formats.numbers import number as read_number
-from photostrip.formats.observations import Manner, read_measurements
+from photostrip.formats.measured.control import ControlTable, read_control, refuse_repeated
+from photostrip.formats.measured.exterior import OrientationTable, PositionTable, read_orientations, read_positions
+from photostrip.formats.measured.observations import Manner, read_measurements
+from photostrip.formats.text.findings import Findings, listed, suggestion
+from photostrip.formats.text.numbers import NotANumber
+from photostrip.formats.text.numbers import number as read_number
 from photostrip.geometry.rotation import SYSTEMS
-from photostrip.project.document import fault_at
-from photostrip.project.merging import path_of, told_where_named
 from photostrip.project.models import ModelTables, model_tables, read_model_points
-from photostrip.project.references import listed_photos, marks_of
+from photostrip.project.yaml.document import fault_at
+from photostrip.project.yaml.merging import path_of, told_where_named
+from photostrip.project.yaml.references import listed_photos, marks_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from photostrip.formats.measurements import Measurements
-    from photostrip.project.document import Node
-    from photostrip.project.references import ListedPhoto
+    from photostrip.formats.measured.measurements import Measurements
+    from photostrip.project.yaml.document import Node
+    from photostrip.project.yaml.references import ListedPhoto
 
     Path = tuple[str | int, ...]
 

@@ -9,12 +9,12 @@ from pydantic import PlainValidator, WithJsonSchema
 
 from photostrip.compare import SetTolerance, Tolerance, Tolerances
 from photostrip.errors import InputError
-from photostrip.formats.findings import Findings
-from photostrip.formats.numbers import NotANumber, shown
-from photostrip.formats.numbers import number as read_number
-from photostrip.project.merging import read_tree
-from photostrip.project.schema import Flag, Section, Words, described, key, wrong
-from photostrip.project.validation import checked
+from photostrip.formats.text.findings import Findings
+from photostrip.formats.text.numbers import NotANumber, shown
+from photostrip.formats.text.numbers import number as read_number
+from photostrip.project.yaml.merging import read_tree
+from photostrip.project.yaml.schema import Flag, Section, Words, described, key, wrong
+from photostrip.project.yaml.validation import checked
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -11,14 +11,14 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from photostrip.errors import Fault, InputError
-from photostrip.report.document import sections_of, title_of
-from photostrip.report.parts import Facts, Table, Words
-from photostrip.report.plots_strip import strip_pictures
+from photostrip.report.page.parts import Facts, Table, Words
+from photostrip.report.pictures.plots_strip import strip_pictures
+from photostrip.report.sections.document import sections_of, title_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from photostrip.report.parts import Part, Section
+    from photostrip.report.page.parts import Part, Section
 
 Document = dict[str, Any]
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from photostrip.geodesy.crs import tie_frames
 from photostrip.geometry.rotation import from_vector
-from photostrip.triangulation.bundle.problem import Cameras, Control, Images, Problem, Start
+from photostrip.triangulation.bundle.observations.problem import Cameras, Control, Images, Problem, Start
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def truth_of(simulation: Simulation) -> Start:
-    """Give the truth of a simulation in the frame of :func:`problem_of`.
+    """Give the truth of a simulation in the frame of ``problem_of``.
 
     Parameters
     ----------

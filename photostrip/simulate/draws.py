@@ -4,7 +4,7 @@ Numpy promises that the bits of PCG64 stay the same for ever, but not what its `
 the bits are taken: the upper 53 of each word divided by 2^53 are a uniform number, pairs of these give normal numbers
 by the formula of Box and Muller.
 
-Each purpose has a stream of its own (:class:`Purpose`), so that asking for a film deformation, say, does not change
+Each purpose has a stream of its own (``Purpose``), so that asking for a film deformation, say, does not change
 the flight, and a strip that is twice as noisy has the same errors twice as large.
 """
 
@@ -68,7 +68,7 @@ class Draws:
         return np.asarray((words >> np.uint64(11)) * 2.0**-53).reshape(shape)
 
     def between(self, *shape: int) -> NDArray[np.float64]:
-        """Draw uniform numbers in [-1, 1); see :meth:`uniform`."""
+        """Draw uniform numbers in [-1, 1); see ``uniform``."""
         return 2.0 * self.uniform(*shape) - 1.0
 
     def normal(self, *shape: int) -> NDArray[np.float64]:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.triangulation import lens
-from photostrip.triangulation.refinement import refraction_constant
+from photostrip.triangulation.image_coordinates import lens_distortion
+from photostrip.triangulation.image_coordinates.corrections import refraction_constant
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -110,5 +110,5 @@ def sees(spec: Spec, photos: Photos, photo: Rows, xyz: Array) -> NDArray[np.bool
     xy, depth = project(photos, photo, xyz - photos.centers[photo], spec.camera.principal_distance)
     inside = (np.abs(xy + spec.camera.principal_point) <= USABLE / 2.0 * np.asarray(spec.format)).all(axis=1)
     if spec.camera.distortion is not None:
-        inside &= np.hypot(xy[:, 0], xy[:, 1]) <= USABLE * lens.reach(spec.camera.distortion)[1]
+        inside &= np.hypot(xy[:, 0], xy[:, 1]) <= USABLE * lens_distortion.reach(spec.camera.distortion)[1]
     return np.asarray(inside & (depth > 0.0))

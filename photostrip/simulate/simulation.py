@@ -23,7 +23,7 @@ from photostrip.simulate.imaging import bent, project
 from photostrip.simulate.placement import place
 from photostrip.simulate.plotter import Scene, plotted
 from photostrip.simulate.validation import LARGEST_ARC, faults_of
-from photostrip.triangulation.refinement import distort
+from photostrip.triangulation.image_coordinates.corrections import distort
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -145,7 +145,7 @@ def simulate(spec: Spec) -> Simulation:
 
     Notes
     -----
-    Random numbers are drawn as :mod:`photostrip.simulate.draws` says; each function below names its draws. Image
+    Random numbers are drawn as ``draws`` says; each function below names its draws. Image
     noise (`Purpose.IMAGE`): for each row of the observations, by photo and point, x, y.
     """
     if faults := faults_of(spec):

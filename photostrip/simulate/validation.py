@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from photostrip.errors import Fault
 from photostrip.simulate.spec import ERROR_KINDS, HANDS, LAYOUTS, MODEL_AXES, USES
-from photostrip.triangulation import lens
+from photostrip.triangulation.image_coordinates import lens_distortion
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -90,7 +90,7 @@ def _camera(spec: Spec) -> Iterator[Fault]:
     if camera.format is None:
         yield _fault("camera.format", "the camera has no format", "width and height of the photo in mm")
     yield from _each("camera.format", camera.format, 1.0, 2_000.0, "mm")
-    for fault in lens.faults(camera):
+    for fault in lens_distortion.faults(camera):
         yield replace(fault, key="camera.distortion")
     if camera.pixel_size is not None:
         yield from _range("camera.pixel_size", camera.pixel_size, 1e-5, 1.0, "mm")

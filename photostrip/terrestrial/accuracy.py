@@ -141,7 +141,7 @@ def supported(
 
     Notes
     -----
-    Source: derived; :func:`required` solved for m.
+    Source: derived; ``required`` solved for m.
     """
     unit = required(xz, principal_distance, 1.0, rotation)
     return np.stack([horizontal / unit.horizontal, vertical / unit.vertical], axis=-1)

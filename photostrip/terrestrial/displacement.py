@@ -113,7 +113,7 @@ def statistic(displacement: Floats, covariance: Floats) -> Floats:
 
 
 def limit(significance: float, components: int = SPACE) -> float:
-    """Critical value of :func:`statistic`.
+    """Critical value of ``statistic``.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""From the measurements of all epochs to displacements: the walk through :mod:`photostrip.terrestrial`.
+"""From the measurements of all epochs to displacements: the walk through ``terrestrial``.
 
 Errors of the base and of the angles of the reference epoch are common to all epochs: they change a displacement by
 their relative size (a base wrong by 1:1000 makes every displacement wrong by 1:1000) and are not part of its

@@ -52,7 +52,7 @@ def ground_from_photo(alpha: ArrayLike, omega: ArrayLike = 0.0, kappa: ArrayLike
 
 
 def angles_of(rotation: ArrayLike) -> tuple[Floats, Floats, Floats]:
-    """Azimuth, elevation and roll of a camera; the inverse of :func:`ground_from_photo`.
+    """Azimuth, elevation and roll of a camera; the inverse of ``ground_from_photo``.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def directions_of(vector: ArrayLike) -> Floats:
 
 
 def vectors_of(directions: ArrayLike) -> Floats:
-    """Give unit vectors of directions; the inverse of :func:`directions_of`.
+    """Give unit vectors of directions; the inverse of ``directions_of``.
 
     Parameters
     ----------

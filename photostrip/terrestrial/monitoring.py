@@ -172,7 +172,7 @@ class Monitoring:
     rates : Rates or None
         Uniform motion, when the epochs have times.
     reason : ndarray of int, shape (e, n)
-        Why a point has no coordinates in an epoch: a key of :data:`REASONS`; 0 where it has.
+        Why a point has no coordinates in an epoch: a key of ``REASONS``; 0 where it has.
     parallax, parallax_sigma : ndarray, shape (e, n)
         Vertical parallaxes in mm with their standard deviations; NaN where z was not measured on the right photo.
     parallax_change, parallax_change_sigma : ndarray, shape (e, n)

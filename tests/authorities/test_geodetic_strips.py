@@ -12,7 +12,7 @@ from photostrip.camera import Camera
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.local_frame import geocentric_from_geodetic
 from photostrip.pipeline import Inputs, Settings, Strip, triangulate
-from photostrip.triangulation import polynomial
+from photostrip.triangulation.polynomial import correction
 from tests.strips import control_points, measured
 from tests.vectors import section, vector
 
@@ -48,7 +48,7 @@ def run(name: str, frame: str, adjustment: str, degree: str = "auto") -> Result:
     control = control_points(given, check=list(check))
     strip = Strip("A", Camera("camera", example.input["f"]), observations.photo_ids)
     spec = GEOGRAPHIC if frame == "geographic" else GEOCENTRIC
-    settings = Settings(adjustment=adjustment, polynomial=polynomial.Settings(degree))
+    settings = Settings(adjustment=adjustment, polynomial=correction.Settings(degree))
     return triangulate(Inputs(name, (strip,), observations, control, (spec,)), settings)
 
 

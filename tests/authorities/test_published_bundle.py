@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.formats.result.document import document_of
 from photostrip.pipeline import triangulate
 from photostrip.project.loading import load_project
+from photostrip.result.document import document_of
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:

@@ -11,14 +11,15 @@ import pytest
 
 from photostrip.geometry.rotation import angles, from_alpha_omega_kappa, rotation_x, rotation_y, rotation_z
 from photostrip.geometry.similarity import Similarity
-from photostrip.triangulation import formation, relative
-from photostrip.triangulation.intersection import intersect
+from photostrip.triangulation.relative_orientation import relative
+from photostrip.triangulation.strip_formation import formation
+from photostrip.triangulation.strip_formation.intersection import intersect
 from tests.strips import MICROMETRE, measured
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.relative import Orientation
+    from photostrip.triangulation.relative_orientation.relative import Orientation
 
     Floats = NDArray[np.float64]
 

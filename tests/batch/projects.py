@@ -9,8 +9,8 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from photostrip.batch.work import evaluate
-from photostrip.formats.simulation import project_files
-from photostrip.formats.writing import write_files
+from photostrip.formats.output.simulation import project_files
+from photostrip.formats.text.writing import write_files
 from photostrip.simulate.simulation import simulate
 from photostrip.simulate.spec import Flight, Points, Spec
 from tests.source_tree import ROOT

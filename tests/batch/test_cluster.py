@@ -18,13 +18,13 @@ import pytest
 
 from photostrip.batch import cluster as clusters
 from photostrip.batch.folder import opened, program
+from photostrip.batch.packing import pack
 from photostrip.batch.run import Run, Stop
 from photostrip.batch.selection import choose
 from photostrip.batch.tasks import Limits, Task
 from photostrip.batch.work import evaluate
 from photostrip.cli.main import main
 from photostrip.errors import InputError
-from photostrip.project.packing import pack
 from tests.batch.faulty import WORK
 from tests.batch.projects import environment, run, tree, write_projects
 from tests.geodesy.frames import write_gtx

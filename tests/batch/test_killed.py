@@ -17,8 +17,8 @@ import pytest
 
 from photostrip.cli import batching
 from photostrip.cli.main import main
-from photostrip.formats.batch import parsed_record
-from photostrip.formats.source import digest
+from photostrip.formats.output.batch import parsed_record
+from photostrip.formats.text.source import digest
 from tests.batch.projects import Alone, command, environment, run, tree, write_projects
 
 if TYPE_CHECKING:

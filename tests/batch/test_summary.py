@@ -17,10 +17,10 @@ from photostrip.batch.run import named
 from photostrip.batch.selection import Chosen
 from photostrip.batch.tasks import EXIT_CODES, failure, not_run
 from photostrip.errors import Fault, InputError
-from photostrip.formats.batch import parsed_record, record_text, summary_csv, summary_json
-from photostrip.report.batch import ORDER, ROWS, batch_junit, batch_sections, counts, outcome_line
-from photostrip.report.progress import BatchTable, batch_table, clock
-from photostrip.report.text import to_text
+from photostrip.formats.output.batch import parsed_record, record_text, summary_csv, summary_json
+from photostrip.report.commands.batch import ORDER, ROWS, batch_junit, batch_sections, counts, outcome_line
+from photostrip.report.page.progress import BatchTable, batch_table, clock
+from photostrip.report.page.text import to_text
 from tests.batch.projects import command, environment, write_projects
 
 if TYPE_CHECKING:

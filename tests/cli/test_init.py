@@ -11,10 +11,10 @@ import pytest
 
 from photostrip import __version__
 from photostrip.cli.main import COMMANDS, main
-from photostrip.project.checking import check_project
-from photostrip.project.schema import ProjectFile
+from photostrip.project.checks.checking import check_project
 from photostrip.project.simulation_spec import SimulationFile
 from photostrip.project.template import template_files
+from photostrip.project.yaml.schema import ProjectFile
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.formats.simulation import project_files
-from photostrip.formats.writing import write_files
+from photostrip.formats.output.simulation import project_files
+from photostrip.formats.text.writing import write_files
 from photostrip.simulate import Flight, Models, Spec, simulate
 
 if TYPE_CHECKING:

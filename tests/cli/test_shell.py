@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from photostrip.cli.completion import keys
+from photostrip.cli.commands.completion import keys
 from photostrip.cli.main import COMMANDS, main
 from photostrip.cli.manual import manual_pages
 from tests.cli.helps import FOLDER

@@ -15,10 +15,10 @@ from photostrip.cli.main import main
 from photostrip.compare import Tolerances, baseline_of
 from photostrip.compare.tolerances import SETS, UNITS
 from photostrip.errors import InputError
-from photostrip.formats.result.files import to_json
-from photostrip.formats.result.places import line_finder
+from photostrip.formats.output.result_files import to_json
+from photostrip.formats.output.result_lines import line_finder
 from photostrip.project.tolerance_profile import load_tolerances
-from photostrip.report.junit import Case, to_junit
+from photostrip.report.page.junit import Case, to_junit
 from tests.results import case
 from tests.source_tree import ROOT
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from photostrip.distributions import gamma_cdf
-from photostrip.formats.simulation import inputs_of
+from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline import Settings
 from photostrip.report import sections_of, title_of
-from photostrip.report.text import to_text
+from photostrip.report.page.text import to_text
 from photostrip.simulate.simulation import simulate
 from photostrip.simulate.spec import GrossError
 from tests.results import Case, case, solved, spec

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from photostrip.errors import Fault, InputError
-from photostrip.formats import files
-from photostrip.formats.files import decode, read_bytes
+from photostrip.formats.text import files
+from photostrip.formats.text.files import decode, read_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Callable

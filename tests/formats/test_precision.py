@@ -10,13 +10,13 @@ from io import StringIO
 import numpy as np
 import pytest
 
-from photostrip.formats.result.document import document_of
-from photostrip.formats.result.files import result_files
-from photostrip.formats.result.precision import ellipses
+from photostrip.formats.output.result_files import result_files
 from photostrip.geometry.rotation import SYSTEMS, angle_rates, angles, from_angles, from_vector
 from photostrip.pipeline import Precision, Settings
 from photostrip.report import sections_of, title_of
-from photostrip.report.text import to_text
+from photostrip.report.page.text import to_text
+from photostrip.result.document import document_of
+from photostrip.result.points.precision import ellipses
 from tests.results import FRAMES, Case, case, solved
 
 SAMPLES = 200_000

@@ -13,12 +13,12 @@ import pytest
 from pyproj import CRS, Transformer
 from scipy.spatial.transform import Rotation
 
-from photostrip.formats.result.document import document_of
-from photostrip.formats.result.numbers import natural, rounded, significant
-from photostrip.formats.result.summary import TOLERANCES
-from photostrip.formats.simulation import inputs_of
+from photostrip.formats.output.simulation import inputs_of
 from photostrip.notes import Note
 from photostrip.pipeline import Settings
+from photostrip.result.document import document_of
+from photostrip.result.numbers import natural, rounded, significant
+from photostrip.result.summary import TOLERANCES
 from photostrip.simulate.simulation import simulate
 from photostrip.simulate.spec import Flight, GrossError
 from tests.results import FRAMES, NORTH_FIRST, Case, case, solved, spec, written_to

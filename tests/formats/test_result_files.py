@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 import pytest
 
 from photostrip.errors import InputError
-from photostrip.formats.result.document import document_of
-from photostrip.formats.result.files import read_result, result_files, to_json
+from photostrip.formats.output.result_files import read_result, result_files, to_json
 from photostrip.pipeline import triangulate
+from photostrip.result.document import document_of
 from tests.results import FRAMES, case, solved
 from tests.source_tree import ROOT
 
@@ -84,7 +84,7 @@ def test_every_record_stands_on_a_line_of_its_own() -> None:
 def test_two_runs_write_the_same_bytes() -> None:
     """In processes of their own, with different orders of sets and dictionaries of texts."""
     code = (
-        "from tests.results import *\nfrom photostrip.formats.result.files import result_files\nimport hashlib\n"
+        "from tests.results import *\nfrom photostrip.formats.output.result_files import result_files\nimport hashlib\n"
         "files = result_files(case('projected', 2).document, 'resolved')\n"
         "print({name: hashlib.sha256(text.encode()).hexdigest() for name, text in files.items()})"
     )

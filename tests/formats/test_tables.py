@@ -14,10 +14,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from photostrip.formats import table_text, tables
-from photostrip.formats.findings import LARGEST_LIST, Findings, counted, listed, suggestion
-from photostrip.formats.observations import OBSERVATIONS, read_measurements
-from photostrip.formats.tables import read_table
+from photostrip.formats.measured.observations import OBSERVATIONS, read_measurements
+from photostrip.formats.text import table_text, tables
+from photostrip.formats.text.findings import LARGEST_LIST, Findings, counted, listed, suggestion
+from photostrip.formats.text.tables import read_table
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from photostrip.errors import InputError
-from photostrip.formats.writing import make_rule, write_files, write_text
+from photostrip.formats.text.writing import make_rule, write_files, write_text
 
 
 def content(folder: Path) -> dict[str, str]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.formats.simulation import inputs_of, settings_of
+from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.geodesy.crs import tie_frames
 from photostrip.geometry.rotation import angles
 from photostrip.pipeline import triangulate

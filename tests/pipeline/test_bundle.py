@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from photostrip.errors import GeometryError
-from photostrip.formats.result.document import document_of
-from photostrip.formats.simulation import inputs_of
+from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline import Strip
 from photostrip.points import PhotoPoints
+from photostrip.result.document import document_of
 from photostrip.simulate import Control, Flight, Ground, Image, Spec, Terrain
 from tests.pipeline.blocks import adjusted, corners, errors, exact, orientations, positions, simulate, with_control
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from photostrip.errors import GeometryError
-from photostrip.formats.result.document import document_of
-from photostrip.formats.simulation import inputs_of
+from photostrip.formats.output.simulation import inputs_of
+from photostrip.result.document import document_of
 from photostrip.simulate import Control, Flight, GrossError, Ground, Image, Points, Spec, Terrain
-from photostrip.triangulation.bundle import reliability
+from photostrip.triangulation.bundle.quality import reliability
 from photostrip.triangulation.bundle.solve import solve
 from tests.pipeline.blocks import adjusted, corners, errors, positions, simulate, with_control
 
@@ -122,7 +122,7 @@ def test_what_the_user_keeps_stays() -> None:
     simulation = simulate(replace(BLOCK, gross_errors=(GrossError("image", count=1, size_um=120.0),)))
     (error,) = simulation.truth.errors
     inputs = inputs_of(simulation)
-    from photostrip.formats.simulation import settings_of
+    from photostrip.formats.output.simulation import settings_of
     from photostrip.pipeline import triangulate
 
     settings = replace(settings_of(simulation), adjustment="bundle")

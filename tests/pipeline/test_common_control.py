@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.formats.simulation import inputs_of
-from photostrip.pipeline import Settings, precision, triangulate
+from photostrip.formats.output.simulation import inputs_of
+from photostrip.pipeline import Settings, triangulate
+from photostrip.pipeline.precision import strip_precision
 from photostrip.simulate import Control, Flight, Image, Points, Spec, simulate
-from photostrip.triangulation import polynomial
+from photostrip.triangulation.polynomial import correction
 from tests.derivatives import UNSCREENED
 
 if TYPE_CHECKING:
@@ -48,11 +49,11 @@ def by_strip(inputs: Inputs, wanted: Settings) -> list[Floats]:
 def test_common_control_makes_common_errors(adjustment: str) -> None:
     """Mean of two strips: a quarter of both covariances, and twice what their shared control does to both."""
     inputs = two_strips()
-    wanted = Settings(adjustment=adjustment, relative=UNSCREENED, polynomial=polynomial.Settings("1"))
+    wanted = Settings(adjustment=adjustment, relative=UNSCREENED, polynomial=correction.Settings("1"))
     result = triangulate(inputs, wanted)
     observations, assured = result.refined.observations, result.precision
     assert assured is not None
-    each = [precision.of_strip(strip, observations, result.frames, inputs.control) for strip in result.strips]
+    each = [strip_precision.of_strip(strip, observations, result.frames, inputs.control) for strip in result.strips]
     names = [set(strip.control.ids) for strip in result.strips]
     common = [n for n, name in enumerate(inputs.control.ids) if name in names[0] & names[1]]
     one, other = (np.searchsorted(result.points.number, strip.formed.point) for strip in result.strips)

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from photostrip.errors import InputError
-from photostrip.formats.result.document import document_of
-from photostrip.formats.simulation import inputs_of, settings_of
+from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.geodesy.crs import FrameSpec, tie_frames
 from photostrip.pipeline import Inputs, Result, triangulate
+from photostrip.result.document import document_of
 from photostrip.simulate import Control, Flight, Ground, Spec, simulate
 
 MILLIMETRE = 1e-3  # m

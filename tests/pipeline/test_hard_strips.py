@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from photostrip.errors import InputError
-from photostrip.formats.simulation import inputs_of, settings_of
+from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline import triangulate
 from photostrip.simulate import Control, Flight, Spec, simulate
 

@@ -9,22 +9,22 @@ import numpy as np
 import pytest
 
 from photostrip.errors import InputError
-from photostrip.formats.result.document import document_of
-from photostrip.formats.simulation import inputs_of
+from photostrip.formats.output.simulation import inputs_of
 from photostrip.geometry.similarity import Similarity
 from photostrip.pipeline import Inputs, LinkedStrip, MeasuredModels, ModelStrip, Settings, triangulate
-from photostrip.pipeline.model_strips import adjust_models, form_models
-from photostrip.report.document import sections_of
+from photostrip.pipeline.models.model_strips import adjust_models, form_models
+from photostrip.report.sections.document import sections_of
+from photostrip.result.document import document_of
 from photostrip.simulate import Control, Flight, Ground, Models, Points, Spec, simulate
-from photostrip.triangulation import polynomial
-from photostrip.triangulation.models import centers, errors, link_screening
+from photostrip.triangulation.independent_models import link_screening, model_errors, perspective_centers
+from photostrip.triangulation.polynomial import correction
 from tests.models import inputs, truth
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.points import ModelPoints
-    from photostrip.triangulation.models.strip import FormedModels
+    from photostrip.triangulation.independent_models.formation import FormedModels
 
     Floats = NDArray[np.float64]
 
@@ -73,7 +73,7 @@ def test_a_bent_strip_takes_its_centers_along() -> None:
 
     beam = replace(given, points=bent(given.points), centers=bent(given.centers))
     points = beam.measured()
-    settings = Settings(polynomial=polynomial.Settings("2"))
+    settings = Settings(polynomial=correction.Settings("2"))
     plain, strip = (linked(inputs(given, points, bands=9), each) for each in (PLAIN, settings))
     off = [np.abs(s.intermediate.cartesian_from_intermediate(s.centers) - given.centers).max() for s in (plain, strip)]
     assert off[0] > 1.0
@@ -164,7 +164,7 @@ def test_covariances_are_those_of_a_numerical_jacobian() -> None:
     measured = given.measured(rng.normal(size=(len(given.model), 3)))
     formed = nodes_of(measured)
     similarity = Similarity.from_points(formed.xyz, given.points[formed.point])
-    found = errors.differentiate(formed, similarity)
+    found = model_errors.differentiate(formed, similarity)
     count = len(formed.node)
 
     def place(xyz: Floats) -> Floats:
@@ -185,14 +185,14 @@ def test_covariances_are_those_of_a_numerical_jacobian() -> None:
     jacobian = np.column_stack(columns)
     full = (jacobian * measured.sigma.ravel() ** 2) @ jacobian.T
     blocks = np.array([full[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] for k in range(count)])
-    assert np.abs(errors.covariances(found) - blocks).max() < 1e-3 * np.abs(blocks).max()
+    assert np.abs(model_errors.covariances(found) - blocks).max() < 1e-3 * np.abs(blocks).max()
     weights = rng.normal(size=(4, count, 3))
-    sums = errors.sums(found, np.arange(count), weights)
+    sums = model_errors.sums(found, np.arange(count), weights)
     flat = weights.reshape(4, -1)
     expected = flat @ full @ flat.T
-    assert np.abs(errors.covariance_of_sums(found, sums) - expected).max() < 1e-3 * np.abs(expected).max()
+    assert np.abs(model_errors.covariance_of_sums(found, sums) - expected).max() < 1e-3 * np.abs(expected).max()
     mixed = (full @ flat.T).reshape(count, 3, 4)
-    assert np.abs(errors.with_sums(found, sums) - mixed).max() < 1e-3 * np.abs(mixed).max()
+    assert np.abs(model_errors.with_sums(found, sums) - mixed).max() < 1e-3 * np.abs(mixed).max()
 
 
 def test_centers_follow_the_polynomial_as_a_stiff_body() -> None:
@@ -208,7 +208,7 @@ def test_centers_follow_the_polynomial_as_a_stiff_body() -> None:
     x, y = 0.7, -0.4
     by_x = (field(x + step, y) - field(x - step, y)) / (2 * step)
     by_y = (field(x, y + step) - field(x, y - step)) / (2 * step)
-    rows = centers.displacement_rows(place, above, terms)
+    rows = perspective_centers.displacement_rows(place, above, terms)
     found = sum(row[0] @ c for row, c in zip(rows, coefficients, strict=True))
     tilt = 1.5 * np.array([-by_x[2], -by_y[2], (by_x[0] + by_y[1]) / 2])
     np.testing.assert_allclose(found, field(x, y) + tilt, atol=1e-9)
@@ -216,7 +216,7 @@ def test_centers_follow_the_polynomial_as_a_stiff_body() -> None:
 
 def straight(adjustment: str) -> Settings:
     """Settings in which nothing is decided from the data."""
-    return Settings(adjustment, polynomial=polynomial.Settings("1"), links=link_screening.Settings("none"))
+    return Settings(adjustment, polynomial=correction.Settings("1"), links=link_screening.Settings("none"))
 
 
 def test_the_whole_chain_agrees_with_differences() -> None:

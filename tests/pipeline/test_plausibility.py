@@ -12,12 +12,13 @@ import pytest
 
 from photostrip.cli.main import main
 from photostrip.errors import PhotostripError
-from photostrip.formats.simulation import inputs_of, project_files, settings_of
+from photostrip.formats.output.simulation import inputs_of, project_files, settings_of
 from photostrip.geometry.rotation import angles
-from photostrip.pipeline import Settings, evidence, plausibility, triangulate
+from photostrip.pipeline import Settings, triangulate
 from photostrip.pipeline.inputs import GivenOrientations
+from photostrip.pipeline.plausibility import evidence, gate
 from photostrip.simulate import DIGITAL, Control, Film, Flight, GrossError, Ground, Image, Spec, Terrain, simulate
-from photostrip.triangulation.plausibility import flight_order
+from photostrip.triangulation.plausibility.photos import flight_order
 from tests.pipeline.blocks import positions
 
 if TYPE_CHECKING:
@@ -91,7 +92,7 @@ def control_rows(inputs: Inputs) -> NDArray[np.intp]:
 def test_a_sound_project_has_no_finding(frame: str) -> None:
     made = simulation(frame)
     assert told(inputs_of(made), settings_of(made)) == ()
-    assert plausibility.of_inputs(inputs_of(made), settings_of(made)) == ()
+    assert gate.of_inputs(inputs_of(made), settings_of(made)) == ()
 
 
 @pytest.mark.parametrize(
@@ -113,7 +114,7 @@ def test_a_sound_project_has_no_finding(frame: str) -> None:
 def test_other_sound_projects_have_none_either(spec: Spec) -> None:
     made = simulate(spec)
     assert told(inputs_of(made), settings_of(made)) == ()
-    assert plausibility.of_inputs(inputs_of(made), settings_of(made)) == ()
+    assert gate.of_inputs(inputs_of(made), settings_of(made)) == ()
 
 
 # ------------------------------------------------------------------------------------------------------- one mistake
@@ -122,7 +123,7 @@ def test_other_sound_projects_have_none_either(spec: Spec) -> None:
 def test_control_with_exchanged_axes_is_told_by_its_place() -> None:
     made = simulation("utm")
     wrong = with_control(inputs_of(made), lambda enu: enu[:, [1, 0, 2]])
-    assert codes(plausibility.of_inputs(wrong, Settings())) == ["P401"]
+    assert codes(gate.of_inputs(wrong, Settings())) == ["P401"]
     findings = told(wrong)
     assert codes(findings) == ["P401"]
     assert any("with east and north exchanged it would lie there" in each.message for each in findings)
@@ -137,7 +138,7 @@ def test_mirrored_images_are_told_apart_from_control_where_the_place_is_known(fl
     assert finding.code == "P103"
     expected = "y counted the other way" if flip[1] < 0 else "negatives read as positives"
     assert expected in finding.message
-    assert codes(plausibility.of_inputs(wrong, Settings())) == ["P103"]
+    assert codes(gate.of_inputs(wrong, Settings())) == ["P103"]
     local = inputs_of(simulation("local"))
     both = replace(local, observations=replace(local.observations, xy=local.observations.xy * flip))
     (finding,) = told(both)
@@ -210,7 +211,7 @@ def test_heights_of_two_kinds() -> None:
 
 @pytest.mark.parametrize("before", [False, True])
 def test_one_of_two_lists_in_feet_or_elsewhere(before: bool) -> None:
-    ask = (lambda wrong: plausibility.of_inputs(wrong, Settings())) if before else told
+    ask = (lambda wrong: gate.of_inputs(wrong, Settings())) if before else told
     feet, _ = second_list(inputs_of(simulation("local")), lambda enu: enu / FOOT)
     assert "P403" in codes(ask(feet))
     away, names = second_list(inputs_of(simulation("local")), lambda enu: enu + np.array([5000.0, -3000.0, 0.0]))
@@ -403,18 +404,18 @@ def test_tilts_as_large_as_bases_are_no_wrong_order(seed: int) -> None:
     inputs = inputs_of(simulate(Spec(seed=seed, camera=DIGITAL, flight=lens)))
     (screen,) = flight_order.examine(inputs.observations, "A", inputs.strips[0].photos)[0]
     assert screen.code == "P201"  # side by side, the photos look exchanged
-    assert plausibility.of_inputs(inputs, Settings()) == ()
+    assert gate.of_inputs(inputs, Settings()) == ()
     photos = [*inputs.strips[0].photos]
     photos[3], photos[1] = photos[1], photos[3]
     wrong = replace(inputs, strips=(replace(inputs.strips[0], photos=tuple(photos)),))
-    assert codes(plausibility.of_inputs(wrong, Settings())) == ["P201"]
+    assert codes(gate.of_inputs(wrong, Settings())) == ["P201"]
 
 
 @pytest.mark.parametrize("end_lap", [60.0, 80.0])
 def test_where_a_point_lies_along_a_strip_does_not_depend_on_the_end_lap(end_lap: float) -> None:
     made = simulate(Spec(seed=4, flight=Flight(photos=6, end_lap_percent=end_lap, attitude_sigma_deg=(2.0, 2.0, 2.0))))
     inputs = inputs_of(made)
-    examined = plausibility.before(inputs, Settings())
+    examined = gate.before(inputs, Settings())
     rows, place = evidence.stations(inputs.strips[0], examined.observations, inputs.control, examined.steps)
     index = {name: row for row, name in enumerate(made.truth.points.ids)}
     xyz = made.truth.points.xyz[[index[inputs.control.ids[row]] for row in rows]]
@@ -434,7 +435,7 @@ def test_ids_are_examined_by_the_images_alone() -> None:
     first = next(point for point, on in enumerate(seen) if on == {0, 1})
     last = next(point for point, on in enumerate(seen) if on == {len(photos) - 2, len(photos) - 1})
     same = replace(inputs, observations=replace(o, point=np.where(o.point == last, first, o.point)))
-    findings = plausibility.of_inputs(same, Settings())
+    findings = gate.of_inputs(same, Settings())
     one = next(each for each in findings if each.code == "P301")
     assert (one.points, set(one.photos)) == ((o.point_ids[first],), {photos[0], photos[1], photos[-2], photos[-1]})
     rows = np.flatnonzero(o.point == first)
@@ -446,11 +447,11 @@ def test_ids_are_examined_by_the_images_alone() -> None:
         xy=np.r_[o.xy, o.xy[rows] + 0.004],
         sigma=np.r_[o.sigma, o.sigma[rows]],
     )
-    (finding,) = plausibility.of_inputs(replace(inputs, observations=copy), Settings())
+    (finding,) = gate.of_inputs(replace(inputs, observations=copy), Settings())
     assert (finding.code, set(finding.points)) == ("P302", {o.point_ids[first], "again"})
     assert finding.evidence["mean_distance_mm"] == pytest.approx(0.004 * np.sqrt(2.0), abs=1e-9)
     apart = replace(copy, xy=np.r_[o.xy, o.xy[rows] + 0.1])
-    assert plausibility.of_inputs(replace(inputs, observations=apart), Settings()) == ()
+    assert gate.of_inputs(replace(inputs, observations=apart), Settings()) == ()
 
 
 # ------------------------------------------------------------------------------------------------- given cameras
@@ -464,24 +465,22 @@ def with_positions(change: Callable[[Floats], Floats], frame: str = "utm") -> In
 
 @pytest.mark.parametrize("frame", FRAMES)
 def test_given_positions_that_are_right_are_not_told(frame: str) -> None:
-    assert plausibility.of_inputs(with_positions(lambda enu: enu, frame), Settings()) == ()
+    assert gate.of_inputs(with_positions(lambda enu: enu, frame), Settings()) == ()
 
 
 def test_given_positions_below_the_ground_and_in_feet() -> None:
-    (below,) = plausibility.of_inputs(with_positions(lambda enu: enu - [0.0, 0.0, 2000.0]), Settings())
+    (below,) = gate.of_inputs(with_positions(lambda enu: enu - [0.0, 0.0, 2000.0]), Settings())
     assert (below.code, len(below.photos), below.key) == ("P204", 7, "camera_positions")
-    (feet,) = plausibility.of_inputs(with_positions(lambda enu: enu / [1.0, 1.0, FOOT]), Settings())
+    (feet,) = gate.of_inputs(with_positions(lambda enu: enu / [1.0, 1.0, FOOT]), Settings())
     assert feet.code == "P205"
     ratio = float(feet.evidence["given_above_control_m"]) / float(feet.evidence["by_photo_scale_m"])
     assert ratio == pytest.approx(1 / FOOT, rel=0.25)  # the ground's own height counts in metres
-    one = plausibility.of_inputs(
-        with_positions(lambda enu: enu + np.outer(np.arange(7) == 3, [0, 0, 700.0])), Settings()
-    )
+    one = gate.of_inputs(with_positions(lambda enu: enu + np.outer(np.arange(7) == 3, [0, 0, 700.0])), Settings())
     assert [(each.code, each.photos) for each in one] == [("P205", ("1004",))]
 
 
 def test_given_positions_of_other_photos() -> None:
-    findings = plausibility.of_inputs(with_positions(lambda enu: enu[[0, 1, 3, 2, 4, 5, 6]]), Settings())
+    findings = gate.of_inputs(with_positions(lambda enu: enu[[0, 1, 3, 2, 4, 5, 6]]), Settings())
     assert ("P207", ("1003", "1004")) in [(each.code, each.photos) for each in findings]
     assert {each.key for each in findings} == {"camera_positions"}
 

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.formats.result.document import document_of
-from photostrip.formats.result.files import rejected_csv
-from photostrip.formats.simulation import inputs_of, project_files, settings_of
+from photostrip.formats.output.result_files import rejected_csv
+from photostrip.formats.output.simulation import inputs_of, project_files, settings_of
 from photostrip.pipeline import triangulate
+from photostrip.result.document import document_of
 from photostrip.simulate.simulation import simulate
 from photostrip.simulate.spec import Control, Flight, GrossError, Points, Spec
 from tests.source_tree import ROOT

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photostrip.formats.result.document import document_of
-from photostrip.formats.simulation import inputs_of, settings_of
+from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline import triangulate
-from photostrip.pipeline.deformation import model_deformations
-from photostrip.report.document import sections_of
+from photostrip.report.sections.document import sections_of
+from photostrip.result.adjustment.deformation_surface import model_deformations
+from photostrip.result.document import document_of
 from photostrip.simulate import Control, Flight, Points, Spec, Terrain, simulate
 
 if TYPE_CHECKING:

@@ -29,7 +29,7 @@ from photostrip.planning.single_model import (
     parameter_rows,
     six_point_variances,
 )
-from photostrip.triangulation import gruber
+from photostrip.triangulation.relative_orientation import six_points
 from tests.vectors import cases
 
 if TYPE_CHECKING:
@@ -252,8 +252,8 @@ def test_six_standard_points_have_the_printed_variances() -> None:
     f, a, b = 100.0, 65.0, 70.0
     points = np.array([[x, y, f] for y in (0.0, a, -a) for x in (0.0, b)])
     dependent = element_covariance(points, b, 0.01)
-    turn = gruber.dependent_from_base(b)
-    assert dependent == pytest.approx(1e-4 * turn @ gruber.cofactors(f, a, b) @ turn.T, rel=1e-9, abs=1e-16)
+    turn = six_points.dependent_from_base(b)
+    assert dependent == pytest.approx(1e-4 * turn @ six_points.cofactors(f, a, b) @ turn.T, rel=1e-9, abs=1e-16)
     free = free_covariance(dependent, b)
     assert np.diag(free) == pytest.approx(six_point_variances(0.01, f, a, b))
     sd = np.sqrt(np.diag(free))

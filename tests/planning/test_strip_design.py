@@ -17,7 +17,7 @@ from photostrip.planning.placement import Placement, Required, best_places, equa
 from photostrip.planning.strip_design import Design, along_the_strip, bands_needed, outcome, plan_strip
 from photostrip.planning.strip_methods import BUNDLE, COVARIANCE, METHODS, SIMILARITY, accuracy
 from photostrip.simulate import FILM, Points
-from photostrip.triangulation.screening import DETECTABLE
+from photostrip.triangulation.gross_errors.pairs.screening import DETECTABLE
 
 if TYPE_CHECKING:
     from photostrip.planning.ideal_strip import IdealStrip

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 import yaml
 
-from photostrip.formats.findings import Findings
-from photostrip.project import document
-from photostrip.project.document import Node, Place, fault_at, key_path, parse
+from photostrip.formats.text.findings import Findings
+from photostrip.project.yaml import document
+from photostrip.project.yaml.document import Node, Place, fault_at, key_path, parse
 
 LOADERS = [pytest.param(yaml.BaseLoader, id="python"), pytest.param(document.LOADER, id="c")]
 TEXT = """\

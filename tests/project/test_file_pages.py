@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from photostrip.formats.control import read_control
-from photostrip.formats.findings import Findings
-from photostrip.formats.observations import Manner, read_measurements
-from photostrip.project.document import parse
-from photostrip.project.schema import ProjectFile
-from photostrip.project.validation import checked
+from photostrip.formats.measured.control import read_control
+from photostrip.formats.measured.observations import Manner, read_measurements
+from photostrip.formats.text.findings import Findings
+from photostrip.project.yaml.document import parse
+from photostrip.project.yaml.schema import ProjectFile
+from photostrip.project.yaml.validation import checked
 from tests.pages import blocks
 from tests.project.samples import MARKED_FILES, sample
 from tests.source_tree import ROOT

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.formats.simulation import project_files
-from photostrip.formats.writing import write_files
+from photostrip.formats.output.simulation import project_files
+from photostrip.formats.text.writing import write_files
 from photostrip.pipeline import triangulate
 from photostrip.project.loading import load_project
 from photostrip.simulate.simulation import simulate

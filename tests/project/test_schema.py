@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from photostrip.pipeline import Settings
-from photostrip.project import validation
 from photostrip.project.loading import json_schema
-from photostrip.project.schema import Output, Processing, ProjectFile, Section, Tolerances
+from photostrip.project.yaml import validation
+from photostrip.project.yaml.schema import Output, Processing, ProjectFile, Section, Tolerances
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:

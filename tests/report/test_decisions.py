@@ -7,8 +7,8 @@ import copy
 import numpy as np
 import pytest
 
-from photostrip.report.decision_sections import WEIGHTS_SHOWN, decisions_section, weights_section
-from photostrip.report.parts import Facts, Table
+from photostrip.report.page.parts import Facts, Table
+from photostrip.report.sections.decision_sections import WEIGHTS_SHOWN, decisions_section, weights_section
 from tests.results import case
 
 

@@ -15,13 +15,13 @@ from xml.etree import ElementTree as ET
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.formats.result.files import to_json
+from photostrip.formats.output.result_files import to_json
 from photostrip.report import sections_of
 from photostrip.report.html import to_html
-from photostrip.report.parts import Facts, Table, Words
-from photostrip.report.plan_view import plan_of
-from photostrip.report.plots_strip import LONGEST, strip_pictures
-from photostrip.report.svg import Axis, nice
+from photostrip.report.page.parts import Facts, Table, Words
+from photostrip.report.pictures.plan_view import plan_of
+from photostrip.report.pictures.plots_strip import LONGEST, strip_pictures
+from photostrip.report.pictures.svg import Axis, nice
 from tests.reports import saved
 from tests.results import FRAMES, case, spec, write_project
 from tests.source_tree import ROOT

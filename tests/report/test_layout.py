@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from photostrip.report.layout import NARROWEST, WIDEST, cells, clamp, cut, lay_out, pad, plain_ascii, wrapped
-from photostrip.report.parts import Column, Facts, Section, Table, Words
+from photostrip.report.page.layout import NARROWEST, WIDEST, cells, clamp, cut, lay_out, pad, plain_ascii, wrapped
+from photostrip.report.page.parts import Column, Facts, Section, Table, Words
 
 WORDS = st.text(st.characters(codec="utf-8", exclude_categories=("Cc", "Cs", "Zl", "Zp")), max_size=90)
 NUMBERS = st.floats(-1e6, 1e6).map(lambda value: f"{value:.3f}")

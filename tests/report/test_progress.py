@@ -7,9 +7,9 @@ import time
 
 import pytest
 
-from photostrip.report import progress as module
-from photostrip.report.layout import cells
-from photostrip.report.progress import WIPE, Progress, progress, wanted
+from photostrip.report.page import progress as module
+from photostrip.report.page.layout import cells
+from photostrip.report.page.progress import WIPE, Progress, progress, wanted
 
 
 class Terminal(io.StringIO):

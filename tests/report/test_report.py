@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 import pytest
 
 from photostrip.errors import InputError
-from photostrip.formats.result.files import to_json
+from photostrip.formats.output.result_files import to_json
 from photostrip.report import chosen_sections, require_complete, sections_of, title_of
-from photostrip.report.layout import cells
-from photostrip.report.parts import Column, Facts, Section, Table, Words
-from photostrip.report.strip_sections import ALL_SHOWN, WORST_SHOWN
-from photostrip.report.text import to_markdown, to_text
+from photostrip.report.page.layout import cells
+from photostrip.report.page.parts import Column, Facts, Section, Table, Words
+from photostrip.report.page.text import to_markdown, to_text
+from photostrip.report.sections.strip_sections import ALL_SHOWN, WORST_SHOWN
 from tests.reports import FOLDER, SNAPSHOTS, fresh, saved
 from tests.results import FRAMES, case
 

@@ -16,7 +16,7 @@ from photostrip.simulate.film import sheets
 from photostrip.simulate.simulation import simulate
 from photostrip.simulate.spec import FILM as CAMERA
 from photostrip.simulate.spec import Film, Flight, Image, Spec, Terrain
-from photostrip.triangulation import interior, refinement
+from photostrip.triangulation.image_coordinates import corrections, interior
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -58,8 +58,8 @@ def corrected(done: Simulation, *, transform: str = "affine", camera: Camera = L
     oriented = interior.orient(done.fiducials, cameras, interior.Settings(transform))
     photo = interior.transform(done.observations, oriented)
     flying, ground = (float(xyz[:, 2].mean()) for xyz in (done.truth.centers_ground, done.truth.ground.xyz))
-    settings = refinement.Settings(refraction=refraction, flying_height=flying, ground_height=ground)
-    return refinement.refine(photo, cameras, settings).observations.xy
+    settings = corrections.Settings(refraction=refraction, flying_height=flying, ground_height=ground)
+    return corrections.refine(photo, cameras, settings).observations.xy
 
 
 def largest(shift: Floats) -> float:
@@ -87,7 +87,7 @@ def shift_of_the_lens(xy: Floats) -> Floats:
 def shift_of_the_air(done: Simulation, xy: Floats) -> Floats:
     """Saastamoinen's dr, outwards."""
     flying, ground = (float(each[:, 2].mean()) for each in (done.truth.centers_ground, done.truth.ground.xyz))
-    constant = refinement.refraction_constant(flying, ground)
+    constant = corrections.refraction_constant(flying, ground)
     return np.asarray(constant * xy * (1 + (xy**2).sum(1, keepdims=True) / done.camera.principal_distance**2))
 
 

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from photostrip.camera import Distortion
-from photostrip.formats.simulation import inputs_of, project_files, settings_of
-from photostrip.formats.writing import write_files
+from photostrip.formats.output.simulation import inputs_of, project_files, settings_of
+from photostrip.formats.text.writing import write_files
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.project.loading import load_project
 from photostrip.simulate import (
@@ -278,7 +278,7 @@ def test_the_same_specification_gives_the_same_bytes() -> None:
     code = (
         "import hashlib\n"
         "from tests.simulate.test_files import TINY, VARIANTS\n"
-        "from photostrip.formats.simulation import project_files\n"
+        "from photostrip.formats.output.simulation import project_files\n"
         "from photostrip.simulate import simulate\n"
         "for spec in (TINY, *VARIANTS.values()):\n"
         "    for name, text in project_files(simulate(spec)).items():\n"

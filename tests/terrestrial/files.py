@@ -30,7 +30,7 @@ TRUTH = turned(replace(world(number=12, moving=4, size=0.05), epochs=3), 60.0, -
 
 
 def project(unit: str = "deg") -> str:
-    """Give the text of the project of :data:`TRUTH`."""
+    """Give the text of the project of ``TRUTH``."""
     per_radian = 180 / np.pi if unit == "deg" else 200 / np.pi
     text = PROJECT
     for letter, angles in zip("LR", TRUTH.attitudes, strict=True):

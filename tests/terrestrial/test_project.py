@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from photostrip.errors import InputError
-from photostrip.project.terrestrial_loading import load_survey
-from photostrip.project.terrestrial_presets import own_presets, read_presets
+from photostrip.project.terrestrial.terrestrial_loading import load_survey
+from photostrip.project.terrestrial.terrestrial_presets import own_presets, read_presets
 from photostrip.terrestrial.epochs import monitor
 from tests.terrestrial.files import CENTERS, TRUTH, coordinates, project, pseudo_parallaxes, write
 from tests.test_packaging import build

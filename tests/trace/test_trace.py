@@ -12,9 +12,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from photostrip.cli.main import main
-from photostrip.formats.trace import SYMBOLS, trace_of
-from photostrip.report.text import to_text
-from photostrip.report.trace_sections import trace_sections, trace_title
+from photostrip.report.commands.trace_sections import trace_sections, trace_title
+from photostrip.report.page.text import to_text
+from photostrip.result.trace.trace import SYMBOLS, trace_of
 from photostrip.simulate.spec import GrossError
 from tests.results import case, spec, write_project
 from tests.source_tree import ROOT

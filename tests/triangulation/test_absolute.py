@@ -15,8 +15,8 @@ from scipy.spatial.transform import Rotation
 from photostrip.errors import EXIT_GEOMETRY, EXIT_INPUT, GeometryError, InputError
 from photostrip.geometry.similarity import Similarity
 from photostrip.pipeline import Settings, triangulate
-from photostrip.triangulation import absolute
-from photostrip.triangulation.absolute import AbsoluteOrientation, Targets, orient, weights
+from photostrip.triangulation import absolute_orientation
+from photostrip.triangulation.absolute_orientation import AbsoluteOrientation, Targets, orient, weights
 from tests.strips import attitude, control_points, fly, project, targets
 from tests.vectors import cases
 
@@ -329,7 +329,7 @@ def test_heights_on_a_line_over_level_ground_name_their_line(use: dict[str, str]
 def test_plan_control_at_several_heights_holds_heights_on_a_line_weakly() -> None:
     """Relief of 50 m turns with the roll of the strip by little, but it turns: warned of, not refused."""
     found = case({"A": "xy", "D": "xy", "H": "xy", "I": "z", "J": "z", "K": "z"}).orient()
-    assert 1 / absolute.WEAK_LIMIT < found.condition < 1 / absolute.RANK_LIMIT
+    assert 1 / absolute_orientation.WEAK_LIMIT < found.condition < 1 / absolute_orientation.RANK_LIMIT
 
 
 def test_one_point_off_the_line_is_enough() -> None:
@@ -340,7 +340,7 @@ def test_one_point_off_the_line_is_enough() -> None:
 
 def test_control_nearly_on_a_line_has_a_large_condition_number() -> None:
     near = {**GROUND, "J": (4000.0, 40.0, 10.0)}
-    assert case(dict.fromkeys("IJK", "xyz"), ground=near).orient().condition > 1 / absolute.WEAK_LIMIT
+    assert case(dict.fromkeys("IJK", "xyz"), ground=near).orient().condition > 1 / absolute_orientation.WEAK_LIMIT
     assert case(FULL).orient().condition < 20
 
 

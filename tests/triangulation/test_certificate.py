@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from photostrip.errors import InputError
-from photostrip.triangulation.certificate import PLACES, solve
+from photostrip.triangulation.image_coordinates.certificate import PLACES, solve
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from photostrip.triangulation import exterior
-from photostrip.triangulation.exterior import Resection, project, resect
+from photostrip.triangulation.resection import resection
+from photostrip.triangulation.resection.resection import Resection, project, resect
 from tests.strips import MICROMETRE, attitude, photograph
 
 if TYPE_CHECKING:
@@ -151,7 +151,7 @@ def test_a_step_is_that_of_derivatives_taken_as_differences(seed: int) -> None:
     one = scene(seed, [7, 5], 50 * MICROMETRE)
     centers, rotations = one.start(np.random.default_rng(seed), metres=30.0, degrees=2.0)
     distance, segments = np.array([1500.0, 1400.0]), (np.array([0, 1]), np.array([0, 7]))
-    found = exterior._steps(one.xy, one.points, one.photo, one.focal, (centers, rotations), distance, segments)
+    found = resection._steps(one.xy, one.points, one.photo, one.focal, (centers, rotations), distance, segments)
     for number in range(2):
         rows = one.photo == number
 

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from photostrip.camera import Camera
 from photostrip.points import PhotoPoints
-from photostrip.triangulation import interior
-from photostrip.triangulation.film import Deformation
+from photostrip.triangulation.image_coordinates import interior
+from photostrip.triangulation.image_coordinates.film_deformation import Deformation
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -16,9 +16,10 @@ from photostrip.errors import EXIT_GEOMETRY, GeometryError
 from photostrip.geometry.rotation import alpha_omega_kappa, from_alpha_omega_kappa
 from photostrip.geometry.similarity import Similarity
 from photostrip.points import PhotoPoints
-from photostrip.triangulation import formation, relative
-from photostrip.triangulation.formation import SCALE_TRANSFERS, FormedStrip, Settings
-from photostrip.triangulation.relative import Orientation
+from photostrip.triangulation.relative_orientation import relative
+from photostrip.triangulation.relative_orientation.relative import Orientation
+from photostrip.triangulation.strip_formation import formation
+from photostrip.triangulation.strip_formation.formation import SCALE_TRANSFERS, FormedStrip, Settings
 from tests.strips import MICROMETRE, attitude, batch, fly, measured, photograph
 from tests.vectors import cases, section
 

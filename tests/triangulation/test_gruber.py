@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from photostrip.geometry.rotation import alpha_omega_kappa
-from photostrip.triangulation import gruber, relative
+from photostrip.triangulation.relative_orientation import relative, six_points
 from tests.strips import attitude, batch
 from tests.vectors import cases, section
 
@@ -41,14 +41,14 @@ def design(left: Floats, focal: float, base: float) -> Floats:
 def test_the_examples_of_the_formula_book(example: Vector) -> None:
     f, a, b = (example.input[name] for name in "fab")
     expected, rel = example.expected, example.tol["rel"]
-    found = gruber.orient_six_points(example.input["q"], f, a, b)
+    found = six_points.orient_six_points(example.input["q"], f, a, b)
     assert np.allclose(found.elements, expected["elements_rad"], rtol=rel, atol=0)
     assert found.closing_error == pytest.approx(expected["closing_W"], rel=rel)
     assert found.sigma == pytest.approx(expected["m_q"], rel=rel)
     assert np.allclose(found.residuals, expected["residuals"], rtol=rel, atol=0)
-    q = gruber.cofactors(f, a, b)
+    q = six_points.cofactors(f, a, b)
     assert np.allclose(q, expected["cofactor"], rtol=rel, atol=1e-18)
-    t = gruber.dependent_from_base(b)
+    t = six_points.dependent_from_base(b)
     dependent = t @ q @ t.T
     formulas = expected["cofactor_formulas"]
     values = {
@@ -70,7 +70,7 @@ def test_the_examples_of_the_formula_book(example: Vector) -> None:
 def test_the_dependent_pair_of_the_formula_book(example: Vector) -> None:
     names = ("alpha1p", "kappa1p", "alpha2p", "omega2p", "kappa2p")
     elements = np.radians([example.input[f"{name}_deg"] for name in names])
-    direction, rotation = gruber.dependent_pair(elements)
+    direction, rotation = six_points.dependent_pair(elements)
     expected, tol = example.expected["dependent_pair"], example.tol["abs"]
     assert direction[1] / direction[0] == pytest.approx(expected["by_over_bx"], abs=tol)
     assert direction[2] / direction[0] == pytest.approx(expected["bz_over_bx"], abs=tol)
@@ -78,7 +78,7 @@ def test_the_dependent_pair_of_the_formula_book(example: Vector) -> None:
     assert np.allclose(degrees, expected["alpha_omega_kappa_right_deg"], rtol=0, atol=tol)
     ratios = [1.0, expected["by_over_bx"], expected["bz_over_bx"]]
     given_rotation = attitude(expected["alpha_omega_kappa_right_deg"])[0]
-    assert np.allclose(gruber.base_elements(ratios, given_rotation), elements, rtol=0, atol=tol)
+    assert np.allclose(six_points.base_elements(ratios, given_rotation), elements, rtol=0, atol=tol)
 
 
 def test_all_examples_are_here() -> None:
@@ -88,21 +88,21 @@ def test_all_examples_are_here() -> None:
 @given(LENGTHS, LENGTHS, LENGTHS, st.lists(st.floats(-1, 1), min_size=6, max_size=6))
 def test_the_closed_forms_are_the_linear_least_squares(f: float, a: float, b: float, q: list[float]) -> None:
     jacobian = design(standard_points(a, b), f, b)
-    found = gruber.orient_six_points(q, f, a, b)
+    found = six_points.orient_six_points(q, f, a, b)
     solution, *_ = np.linalg.lstsq(jacobian, -np.array(q), rcond=None)
     size = np.abs(solution).max() + 1e-12
     assert np.allclose(found.elements, solution, rtol=0, atol=1e-9 * size)
     assert np.allclose(found.residuals, np.array(q) + jacobian @ solution, rtol=0, atol=1e-9)
     assert found.sigma == pytest.approx(np.linalg.norm(found.residuals), abs=1e-9)
     inverse = np.linalg.inv(jacobian.T @ jacobian)
-    assert np.allclose(gruber.cofactors(f, a, b), inverse, rtol=0, atol=1e-9 * np.abs(inverse).max())
+    assert np.allclose(six_points.cofactors(f, a, b), inverse, rtol=0, atol=1e-9 * np.abs(inverse).max())
 
 
 @given(LENGTHS, LENGTHS)
 def test_the_weight_numbers_of_hallert(a: float, b: float) -> None:
     f = 153.0
-    t = gruber.dependent_from_base(b)
-    found = t @ gruber.cofactors(f, a, b) @ t.T  # by, bz, dkappa, dalpha, domega
+    t = six_points.dependent_from_base(b)
+    found = t @ six_points.cofactors(f, a, b) @ t.T  # by, bz, dkappa, dalpha, domega
     expected = np.zeros((5, 5))
     np.fill_diagonal(
         expected,
@@ -130,7 +130,7 @@ def test_the_rigorous_solution_is_close(elements: tuple[float, ...]) -> None:
     pairs = batch(left[None], (right - np.column_stack([np.zeros(6), q]))[None], f)
     rigorous, converged, _ = relative.solve(pairs)
     assert converged.all()
-    linear = gruber.orient_six_points(q, f, a, b).elements
+    linear = six_points.orient_six_points(q, f, a, b).elements
     assert np.allclose(linear, elements, rtol=0, atol=1e-12)
     assert (
         np.abs(rigorous[0] - linear).max() < 10 * np.abs(elements).max() ** 2 + 1e-9
@@ -139,8 +139,8 @@ def test_the_rigorous_solution_is_close(elements: tuple[float, ...]) -> None:
 
 @given(st.tuples(TILTS, KAPPAS, TILTS, TILTS, KAPPAS))
 def test_the_dependent_pair_leads_back(elements: tuple[float, ...]) -> None:
-    direction, rotation = gruber.dependent_pair(elements)
-    again = gruber.base_elements(direction * 7.0, rotation)
+    direction, rotation = six_points.dependent_pair(elements)
+    again = six_points.base_elements(direction * 7.0, rotation)
     difference = (again - elements + np.pi) % (2 * np.pi) - np.pi
     assert np.abs(difference).max() < 1e-13
     assert np.linalg.norm(direction) == pytest.approx(1, abs=1e-15)
@@ -148,11 +148,11 @@ def test_the_dependent_pair_leads_back(elements: tuple[float, ...]) -> None:
 
 def test_to_the_first_order_the_dependent_pair_is_linear() -> None:
     b, step = 92.0, 1e-5
-    t = gruber.dependent_from_base(b)
+    t = six_points.dependent_from_base(b)
     for number in range(5):
         elements = np.zeros(5)
         elements[number] = step
-        direction, rotation = gruber.dependent_pair(elements)
+        direction, rotation = six_points.dependent_pair(elements)
         dalpha, domega, dkappa = alpha_omega_kappa(rotation)
         found = [b * direction[1] / direction[0], b * direction[2] / direction[0], dkappa, dalpha, domega]
         assert np.allclose(found, t[:, number] * step, rtol=0, atol=1e-7 * step * b)
@@ -160,7 +160,7 @@ def test_to_the_first_order_the_dependent_pair_is_linear() -> None:
 
 def test_many_pairs_at_once() -> None:
     elements = np.random.default_rng(1).uniform(-0.3, 0.3, (4, 3, 5))
-    direction, rotation = gruber.dependent_pair(elements)
+    direction, rotation = six_points.dependent_pair(elements)
     assert direction.shape == (4, 3, 3)
     assert rotation.shape == (4, 3, 3, 3)
-    assert np.allclose(gruber.base_elements(direction, rotation), elements, rtol=0, atol=1e-14)
+    assert np.allclose(six_points.base_elements(direction, rotation), elements, rtol=0, atol=1e-14)

@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 from photostrip.camera import Camera
 from photostrip.errors import InputError
 from photostrip.points import PhotoPoints
-from photostrip.triangulation import interior
-from photostrip.triangulation.fiducial_marks import WRONG_PATTERN
-from photostrip.triangulation.interior import InteriorOrientation, Settings
+from photostrip.triangulation.image_coordinates import interior
+from photostrip.triangulation.image_coordinates.fiducial_marks import WRONG_PATTERN
+from photostrip.triangulation.image_coordinates.interior import InteriorOrientation, Settings
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from photostrip.triangulation.intersection import intersect
+from photostrip.triangulation.strip_formation.intersection import intersect
 from tests.strips import attitude, photograph
 from tests.vectors import cases, section
 

@@ -11,13 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from photostrip.formats.simulation import inputs_of
+from photostrip.formats.output.simulation import inputs_of
 from photostrip.simulate.simulation import simulate
 from photostrip.simulate.spec import Flight, Spec, Terrain
-from photostrip.triangulation.plausibility import flight, flight_order, layout, rotations
-from photostrip.triangulation.plausibility.control_fit import bend, lay, upright
-from photostrip.triangulation.plausibility.control_strip import Rays
-from photostrip.triangulation.plausibility.digits import slip
+from photostrip.triangulation.plausibility.control import layout
+from photostrip.triangulation.plausibility.control.control_fit import bend, lay, upright
+from photostrip.triangulation.plausibility.control.control_strip import Rays
+from photostrip.triangulation.plausibility.control.digits import slip
+from photostrip.triangulation.plausibility.photos import flight, flight_order, rotations
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

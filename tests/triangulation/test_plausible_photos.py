@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from photostrip.simulate import Flight, Spec, simulate
-from photostrip.triangulation.plausibility import flight_order, mosaic, units
+from photostrip.triangulation.plausibility.photos import flight_order, mosaic, units
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

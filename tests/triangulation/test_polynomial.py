@@ -16,10 +16,10 @@ from scipy.stats import f as f_distribution
 from photostrip.geometry.similarity import Similarity
 from photostrip.pipeline import Settings as RunSettings
 from photostrip.pipeline import triangulate
-from photostrip.triangulation import polynomial
-from photostrip.triangulation.absolute import weights
-from photostrip.triangulation.polynomial import Problem, Settings, fit
-from photostrip.triangulation.polynomial_terms import bands, choose_terms, count_stations
+from photostrip.triangulation.absolute_orientation import weights
+from photostrip.triangulation.polynomial import correction
+from photostrip.triangulation.polynomial.correction import Problem, Settings, fit
+from photostrip.triangulation.polynomial.terms import bands, choose_terms, count_stations
 from tests.strips import MICROMETRE, control_points, fly, project, targets
 from tests.vectors import cases, section
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from photostrip.pipeline import Result
-    from photostrip.triangulation.polynomial import Evidence, Polynomial
+    from photostrip.triangulation.polynomial.correction import Evidence, Polynomial
     from tests.strips import Flown
     from tests.vectors import Vector
 
@@ -334,7 +334,7 @@ def test_bands_left_out_in_closed_form_are_refitted(seed: int) -> None:
     one = problem(xyz, given_, sigma=sigma)
     found = fit(one, Settings("3"))
     inner = [np.arange(3 * band, 3 * band + 3) for band in range(1, 6)]
-    for group, axes in polynomial.GROUPS:
+    for group, axes in correction.GROUPS:
         for evidence in steps(found, group)[1:]:
             assert evidence.left_out_by == "band"
             terms = {1: ("1", "X", "Y"), 2: SQUARE, 3: CUBIC}[evidence.degree]
@@ -349,7 +349,7 @@ def test_points_left_out_in_closed_form_are_refitted(seed: int) -> None:
     one = problem(xyz, xyz + rng.normal(0, 0.1, xyz.shape))
     found = fit(one, Settings("2"))
     single = [[row] for row in range(9)]
-    for group, axes in polynomial.GROUPS:
+    for group, axes in correction.GROUPS:
         for evidence in steps(found, group)[1:]:
             assert evidence.left_out_by == "point"
             terms = {1: ("1", "X", "Y"), 2: SQUARE}[evidence.degree]
@@ -367,7 +367,7 @@ def test_bands_are_left_out_when_the_ladder_says_so_of_what_is_left(seed: int, s
     one = problem(xyz, xyz + rng.normal(0, 0.1, xyz.shape))
     found = fit(one, Settings("auto"))
     group = bands(xyz[:, 0], one.spacing)
-    for kind, _ in polynomial.GROUPS:
+    for kind, _ in correction.GROUPS:
         richest = steps(found, kind)[-1]
         terms = choose_terms(xyz, 3, one.sizes)
         rest = [xyz[group != band] for band in range(1, group.max())]

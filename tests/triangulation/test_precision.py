@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from photostrip.pipeline import Settings, triangulate
-from photostrip.triangulation import formation, polynomial, precision
+from photostrip.triangulation.error_propagation import covariances as precision
+from photostrip.triangulation.polynomial import correction
+from photostrip.triangulation.strip_formation import formation
 from tests.derivatives import (
     UNSCREENED,
     differenced,
@@ -29,7 +31,7 @@ def settings(adjustment: str, transfer: str = "least_squares") -> Settings:
         adjustment="similarity" if adjustment == "similarity" else "polynomial",
         relative=UNSCREENED,
         formation=formation.Settings(transfer),
-        polynomial=polynomial.Settings(degree),
+        polynomial=correction.Settings(degree),
     )
 
 

@@ -16,8 +16,8 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from photostrip.camera import Camera, Distortion
 from photostrip.errors import GeometryError, InputError
 from photostrip.points import PhotoPoints
-from photostrip.triangulation import lens, refinement
-from photostrip.triangulation.refinement import Bending, Refined, Settings
+from photostrip.triangulation.image_coordinates import corrections, lens_distortion
+from photostrip.triangulation.image_coordinates.corrections import Bending, Refined, Settings
 
 Floats = NDArray[np.float64]
 
@@ -64,7 +64,7 @@ def observed(xy: Floats, photos: tuple[str, ...] = ("1",)) -> PhotoPoints:
 
 
 def refine(xy: Floats, camera: Camera, settings: Settings | None = None) -> Refined:
-    return refinement.refine(observed(xy), {"1": camera}, settings or Settings())
+    return corrections.refine(observed(xy), {"1": camera}, settings or Settings())
 
 
 unit = st.floats(-1, 1)
@@ -109,9 +109,9 @@ bendings = st.builds(Bending, st.floats(-4e-4, 4e-4), st.floats(0, 1e-3))
 
 @given(cameras, image_points, bendings)
 def test_every_correction_has_its_inverse(camera: Camera, image: Floats, constant: Bending) -> None:
-    ideal = refinement.undistort(image, camera, constant)
-    assert np.abs(refinement.distort(ideal, camera, constant) - image).max() < PICOMETRE
-    again = refinement.undistort(refinement.distort(ideal, camera, constant), camera, constant)
+    ideal = corrections.undistort(image, camera, constant)
+    assert np.abs(corrections.distort(ideal, camera, constant) - image).max() < PICOMETRE
+    again = corrections.undistort(corrections.distort(ideal, camera, constant), camera, constant)
     assert np.abs(again - ideal).max() < PICOMETRE
 
 
@@ -119,8 +119,8 @@ def test_every_correction_has_its_inverse(camera: Camera, image: Floats, constan
 def test_a_table_of_points_is_refined_as_its_camera_alone(camera: Camera, image: Floats) -> None:
     settings = Settings(refraction=True, flying_height=3000.0, ground_height=200.0)
     found = refine(image, camera, settings).observations
-    constant = Bending(refinement.refraction_constant(3000.0, 200.0))
-    assert np.array_equal(found.xy, refinement.undistort(image, camera, constant))
+    constant = Bending(corrections.refraction_constant(3000.0, 200.0))
+    assert np.array_equal(found.xy, corrections.undistort(image, camera, constant))
     assert found.photo_ids == ("1",)
 
 
@@ -134,7 +134,7 @@ def test_the_order_is_principal_point_distortion_refraction_curvature() -> None:
     x, y = x * shrink, y * shrink
     stretch = 1 + 2e-4 * (x * x + y * y) / FOCAL**2
     expected = [x * stretch, y * stretch]
-    found = refinement.undistort(np.array([[100.5, -70.3]]), camera, Bending(5e-5, 2e-4))
+    found = corrections.undistort(np.array([[100.5, -70.3]]), camera, Bending(5e-5, 2e-4))
     assert found[0] == pytest.approx(expected, abs=1e-12)
 
 
@@ -147,7 +147,7 @@ def test_brown_is_the_formula_of_the_project_file(direction: str, c: tuple[float
     dx = x * (k1 * r2 + k2 * r2**2 + k3 * r2**3) + p1 * (r2 + 2 * x**2) + 2 * p2 * x * y + b1 * x + b2 * y
     dy = y * (k1 * r2 + k2 * r2**2 + k3 * r2**3) + p2 * (r2 + 2 * y**2) + 2 * p1 * x * y
     given_points, shifted = np.array([[x, y]]), np.array([[x + dx, y + dy]])
-    shift = refinement.undistort if direction == FORWARD else refinement.distort
+    shift = corrections.undistort if direction == FORWARD else corrections.distort
     assert shift(given_points, camera) == pytest.approx(shifted, abs=1e-12)
 
 
@@ -160,9 +160,10 @@ def test_the_jacobian_agrees_with_differences(distortion: Distortion, points: Fl
         [points - h * unit_vector for unit_vector in np.eye(2)],
     )
     columns = [
-        (a + lens.shift(a, distortion) - b - lens.shift(b, distortion)) / (2 * h) for a, b in zip(*ways, strict=True)
+        (a + lens_distortion.shift(a, distortion) - b - lens_distortion.shift(b, distortion)) / (2 * h)
+        for a, b in zip(*ways, strict=True)
     ]
-    assert np.allclose(lens.jacobian(points, distortion), np.stack(columns, -1), rtol=0, atol=1e-7)
+    assert np.allclose(lens_distortion.jacobian(points, distortion), np.stack(columns, -1), rtol=0, atol=1e-7)
 
 
 # ------------------------------------------------------------------------------------------- signs
@@ -194,7 +195,7 @@ def test_a_table_has_the_sign_of_its_direction(direction: str) -> None:
     camera = replace(PLAIN, format=None, distortion=distortion)
     image = np.array([[60.0, -80.0]])
     expected = image * (1 + 6e-5) if direction == FORWARD else image / (1 + 6e-5)
-    assert refinement.undistort(image, camera) == pytest.approx(expected, abs=1e-9)
+    assert corrections.undistort(image, camera) == pytest.approx(expected, abs=1e-9)
 
 
 # ------------------------------------------------------------------------------------------- tables
@@ -205,8 +206,15 @@ def test_a_spline_through_a_cubic_is_the_cubic() -> None:
     for nodes in ((60.0, 170.0), (0.0, 20.0, 50.0, 90.0, 170.0), NODES):
         tabulated = Distortion("radial-table", FORWARD, radius=nodes, distortion=tuple(3e-8 * r**3 for r in nodes))
         points = np.random.default_rng(1).uniform(-110, 110, (200, 2))
-        assert np.abs(lens.shift(points, tabulated) - lens.shift(points, polynomial)).max() < 1e-12
-        assert np.allclose(lens.jacobian(points, tabulated), lens.jacobian(points, polynomial), rtol=0, atol=1e-12)
+        assert (
+            np.abs(lens_distortion.shift(points, tabulated) - lens_distortion.shift(points, polynomial)).max() < 1e-12
+        )
+        assert np.allclose(
+            lens_distortion.jacobian(points, tabulated),
+            lens_distortion.jacobian(points, polynomial),
+            rtol=0,
+            atol=1e-12,
+        )
 
 
 def test_the_spline_is_that_of_scipy_with_the_table_mirrored() -> None:
@@ -214,7 +222,7 @@ def test_the_spline_is_that_of_scipy_with_the_table_mirrored() -> None:
     nodes, values = np.array(distortion.radius), np.array(distortion.distortion)
     other = CubicSpline(np.append(-nodes[:0:-1], nodes), np.append(-values[:0:-1], values), bc_type="not-a-knot")
     radius = np.linspace(0, 170, 1001)
-    found = lens.shift(np.stack([radius, np.zeros_like(radius)], -1), distortion)
+    found = lens_distortion.shift(np.stack([radius, np.zeros_like(radius)], -1), distortion)
     assert np.abs(found[:, 0] - other(radius)).max() < 1e-12
     assert not found[:, 1].any()
 
@@ -222,17 +230,17 @@ def test_the_spline_is_that_of_scipy_with_the_table_mirrored() -> None:
 @given(st.floats(0, 170), st.floats(0, 2 * np.pi))
 def test_a_table_is_the_same_in_all_directions(radius: float, azimuth: float) -> None:
     direction = np.array([np.cos(azimuth), np.sin(azimuth)])
-    found = lens.shift(radius * direction[None], table(FORWARD))[0]
-    along_x = lens.shift(np.array([[radius, 0.0]]), table(FORWARD))[0, 0]
+    found = lens_distortion.shift(radius * direction[None], table(FORWARD))[0]
+    along_x = lens_distortion.shift(np.array([[radius, 0.0]]), table(FORWARD))[0, 0]
     assert found == pytest.approx(along_x * direction, abs=1e-12)
 
 
 def test_the_values_of_the_table_are_kept() -> None:
     rows = np.loadtxt(DATA / "published_distortion.csv", delimiter=",", skiprows=1)
     distortion = Distortion("radial-table", FORWARD, radius=tuple(rows[:, 0]), distortion=tuple(rows[:, 1]))
-    found = lens.shift(np.stack([rows[:, 0], 0 * rows[:, 0]], -1), distortion)
+    found = lens_distortion.shift(np.stack([rows[:, 0], 0 * rows[:, 0]], -1), distortion)
     assert found[:, 0] == pytest.approx(rows[:, 1], abs=1e-12)
-    between = lens.shift(np.stack([np.linspace(0, 110, 500), np.zeros(500)], -1), distortion)[:, 0]
+    between = lens_distortion.shift(np.stack([np.linspace(0, 110, 500), np.zeros(500)], -1), distortion)[:, 0]
     # a spline may swing over: on this table, rounded to micrometres, by 0.1 micrometres
     assert rows[:, 1].min() - 0.0001 < between.min()
     assert between.max() < rows[:, 1].max() + 0.0001
@@ -246,7 +254,7 @@ def test_the_spline_follows_a_lens_better_than_other_interpolations(
 ) -> None:
     nodes, radius = np.arange(0, 111, step), np.linspace(0, 110, 1101)
     distortion = Distortion("radial-table", FORWARD, radius=tuple(nodes), distortion=tuple(old_lens(nodes)))
-    found = lens.shift(np.stack([radius, 0 * radius], -1), distortion)[:, 0]
+    found = lens_distortion.shift(np.stack([radius, 0 * radius], -1), distortion)[:, 0]
 
     def off_um(values: Floats) -> float:
         return float(np.abs(values - old_lens(radius)).max() / MICROMETRE)
@@ -266,7 +274,7 @@ def test_points_beyond_the_table_are_refused_by_name(direction: str) -> None:
     assert places == ["photo 1, point P1: 110.018", "photo 1, point P2: 101.001"]
     assert "the distortion table of camera plain ends at " in caught.value.faults[0].message
     assert caught.value.faults[0].key == "cameras.plain.distortion.radius"
-    for convert in (refinement.distort, refinement.undistort):
+    for convert in (corrections.distort, corrections.undistort):
         with pytest.raises(InputError, match="lies beyond the distortion table"):
             convert(image, camera)
 
@@ -275,15 +283,15 @@ def test_of_many_points_beyond_the_table_the_first_are_named_and_all_counted() -
     camera = replace(PLAIN, format=None, distortion=table(FORWARD, (0.0, 50.0, 100.0)))
     with pytest.raises(InputError) as caught:
         refine(np.full((50, 2), 90.0), camera)
-    assert len(caught.value.faults) == refinement.SHOWN + 1
+    assert len(caught.value.faults) == corrections.SHOWN + 1
     assert caught.value.faults[-1].message == "30 more points lie beyond the distortion table of camera plain"
 
 
 @directions
 def test_the_last_radius_of_a_table_belongs_to_it(direction: str) -> None:
     camera = replace(PLAIN, format=None, distortion=table(direction, (0.0, 50.0, 100.0)))
-    image_limit, ideal_limit = lens.reach(table(direction, (0.0, 50.0, 100.0)))
-    ideal = refinement.undistort(np.array([[0.0, image_limit]]), camera)
+    image_limit, ideal_limit = lens_distortion.reach(table(direction, (0.0, 50.0, 100.0)))
+    ideal = corrections.undistort(np.array([[0.0, image_limit]]), camera)
     assert ideal == pytest.approx(np.array([[0.0, ideal_limit]]), abs=PICOMETRE)
     assert sorted([image_limit, ideal_limit]) == pytest.approx([100 + 0.02 * np.sin(100 / 28), 100.0], abs=1e-12)
 
@@ -301,7 +309,7 @@ def test_the_last_radius_of_a_table_belongs_to_it(direction: str) -> None:
 )
 def test_a_table_that_is_none_is_refused(radius: tuple[float, ...], values: tuple[float, ...], message: str) -> None:
     camera = replace(PLAIN, distortion=Distortion("radial-table", FORWARD, radius=radius, distortion=values))
-    (fault,) = lens.faults(camera)
+    (fault,) = lens_distortion.faults(camera)
     assert message in fault.message
     assert fault.key == "cameras.plain.distortion"
 
@@ -323,7 +331,7 @@ def test_a_table_that_is_none_is_refused(radius: tuple[float, ...], values: tupl
 )
 def test_distortion_that_folds_the_photo_is_refused(direction: str, k1: float, folds: bool) -> None:
     camera = replace(PLAIN, distortion=brown(direction, (k1, 0.0, 0.0)))
-    found = lens.faults(camera)
+    found = lens_distortion.faults(camera)
     assert bool(found) == folds
     if folds:
         # r (1 + k1 r^2) turns back where 1 + 3 k1 r^2 = 0; radii are tried in steps of at most 1 % of the corner's
@@ -337,25 +345,25 @@ def test_distortion_that_folds_the_photo_is_refused(direction: str, k1: float, f
 def test_only_the_format_and_the_measured_points_must_have_an_inverse() -> None:
     folds_at_105 = brown(FORWARD, (-1 / (3 * 105.0**2), 0.0, 0.0))
     small = Camera("small", 50.0, format=(100.0, 100.0), distortion=folds_at_105)
-    assert not lens.faults(small)
-    assert lens.faults(replace(small, format=(160.0, 160.0)))
-    assert lens.faults(replace(small, principal_point=(40.0, 40.0)))
-    assert lens.faults(small, 110.0)
-    assert not lens.faults(replace(small, format=None))
+    assert not lens_distortion.faults(small)
+    assert lens_distortion.faults(replace(small, format=(160.0, 160.0)))
+    assert lens_distortion.faults(replace(small, principal_point=(40.0, 40.0)))
+    assert lens_distortion.faults(small, 110.0)
+    assert not lens_distortion.faults(replace(small, format=None))
     with pytest.raises(InputError, match="folds"):
         refine(np.array([[0.0, 110.0]]), replace(small, format=None))
     with pytest.raises(GeometryError, match="no inverse at some point"):
-        refinement.distort(np.array([[90.0, 0.0]]), small)  # the largest ideal radius is 70 mm
+        corrections.distort(np.array([[90.0, 0.0]]), small)  # the largest ideal radius is 70 mm
 
 
 def test_an_ideal_point_may_lie_farther_out_than_its_image() -> None:
     """Barrel distortion written from the ideal to the image folds beyond the format, not in it."""
     camera = replace(PLAIN, format=(160.0, 160.0), distortion=brown(BACKWARD, (-9e-6, 0.0, 0.0)))  # images to 128.3 mm
     image = np.array([[80.0, 80.0], [-80.0, 1.0]])
-    assert not lens.faults(camera)
+    assert not lens_distortion.faults(camera)
     ideal = refine(image, camera).observations.xy
     assert np.hypot(*ideal[0]) > 135
-    assert np.abs(refinement.distort(ideal, camera) - image).max() < PICOMETRE
+    assert np.abs(corrections.distort(ideal, camera) - image).max() < PICOMETRE
 
 
 # ------------------------------------------------------------------------------------------- refraction
@@ -419,8 +427,8 @@ def test_refraction_is_that_of_a_ray_through_the_standard_atmosphere(
 def test_the_curvature_of_the_layers_does_not_matter(flying: float, ground: float) -> None:
     """Two rays that differ by refraction only, through round layers: what the plane formula leaves."""
     bent, _ = traced(150.0, flying, ground, 6_371_000.0)
-    constant = refinement.refraction_constant(flying, ground)
-    assert abs(150.0 - refinement.refraction_shift(150.0, FOCAL, constant) - bent) < 0.1 * MICROMETRE
+    constant = corrections.refraction_constant(flying, ground)
+    assert abs(150.0 - corrections.refraction_shift(150.0, FOCAL, constant) - bent) < 0.1 * MICROMETRE
 
 
 @pytest.mark.parametrize(
@@ -439,21 +447,21 @@ def test_the_constant_agrees_with_the_printed_formula() -> None:
         H, h = flying / 1000, ground / 1000
         printed = 2335 / (H - h) * ((1 - 0.02257 * h) ** 5.256 - (1 - 0.02257 * H) ** 5.256)
         printed = (printed - 277.0 * (1 - 0.02257 * H) ** 4.256) * 1e-6
-        assert refinement.refraction_constant(flying, ground) == pytest.approx(printed, rel=0.006)
+        assert corrections.refraction_constant(flying, ground) == pytest.approx(printed, rel=0.006)
 
 
 def test_the_constant_runs_on_through_the_tropopause() -> None:
-    below, at, above = (refinement.refraction_constant(11_000.0 + d, 0.0) for d in (-1, 0, 1))
+    below, at, above = (corrections.refraction_constant(11_000.0 + d, 0.0) for d in (-1, 0, 1))
     assert 0 < at - below < 1e-8
     assert 0 < above - at < 1e-8  # steeper, because the density falls faster above, but without a jump
 
 
 @given(st.floats(0, 170), st.floats(1000, 12_000))
 def test_refraction_shift_is_the_textbook_form(radius: float, flying: float) -> None:
-    constant = refinement.refraction_constant(flying, 0.0)
-    found = refinement.refraction_shift(radius, FOCAL, constant)
+    constant = corrections.refraction_constant(flying, 0.0)
+    found = corrections.refraction_shift(radius, FOCAL, constant)
     assert found == pytest.approx(constant * (radius + radius**3 / FOCAL**2), rel=1e-12)
-    corrected = refinement.undistort(np.array([[radius, 0.0]]), PLAIN, Bending(constant))
+    corrected = corrections.undistort(np.array([[radius, 0.0]]), PLAIN, Bending(constant))
     assert corrected[0, 0] == pytest.approx(radius - found, abs=1e-12)
 
 
@@ -461,7 +469,7 @@ def test_heights_of_the_settings_go_before_those_of_the_caller() -> None:
     image = np.array([[100.0, 100.0]])
 
     def largest(settings: Settings) -> float:
-        found = refinement.refine(observed(image), {"1": PLAIN}, settings, flying_height=5000.0, ground_height=500.0)
+        found = corrections.refine(observed(image), {"1": PLAIN}, settings, flying_height=5000.0, ground_height=500.0)
         return found.largest_um["refraction"]
 
     radius = np.hypot(100.0, 100.0)
@@ -470,7 +478,7 @@ def test_heights_of_the_settings_go_before_those_of_the_caller() -> None:
         (Settings(refraction=True, flying_height=4000.0), 4000.0, 500.0),
         (Settings(refraction=True, flying_height=4000.0, ground_height=0.0), 4000.0, 0.0),
     ):
-        expected = refinement.refraction_shift(radius, FOCAL, refinement.refraction_constant(flying, ground))
+        expected = corrections.refraction_shift(radius, FOCAL, corrections.refraction_constant(flying, ground))
         assert largest(settings) == pytest.approx(expected / MICROMETRE)
 
 
@@ -493,8 +501,8 @@ def test_curvature_is_that_of_a_sphere_seen_from_above(flying: float, angle_deg:
     arc = flying * tangent / radius  # as a plane map has it: distances along the sphere
     below = flying + radius * (1 - np.cos(arc))
     seen = FOCAL * radius * np.sin(arc) / below
-    bending = Bending(curvature=refinement.curvature_constant(flying, 0.0, radius))
-    found = refinement.undistort(np.array([[0.0, seen]]), PLAIN, bending)
+    bending = Bending(curvature=corrections.curvature_constant(flying, 0.0, radius))
+    found = corrections.undistort(np.array([[0.0, seen]]), PLAIN, bending)
     missing = FOCAL * tangent - seen
     assert missing > 0  # the ground falls away from the plane, so its images lie too far inside
     assert found[0, 0] == 0
@@ -503,8 +511,8 @@ def test_curvature_is_that_of_a_sphere_seen_from_above(flying: float, angle_deg:
 
 def test_the_textbook_size_of_curvature() -> None:
     # wide angle, 1:30 000, 140 mm from the middle: dr = r^3 H / (2 R f^2)
-    bending = Bending(curvature=refinement.curvature_constant(4590.0, 0.0, 6370000.0))
-    found = refinement.undistort(np.array([[140.0, 0.0]]), PLAIN, bending)
+    bending = Bending(curvature=corrections.curvature_constant(4590.0, 0.0, 6370000.0))
+    found = corrections.undistort(np.array([[140.0, 0.0]]), PLAIN, bending)
     assert found[0, 0] - 140.0 == pytest.approx(140.0**3 * 4590.0 / (2 * 6370000.0 * FOCAL**2), rel=1e-9)
     assert 0.0421 < found[0, 0] - 140.0 < 0.0423
 
@@ -527,8 +535,8 @@ def test_each_photo_gets_its_camera() -> None:
     second = replace(PLAIN, name="second", distortion=brown(FORWARD, (1e-7, 0.0, 0.0)))
     image = np.array([[30.0, 40.0], [60.0, 80.0]])
     used = {"a": first, "b": second, "c": PLAIN, "d": first}
-    found = refinement.refine(observed(image, tuple(used)), used, Settings())
-    expected = np.vstack([refinement.undistort(image, camera) for camera in used.values()])
+    found = corrections.refine(observed(image, tuple(used)), used, Settings())
+    expected = np.vstack([corrections.undistort(image, camera) for camera in used.values()])
     assert np.array_equal(found.observations.xy, expected)
     assert np.array_equal(found.observations.xy[4:6], image)
     assert found.largest_um == {"principal point": pytest.approx(1000.0), "distortion": pytest.approx(100.0)}
@@ -539,21 +547,21 @@ def test_every_fault_of_every_camera_is_told_at_once() -> None:
     folding = replace(PLAIN, name="folding", distortion=brown(FORWARD, (-1e-4, 0.0, 0.0)))
     short = replace(PLAIN, name="short", distortion=table(FORWARD, (0.0, 50.0)))
     with pytest.raises(InputError) as caught:
-        refinement.refine(observed(np.full((1, 2), 60.0), ("a", "b")), {"a": folding, "b": short}, Settings())
+        corrections.refine(observed(np.full((1, 2), 60.0), ("a", "b")), {"a": folding, "b": short}, Settings())
     assert [fault.code for fault in caught.value.faults] == ["distortion-folds", "beyond-distortion-table"]
 
 
 def test_nothing_to_do_costs_nothing_and_a_big_strip_little() -> None:
     photos = tuple(f"{i}" for i in range(1000))
     measured = observed(np.random.default_rng(1).uniform(-110, 110, (30, 2)), photos)
-    assert refinement.refine(measured, dict.fromkeys(photos, PLAIN), Settings()).observations is measured
+    assert corrections.refine(measured, dict.fromkeys(photos, PLAIN), Settings()).observations is measured
     zeros = replace(PLAIN, distortion=brown(FORWARD, (0.0, 0.0, 0.0)))
-    nothing = refinement.refine(measured, dict.fromkeys(photos, zeros), Settings())
+    nothing = corrections.refine(measured, dict.fromkeys(photos, zeros), Settings())
     assert nothing.largest_um == {"distortion": 0.0}
     assert np.array_equal(nothing.observations.xy, measured.xy)
     full = replace(PLAIN, principal_point=(0.01, 0.02), distortion=brown(BACKWARD, (1e-7, 0.0, 0.0), (1e-6, 1e-6)))
     start = time.perf_counter()
-    refinement.refine(measured, dict.fromkeys(photos, full), Settings())
+    corrections.refine(measured, dict.fromkeys(photos, full), Settings())
     assert time.perf_counter() - start < 2.0  # 0.03 s measured
 
 
@@ -561,12 +569,12 @@ def test_nothing_to_do_costs_nothing_and_a_big_strip_little() -> None:
 def test_each_correction_has_its_switch(off: str, effect: str) -> None:
     camera = replace(PLAIN, principal_point=(0.012, -0.004), distortion=brown(FORWARD, (1.2e-8, 0.0, 0.0)))
     points = observed(np.array([[80.0, -60.0], [-90.0, 10.0]]), ("1",))
-    both = refinement.refine(points, {"1": camera}, Settings())
-    one = refinement.refine(points, {"1": camera}, replace(Settings(), **{off: False}))
+    both = corrections.refine(points, {"1": camera}, Settings())
+    one = corrections.refine(points, {"1": camera}, replace(Settings(), **{off: False}))
     assert set(both.largest_um) - set(one.largest_um) == {effect}
     without = (
         replace(camera, principal_point=(0.0, 0.0)) if off == "principal_point" else replace(camera, distortion=None)
     )
-    expected = refinement.refine(points, {"1": without}, Settings())
+    expected = corrections.refine(points, {"1": without}, Settings())
     assert np.array_equal(one.observations.xy, expected.observations.xy)
     assert both.largest_um[effect] == pytest.approx(12.6 if off == "principal_point" else 12.0, rel=0.03)

@@ -15,8 +15,8 @@ from scipy.spatial.transform import Rotation
 from photostrip.errors import EXIT_GEOMETRY, GeometryError
 from photostrip.pipeline import Settings, triangulate
 from photostrip.points import PhotoPoints
-from photostrip.triangulation import relative
-from photostrip.triangulation.intersection import intersect
+from photostrip.triangulation.relative_orientation import relative
+from photostrip.triangulation.strip_formation.intersection import intersect
 from tests.strips import (
     MICROMETRE,
     Flown,
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from photostrip.triangulation.relative import Orientation, Pairs
+    from photostrip.triangulation.relative_orientation.relative import Orientation, Pairs
     from tests.vectors import Vector
 
     Floats = NDArray[np.float64]

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.formats.result.document import document_of
 from photostrip.geodesy.crs import tie_frames
 from photostrip.pipeline import Settings, triangulate
 from photostrip.pipeline.strip import adjust_strip
-from photostrip.triangulation import control_screening, formation, relative, scale_screening
+from photostrip.result.document import document_of
+from photostrip.triangulation.gross_errors.control import control_screening
+from photostrip.triangulation.relative_orientation import relative
+from photostrip.triangulation.strip_formation import formation, scale_ratios
 from tests.strips import LOCAL, MICROMETRE, control_points, fly, project
 
 if TYPE_CHECKING:
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
 
     from photostrip.pipeline import Result
     from photostrip.points import ControlPoints
-    from photostrip.triangulation.relative import Orientation
+    from photostrip.triangulation.relative_orientation.relative import Orientation
     from tests.strips import Flown
 
     Floats = NDArray[np.float64]
@@ -57,7 +59,7 @@ def test_scale_ratios_scatter_as_propagated() -> None:
         joined = formation.form(oriented, formation.Settings(), strip.photos, sigma).junctions
         vectors, _, _ = formation.model_points(oriented)
         rows = (joined.joint, joined.before, joined.after)
-        single, model = scale_screening.spreads(oriented, vectors, rows, sigma)
+        single, model = scale_ratios.spreads(oriented, vectors, rows, sigma)
         values.append((joined.ratio / joined.factor[joined.joint] - 1) / np.hypot(single, model))
     # the mean of a joint takes its part away, the points take part in their own orientation
     assert 0.75 < np.concatenate(values).std() < 1.05
@@ -96,7 +98,7 @@ def test_the_spread_by_the_models_is_that_of_differences() -> None:
             _, jacobian = relative.linearised(oriented.elements, oriented.pairs)
             part = jacobian[:, oriented.pairs.pair == model]
             variance[here] += np.diag(own @ np.linalg.inv(part @ part.T) @ own.T) * sigma[model] ** 2
-    _, model_spread = scale_screening.spreads(oriented, vectors, rows, sigma)
+    _, model_spread = scale_ratios.spreads(oriented, vectors, rows, sigma)
     assert model_spread == pytest.approx(np.sqrt(variance), rel=1e-4)
 
 
@@ -122,7 +124,7 @@ def test_a_wrong_ratio_among_three_does_not_reach_the_scale() -> None:
     ratio = np.array([1.0002, 0.9999, 1.01, 1.0, 1.0001])
     joint = np.array([0, 0, 0, 1, 1])
     spread = (np.full(5, 2e-4), np.zeros(5))
-    used, limit = scale_screening.screen(ratio, np.ones(5), spread, joint, 2)
+    used, limit = scale_ratios.screen(ratio, np.ones(5), spread, joint, 2)
     assert used.tolist() == [True, True, False, True, True]
     assert (limit > 3 * 2e-4).all()
     assert (limit < 5 * 2e-4).all()
@@ -130,7 +132,7 @@ def test_a_wrong_ratio_among_three_does_not_reach_the_scale() -> None:
 
 def test_of_two_ratios_none_is_rejected() -> None:
     ratio, joint = np.array([1.0, 1.1]), np.array([0, 0])
-    used, _ = scale_screening.screen(ratio, np.ones(2), (np.full(2, 1e-4), np.zeros(2)), joint, 1)
+    used, _ = scale_ratios.screen(ratio, np.ones(2), (np.full(2, 1e-4), np.zeros(2)), joint, 1)
     assert used.all()
 
 

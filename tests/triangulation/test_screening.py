@@ -9,16 +9,17 @@ import pytest
 
 from photostrip.errors import EXIT_INPUT, InputError
 from photostrip.statistics import grubbs_limit, tau_limit
-from photostrip.triangulation import relative, screening
-from photostrip.triangulation.relative import Settings
+from photostrip.triangulation.gross_errors.pairs import screening
+from photostrip.triangulation.relative_orientation import relative
+from photostrip.triangulation.relative_orientation.relative import Settings
 from tests.strips import MICROMETRE, TruePairs, batch, gruber, measured, true_pairs
 from tests.vectors import cases, section
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.relative import Orientation
-    from photostrip.triangulation.screening import Rejection
+    from photostrip.triangulation.gross_errors.pairs.screening import Rejection
+    from photostrip.triangulation.relative_orientation.relative import Orientation
     from tests.vectors import Vector
 
     Floats = NDArray[np.float64]

@@ -11,8 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from photostrip.triangulation import deletion, readmission, relative, robust, screening
-from photostrip.triangulation.relative import Pairs, Settings
+from photostrip.triangulation.gross_errors.pairs import deletion, readmission, screening
+from photostrip.triangulation.relative_orientation import relative, robust
+from photostrip.triangulation.relative_orientation.relative import Pairs, Settings
 from tests.strips import MICROMETRE, TruePairs, true_pairs
 from tests.vectors import Vector, cases
 

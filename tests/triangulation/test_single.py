@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_alpha_omega_kappa, from_vector
-from photostrip.triangulation.exterior import project
-from photostrip.triangulation.single import derivatives, intersect_points, space_resection
+from photostrip.triangulation.resection.closed_form import derivatives, intersect_points, space_resection
+from photostrip.triangulation.resection.resection import project
 from tests.source_tree import ROOT
 
 FOCAL = 153.0

@@ -9,29 +9,29 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.formats.result.document import document_of
 from photostrip.pipeline import Inputs, Result, Settings, StripResult, triangulate
-from photostrip.pipeline import covariance as pipeline_covariance
+from photostrip.pipeline import covariance_adjustment as pipeline_covariance
 from photostrip.pipeline.strip import adjust_formed, form_strip
-from photostrip.report.document import project_section
-from photostrip.triangulation import (
+from photostrip.report.sections.document import project_section
+from photostrip.result.document import document_of
+from photostrip.triangulation.covariance_adjustment import (
     block_tridiagonal,
-    polynomial,
-    strip_conditions,
-    strip_covariance,
-    strip_passes,
-    strip_system,
+    conditions,
+    prediction,
+    relinearisation,
+    system,
 )
+from photostrip.triangulation.polynomial import correction
 from tests.derivatives import UNSCREENED, errors_of, spec, without_noise, written_out
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.error_rows import Rows
-    from photostrip.triangulation.strip_errors import StripErrors
+    from photostrip.triangulation.error_propagation.derivatives import Rows
+    from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
     Floats = NDArray[np.float64]
-    Prepared = tuple[StripErrors, strip_conditions.Conditions, strip_conditions.Local]
+    Prepared = tuple[StripErrors, conditions.Conditions, conditions.Local]
 
 COVARIANCE = Settings(adjustment="covariance", relative=UNSCREENED)
 SIMILARITY = Settings(adjustment="similarity", relative=UNSCREENED)
@@ -49,10 +49,10 @@ def noisy(photos: int, lap: float, bands: int = 3, seed: int = 4) -> Result:
 def prepared(result: Result, *, distances: bool) -> Prepared:
     found = errors_of(result)
     (strip,) = result.strips
-    local = strip_conditions.Local.about(strip_conditions.centers_of(found.errors)[:-1], 900.0)
+    local = conditions.Local.about(conditions.centers_of(found.errors)[:-1], 900.0)
     given = strip.absolute.misclosures[found.control.point, found.control.axis]
     formed = (strip.orientation, strip.formed)
-    wanted = strip_conditions.conditions(found.errors, formed, (found.control, given), local, distances=distances)
+    wanted = conditions.conditions(found.errors, formed, (found.control, given), local, distances=distances)
     return found.errors, wanted, local
 
 
@@ -69,11 +69,11 @@ def test_the_band_gives_what_the_whole_matrix_gives(photos: int, lap: float, *, 
     factor, n = 1.3, errors.models
     (strip,), found = result.strips, errors_of(result)
     control = strip.absolute.misclosures[found.control.point, found.control.axis]
-    again = strip_conditions.misclosures_at(wanted, strip.formed, strip.absolute.similarity, control)
+    again = conditions.misclosures_at(wanted, strip.formed, strip.absolute.similarity, control)
     assert again == pytest.approx(wanted.value, abs=1e-9)
-    solved = strip_system.system(errors, wanted, factor)
+    solved = system.system(errors, wanted, factor)
     things = [errors.points, pipeline_covariance.photo_rows(errors)]
-    predicted, cofactors = strip_covariance.predict(errors, wanted, local, solved, things)
+    predicted, cofactors = prediction.predict(errors, wanted, local, solved, things)
 
     by_images = written_out(without_frame(wanted.rows), errors)[:, 0]
     design = np.zeros((len(wanted.value), 7 * (n + 1)))
@@ -86,7 +86,7 @@ def test_the_band_gives_what_the_whole_matrix_gives(photos: int, lap: float, *, 
     solution = np.linalg.solve(whole, np.concatenate([wanted.value, np.zeros(7 * n)]))
     inverse = np.linalg.inv(whole)
     assert cofactors == pytest.approx(np.diag(inverse)[: len(cofactors)], abs=1e-8 * np.abs(inverse).max())
-    images = strip_passes.image_errors(errors, wanted, solved)
+    images = relinearisation.image_errors(errors, wanted, solved)
     expected = by_images.T @ solution[: len(by_images)]
     assert images.ravel() == pytest.approx(expected, abs=1e-8 * np.abs(expected).max())
     for rows, seen in zip(things, predicted, strict=True):
@@ -98,7 +98,7 @@ def test_the_band_gives_what_the_whole_matrix_gives(photos: int, lap: float, *, 
             start = len(by_images) + 7 * rows.first[thing]
             column[start : start + 7] = (rows.frame[thing] @ local.to_common[rows.first[thing]]).T
             assert seen.error[thing] == pytest.approx(column.T @ solution, abs=1e-9)
-            moved = strip_passes.displacements(errors, rows, images)[thing]
+            moved = relinearisation.displacements(errors, rows, images)[thing]
             assert moved == pytest.approx(own[thing] @ images.ravel(), abs=1e-9)
             covariance = own[thing] @ own[thing].T - column.T @ inverse @ column
             assert seen.covariance[thing] == pytest.approx(covariance, abs=1e-8 * np.abs(covariance).max())
@@ -151,7 +151,7 @@ def formed_from_what_is_taken_for_true(result: Result) -> Floats:
     inputs, own = result.inputs, result.strips[0].covariance
     assert own is not None
     xy, images = inputs.observations.xy.copy(), own.errors.images
-    xy[images.row] -= strip_passes.image_errors(own.errors, own.conditions, own.system) * images.sigma
+    xy[images.row] -= relinearisation.image_errors(own.errors, own.conditions, own.system) * images.sigma
     row_of = {inputs.observations.point_ids[number]: row for row, number in enumerate(result.points.number)}
     given = np.array([result.points.ground[row_of[name]] for name in inputs.control.ids])
     control = replace(inputs.control, enu=given)
@@ -180,7 +180,7 @@ def test_passes_go_on_until_nothing_is_left_to_be_linear(monkeypatch: pytest.Mon
 def test_the_control_alone_when_asked_for() -> None:
     """Without the distances nothing is known better, and much is known worse; both forms say what took part."""
     inputs = noisy(9, 80.0).inputs
-    alone = replace(COVARIANCE, covariance=strip_conditions.Settings(distances=False))
+    alone = replace(COVARIANCE, covariance=conditions.Settings(distances=False))
     found = [triangulate(inputs, wanted) for wanted in (alone, COVARIANCE)]
     documents = [document_of(result) for result in found]
     blocks = [document["covariance"][0] for document in documents]
@@ -278,7 +278,7 @@ def test_check_points_together_follow_chi_square(adjustment: str) -> None:
 def test_repetitions_scatter_as_stated() -> None:
     """One strip of six photos with mixed control drawn anew 250 times, which knows the scatter to about 3 %."""
     inputs = without_noise(spec(6, use={"xyz": 0.5, "xy": 0.25, "z": 0.25}))
-    base = Settings(relative=UNSCREENED, polynomial=polynomial.Settings("2"))
+    base = Settings(relative=UNSCREENED, polynomial=correction.Settings("2"))
     settings = {name: replace(base, adjustment=name) for name in ("polynomial", "covariance")}
     truth, rng = triangulate(inputs, base), np.random.default_rng(12)
     strip, true = truth.strips[0].strip, truth.points.cartesian

@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 
 from photostrip.geometry.rotation import from_vector
 from photostrip.pipeline import Settings, triangulate
-from photostrip.triangulation import bridging, ray_decisions, window_adjustment, window_points, windows
-from photostrip.triangulation.strip_screening import BOTH, SEVERAL, TOLD
+from photostrip.triangulation.gross_errors.rays import ray_decisions, window_adjustment, window_points, windows
+from photostrip.triangulation.gross_errors.rays.strip_screening import BOTH, SEVERAL, TOLD
+from photostrip.triangulation.strip_formation import non_neighbours
 from tests.strips import MICROMETRE, control_points, fly, photograph, project
 
 if TYPE_CHECKING:
@@ -185,10 +186,10 @@ def test_every_photo_is_in_a_window_and_every_point_at_home_with_all_its_rays() 
 def test_rays_meet_where_they_do() -> None:
     rng = np.random.default_rng(4)
     centers, xyz = rng.normal(0, 1, (20, 2, 3)), rng.normal(0, 1, (20, 3)) - [0, 0, 10]
-    meet, sound = bridging.meeting(centers, (xyz[:, None] - centers) * rng.uniform(0.1, 3, (20, 2, 1)))
+    meet, sound = non_neighbours.meeting(centers, (xyz[:, None] - centers) * rng.uniform(0.1, 3, (20, 2, 1)))
     assert sound.all()
     assert meet == pytest.approx(xyz, abs=1e-6)
-    _, behind = bridging.meeting(centers, centers - xyz[:, None])
+    _, behind = non_neighbours.meeting(centers, centers - xyz[:, None])
     assert not behind.any()
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.triangulation.zones import Support, zones
+from photostrip.triangulation.gross_errors.pairs.zones import Support, zones
 from tests.strips import true_pairs
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ from photostrip.triangulation.bundle.solve import solve
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.bundle.problem import Problem
+    from photostrip.triangulation.bundle.observations.problem import Problem
     from photostrip.triangulation.bundle.solution import Solution
 
     Floats = NDArray[np.float64]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.triangulation.bundle.problem import Images, Problem, Start
+from photostrip.triangulation.bundle.observations.problem import Images, Problem, Start
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -38,7 +38,7 @@ class Settings:
     variance_components : bool
         Whether the standard deviations of the groups of observations are estimated.
     self_calibration : tuple of str
-        Parameters of every camera that are estimated, of :data:`CALIBRATION`.
+        Parameters of every camera that are estimated, of ``CALIBRATION``.
     calibration_sigma : dict of str to float
         A-priori standard deviations of these parameters about the given calibration, in their units; without one a
         parameter is free.

@@ -7,20 +7,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.triangulation.bundle import reliability, robust
-from photostrip.triangulation.bundle.precision import precision as precision_of
+from photostrip.triangulation.bundle import robust
+from photostrip.triangulation.bundle.quality import reliability
+from photostrip.triangulation.bundle.quality.precision import precision as precision_of
+from photostrip.triangulation.bundle.quality.self_calibration import image_shift
 from photostrip.triangulation.bundle.selection import Selection, restarted, selected, supported
-from photostrip.triangulation.bundle.self_calibration import image_shift
 from photostrip.triangulation.bundle.solve import solve
-from photostrip.triangulation.exterior import project
-from photostrip.triangulation.single import derivatives, intersect_points
+from photostrip.triangulation.resection.closed_form import derivatives, intersect_points
+from photostrip.triangulation.resection.resection import project
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.bundle.problem import Problem
+    from photostrip.triangulation.bundle.observations.problem import Problem
     from photostrip.triangulation.bundle.settings import Settings
     from photostrip.triangulation.bundle.solution import Precision, Solution
 

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.bundle.model import Model
+    from photostrip.triangulation.bundle.observations.model import Model
 
     Floats = NDArray[np.float64]
 

@@ -12,10 +12,8 @@ import numpy as np
 
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_vector
-from photostrip.triangulation.bundle import datum, defects
-from photostrip.triangulation.bundle.linearise import PHOTO, SIGNS, backward
-from photostrip.triangulation.bundle.model import Move, State, model_of, state_of
-from photostrip.triangulation.bundle.reduced import (
+from photostrip.triangulation.bundle.normal_equations import datum, defects
+from photostrip.triangulation.bundle.normal_equations.reduced import (
     control_residuals,
     control_squares,
     factored,
@@ -23,16 +21,18 @@ from photostrip.triangulation.bundle.reduced import (
     points_of,
     reduce,
 )
+from photostrip.triangulation.bundle.observations.linearise import PHOTO, SIGNS, backward
+from photostrip.triangulation.bundle.observations.model import Move, State, model_of, state_of
 from photostrip.triangulation.bundle.solution import Solution, Step
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.bundle.layout import Batch
-    from photostrip.triangulation.bundle.linearise import Eliminated
-    from photostrip.triangulation.bundle.model import Model
-    from photostrip.triangulation.bundle.problem import Problem
-    from photostrip.triangulation.bundle.reduced import Reduced
+    from photostrip.triangulation.bundle.normal_equations.reduced import Reduced
+    from photostrip.triangulation.bundle.observations.layout import Batch
+    from photostrip.triangulation.bundle.observations.linearise import Eliminated
+    from photostrip.triangulation.bundle.observations.model import Model
+    from photostrip.triangulation.bundle.observations.problem import Problem
 
     Floats = NDArray[np.float64]
 

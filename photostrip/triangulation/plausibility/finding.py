@@ -78,9 +78,9 @@ def found(
     Parameters
     ----------
     code : str
-        Its kind, a key of :data:`KINDS`.
+        Its kind, a key of ``KINDS``.
     message, fix, evidence, photos, points, strips, key
-        As for :class:`photostrip.notes.Finding`.
+        As for ``notes.Finding``.
 
     Returns
     -------

@@ -13,8 +13,8 @@ from photostrip.geometry.rotation import from_vector
 from photostrip.simulate import Control as SimulatedControl
 from photostrip.simulate import Flight, Points, Spec, simulate
 from photostrip.simulate.bundle import problem_of, truth_of
-from photostrip.triangulation.bundle.precision import precision
-from photostrip.triangulation.bundle.problem import Attitudes, Control, Positions, Problem
+from photostrip.triangulation.bundle.observations.problem import Attitudes, Control, Positions, Problem
+from photostrip.triangulation.bundle.quality.precision import precision
 from photostrip.triangulation.bundle.solve import solve
 from tests.bundles import dense
 

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 from photostrip.simulate import Flight, Points, Spec, simulate
 from photostrip.simulate.bundle import problem_of
-from photostrip.triangulation.bundle import reduced
-from photostrip.triangulation.bundle.band import Band
-from photostrip.triangulation.bundle.precision import precision
+from photostrip.triangulation.bundle.normal_equations import reduced
+from photostrip.triangulation.bundle.normal_equations.band import Band
+from photostrip.triangulation.bundle.normal_equations.sparse import Sparse
+from photostrip.triangulation.bundle.quality.precision import precision
 from photostrip.triangulation.bundle.solve import solve
-from photostrip.triangulation.bundle.sparse import Sparse
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -10,7 +10,7 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
-from photostrip.triangulation.bundle.precision import precision
+from photostrip.triangulation.bundle.quality.precision import precision
 from photostrip.triangulation.bundle.solve import solve
 from tests.peer import FILE, SHAPES, problem
 from tests.source_tree import ROOT

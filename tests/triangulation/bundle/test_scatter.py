@@ -9,7 +9,7 @@ import pytest
 
 from photostrip.simulate import Control, Flight, Image, Points, Spec, simulate
 from photostrip.simulate.bundle import problem_of, truth_of
-from photostrip.triangulation.bundle.precision import precision
+from photostrip.triangulation.bundle.quality.precision import precision
 from photostrip.triangulation.bundle.solve import solve
 
 SEEDS = 500

@@ -16,7 +16,7 @@ from photostrip.geometry.rotation import angle_between, from_vector
 from photostrip.simulate import Control as SimulatedControl
 from photostrip.simulate import Flight, Image, Points, Spec, simulate
 from photostrip.simulate.bundle import problem_of, truth_of
-from photostrip.triangulation.bundle.problem import Cameras, Control, Images, Positions, Problem, Start
+from photostrip.triangulation.bundle.observations.problem import Cameras, Control, Images, Positions, Problem, Start
 from photostrip.triangulation.bundle.solve import Settings, solve
 
 if TYPE_CHECKING:

@@ -15,15 +15,15 @@ from scipy.spatial.transform import Rotation
 from photostrip.errors import GeometryError, InputError
 from photostrip.geometry.similarity import Similarity
 from photostrip.pipeline import ModelStrip, Settings
-from photostrip.pipeline.model_strips import form_models, models_of
-from photostrip.triangulation.models import link_screening, linking
+from photostrip.pipeline.models.model_strips import form_models, models_of
+from photostrip.triangulation.independent_models import link_screening, linking
 from tests.models import SIGMA, truth
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.points import ModelPoints
-    from photostrip.triangulation.models.strip import FormedModels
+    from photostrip.triangulation.independent_models.formation import FormedModels
 
     Floats = NDArray[np.float64]
 

@@ -1,0 +1,96 @@
+"""A project with all its files as bytes, so that another machine can compute it without a shared disk."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from photostrip.errors import InputError
+from photostrip.formats.text.files import read_bytes
+from photostrip.formats.text.findings import Findings
+from photostrip.formats.text.source import Source, reading_from
+from photostrip.formats.text.table_text import LARGEST_TABLE
+from photostrip.geodesy.crs import grid_names
+from photostrip.project.yaml.merging import override, path_of, read_tree
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from photostrip.project.yaml.document import Node
+
+
+@dataclass(frozen=True)
+class Parcel:
+    """The files of a project.
+
+    Parameters
+    ----------
+    files : dict of str to bytes
+        Content of the project file, of what it extends and of its tables, by path as the user typed it.
+    grids : dict of str to bytes
+        Content of the grid files beside the project file, by name.
+    folder : str
+        Working folder to which relative paths refer.
+    """
+
+    files: dict[str, bytes]
+    grids: dict[str, bytes]
+    folder: str
+
+
+def pack(path: Path, overrides: Sequence[str] = ()) -> Parcel:
+    """Read all files of a project without looking into its tables.
+
+    Parameters
+    ----------
+    path : Path
+        The project file.
+    overrides : sequence of str
+        Assignments that replace values of the file.
+
+    Returns
+    -------
+    Parcel
+        Its files.
+
+    Raises
+    ------
+    InputError
+        When one of them cannot be read.
+    """
+    findings, names = Findings(), list[str]()
+    with reading_from(Source()):  # an account of its own: what is read here is not what a result is made from
+        root = read_tree(str(path), findings, names)
+        if root is not None:
+            root = override(root, overrides, findings)
+            names += [path_of(node, str(path)) for node in _values(root, "file")]
+        findings.stop()
+        files = {name: read_bytes(name, LARGEST_TABLE) for name in dict.fromkeys(names)}
+    if root is None:  # cannot be: read_tree() had a reason, and stop() told it
+        raise InputError(f"{path} cannot be read")
+    grids = {name for node in _values(root, "crs") for name in grid_names(node.text)}
+    found = {name: path.parent / name for name in sorted(grids) if _travels(name) and (path.parent / name).is_file()}
+    return Parcel(files, {name: grid.read_bytes() for name, grid in found.items()}, str(Path.cwd()))
+
+
+def unpack_grids(parcel: Parcel, folder: Path) -> None:
+    """Write the grid files of a parcel, which PROJ reads by itself, into a folder."""
+    for name, data in parcel.grids.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(data)
+
+
+def _travels(grid: str) -> bool:
+    """Whether a grid file stands below the project's folder; others must be on every machine."""
+    return not Path(grid).is_absolute() and ".." not in Path(grid).parts
+
+
+def _values(node: Node, key: str) -> Iterator[Node]:
+    """Give every text of the project that stands under a key of this name."""
+    for name, inner in node.entries.items():
+        if name == key and inner.text:
+            yield inner
+        yield from _values(inner, key)
+    for inner in node.elements:
+        yield from _values(inner, key)

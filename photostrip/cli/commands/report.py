@@ -1,0 +1,50 @@
+"""``photostrip report``: the accuracy report again, from a saved result."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from photostrip.cli.options import Quiet, Verbose, Width
+from photostrip.cli.showing import Format, show
+
+HTML = ".html"
+
+
+def report(
+    result: Annotated[Path, typer.Argument(metavar="RESULT", help="A result.json, or the folder that holds it.")],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FILE", help="File to write; its ending gives the format.")
+    ] = None,
+    form: Annotated[
+        Format | None, typer.Option("--format", envvar="PHOTOSTRIP_FORMAT", help="How the report is printed.")
+    ] = None,
+    width: Width = None,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Print the accuracy report of a saved result again.
+
+    It is the report that `photostrip run` printed. FILE may end in .txt, .md, .html or .json. The exit code does not
+    depend on the tolerances: the report of a failed result is a report.
+    """
+    from photostrip.cli.showing import form_of, rendered
+    from photostrip.formats.output.result_files import read_result
+    from photostrip.formats.text.writing import write_text
+    from photostrip.report import require_complete
+
+    file = str(result / "result.json" if result.is_dir() else result)
+    document = read_result(file)
+    require_complete(document, file)
+    if output is None:
+        show(document, form or Format.TEXT, width, quiet=quiet, verbose=verbose)
+        return
+    if form is None and output.suffix.lower() == HTML:
+        from photostrip.report.html import check_html, to_html
+
+        check_html("--output")
+        write_text(output, to_html(document, everything=verbose))
+        return
+    write_text(output, rendered(document, form or form_of(output), width, quiet=quiet, verbose=verbose))

@@ -1,0 +1,48 @@
+"""``photostrip schema``: what may stand in the files that users write, for editors and other programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+
+def schema(
+    simulation: Annotated[
+        bool, typer.Option("--simulation", help="The specification of `photostrip simulate` instead.")
+    ] = False,
+    plan: Annotated[
+        Literal["model", "strip", "camera"] | None,
+        typer.Option("--plan", help="The file of this command of `photostrip plan` instead."),
+    ] = None,
+    tolerances: Annotated[
+        bool, typer.Option("--tolerances", help="The tolerance profile of `photostrip compare` instead.")
+    ] = False,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FILE", help="File to write; default: stdout.")
+    ] = None,
+) -> None:
+    """Print the JSON Schema of the project file: every key, its unit, its default.
+
+    An editor that knows JSON Schema completes keys and explains them: write the schema to a file and begin the
+    project file with `# yaml-language-server: $schema=photostrip.schema.json`.
+    """
+    import json
+
+    from photostrip.formats.text.writing import write_text
+    from photostrip.project.plans.plan_schemas import plan_schema
+    from photostrip.project.simulation_spec import simulation_schema
+    from photostrip.project.yaml.schema import json_schema
+
+    if tolerances:
+        from photostrip.project.tolerance_profile import tolerance_schema
+
+        found = tolerance_schema()
+    else:
+        found = plan_schema(plan) if plan else simulation_schema() if simulation else json_schema()
+    text = json.dumps(found, indent=2, ensure_ascii=True) + "\n"
+    if output is None:
+        typer.echo(text, nl=False)
+    else:
+        write_text(output, text)

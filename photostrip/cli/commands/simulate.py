@@ -1,0 +1,37 @@
+"""``photostrip simulate``: a synthetic project with known truth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def simulate(
+    spec: Annotated[Path, typer.Argument(metavar="SPEC", help="Specification of the simulation (YAML).")],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="DIR", help="Folder to write the project into.")],
+    assignments: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Override a key, as in flight.photos=20; may be repeated."),
+    ] = None,
+    depfile: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a rule for make.")] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but errors.")] = False,
+) -> None:
+    """Write a synthetic project with known truth, ready to run.
+
+    DIR gets project.yaml with its tables, and truth.json: the true coordinates, perspective centres and rotations,
+    and the gross errors that were put in. The same SPEC gives the same files on every machine.
+    """
+    from photostrip.formats.output.simulation import project_files, summary
+    from photostrip.formats.text.writing import make_rule, write_files, write_text
+    from photostrip.project.simulation_spec import load_specification
+
+    specification = load_specification(spec, assignments or [])
+    simulation = specification.simulate()
+    write_files(output, project_files(simulation))
+    target = str(output / "project.yaml")
+    if depfile is not None:
+        write_text(depfile, make_rule(target, specification.files))
+    if not quiet:
+        typer.echo(f"{target}: {summary(simulation)}", err=True)

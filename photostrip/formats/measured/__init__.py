@@ -1,0 +1,1 @@
+"""Tables of measured and given coordinates."""

@@ -1,0 +1,51 @@
+"""Measured image coordinates as a table gives them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from photostrip.formats.text.tables import Table
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Measurements:
+    """Measured image coordinates as the table gives them: in its unit, with its direction of y.
+
+    Parameters
+    ----------
+    table : Table
+        Where they stand.
+    photo_ids, target_ids : tuple of str
+        Ids of the photos, and of the points or marks, in order of first appearance.
+    photo, target : ndarray of int, shape (n,)
+        Photo and target of each row.
+    xy : ndarray, shape (n, 2)
+        Coordinates in the unit of the table.
+    sigma : ndarray, shape (n, 2)
+        Standard deviations in the unit of the table; NaN where the row has none.
+    times : ndarray of int, shape (n,)
+        Number of measurements of which each row is the mean.
+    """
+
+    table: Table
+    photo_ids: tuple[str, ...]
+    target_ids: tuple[str, ...]
+    photo: Numbers
+    target: Numbers
+    xy: Floats
+    sigma: Floats
+    times: Numbers
+
+    @cached_property
+    def photos_measured(self) -> frozenset[str]:
+        """Photos on which anything is measured."""
+        return frozenset(self.photo_ids)

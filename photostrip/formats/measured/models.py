@@ -1,0 +1,199 @@
+"""Model coordinates measured on a plotter: tables ``model,point,x,y,z[,sx,sy,sz]`` and ``model,photo,x,y,z[,...]``.
+
+Files of blocks, a model's id, lines ``point x y z`` and -99, are read as well.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.formats.measured.control import AXES
+from photostrip.formats.measured.observations import PHOTO, POINT
+from photostrip.formats.text.findings import counted
+from photostrip.formats.text.tables import Column, Table, read_table
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from photostrip.formats.text.findings import Findings
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+MODEL = Column("model", aliases=("model_id", "pair", "stereopair"))
+COORDINATES = (
+    *(Column(axis, number=True) for axis in AXES),
+    *(
+        Column(f"s{axis}", number=True, required=False, filled=False, positive=True, aliases=(f"sigma_{axis}",))
+        for axis in AXES
+    ),
+)
+END = "-99"  # of a model, in a file of blocks
+MODEL_POINTS = (MODEL, POINT, *COORDINATES)
+MODEL_CENTERS = (MODEL, PHOTO, *COORDINATES)
+
+
+@dataclass(frozen=True, eq=False)
+class ModelTable:
+    """Model coordinates as the table has them.
+
+    Parameters
+    ----------
+    table : Table
+        Where they stand.
+    target : str
+        What is measured: ``point`` or ``photo``, for its perspective centre.
+    model_ids, target_ids : tuple of str
+        Ids in order of first appearance.
+    models, targets : ndarray of int, shape (n,)
+        Numbers of the model and of the point of each row.
+    xyz, sigma : ndarray, shape (n, 3)
+        Coordinates and standard deviations in the unit of the table; NaN where a cell is empty.
+    """
+
+    table: Table
+    target: str
+    model_ids: tuple[str, ...]
+    target_ids: tuple[str, ...]
+    models: Numbers
+    targets: Numbers
+    xyz: Floats
+    sigma: Floats
+
+
+def read_models(
+    file: str,
+    findings: Findings,
+    *,
+    centers: bool = False,
+    has_sigma: bool = True,
+    columns: Mapping[str, str] | None = None,
+) -> ModelTable | None:
+    """Read a table of model coordinates.
+
+    Parameters
+    ----------
+    file : str
+        Path of a ``.csv`` or ``.csv.gz`` file.
+    findings : Findings
+        Where faults and notes go.
+    centers : bool
+        Whether the table holds perspective centres, by photo.
+    has_sigma : bool
+        Whether the project has standard deviations for rows without them.
+    columns : mapping of str to str, optional
+        Names in the header of columns that are called otherwise than here.
+
+    Returns
+    -------
+    ModelTable or None
+        What could be read; None when the header is wrong.
+    """
+    target = "photo" if centers else "point"
+    rewritten = None if centers else rows_of_blocks
+    layout = MODEL_CENTERS if centers else MODEL_POINTS
+    table = read_table(file, layout, findings, columns=columns, rewritten=rewritten)
+    if table is None:
+        return None
+    read = ModelTable(
+        table,
+        target,
+        table.ids["model"],
+        table.ids[target],
+        table.codes["model"],
+        table.codes[target],
+        np.column_stack([table.column(axis) for axis in AXES]),
+        np.column_stack([table.column(f"s{axis}") for axis in AXES]),
+    )
+    if not has_sigma:
+        _refuse_without_sigma(read, findings)
+    _refuse_repeated(read, findings)
+    return read
+
+
+def rows_of_blocks(data: bytes) -> bytes:
+    """Make a table of a file of blocks, as programs for independent models write it: model, ``point x y z``, -99.
+
+    Parameters
+    ----------
+    data : bytes
+        A file: each model begins with a line that has its id alone, holds lines of a point, three coordinates and
+        whatever else, parted by blanks, and ends with -99.
+
+    Returns
+    -------
+    bytes
+        A table with each row in the line of its point; any other file as it is.
+    """
+    lines = data.decode().splitlines()
+    filled = [line.split() for line in lines if line.strip()]
+    if not filled or len(filled[0]) != 1 or "," in filled[0][0] or not any(each == [END] for each in filled):
+        return data
+    found, model, header = [], "", ",".join(column.name for column in MODEL_POINTS if column.required)
+    for fields in (line.split() for line in lines):
+        text = ""
+        if fields == [END]:
+            model = ""
+        elif fields and not model:
+            model, text, header = fields[0], header, ""
+        elif fields:
+            text = ",".join(_quoted(each) for each in (model, *fields[:4]))
+        found.append(text)
+    return "\n".join(found).encode()
+
+
+def _quoted(text: str) -> str:
+    return '"' + text.replace('"', '""') + '"' if '"' in text or "," in text else text
+
+
+def _refuse_without_sigma(read: ModelTable, findings: Findings) -> None:
+    """Ask for the standard deviations that neither rows nor project give."""
+    rows = np.flatnonzero(np.isnan(read.sigma).any(axis=1))
+    if not len(rows) or findings.number(read.table.file):
+        return
+    number = counted(len(rows), "row has no standard deviation", "rows have no standard deviation")
+    message = f"{number} (sx, sy, sz), and the project file gives none"
+    fix = "set `models.sigma: [sx, sy, sz]` in the project file, or fill the columns sx, sy, sz"
+    findings.add(read.table.fault(int(rows[0]), "sx", message, "no-sigma", fix=fix))
+
+
+def _refuse_repeated(read: ModelTable, findings: Findings) -> None:
+    """Refuse a point that stands twice in one model: two points of one id, or a model that was written twice."""
+    key = read.models * max(len(read.target_ids), 1) + read.targets
+    order = np.argsort(key, kind="stable")
+    again = order[1:][key[order][1:] == key[order][:-1]]
+    first = {int(key[row]): int(row) for row in order[::-1].tolist()}
+    whole = _written_twice(read, again)
+    told: set[int] = set()
+    for row in sorted(again.tolist()):
+        if findings.full(read.table.file):
+            findings.count(read.table.file, 1)
+            continue
+        model, line = int(read.models[row]), read.table.lines[first[int(key[row])]]
+        name = read.model_ids[model]
+        if model in whole:
+            if model not in told:
+                told.add(model)
+                message = (
+                    f"model {name} stands twice: its points begin again here, and are given already in line {line}"
+                )
+                fix = "give one of the two another id, or take it out"
+                findings.add(read.table.fault(row, "model", message, "model-twice", fix=fix))
+            continue
+        message = (
+            f"{read.target} {read.target_ids[read.targets[row]]} is measured in model {name} already, in line {line}"
+        )
+        fix = "keep one of the two, or give one another id"
+        findings.add(read.table.fault(row, read.target, message, "measured-twice", fix=fix))
+
+
+def _written_twice(read: ModelTable, again: Numbers) -> set[int]:
+    """Models of which half the rows or more stand a second time."""
+    rows = np.bincount(read.models, minlength=len(read.model_ids))
+    repeated = np.bincount(read.models[again], minlength=len(read.model_ids))
+    return set(np.flatnonzero((repeated > 1) & (3 * repeated >= rows)).tolist())

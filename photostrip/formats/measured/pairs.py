@@ -1,0 +1,124 @@
+"""Stereocomparator lists, one row for a point of a pair: ``pair,point,x,y,p,q`` or ``pair,point,xl,yl,xr,yr``.
+
+Instead of ``pair`` there may be two columns ``left`` and ``right``. With x, y, p, q the left photo has x, y and the
+right photo x - p, y - q: p and q are the parallaxes. Every row becomes one row for each of the two photos.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.formats.text.tables import Column, Table
+
+if TYPE_CHECKING:
+    from collections.abc import Set as AbstractSet
+
+    from numpy.typing import NDArray
+
+    from photostrip.formats.text.findings import Findings
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+POINT = Column("point", aliases=("point_id", "id"))
+PAIR = (Column("pair", aliases=("pair_id", "model", "stereopair")),)
+BOTH = (
+    Column("left", aliases=("left_photo", "photo_left")),
+    Column("right", aliases=("right_photo", "photo_right")),
+)
+PARALLAXES = tuple(Column(name, number=True) for name in "xypq")
+TWO_POINTS = tuple(
+    Column(f"{axis}{side}", number=True, aliases=(f"{axis}_{word}",))
+    for side, word in (("l", "left"), ("r", "right"))
+    for axis in "xy"
+)
+SIGMA = tuple(
+    Column(f"s{axis}", number=True, required=False, filled=False, positive=True, aliases=(f"sigma_{axis}",))
+    for axis in "xy"
+)
+LAYOUTS = tuple((*names, POINT, *numbers, *SIGMA) for names in (PAIR, BOTH) for numbers in (PARALLAXES, TWO_POINTS))
+SIGNS = "-–—/:_+ "  # dashes as spreadsheets write them
+
+
+def is_pair_list(table: Table) -> bool:
+    """Whether a table was read in one of the layouts of pairs."""
+    return "photo" not in table.ids
+
+
+def photos_of_pairs(table: Table, photos: AbstractSet[str], findings: Findings) -> Table | None:
+    """Make a table of photos of a table of pairs.
+
+    Parameters
+    ----------
+    table : Table
+        A table in one of ``LAYOUTS``.
+    photos : set of str
+        Photos of the strips, by which the name of a pair is divided.
+    findings : Findings
+        Where faults go.
+
+    Returns
+    -------
+    Table or None
+        Columns ``photo``, ``point``, ``x``, ``y``, ``sx``, ``sy``, two rows for each row: left, then right; None when
+        a pair names no two photos of the strips.
+    """
+    ids, codes = _photos(table, photos, findings)
+    if (codes < 0).any():
+        return None
+    n, table = len(table), table.placed_as("photo", "pair" if "pair" in table.ids else "left")
+    xy = np.stack([np.stack(each, -1) for each in _coordinates(table)], 1).reshape(2 * n, 2)
+    numbers = {"x": xy[:, 0], "y": xy[:, 1]}
+    numbers |= {name: np.repeat(table.numbers[name], 2) for name in ("sx", "sy") if name in table.numbers}
+    return replace(
+        table,
+        lines=np.repeat(table.lines, 2),
+        numbers=numbers,
+        codes={"photo": codes.reshape(-1), "point": np.repeat(table.codes["point"], 2)},
+        ids={"photo": ids, "point": table.ids["point"]},
+    )
+
+
+def _coordinates(table: Table) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]]:
+    """Coordinates on the left and on the right photo."""
+    if "xl" in table.numbers:
+        xl, yl, xr, yr = (table.numbers[column.name] for column in TWO_POINTS)
+        return (xl, yl), (xr, yr)
+    x, y, p, q = (table.numbers[column.name] for column in PARALLAXES)
+    return (x, y), (x - p, y - q)
+
+
+def _photos(table: Table, photos: AbstractSet[str], findings: Findings) -> tuple[tuple[str, ...], Numbers]:
+    """Left and right photo of each row, shape (n, 2), counted in the ids; -1 where a pair is none, which is told."""
+    if "pair" not in table.ids:
+        names = tuple(dict.fromkeys((*table.ids["left"], *table.ids["right"])))
+        number = {name: code for code, name in enumerate(names)}
+        sides = [
+            np.array([number[name] for name in table.ids[side]], np.intp)[table.codes[side]]
+            for side in ("left", "right")
+        ]
+        return names, np.stack(sides, -1)
+    number = {}
+    of_pair = np.full((len(table.ids["pair"]), 2), -1, np.intp)
+    for code, pair in enumerate(table.ids["pair"]):
+        ways = [(pair[:place].strip(), pair[place + 1 :].strip()) for place, sign in enumerate(pair) if sign in SIGNS]
+        known = list(dict.fromkeys(way for way in ways if way[0] in photos and way[1] in photos))
+        if len(known) == 1:
+            of_pair[code] = [number.setdefault(name, len(number)) for name in known[0]]
+        else:
+            _refuse(table, code, pair, known, findings)
+    return tuple(number), of_pair[table.codes["pair"]]
+
+
+def _refuse(table: Table, code: int, pair: str, ways: list[tuple[str, str]], findings: Findings) -> None:
+    row = int(np.argmax(table.codes["pair"] == code))
+    if ways:
+        either = " or ".join(f"{left} and {right}" for left, right in ways)
+        message = f"pair {pair} may be photos {either}"
+    else:
+        message = f"pair {pair} does not name two photos of the strips"
+    fix = "write it as LEFT-RIGHT with ids of the strips' photos, or use two columns left and right"
+    findings.add(table.fault(row, "pair", message, "pair", expected="a pair such as 1001-1002", fix=fix))

@@ -1,0 +1,141 @@
+"""A point measured several times on one photo: refused, or averaged with its spread told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.formats.text.findings import counted
+from photostrip.notes import Note
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.formats.measured.measurements import Measurements
+    from photostrip.formats.text.findings import Findings
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+POLICIES = ("refuse", "average")
+FARTHEST = 10.0  # standard deviations from the mean; beyond, two measurements are not of one point
+
+
+def refuse(read: Measurements, target: str, findings: Findings) -> None:
+    """Refuse a second measurement of the same point on the same photo.
+
+    Parameters
+    ----------
+    read : Measurements
+        The table.
+    target : str
+        What is measured, ``point`` or ``mark``.
+    findings : Findings
+        Where faults go.
+    """
+    key = _key(read)
+    order = np.argsort(key, kind="stable")
+    again = np.flatnonzero(key[order][1:] == key[order][:-1]) + 1
+    first: dict[int, int] = {}
+    for place in again:
+        row = int(order[place])
+        number = first.setdefault(int(key[row]), int(order[place - 1]))
+        if findings.full(read.table.file):
+            findings.count(read.table.file, 1)
+            continue
+        name, photo = read.target_ids[read.target[row]], read.photo_ids[read.photo[row]]
+        message = f"{target} {name} is measured on photo {photo} already, in line {read.table.lines[number]}"
+        fix = "keep one of the two, give one another id, or set `repeated: average`"
+        findings.add(read.table.fault(row, target, message, "measured-twice", fix=fix))
+
+
+def averaged(read: Measurements, target: str, default: float | None, findings: Findings) -> Measurements:
+    """Replace several measurements of a point on a photo by their weighted mean.
+
+    Parameters
+    ----------
+    read : Measurements
+        The table.
+    target : str
+        What is measured, ``point`` or ``mark``.
+    default : float or None
+        Standard deviation of rows without one, in the unit of the table.
+    findings : Findings
+        Gets a fault for measurements too far apart to be of one point, and a note with the spread of the others.
+
+    Returns
+    -------
+    Measurements
+        One row for each point of a photo, where its first measurement stood; the same table when no point is measured
+        twice. Standard deviations of means follow from those of their measurements, not from the spread.
+    """
+    _, first, group, count = np.unique(_key(read), return_index=True, return_inverse=True, return_counts=True)
+    if (count == 1).all():
+        return read
+    sigma = np.where(np.isnan(read.sigma), np.nan if default is None else default, read.sigma)
+    weight = np.where(np.isfinite(sigma), sigma, 1.0) ** -2.0
+    total = _sums(group, weight)
+    mean = _sums(group, weight * read.xy) / total
+    off = np.where(count[group, None] > 1, read.xy - mean[group], 0.0)
+    _refuse_far(read, target, np.abs(off) / sigma, group, findings)
+    findings.notes.append(_spread(read, target, off, count))
+    own = np.where(count[:, None] > 1, np.where(np.isnan(_sums(group, sigma)), np.nan, total**-0.5), read.sigma[first])
+    order = np.argsort(first)
+    rows = first[order]
+    return replace(
+        read,
+        table=read.table.take(rows),
+        photo=read.photo[rows],
+        target=read.target[rows],
+        xy=np.where(count[order, None] > 1, mean[order], read.xy[rows]),
+        sigma=own[order],
+        times=count[order],
+    )
+
+
+def _key(read: Measurements) -> Numbers:
+    return np.asarray(read.photo * len(read.target_ids) + read.target, np.intp)
+
+
+def _sums(group: Numbers, values: Floats) -> Floats:
+    return np.column_stack([np.bincount(group, column) for column in values.T])
+
+
+def _refuse_far(read: Measurements, target: str, ratio: Floats, group: Numbers, findings: Findings) -> None:
+    """Refuse measurements that lie farther from their mean than one point's can."""
+    farthest = np.zeros(group.max() + 1)
+    np.maximum.at(farthest, group, np.nan_to_num(ratio.max(axis=1)))
+    for number in np.flatnonzero(farthest > FARTHEST).tolist():
+        if findings.full(read.table.file):
+            findings.count(read.table.file, 1)
+            continue
+        rows = np.flatnonzero(group == number)
+        apart = np.ptp(read.xy[rows], axis=0)
+        name, photo = read.target_ids[read.target[rows[0]]], read.photo_ids[read.photo[rows[0]]]
+        lines = ", ".join(str(line) for line in read.table.lines[rows].tolist())
+        message = (
+            f"{target} {name} is measured {len(rows)} times on photo {photo} (lines {lines}), up to {apart.max():g} in "
+            f"{'xy'[int(apart.argmax())]} apart: {farthest[number]:.0f} standard deviations from the mean"
+        )
+        fix = "take the wrong one out, or give the other point an id of its own"
+        findings.add(read.table.fault(int(rows[-1]), target, message, "measurements-disagree", fix=fix))
+
+
+def _spread(read: Measurements, target: str, off: Floats, count: Numbers) -> Note:
+    """Tell how well repeated measurements agree."""
+    several = count > 1
+    freedom = int((count[several] - 1).sum())
+    scatter = np.sqrt((off**2).sum(axis=0) / freedom)
+    worst = int(np.abs(off).max(axis=1).argmax())
+    name, photo = read.target_ids[read.target[worst]], read.photo_ids[read.photo[worst]]
+    message = (
+        f"{counted(int(several.sum()), target)} measured up to {count.max()} times on a photo, the mean is used; one"
+        f" measurement scatters by {scatter[0]:.3g} in x and {scatter[1]:.3g} in y (standard deviations, unit of the"
+        f" table), the worst is {target} {name} on photo {photo}, {np.abs(off[worst]).max():.3g} off its mean"
+    )
+    line = int(read.table.lines[worst])
+    return Note(
+        "measurements-averaged", message, "note", photos=(photo,), points=(name,), file=read.table.file, line=line
+    )

@@ -1,0 +1,387 @@
+"""Documents of direction computations: what goes out as JSON and CSV, and what reports are made from."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.result.numbers import rounded, significant
+from photostrip.terrestrial import accuracy
+from photostrip.terrestrial.directions import Phototheodolite, directions_from_photo, photo_from_directions
+from photostrip.terrestrial.frame import ARCSECONDS
+from photostrip.terrestrial.orientation import ANGLES
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.result.numbers import Document
+    from photostrip.terrestrial.orientation import Orientation, Settings, Sightings
+
+    Floats = NDArray[np.float64]
+
+SCHEMA = 1
+ANGLE, ARCSEC, MILLIMETRE, MICROMETRE, RATIO = 8, 5, 6, 4, 5  # decimals: finer than any report prints
+PER_RADIAN = {"deg": 180 / np.pi, "gon": 200 / np.pi}
+FULL_CIRCLE = 2 * np.pi
+ROUNDING = 1e-12  # rad
+UM = 1000.0  # in a millimetre
+
+
+def head(kind: str, camera: Phototheodolite | None = None) -> Document:
+    """Begin a document: what it is and of which camera."""
+    document: Document = {"photostrip_terrestrial_result": SCHEMA, "kind": kind}
+    if camera is not None:
+        document["camera"] = {
+            "name": camera.name,
+            "principal_distance_mm": rounded(camera.principal_distance, MILLIMETRE),
+            "principal_point_mm": rounded(camera.principal_point, MILLIMETRE),
+            "format_mm": None if camera.format is None else rounded(camera.format, MILLIMETRE),
+        }
+    return document
+
+
+def orientation_block(angles: Sequence[float], unit: str) -> Document:
+    """Give the angles of a photo, azimuth from 0 to a full circle."""
+    alpha, omega, kappa = angles
+    values = (positive(alpha), omega, kappa)
+    names = dict(zip(ANGLES, rounded(np.array(values) * PER_RADIAN[unit], ANGLE), strict=True))
+    return {"unit": unit, **names}
+
+
+def positive(angle: float) -> float:
+    """Bring an azimuth between 0 and a full circle; what rounds to the full circle is 0."""
+    turned = float(np.mod(angle, FULL_CIRCLE))
+    return 0.0 if FULL_CIRCLE - turned < ROUNDING else turned
+
+
+# ---------------------------------------------------------------------------------------------------- conversion
+
+
+def conversion(
+    camera: Phototheodolite,
+    angles: Sequence[float],
+    rotation: Floats,
+    points: tuple[Sequence[str], Floats],
+    options: tuple[str, float | None],
+    *,
+    to_photo: bool = False,
+) -> Document:
+    """Give photo coordinates with their directions.
+
+    Parameters
+    ----------
+    camera : Phototheodolite
+        The camera.
+    angles : sequence of float
+        alpha, omega, kappa in radians.
+    rotation : ndarray, shape (3, 3)
+        Photo to ground.
+    points : tuple
+        Ids, and image coordinates in mm as measured or directions in radians.
+    options : tuple
+        Unit of angles, and standard deviation of an image coordinate in mm, None without standard deviations.
+    to_photo : bool
+        Whether directions are given.
+
+    Returns
+    -------
+    dict
+        The document.
+    """
+    ids, given = points
+    unit, sigma = options
+    f, centre = camera.principal_distance, np.array(camera.principal_point)
+    xz = photo_from_directions(given, f, rotation) if to_photo else given - centre
+    directions = given if to_photo else directions_from_photo(xz, f, rotation)
+    document = head("photo-coordinates" if to_photo else "directions", camera)
+    document["orientation"] = orientation_block(angles, unit)
+    document["units"] = {"x": "mm", "z": "mm", "lambda": unit, "beta": unit, "_arcsec": "seconds of arc"}
+    turned = np.array([[positive(each[0]), each[1]] for each in directions]).reshape(-1, 2)
+    rows = zip(ids, rounded(xz + centre, MILLIMETRE), rounded(turned * PER_RADIAN[unit], ANGLE), strict=True)
+    document["points"] = [
+        {"id": name, "x": x, "z": z, "lambda": horizontal, "beta": vertical}
+        for name, (x, z), (horizontal, vertical) in rows
+    ]
+    if sigma is not None:
+        document["image_sigma_um"] = rounded(sigma * UM, MICROMETRE)
+        errors = accuracy.required(xz, f, sigma, rotation)
+        for row, angle, vertical in zip(document["points"], errors.angle, errors.vertical, strict=True):
+            row["sigma_lambda_arcsec"] = rounded(angle * ARCSECONDS, ARCSEC)
+            row["sigma_beta_arcsec"] = rounded(vertical * ARCSECONDS, ARCSEC)
+    return document
+
+
+# ------------------------------------------------------------------------------------------------------ accuracy
+
+
+def required_accuracy(
+    camera: Phototheodolite,
+    angles: tuple[Sequence[float], Floats, str],
+    sigma: float,
+    grid: tuple[Floats, Floats],
+    *,
+    as_printed: bool = False,
+) -> Document:
+    """Give the accuracy over the photo with which directions must be measured.
+
+    Parameters
+    ----------
+    camera : Phototheodolite
+        The camera.
+    angles : tuple
+        alpha, omega, kappa in radians, the rotation from photo to ground, and the unit of angles.
+    sigma : float
+        Standard error of image coordinates and principal distance in mm.
+    grid : tuple of ndarray
+        Coordinates x and z of the table in mm, from the principal point.
+    as_printed : bool
+        Whether by the formulas as they are printed.
+
+    Returns
+    -------
+    dict
+        The document.
+    """
+    x, z = (axis.ravel() for axis in np.meshgrid(*grid))
+    xz = np.column_stack([x, z])
+    exact = accuracy.required(xz, camera.principal_distance, sigma, angles[1])
+    document = head("direction-accuracy", camera)
+    document["orientation"] = orientation_block(angles[0], angles[2])
+    document["image_sigma_um"] = rounded(sigma * UM, MICROMETRE)
+    document["formulas"] = "as printed" if as_printed else "exact"
+    document["units"] = {"x": "mm from the principal point", "z": "mm from the principal point"}
+    columns = {"angle_arcsec": exact.angle, "horizontal_arcsec": exact.horizontal, "vertical_arcsec": exact.vertical}
+    if as_printed:
+        printed = accuracy.as_printed(xz, camera.principal_distance, sigma)
+        columns = {
+            "angle_arcsec": printed.horizontal * np.sqrt(2.0),
+            "horizontal_arcsec": printed.horizontal,
+            "vertical_arcsec": printed.vertical_eq6,
+            "vertical_eq5_arcsec": printed.vertical_eq5,
+            "vertical_exact_arcsec": exact.vertical,
+        }
+    document["points"] = _table(xz, {name: column * ARCSECONDS for name, column in columns.items()}, ARCSEC)
+    return document
+
+
+def _table(xz: Floats, columns: dict[str, Floats], decimals: int) -> list[Document]:
+    names = ("x", "z", *columns)
+    values = np.column_stack([rounded(xz, MILLIMETRE), *(rounded(each, decimals) for each in columns.values())])
+    return [dict(zip(names, row, strict=True)) for row in values.tolist()]
+
+
+def theodolite_accuracy(
+    camera: Phototheodolite,
+    angles: tuple[Sequence[float], Floats, str],
+    theodolite: tuple[float, float, int],
+    sigma: float | None,
+    grid: tuple[Floats, Floats],
+) -> Document:
+    """Give the image accuracy over the photo that a theodolite can vouch for.
+
+    Parameters
+    ----------
+    camera : Phototheodolite
+        The camera.
+    angles : tuple
+        alpha, omega, kappa in radians, the rotation from photo to ground, and the unit of angles.
+    theodolite : tuple
+        Standard errors of a horizontal and a vertical direction measured in one round, in arcseconds, and the number of
+        rounds.
+    sigma : float, optional
+        Image accuracy wanted, mm: the rounds it needs are computed.
+    grid : tuple of ndarray
+        Coordinates x and z of the table in mm, from the principal point.
+
+    Returns
+    -------
+    dict
+        The document.
+    """
+    x, z = (axis.ravel() for axis in np.meshgrid(*grid))
+    xz = np.column_stack([x, z])
+    horizontal, vertical, rounds = theodolite
+    means = [accuracy.of_rounds(each, rounds) for each in (horizontal, vertical)]
+    by = (means[0] / ARCSECONDS, means[1] / ARCSECONDS)
+    image = accuracy.supported(xz, camera.principal_distance, *by, angles[1]) * UM
+    document = head("theodolite-accuracy", camera)
+    document["orientation"] = orientation_block(angles[0], angles[2])
+    document["theodolite"] = {
+        "horizontal_arcsec": rounded(horizontal, ARCSEC),
+        "vertical_arcsec": rounded(vertical, ARCSEC),
+        "rounds": rounds,
+        "mean_horizontal_arcsec": rounded(means[0], ARCSEC),
+        "mean_vertical_arcsec": rounded(means[1], ARCSEC),
+    }
+    document["supported_um"] = {
+        "by_horizontal": rounded(image[:, 0].max(), MICROMETRE),
+        "by_vertical": rounded(image[:, 1].max(), MICROMETRE),
+        "by_both": rounded(image.max(), MICROMETRE),
+    }
+    if sigma is not None:
+        needed = accuracy.required(xz, camera.principal_distance, sigma, angles[1])
+        document["wanted"] = {
+            "image_sigma_um": rounded(sigma * UM, MICROMETRE),
+            "rounds_horizontal": accuracy.rounds_for(horizontal, float(needed.horizontal.min()) * ARCSECONDS),
+            "rounds_vertical": accuracy.rounds_for(vertical, float(needed.vertical.min()) * ARCSECONDS),
+        }
+    columns = {"by_horizontal_um": image[:, 0], "by_vertical_um": image[:, 1], "supported_um": image.max(axis=1)}
+    document["points"] = _table(xz, columns, MICROMETRE)
+    return document
+
+
+def worked_examples() -> Document:
+    """Give the worked examples of the source: as printed, by the printed formulas, and exact.
+
+    Returns
+    -------
+    dict
+        The document.
+    """
+    document = head("worked-examples")
+    document["examples"] = []
+    for example in accuracy.EXAMPLES:
+        found = accuracy.worked(example)
+        document["examples"].append(
+            {
+                "camera": example.camera,
+                "f_mm": example.f,
+                "x_mm": example.x,
+                "z_mm": example.z,
+                "image_sigma_um": rounded(example.sigma * UM, MICROMETRE),
+                "horizontal_printed_arcsec": example.horizontal,
+                "horizontal_exact_arcsec": rounded(found.horizontal, ARCSEC),
+                "vertical_printed_arcsec": example.vertical,
+                "factor_printed": example.factor,
+                "vertical_with_printed_factor_arcsec": rounded(found.printed_factor, ARCSEC),
+                "factor_of_camera": rounded(found.factor, 4),
+                "vertical_eq6_arcsec": rounded(found.eq6, ARCSEC),
+                "vertical_eq5_arcsec": rounded(found.eq5, ARCSEC),
+                "vertical_exact_arcsec": rounded(found.vertical, ARCSEC),
+                "z_returned_by_printed_eq3_mm": rounded(found.returned_z, ARCSEC),
+            }
+        )
+    return document
+
+
+# --------------------------------------------------------------------------------------------------- orientation
+
+
+def oriented(
+    camera: Phototheodolite, sightings: Sightings, found: Orientation, settings: Settings, unit: str
+) -> Document:
+    """Give a photo oriented by directions.
+
+    Parameters
+    ----------
+    camera : Phototheodolite
+        The camera as given.
+    sightings : Sightings
+        What was measured.
+    found : Orientation
+        The orientation.
+    settings : Settings
+        What was asked for.
+    unit : str
+        Unit of angles.
+
+    Returns
+    -------
+    dict
+        The document.
+    """
+    document = head("photo-orientation", camera)
+    lower, upper = found.sigma0_range(settings.significance)
+    document["summary"] = {
+        "points": len(sightings.ids),
+        "points_used": int(found.used.sum()),
+        "directions_used": int(sightings.measured[found.used].sum()),
+        "redundancy": found.dof,
+        "sigma0": rounded(found.sigma0, RATIO),
+        "sigma0_range": rounded([lower, upper], RATIO),
+        "screening": settings.screening,
+        "significance": settings.significance,
+        "condition": significant(found.condition),
+    }
+    document["elements"] = [
+        _element(name, value, sigma, unit)
+        for name, value, sigma in zip(found.names, found.values, found.sigma, strict=True)
+    ]
+    deviations = found.sigma
+    document["correlations"] = rounded(found.cofactors / np.outer(deviations, deviations), RATIO)
+    document["rotation"] = rounded(found.rotation.ravel(), 12)
+    document["points"] = _sighted(sightings, found)
+    document["rejected"] = [
+        {
+            "point": sightings.ids[each.point],
+            "test": each.test,
+            "value": significant(each.value),
+            "limit": significant(each.limit),
+            "lambda_arcsec": rounded(each.residual[0] * ARCSECONDS, ARCSEC),
+            "beta_arcsec": rounded(each.residual[1] * ARCSECONDS, ARCSEC),
+        }
+        for each in found.rejected
+    ]
+    return document
+
+
+def _element(name: str, value: float, sigma: float, unit: str) -> Document:
+    """Give one unknown: angles in the user's unit with seconds, the others in mm with micrometres."""
+    if name in ANGLES:
+        angle = positive(value) if name == "alpha" else value
+        return {
+            "name": name,
+            "value": rounded(angle * PER_RADIAN[unit], ANGLE),
+            "unit": unit,
+            "sigma": rounded(sigma * ARCSECONDS, ARCSEC),
+            "sigma_unit": "arcsec",
+        }
+    return {
+        "name": name,
+        "value": rounded(value, MILLIMETRE),
+        "unit": "mm",
+        "sigma": rounded(sigma * UM, MICROMETRE),
+        "sigma_unit": "um",
+    }
+
+
+def _sighted(sightings: Sightings, found: Orientation) -> list[Document]:
+    residuals = rounded(found.residuals * ARCSECONDS, ARCSEC)
+    shares = rounded(found.redundancy, RATIO)
+    return [
+        {
+            "id": name,
+            "used": bool(used),
+            "v_lambda_arcsec": v[0],
+            "v_beta_arcsec": v[1],
+            "redundancy_lambda": r[0],
+            "redundancy_beta": r[1],
+        }
+        for name, used, v, r in zip(sightings.ids, found.used, residuals, shares, strict=True)
+    ]
+
+
+def camera_list(cameras: dict[str, Phototheodolite]) -> Document:
+    """Give the cameras that can be named.
+
+    Parameters
+    ----------
+    cameras : dict of str to Phototheodolite
+        By name.
+
+    Returns
+    -------
+    dict
+        The document.
+    """
+    document = head("cameras")
+    document["cameras"] = []
+    for name, each in cameras.items():
+        size = each.format or (np.nan, np.nan)
+        keys = ("principal_distance_mm", "x0_mm", "z0_mm", "width_mm", "height_mm")
+        values = rounded([each.principal_distance, *each.principal_point, *size], MILLIMETRE)
+        document["cameras"].append({"id": name, **dict(zip(keys, values, strict=True))})
+    return document

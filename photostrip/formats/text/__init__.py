@@ -1,0 +1,1 @@
+"""Files, tables and numbers as text, with findings that name the line."""

@@ -1,0 +1,146 @@
+"""The text of a table: unpacked, known to be text, with the place of every cell."""
+
+from __future__ import annotations
+
+import gzip
+import zlib
+from dataclasses import dataclass, field
+from functools import cached_property
+from io import BytesIO, TextIOWrapper
+
+from photostrip.errors import Fault
+from photostrip.formats.text.files import BOM, GZIP, MEGABYTE, decode, read_bytes, refuse
+
+LARGEST_TABLE = 200 * MEGABYTE  # unpacked; a million points are 50 MB
+STEP = 4 * MEGABYTE
+
+
+@dataclass(eq=False)
+class TableText:
+    """The text of a table and where its columns stand: what positions are made from.
+
+    Parameters
+    ----------
+    file : str
+        Path as the user knows it.
+    data : bytes
+        UTF-8; as a text, one long id in another script would make it four times as large.
+    where : dict of str to int
+        Number of the field in a row, by column.
+    header : dict of str to str
+        Name in the header, by column.
+    """
+
+    file: str
+    data: bytes
+    where: dict[str, int] = field(default_factory=dict)
+    header: dict[str, str] = field(default_factory=dict)
+
+    def stream(self) -> TextIOWrapper:
+        """Give the lines of the table; ends of lines of all systems count."""
+        return TextIOWrapper(BytesIO(self.data), encoding="utf-8", newline="")
+
+    @cached_property
+    def _lines(self) -> list[str]:
+        return self.stream().readlines()
+
+    def placed_as(self, column: str, where: str) -> TableText:
+        """Give the text with a column placed where another one stands.
+
+        Parameters
+        ----------
+        column, where : str
+            Name of the column, and of the one in its place.
+
+        Returns
+        -------
+        TableText
+            The same text.
+        """
+        places, header = dict(self.where), dict(self.header)
+        if where in places:
+            places[column], header[column] = places[where], header[where]
+        return TableText(self.file, self.data, places, header)
+
+    def fault(self, line: int, column: str, message: str, code: str, *, expected: str = "", fix: str = "") -> Fault:
+        """Make a fault with the place of a cell.
+
+        Parameters
+        ----------
+        line : int
+            Line, counted from 1.
+        column : str
+            Name of the column; empty for the line as a whole.
+        message, code, expected, fix : str
+            As in ``errors.Fault``.
+
+        Returns
+        -------
+        Fault
+            With file, line, and the character at which the cell begins.
+        """
+        position = self._position(line, self.where[column]) if column in self.where else 0
+        name = self.header.get(column, column)
+        return Fault(message, code, self.file, line, position, name, expected, fix)
+
+    def _position(self, line: int, wanted: int) -> int:
+        """Character, counted from 1, at which a field of a line begins; 0 when the line has not so many."""
+        text = self._lines[line - 1]
+        start, quoted, number_of_field = 0, False, 0
+        for position, character in enumerate(text):
+            if number_of_field == wanted:
+                break
+            if character == '"':
+                quoted = not quoted
+            elif character == "," and not quoted:
+                number_of_field, start = number_of_field + 1, position + 1
+        if number_of_field != wanted:
+            return 0
+        blanks = len(text[start:]) - len(text[start:].lstrip(" \t"))
+        return start + blanks + 1
+
+
+def content(file: str) -> tuple[bytes, bool]:
+    """Read and unpack a file, make sure that it is text, and take a byte order mark off.
+
+    Parameters
+    ----------
+    file : str
+        Path of a ``.csv`` or ``.csv.gz`` file.
+
+    Returns
+    -------
+    data : bytes
+        UTF-8.
+    marked : bool
+        Whether there was a byte order mark.
+
+    Raises
+    ------
+    InputError
+        When it cannot be read or is not text.
+    """
+    data = read_bytes(file, LARGEST_TABLE)
+    packed = file.casefold().endswith(".gz")
+    if packed != data.startswith(GZIP):
+        what = "is compressed (gzip), but its name does not say so" if not packed else "is not compressed (gzip)"
+        refuse(file, "gzip", what, fix="name it .csv.gz" if not packed else "name it .csv")
+    data = _unpack(file, data) if packed else data
+    _, marked = decode(file, data)
+    return data[len(BOM) :] if marked else data, marked
+
+
+def _unpack(file: str, data: bytes) -> bytes:
+    try:
+        with gzip.GzipFile(fileobj=BytesIO(data)) as stream:
+            unpacked = b""
+            while len(unpacked) <= LARGEST_TABLE and (part := stream.read(STEP)):
+                unpacked += part
+    except (EOFError, zlib.error, gzip.BadGzipFile) as error:
+        how = "ends too early" if isinstance(error, EOFError) else "is damaged"
+        refuse(file, "gzip", f"the compressed file {how}", fix="copy or pack it again")
+    if len(unpacked) > LARGEST_TABLE:
+        refuse(file, "file-size", f"unpacks to more than {LARGEST_TABLE // MEGABYTE} MB", expected="a table")
+    if not unpacked:
+        refuse(file, "file-empty", "is empty")
+    return unpacked

@@ -1,0 +1,1 @@
+"""The bundle adjustment of a run: start values, problem, adjustment."""

@@ -1,0 +1,328 @@
+"""From inputs with ids and frames to the arrays of a bundle adjustment, in the Cartesian frame about a local origin."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.geometry.rotation import angle_rates
+from photostrip.pipeline import overruling
+from photostrip.pipeline.results import BlockProblem
+from photostrip.triangulation.bundle.observations.problem import (
+    Attitudes,
+    Cameras,
+    Control,
+    Images,
+    Positions,
+    Problem,
+    Start,
+)
+from photostrip.triangulation.bundle.quality.self_calibration import sigmas
+from photostrip.triangulation.bundle.selection import Selection
+from photostrip.triangulation.gross_errors.control import control_screening
+from photostrip.triangulation.resection.resection import project
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.geodesy.crs import GroundFrame
+    from photostrip.pipeline.inputs import CameraPositions, GivenOrientations, Inputs, Settings
+    from photostrip.pipeline.results import BlockStart
+    from photostrip.points import ControlPoints, PhotoPoints
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+    Flags = NDArray[np.bool_]
+
+FAR = 10.0  # times the median: a ray of no pair that misses its point by more waits outside at first
+LEAST_FAR = 50.0  # in standard deviations
+NO_CORRECTION, DRIFT = "none", "drift"
+
+
+def build(
+    inputs: Inputs,
+    settings: Settings,
+    observations: PhotoPoints,
+    control: ControlPoints,
+    frames: tuple[Sequence[GroundFrame], GroundFrame | None, GroundFrame | None],
+    start: BlockStart,
+) -> BlockProblem:
+    """Collect everything that is observed.
+
+    Parameters
+    ----------
+    inputs : Inputs
+        What is given.
+    settings : Settings
+        What is to be done.
+    observations : PhotoPoints
+        Ideal image coordinates.
+    control : ControlPoints
+        Measured control, no check points.
+    frames : tuple
+        Frames of the control lists, of the camera positions and of the orientations.
+    start : BlockStart
+        Start values.
+
+    Returns
+    -------
+    BlockProblem
+        The problem, and what its rows stand for.
+    """
+    # whole numbers: nothing is lost when the origin is added back
+    origin: Floats = np.round(np.nanmean(start.points, axis=0, dtype=np.float64), -1)
+    place = {photo: number for number, photo in enumerate(start.photos)}
+    photo = np.array([place[name] for name in observations.photo_ids], np.intp)
+    rows = np.flatnonzero(~_dropped(settings, observations))
+    images = Images(
+        photo[observations.photo[rows]], observations.point[rows], observations.xy[rows], observations.sigma[rows]
+    )
+    given, control_rows = _control(control, frames[0], observations, start, origin)
+    positions = _positions(inputs, frames[1], frames[2], start, origin)
+    attitudes = _attitudes(inputs.orientations, frames[2], start)
+    problem = Problem(
+        images,
+        _cameras(inputs, settings),
+        Start(start.centers - origin, start.rotations, start.points - origin),
+        given,
+        positions,
+        attitudes,
+        start.photos,
+        observations.point_ids,
+        tuple(dict.fromkeys(strip.camera.name for strip in inputs.strips)),
+        tuple(strip.id for strip in inputs.strips),
+    )
+    level = {
+        "control": tuple(frames[0][number].kind != "geocentric" for number in control.frame[control_rows].tolist()),
+        "position": _level_positions(inputs, frames[1], frames[2]),
+    }
+    begin = _begin(problem, rows, control, control_rows, start)
+    kept = _named(settings.relative.keep, observations)[rows]
+    return BlockProblem(problem, origin, begin, kept, rows, control_rows, level)
+
+
+def _named(entries: Sequence[str], observations: PhotoPoints) -> Flags:
+    """Mark the measurements that a list of the user names."""
+    flags = np.zeros(len(observations), bool)
+    flags[[row for row in overruling.rows_of(entries, observations).values() if row >= 0]] = True
+    return flags
+
+
+def _dropped(settings: Settings, observations: PhotoPoints) -> Flags:
+    return _named(settings.relative.drop, observations)
+
+
+def _cameras(inputs: Inputs, settings: Settings) -> Cameras:
+    """Cameras of all photos, and what is calibrated of them."""
+    cameras = {strip.camera.name: strip for strip in inputs.strips}
+    number = {name: row for row, name in enumerate(cameras)}
+    of_photo = np.array([number[strip.camera.name] for strip in inputs.strips for _ in strip.photos], np.intp)
+    focal = np.array([strip.camera.principal_distance for strip in cameras.values()])
+    asked = [strip.calibrate for strip in cameras.values()]
+    return Cameras(of_photo, focal, sigmas(asked, settings.bundle.calibration_sigma))
+
+
+# ----------------------------------------------------------------------------------------------- on the ground
+
+
+def given_positions(
+    enu: Floats, use: Flags, sigma: Floats, frame: GroundFrame, near: Floats, ids: Sequence[str]
+) -> tuple[Floats, Floats, Floats]:
+    """Given coordinates as observations in the Cartesian frame.
+
+    Parameters
+    ----------
+    enu : ndarray, shape (n, 3)
+        Given coordinates in the frame's own units, internal order.
+    use : ndarray of bool, shape (n, 3)
+        Which count.
+    sigma : ndarray, shape (n, 3)
+        Standard deviations, metres.
+    frame : GroundFrame
+        Their frame.
+    near : ndarray, shape (n, 3)
+        Present positions, Cartesian: they stand in for what does not count.
+    ids : sequence of str
+        Names for messages.
+
+    Returns
+    -------
+    xyz, axes, sigma : ndarray, shapes (n, 3), (n, 3, 3), (n, 3)
+        As ``problem.Control`` has them.
+    """
+    if not use.all():
+        enu = np.where(use, enu, frame.ground_from_cartesian(near, ids=ids))
+    xyz = frame.cartesian_from_ground(enu, ids=ids)
+    return xyz, frame.axes_at(xyz), np.where(use, sigma, np.inf)
+
+
+def _control(
+    control: ControlPoints, frames: Sequence[GroundFrame], observations: PhotoPoints, start: BlockStart, origin: Floats
+) -> tuple[Control, Numbers]:
+    """Control as observations; points without start coordinates, which no ray determines, are left out."""
+    number = {name: n for n, name in enumerate(observations.point_ids)}
+    point = np.array([number[name] for name in control.ids], np.intp)
+    known = np.isfinite(start.points[point, 0]) if len(point) else np.zeros(0, bool)
+    rows = np.flatnonzero(known)
+    xyz, axes, sigma = np.empty((len(rows), 3)), np.empty((len(rows), 3, 3)), np.empty((len(rows), 3))
+    for index, frame in enumerate(frames):
+        here = control.frame[rows] == index
+        chosen = rows[here]
+        if len(chosen):
+            ids = [control.ids[row] for row in chosen]
+            xyz[here], axes[here], sigma[here] = given_positions(
+                control.enu[chosen], control.use[chosen], control.sigma[chosen], frame, start.points[point[chosen]], ids
+            )
+    return Control(point[rows], xyz - origin, axes, sigma), rows
+
+
+def _positions(
+    inputs: Inputs, frame: GroundFrame | None, of_orientations: GroundFrame | None, start: BlockStart, origin: Floats
+) -> Positions:
+    """Camera positions, and the centres of observed orientations, as observations."""
+    parts: list[Positions] = []
+    place = {photo: number for number, photo in enumerate(start.photos)}
+    if inputs.positions is not None and frame is not None and len(inputs.positions.photos):
+        parts.append(_measured(inputs, inputs.positions, frame, start, origin))
+    orientations = inputs.orientations
+    if orientations is not None and of_orientations is not None and orientations.observed and orientations.photos:
+        photo = np.array([place[name] for name in orientations.photos], np.intp)
+        use = np.ones((len(photo), 3), bool)
+        xyz, axes, sigma = given_positions(
+            orientations.enu, use, orientations.sigma, of_orientations, start.centers[photo], orientations.photos
+        )
+        none = np.zeros((len(photo), 3))
+        parts.append(Positions(photo, xyz - origin, axes, sigma, none, np.full(len(photo), -1), np.zeros(len(photo))))
+    if len(parts) < 2:
+        return parts[0] if parts else Positions()
+    names = ("photo", "xyz", "axes", "sigma", "lever", "group", "time")
+    joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
+    return replace(parts[0], **joined)
+
+
+def _measured(
+    inputs: Inputs, positions: CameraPositions, frame: GroundFrame, start: BlockStart, origin: Floats
+) -> Positions:
+    """Measured positions with lever arm, offset and drift of each strip."""
+    place = {photo: number for number, photo in enumerate(start.photos)}
+    photo = np.array([place[name] for name in positions.photos], np.intp)
+    lever = np.broadcast_to(np.array(positions.lever_arm, float), (len(photo), 3))
+    near = start.centers[photo] + np.einsum("nij,nj->ni", start.rotations[photo], lever)
+    ids = [f"of photo {name}" for name in positions.photos]
+    xyz, axes, sigma = given_positions(positions.enu, positions.use, positions.sigma, frame, near, ids)
+    strip_of = np.repeat(np.arange(len(inputs.strips)), [len(strip.photos) for strip in inputs.strips])
+    strip, count = strip_of[photo], len(inputs.strips)
+    time = positions.time if np.isfinite(positions.time).all() else photo.astype(float)
+    members = np.bincount(strip, minlength=count)
+    mean = np.bincount(strip, time, count) / np.maximum(members, 1)
+    wanted = np.where((members > 0) & (positions.correction != NO_CORRECTION), np.inf, 0.0)
+    drift = np.where((members > 1) & (positions.correction == DRIFT), np.inf, 0.0)
+    group = strip if positions.correction != NO_CORRECTION else np.full(len(photo), -1)
+    return Positions(photo, xyz - origin, axes, sigma, lever, group, time - mean[strip], wanted, drift)
+
+
+def _level_positions(
+    inputs: Inputs, frame: GroundFrame | None, of_orientations: GroundFrame | None
+) -> tuple[bool, ...]:
+    """Whether the axes of each row of the positions are plan and height."""
+    level: list[bool] = []
+    if inputs.positions is not None and frame is not None:
+        level += [frame.kind != "geocentric"] * len(inputs.positions.photos)
+    if inputs.orientations is not None and of_orientations is not None and inputs.orientations.observed:
+        level += [of_orientations.kind != "geocentric"] * len(inputs.orientations.photos)
+    return tuple(level)
+
+
+def _attitudes(given: GivenOrientations | None, frame: GroundFrame | None, start: BlockStart) -> Attitudes:
+    """Observed rotations; the standard deviations of the angles become those about the photo's own axes."""
+    if given is None or frame is None or not given.observed or not given.photos:
+        return Attitudes()
+    from photostrip.geometry.rotation import from_angles
+
+    place = {photo: number for number, photo in enumerate(start.photos)}
+    photo = np.array([place[name] for name in given.photos], np.intp)
+    centers = frame.cartesian_from_ground(given.enu, ids=[f"of photo {name}" for name in given.photos])
+    own = from_angles(given.angles, given.system)
+    rates = own.transpose(0, 2, 1) @ angle_rates(given.angles, given.system)
+    sigma = np.sqrt(np.einsum("nij,nj->ni", rates**2, given.sigma_angles**2))
+    return Attitudes(photo, frame.axes_at(centers).transpose(0, 2, 1) @ own, sigma)
+
+
+def refilled(
+    block: BlockProblem, control: ControlPoints, frames: Sequence[GroundFrame], points: Floats
+) -> tuple[BlockProblem, float]:
+    """Put present positions in where a control point is given in plan or height only.
+
+    What stands in for a coordinate that is not given moves the given ones a little on a curved Earth.
+
+    Parameters
+    ----------
+    block : BlockProblem
+        The problem.
+    control : ControlPoints
+        Measured control.
+    frames : sequence of GroundFrame
+        Frames of the control lists.
+    points : ndarray, shape (q, 3)
+        Present positions of all points, in the frame of the problem.
+
+    Returns
+    -------
+    BlockProblem
+        The same with new targets.
+    float
+        The largest change of a given coordinate, metres.
+    """
+    given = block.problem.control
+    xyz = given.xyz.copy()
+    partial = ~control.use[block.control].all(axis=1) if len(block.control) else np.zeros(0, bool)
+    for index, frame in enumerate(frames):
+        here = np.flatnonzero(partial & (control.frame[block.control] == index))
+        if len(here):
+            chosen = block.control[here]
+            near = points[given.point[here]] + block.origin
+            ids = [control.ids[row] for row in chosen]
+            made = given_positions(control.enu[chosen], control.use[chosen], control.sigma[chosen], frame, near, ids)
+            xyz[here] = made[0] - block.origin
+    moved = np.abs(np.einsum("nij,nj->ni", given.axes, xyz - given.xyz))[np.isfinite(given.sigma)]
+    changed = replace(block.problem, control=replace(given, xyz=xyz))
+    return replace(block, problem=changed), float(moved.max(initial=0.0))
+
+
+# ------------------------------------------------------------------------------------------- what takes part first
+
+
+def _begin(
+    problem: Problem, rows: Numbers, control: ControlPoints, control_rows: Numbers, start: BlockStart
+) -> Selection:
+    """Choose what takes part at first: what the strip method used, and what else fits its result."""
+    images = problem.images
+    used = np.zeros(int(rows.max(initial=-1)) + 1, bool)
+    paired = np.zeros(len(used), bool)
+    for strip in start.strips:
+        used[strip.rows[strip.rows < len(used)]] = True
+        seen = np.unique(strip.orientation.rows)
+        paired[seen[seen < len(used)]] = True
+    inside = used[rows]
+    free = ~paired[rows]
+    focal = problem.cameras.focal[problem.cameras.of_photo]
+    with np.errstate(invalid="ignore"):
+        computed = project(
+            problem.start.points[images.point], problem.start.centers, problem.start.rotations, images.photo, focal
+        )
+        miss = (np.abs(images.xy - computed) / images.sigma).max(axis=1)
+    known = miss[np.isfinite(miss)]
+    far = max(LEAST_FAR, FAR * float(np.median(known)) if len(known) else 0.0)
+    whole = Selection.everything(problem)
+    given = whole.control.copy()
+    axes = list(control_screening.AXES)
+    wrong = {
+        each.id: [axes.index(axis) for axis in each.axes] for strip in start.strips for each in strip.wrong_control
+    }
+    for row, number in enumerate(control_rows.tolist()):
+        given[row, wrong.get(control.ids[number], [])] = False
+    return replace(whole, images=inside | (free & (miss <= far)), control=given)

@@ -1,0 +1,1 @@
+"""A strip of independent models, from the measured models to adjusted points."""

@@ -1,0 +1,131 @@
+"""What links of independent models say beside their numbers: weakness, contradictions, units."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.notes import Note
+from photostrip.triangulation.error_propagation.derivatives import similarity_rows
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.pipeline.inputs import ModelStrip
+    from photostrip.points import ModelPoints
+    from photostrip.triangulation.independent_models.formation import FormedModels
+
+    Floats = NDArray[np.float64]
+
+ODD_SCALE = 30.0  # ratio of the scale of a model to that of the others
+ANOTHER_UNIT, NOTHING = 100.0, 1e-5  # ratio of residuals to what is stated; below the second there are no errors at all
+WEAK = 12.0  # standard deviations of a coordinate by which a link moves the far end of its model
+
+
+def link_notes(strip: ModelStrip, measured: ModelPoints, formed: FormedModels) -> list[Note]:
+    """Say which links are weak, or contradict themselves, and what seems to stand in another unit.
+
+    Parameters
+    ----------
+    strip : ModelStrip
+        The strip.
+    measured : ModelPoints
+        Model coordinates of the project.
+    formed : FormedModels
+        The formed strip.
+
+    Returns
+    -------
+    list of Note
+        In the order of the links.
+    """
+    links, shared, models = formed.links, formed.links.shared, formed.models
+    notes = _unit_notes(strip, formed)
+    if links.factor > 1:
+        text = (
+            f"strip {strip.id}: the common points of the models differ {np.sqrt(links.factor):.1f} times as much as "
+            "the standard deviations of the model coordinates allow; gross errors are searched for with larger ones"
+        )
+        notes.append(Note("sigma-contradicted", text, severity="note", strip=strip.id))
+    center = np.bincount(
+        shared.link[links.used & (models.node[shared.before] >= models.points)], minlength=shared.count
+    )
+    far = far_ends(formed)
+    for link in range(shared.count):
+        names = strip.models[link : link + 2]
+        photo = strip.photos[link + 1]
+        if far[link] > WEAK:
+            why = "" if center[link] else f"; the perspective centre of photo {photo} is missing in one of them"
+            text = (
+                f"strip {strip.id}: models {names[0]} and {names[1]} are linked weakly: the far end of the second is "
+                f"uncertain by {far[link]:.0f} times the standard deviation of a model coordinate{why}"
+            )
+            notes.append(Note("weak-link", text, strip=strip.id, photos=(photo,)))
+        elif not center[link]:
+            text = (
+                f"strip {strip.id}: models {names[0]} and {names[1]} are linked without the perspective centre of "
+                f"photo {photo}, which is not measured in both"
+            )
+            notes.append(Note("link-without-center", text, severity="note", strip=strip.id, photos=(photo,)))
+    for rows in links.doubtful:
+        link = int(shared.link[rows[0]])
+        names = strip.models[link : link + 2]
+        points = [measured.name(int(models.node[shared.before[row]])) for row in rows]
+        what = f"one of {', '.join(points)}" if len(points) > 1 else points[0]
+        text = (
+            f"strip {strip.id}: the common points of models {names[0]} and {names[1]} contradict each other: {what} is "
+            "wrong, and it is used all the same; measure more common points"
+        )
+        notes.append(Note("contradicting-link", text, strip=strip.id, points=tuple(points)))
+    return notes
+
+
+def _unit_notes(strip: ModelStrip, formed: FormedModels) -> list[Note]:
+    """Say where a model, or the standard deviations, seem to stand in another unit than they should."""
+    notes = []
+    scale = formed.places.scale / np.median(formed.places.scale)
+    for number in np.flatnonzero(np.abs(np.log(scale)) > np.log(ODD_SCALE)).tolist():
+        times = f"{1 / scale[number]:.3g} times smaller" if scale[number] < 1 else f"{scale[number]:.3g} times larger"
+        text = (
+            f"strip {strip.id}: the scale number of model {strip.models[number]} is {times} than that of the others: "
+            "are its coordinates in another unit?"
+        )
+        notes.append(Note("odd-scale", text, strip=strip.id, photos=strip.photos[number : number + 2]))
+    solved = formed.links.solved
+    redundancy = int(solved.redundancy.sum())
+    ratio = float(np.sqrt(solved.squares.sum() / redundancy)) if redundancy else 1.0
+    if ratio > ANOTHER_UNIT or NOTHING < ratio < 1 / ANOTHER_UNIT:
+        text = (
+            f"strip {strip.id}: the models fit each other with {ratio:.3g} times the standard deviations that are "
+            "stated: are these in another unit?"
+        )
+        notes.append(Note("sigma-unit", text, strip=strip.id, key="models.sigma"))
+    return notes
+
+
+def far_ends(formed: FormedModels) -> Floats:
+    """Uncertainty of the far end of the model after each link, in standard deviations of a coordinate.
+
+    Parameters
+    ----------
+    formed : FormedModels
+        The strip.
+
+    Returns
+    -------
+    ndarray, shape (j,)
+        Largest standard deviation of a coordinate over the median one of a coordinate of the model.
+    """
+    models, solved = formed.models, formed.links.solved
+    rows = np.flatnonzero((models.model > 0) & (models.node < models.points))
+    link = models.model[rows] - 1
+    moved = solved.similarities.of(link, models.xyz[rows])
+    design = similarity_rows(moved - solved.centroid[link], np.zeros(3))
+    variance = np.einsum("nij,njk,nik->ni", design, solved.cofactors[link], design).max(axis=1)
+    scale = solved.similarities.scale
+    found = np.zeros(len(scale))
+    np.maximum.at(found, link, variance)
+    own = np.array([np.median(models.sigma[rows[link == number]]) for number in range(len(scale))])
+    ratio: Floats = np.sqrt(found) / np.maximum(scale * own, 1e-300)
+    return ratio

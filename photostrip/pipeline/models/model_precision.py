@@ -1,0 +1,231 @@
+"""How precise points and perspective centres of independent models are: covariances from the model coordinates."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.pipeline.precision.check_points import check_points
+from photostrip.pipeline.precision.strip_precision import StripPrecision
+from photostrip.statistics import chi2_quantile
+from photostrip.triangulation import absolute_orientation
+from photostrip.triangulation.error_propagation import control_errors
+from photostrip.triangulation.error_propagation.covariances import A_POSTERIORI, A_PRIORI, LEVEL, CheckTest
+from photostrip.triangulation.error_propagation.derivatives import PARAMETERS, Rows, similarity_rows
+from photostrip.triangulation.gross_errors.control import control_significance
+from photostrip.triangulation.independent_models import model_errors, perspective_centers
+from photostrip.triangulation.polynomial.terms import POWERS
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.geodesy.crs import GroundFrame
+    from photostrip.geodesy.local_frame import IntermediateFrame
+    from photostrip.pipeline.models.model_results import LinkedStrip
+    from photostrip.points import ControlPoints, PhotoPoints
+    from photostrip.triangulation.error_propagation.control_errors import Correction, Misclosures
+    from photostrip.triangulation.independent_models.formation import FormedModels
+    from photostrip.triangulation.independent_models.model_errors import ModelErrors
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+
+def variance_factor(formed: FormedModels) -> tuple[float, str]:
+    """Variance factor of the model coordinates: 1 unless the links contradict what is stated.
+
+    Parameters
+    ----------
+    formed : FormedModels
+        The strip.
+
+    Returns
+    -------
+    factor : float
+        Variance found over variance stated, or 1.
+    basis : str
+        ``"a-posteriori"`` or ``"a-priori"``.
+    """
+    solved = formed.links.solved
+    redundancy, squares = int(solved.redundancy.sum()), float(solved.squares.sum())
+    if redundancy < 1:
+        return 1.0, A_PRIORI
+    low, high = (chi2_quantile(p, redundancy) for p in (LEVEL / 2, 1 - LEVEL / 2))
+    return (1.0, A_PRIORI) if low <= squares <= high else (squares / redundancy, A_POSTERIORI)
+
+
+def of_linked(
+    strip: LinkedStrip, observations: PhotoPoints, frames: Sequence[GroundFrame], given: ControlPoints
+) -> StripPrecision:
+    """Covariances of one strip of independent models.
+
+    Parameters
+    ----------
+    strip : LinkedStrip
+        The strip with all its stages.
+    observations : PhotoPoints
+        It names the points.
+    frames : sequence of GroundFrame
+        Ground frames of the given points.
+    given : ControlPoints
+        All given points; the check points among them are compared with what is found.
+
+    Returns
+    -------
+    StripPrecision
+        Covariances of points and perspective centres, test of the check points. The rotations of the photos are not
+        known, and neither are their covariances.
+    """
+    formed, axes = strip.formed, strip.intermediate.axes
+    found = model_errors.differentiate(formed, strip.absolute.similarity)
+    seen, fit = _fit_to_control(strip, found, frames)
+    factor, basis = variance_factor(formed)
+    influence = _influence(strip, fit)
+    by_parameters = model_errors.sums(found, *_weights(seen, strip.control_rows, fit.operator))
+    spread = model_errors.covariance_of_sums(found, by_parameters)
+    spread += (fit.operator * (seen.variance / factor)) @ fit.operator.T
+    mixed = model_errors.with_sums(found, by_parameters) @ influence.transpose(0, 2, 1)
+    nodes = model_errors.covariances(found) - mixed - mixed.transpose(0, 2, 1)
+    nodes = (nodes + influence @ spread @ influence.transpose(0, 2, 1)) * factor
+    nodes = axes @ nodes @ axes.T
+    points = len(formed.point)
+    sigma = float(np.sqrt(np.median(formed.models.sigma**2) * factor))
+    return StripPrecision(
+        nodes[:points],
+        _of_photos(formed, nodes),
+        lambda rows, columns: axes @ influence[rows] @ fit.operator[:, columns],
+        np.column_stack([formed.point[strip.control_rows][seen.point], seen.axis]),
+        seen.variance,
+        sigma,
+        basis,
+        _check(strip, (found, seen, fit, influence), check_points(strip, given, observations), frames, factor),
+    )
+
+
+def _of_photos(formed: FormedModels, nodes: Floats) -> Floats:
+    """Covariances of the photos: of their centres alone."""
+    photos = np.full((len(formed.photos), 6, 6), np.nan)
+    row = np.searchsorted(formed.node, formed.photos)
+    for photo in np.flatnonzero(np.isfinite(formed.centers).all(axis=1)).tolist():
+        photos[photo, :3, :3] = nodes[row[photo]]
+    return photos
+
+
+def joint(
+    formed: FormedModels,
+    orientation: absolute_orientation.AbsoluteOrientation,
+    given: tuple[ControlPoints, Numbers],
+    frames: Sequence[GroundFrame],
+    intermediate: IntermediateFrame,
+) -> control_significance.Joint | None:
+    """Covariance of all misclosures at the control; None where there are too many to form it as a whole.
+
+    Parameters
+    ----------
+    formed : FormedModels
+        The formed strip.
+    orientation : absolute_orientation.AbsoluteOrientation
+        Its similarity to the control.
+    given : tuple of ControlPoints and ndarray of int
+        The control, and its rows in the points of the strip.
+    frames : sequence of GroundFrame
+        Ground frames of the control.
+    intermediate : IntermediateFrame
+        Frame of the adjustment.
+    """
+    control, rows = given
+    if control.use.sum() > control_significance.LARGEST or len(formed.photos) > control_significance.LONGEST:
+        return None
+    found = model_errors.differentiate(formed, orientation.similarity)
+    xyz = orientation.similarity(formed.xyz[rows])
+    targets = absolute_orientation.Targets(control, frames, intermediate)
+    seen = _misclosures(targets.turned(xyz), targets.axes(xyz), xyz, found.origin)
+    covariance = (
+        model_errors.covariance_of_sums(found, model_errors.sums(found, *_weights(seen, rows))) * formed.links.factor
+    )
+    moved = similarity_rows(xyz[seen.point], found.origin)
+    design = np.einsum("wi,wij->wj", seen.direction, moved)
+    return control_significance.Joint(seen.point, seen.axis, design, covariance + np.diag(seen.variance))
+
+
+def _fit_to_control(
+    strip: LinkedStrip, found: ModelErrors, frames: Sequence[GroundFrame]
+) -> tuple[Misclosures, Correction]:
+    """Misclosures at the control and the operator of the fit, with the weights that were in force."""
+    targets = absolute_orientation.Targets(strip.control, frames, strip.intermediate)
+    xyz = strip.absolute.similarity(strip.formed.xyz[strip.control_rows])
+    control = targets.turned(xyz)
+    seen = _misclosures(control, targets.axes(xyz), xyz, found.origin)
+    terms = [axis.terms for axis in strip.polynomial.axes] if strip.polynomial else [(), (), ()]
+    weight = absolute_orientation.weights(control, strip.precision)
+    return seen, control_errors.correction(seen, weight, xyz, terms, found.origin)
+
+
+def _misclosures(control: ControlPoints, axes: Floats, xyz: Floats, origin: Floats) -> Misclosures:
+    """Control coordinates that count, with their derivatives by a similarity of the strip."""
+    point, axis = np.nonzero(control.use)
+    direction = axes[point, axis]
+    frame = direction[:, None] @ similarity_rows(xyz[point], origin)
+    nothing = np.zeros(0, np.intp)
+    rows = Rows(nothing, frame, np.zeros((len(point), 0, 1, 0)), nothing, nothing, np.zeros((0, 1, 2)))
+    return control_errors.Misclosures(point, axis, direction, control.sigma[point, axis] ** 2, rows)
+
+
+def _weights(seen: Misclosures, rows: Numbers, operator: Floats | None = None) -> tuple[Numbers, Floats]:
+    """Nodes of given points, and sums of their coordinates as weighted sums of the nodes; by default each one."""
+    if operator is None:
+        operator = np.eye(len(seen.point))
+    weights = np.zeros((len(rows), len(operator), 3))
+    np.add.at(weights, seen.point, operator.T[:, :, None] * seen.direction[:, None, :])
+    return rows, weights.transpose(1, 0, 2)
+
+
+def _influence(strip: LinkedStrip, fit: Correction) -> Floats:
+    """Displacement of points and centres by the parameters of the fit, shape (k, 3, t)."""
+    formed = strip.formed
+    nodes = strip.absolute.similarity(formed.node_xyz)
+    influence = fit.influence(nodes)
+    points = len(formed.point)
+    if points < len(nodes) and any(fit.terms):
+        above = perspective_centers.heights_above(nodes[points:], nodes[:points])
+        unit = np.array([fit.reach, fit.breadth, 1.0])
+        start = PARAMETERS
+        for columns in _scaled_rows(nodes[points:], above, fit.terms, unit):
+            influence[points:, :, start : start + columns.shape[2]] = columns
+            start += columns.shape[2]
+    return influence
+
+
+def _scaled_rows(xyz: Floats, above: Floats, terms: Sequence[tuple[str, ...]], unit: Floats) -> list[Floats]:
+    """Displacements of centres by coefficients of X and Y divided by lengths, as the fit has them."""
+    rows = perspective_centers.displacement_rows(xyz, above, terms)
+    return [
+        row / np.array([unit[0] ** i * unit[1] ** j for i, j in (POWERS[name] for name in names)])
+        for row, names in zip(rows, terms, strict=True)
+    ]
+
+
+def _check(
+    strip: LinkedStrip,
+    parts: tuple[ModelErrors, Misclosures, Correction, Floats],
+    checks: tuple[ControlPoints, Numbers],
+    frames: Sequence[GroundFrame],
+    factor: float,
+) -> CheckTest | None:
+    """Test of the check points together; None without any."""
+    (found, control, fit, influence), (points, rows) = parts, checks
+    if not len(rows):
+        return None
+    xyz = strip.xyz[rows]
+    targets = absolute_orientation.Targets(points, frames, strip.intermediate)
+    seen = _misclosures(targets.turned(xyz), targets.axes(xyz), xyz, found.origin)
+    difference = targets.misclosures(xyz)[seen.point, seen.axis]
+    taken = np.einsum("wi,wit->wt", seen.direction, influence[rows][seen.point]) @ fit.operator
+    own = model_errors.sums(found, *_weights(seen, rows))
+    own = own - model_errors.sums(found, *_weights(control, strip.control_rows, taken))
+    spread = model_errors.covariance_of_sums(found, own) * factor + (taken * control.variance) @ taken.T
+    squares = float(difference @ np.linalg.solve(spread + np.diag(seen.variance), difference))
+    return CheckTest(len(points), len(difference), squares)

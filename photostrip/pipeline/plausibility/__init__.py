@@ -1,0 +1,1 @@
+"""The plausibility gate of a run: evidence gathered from the stages, findings told."""

@@ -1,0 +1,71 @@
+"""Directions of bases by relative orientation, where the photos laid side by side leave their order in doubt.
+
+On a photo, a tilt moves the points of its neighbour as a base does: with an end lap of 80 % and a long lens a tilt of
+5 degrees is as large as half a base. The layout of the photos is a cheap screen; what it speaks against is looked at
+with the pair oriented, which keeps base and tilt apart.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import PhotostripError
+from photostrip.pipeline.plausibility import evidence
+from photostrip.triangulation.relative_orientation import relative
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from photostrip.pipeline.inputs import Settings, Strip
+    from photostrip.points import PhotoPoints
+
+LEAST_POINTS = 6  # one more than a pair has unknowns
+WORST = 0.01  # sigma0 of a pair over the principal distance: beyond it the base is no better known than by the layout
+
+
+def closer_look(
+    strip: Strip, observations: PhotoPoints, settings: Settings
+) -> Callable[[str, str], tuple[complex, complex] | None]:
+    """Give what tells in which directions two photos of a strip lie from each other.
+
+    Parameters
+    ----------
+    strip : Strip
+        The strip; the order of its photos does not matter.
+    observations : PhotoPoints
+        Image points in the system of the photo, mm.
+    settings : Settings
+        What is to be done.
+
+    Returns
+    -------
+    callable
+        Of two photos, the direction towards the second on the first and towards the first on the second; None where
+        the pair cannot be oriented well enough to say.
+    """
+    points: list[PhotoPoints] = []
+
+    @cache
+    def toward(one: str, other: str) -> tuple[complex, complex] | None:
+        if not points:
+            points.append(evidence.ideal(observations, [strip], settings))
+        focal = strip.camera.principal_distance
+        try:
+            with np.errstate(all="ignore"):
+                pairs, point, rows = relative.collect_pairs(points[0], [one, other], focal)
+                if len(point) < LEAST_POINTS:
+                    return None
+                oriented, converged = relative.attempt(pairs, point, rows)
+                doubtful = relative.doubtful(oriented, converged)
+        except (PhotostripError, ArithmeticError, ValueError):
+            return None
+        if doubtful[0] or not oriented.sigma0[0] < WORST * focal:
+            return None
+        base, turn = (each[0] for each in oriented.relative)
+        back = -base @ turn
+        return complex(base[0], base[1]), complex(back[0], back[1])
+
+    return toward

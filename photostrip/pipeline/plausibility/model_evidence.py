@@ -1,0 +1,118 @@
+"""What the gate looks at where models were measured: the strip of models, and given points as it sees them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import PhotostripError
+from photostrip.pipeline.models.model_strips import form_models
+from photostrip.triangulation.plausibility.control.control_strip import Seen
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.pipeline.inputs import MeasuredModels, ModelStrip, Settings
+    from photostrip.points import ControlPoints
+    from photostrip.triangulation.independent_models.formation import FormedModels
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+UP = np.array([0.0, 0.0, 1.0])  # of a strip of models with perspective centres
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """A strip of models with centres, as the gate sees it.
+
+    Parameters
+    ----------
+    strip : ModelStrip
+        The strip.
+    centers : ndarray, shape (f, 3)
+        Perspective centres of the photos that have one, in strip coordinates.
+    photos : tuple of str
+        These photos.
+    depth : ndarray, shape (f,)
+        Height of each above the points of its models.
+    rows : ndarray of int
+        Rows of the given points that the strip holds.
+    seen : Seen
+        The same points in the strip.
+    place : ndarray
+        Place of each of them along the strip in bases, from 0 at the first photo.
+    breadth : float
+        Half breadth of the strip over its length.
+    """
+
+    strip: ModelStrip
+    centers: Floats
+    photos: tuple[str, ...]
+    depth: Floats
+    rows: Numbers
+    seen: Seen
+    place: Floats
+    breadth: float
+
+
+def sights(models: MeasuredModels, control: ControlPoints, settings: Settings) -> Iterator[Sight]:
+    """Form the strips as far as that goes, for evidence alone.
+
+    Parameters
+    ----------
+    models : MeasuredModels
+        Strips and model coordinates.
+    control : ControlPoints
+        Given points.
+    settings : Settings
+        What was to be done.
+
+    Yields
+    ------
+    Sight
+        Of each strip that can be formed and has two perspective centres.
+    """
+    for strip in models.strips:
+        try:
+            formed = form_models(strip, models.points, settings)
+        except (PhotostripError, ArithmeticError, ValueError):
+            continue
+        if np.isfinite(formed.centers[:, 0]).sum() > 1:
+            yield _sight(strip, formed, control, models.points.point_ids)
+
+
+def _sight(strip: ModelStrip, formed: FormedModels, control: ControlPoints, point_ids: Sequence[str]) -> Sight:
+    known = np.flatnonzero(np.isfinite(formed.centers[:, 0]))
+    centers, depth = formed.centers[known], _depths(formed)[known]
+    number = {name: n for n, name in enumerate(point_ids)}
+    row_of = {int(n): row for row, n in enumerate(formed.point)}
+    places = np.array([row_of.get(number.get(name, -1), -1) for name in control.ids], np.intp)
+    rows = np.flatnonzero(places >= 0)
+    xyz, middle = formed.xyz[places[rows]], float(np.median(depth))
+    turn = formed.places.rotation[formed.models.model]
+    variance = np.einsum("nij,nj->ni", turn**2, formed.models.sigma**2)
+    variance *= (formed.places.scale[formed.models.model] ** 2 * formed.links.factor)[:, None]
+    plan, height = np.sqrt(np.median(variance[:, :2])), np.sqrt(np.median(variance[:, 2]))
+    floor = 2.0 * float(plan) / abs(middle), 2.0 * float(height) / abs(middle)
+    seen = Seen(strip.id, xyz, np.tile(UP, (len(centers), 1)), centers, floor, abs(middle))
+    along = np.interp(xyz[:, 0], centers[:, 0], known.astype(float))
+    length = max(float(np.ptp(centers[:, 0])), 1e-9)
+    breadth = float(np.quantile(np.abs(formed.xyz[:, 1] - np.median(formed.xyz[:, 1])), 0.95)) / length
+    photos = tuple(strip.photos[k] for k in known.tolist())
+    return Sight(strip, centers, photos, depth, rows, seen, along, breadth)
+
+
+def _depths(formed: FormedModels) -> Floats:
+    """Heights of the centres above the points of their models, strip coordinates; NaN without a centre."""
+    models = formed.models
+    point = (models.node < models.points) & formed.used
+    count = np.bincount(models.model[point], minlength=models.count)
+    ground = np.bincount(models.model[point], formed.model_xyz[point, 2], models.count) / np.maximum(count, 1)
+    both = np.concatenate([ground[:1], (ground[1:] + ground[:-1]) / 2, ground[-1:]])
+    depths: Floats = formed.centers[:, 2] - both
+    return depths

@@ -1,0 +1,189 @@
+"""Errors at check points against what the covariances let expect of all of them together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.triangulation import absolute_orientation
+from photostrip.triangulation.covariance_adjustment import prediction
+from photostrip.triangulation.error_propagation import control_errors, covariances
+from photostrip.triangulation.error_propagation.derivatives import Rows
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.geodesy.crs import GroundFrame
+    from photostrip.pipeline.covariance_adjustment import CovarianceAdjustment
+    from photostrip.pipeline.models.model_results import LinkedStrip
+    from photostrip.pipeline.precision.propagation import Propagation
+    from photostrip.pipeline.results import StripResult
+    from photostrip.points import ControlPoints, PhotoPoints
+    from photostrip.triangulation.error_propagation.control_errors import Misclosures
+    from photostrip.triangulation.error_propagation.strip_errors import StripErrors
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+LARGEST = 100  # check points of a strip that are tested together, spread over it
+
+
+def check_points(
+    strip: StripResult | LinkedStrip, control: ControlPoints, observations: PhotoPoints
+) -> tuple[ControlPoints, Numbers]:
+    """Check points that a strip holds, and their rows in its points.
+
+    Parameters
+    ----------
+    strip : StripResult or LinkedStrip
+        The strip.
+    control : ControlPoints
+        All given points.
+    observations : PhotoPoints
+        Image points of the project, which name its points.
+
+    Returns
+    -------
+    ControlPoints
+        The check points.
+    rows : ndarray of int, shape (c,)
+        Their rows in ``strip.formed.point``.
+    """
+    number = {name: n for n, name in enumerate(observations.point_ids)}
+    row_of = {int(n): row for row, n in enumerate(strip.formed.point)}
+    rows = np.array([row_of.get(number.get(name, -1), -1) for name in control.ids], np.intp)
+    found = np.flatnonzero(control.check & (rows >= 0) & control.use.any(axis=1))
+    found = found[np.argsort(strip.xyz[rows[found], 0], kind="stable")]
+    if len(found) > LARGEST:
+        found = found[np.linspace(0, len(found) - 1, LARGEST).round().astype(int)]
+    return control.take(found), rows[found]
+
+
+def by_fit(found: Propagation, given: Given, rows: Numbers, factor: float) -> covariances.CheckTest:
+    """Test the check points of a strip that was fitted to the control.
+
+    Parameters
+    ----------
+    found : Propagation
+        Rows and operators of the strip method.
+    given : Given
+        What the check points say.
+    rows : ndarray of int, shape (c,)
+        Their rows in the points of the strip.
+    factor : float
+        Variance factor of the image coordinates.
+
+    Returns
+    -------
+    CheckTest
+        The test.
+    """
+    seen = given.seen
+    by_parameters = np.einsum("wi,wit->wt", seen.direction, found.influence[rows][seen.point])
+    taken = by_parameters @ found.fit.operator
+    joint = _joint(found.errors, seen.rows, (found.control.rows, found.control.variance, taken), factor)
+    return _tested(given, joint)
+
+
+def by_covariance(own: CovarianceAdjustment, given: Given) -> covariances.CheckTest:
+    """Test the check points of a strip that was adjusted with its own covariance.
+
+    Parameters
+    ----------
+    own : CovarianceAdjustment
+        The adjustment.
+    given : Given
+        What the check points say.
+
+    Returns
+    -------
+    CheckTest
+        The test.
+    """
+    wanted = own.conditions
+    taken = prediction.influence(own.errors, wanted, own.local, own.system, given.seen.rows)
+    # the similarities of the models are unknowns of this adjustment, not errors
+    parts = (without_frame(wanted.rows), wanted.noise, taken)
+    return _tested(given, _joint(own.errors, without_frame(given.seen.rows), parts, own.factor))
+
+
+@dataclass(frozen=True, eq=False)
+class Given:
+    """What check points say.
+
+    Parameters
+    ----------
+    points : int
+        Check points.
+    seen : Misclosures
+        Their coordinates.
+    difference : ndarray, shape (w,)
+        Adjusted minus given, metres.
+    """
+
+    points: int
+    seen: Misclosures
+    difference: Floats
+
+
+def given_at(
+    strip: StripResult, errors: StripErrors, checks: tuple[ControlPoints, Numbers], frames: Sequence[GroundFrame]
+) -> Given:
+    """Compare a strip with its check points.
+
+    Parameters
+    ----------
+    strip : StripResult
+        The strip.
+    errors : StripErrors
+        Its rows.
+    checks : tuple of ControlPoints and ndarray of int
+        The check points and their rows in the strip.
+    frames : sequence of GroundFrame
+        Ground frames of the given points.
+
+    Returns
+    -------
+    Given
+        Differences along the ground axes.
+    """
+    points, rows = checks
+    xyz = strip.xyz[rows]
+    targets = absolute_orientation.Targets(points, frames, strip.intermediate)
+    seen = control_errors.misclosures(errors.points, targets.turned(xyz), rows, targets.axes(xyz))
+    return Given(len(points), seen, targets.misclosures(xyz)[seen.point, seen.axis])
+
+
+def _tested(given: Given, joint: Floats) -> covariances.CheckTest:
+    joint = joint + np.diag(given.seen.variance)
+    squares = float(given.difference @ np.linalg.solve(joint, given.difference))
+    return covariances.CheckTest(given.points, len(given.difference), squares)
+
+
+def without_frame(rows: Rows) -> Rows:
+    """Leave out the similarity of the first model."""
+    return replace(rows, frame=np.zeros_like(rows.frame))
+
+
+def _joint(errors: StripErrors, own: Rows, by: tuple[Rows, Floats, Floats], factor: float) -> Floats:
+    """Joint covariance of the errors at check coordinates: their own rows minus what is taken away by others."""
+    rows, variance, taken = by
+    slots = max(rows.core.shape[1], own.core.shape[1])
+    core = np.zeros((len(rows.first) + len(own.first), slots, 1, own.core.shape[3]))
+    core[: len(rows.first), : rows.core.shape[1]] = rows.core
+    core[len(rows.first) :, : own.core.shape[1]] = own.core
+    both = Rows(
+        np.concatenate([rows.first, own.first]),
+        np.concatenate([rows.frame, own.frame]),
+        core,
+        np.concatenate([rows.item, own.item + len(rows.first)]),
+        np.concatenate([rows.image, own.image]),
+        np.concatenate([rows.own, own.own]),
+    )
+    operator = np.concatenate([-taken, np.eye(len(own.first))], axis=1)
+    joint = factor * covariances.sums_of(errors, both, operator)
+    return np.asarray(joint + (taken * variance) @ taken.T, float)

@@ -1,0 +1,195 @@
+"""How precise points and photos of a result are: every strip by itself, then all together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.pipeline.covariance_adjustment import measured
+from photostrip.pipeline.precision import check_points
+from photostrip.pipeline.precision.propagation import propagation
+from photostrip.pipeline.results import Precision
+from photostrip.triangulation.error_propagation import covariances
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.geodesy.crs import GroundFrame
+    from photostrip.pipeline.covariance_adjustment import CovarianceAdjustment
+    from photostrip.pipeline.models.model_results import LinkedStrip
+    from photostrip.pipeline.results import Adjusted, StripResult
+    from photostrip.points import ControlPoints, PhotoPoints
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+
+AT_A_TIME = 100  # control coordinates that two strips share, looked at together
+
+
+@dataclass(frozen=True, eq=False)
+class StripPrecision:
+    """Covariances of one strip in the axes of the Cartesian frame.
+
+    Parameters
+    ----------
+    points : ndarray, shape (q, 3, 3)
+        Of the points of the strip, metres^2.
+    photos : ndarray, shape (m, 6, 6)
+        Of centre and small rotation of its photos; NaN where a photo could not be oriented.
+    by_control : callable
+        Takes rows of points (n,) and of control coordinates (c,), gives what errors of these coordinates subtract from
+        these points, (n, 3, c), in the same axes.
+    control : ndarray of int, shape (w, 2)
+        The control coordinates that count: the control point's number among the image points' ids, and its ground axis.
+    variance : ndarray, shape (w,)
+        Their variances, metres^2.
+    sigma : float
+        Standard deviation of an image coordinate of weight one, mm.
+    basis : str
+        Where that comes from.
+    check : CheckTest or None
+        Test of the strip's check points together.
+    """
+
+    points: Floats
+    photos: Floats
+    by_control: Callable[[Numbers, Numbers], Floats]
+    control: Numbers
+    variance: Floats
+    sigma: float
+    basis: str
+    check: covariances.CheckTest | None
+
+
+def of_strip(
+    strip: StripResult, observations: PhotoPoints, frames: Sequence[GroundFrame], given: ControlPoints
+) -> StripPrecision:
+    """Covariances of one strip.
+
+    Parameters
+    ----------
+    strip : StripResult
+        The strip with all its stages.
+    observations : PhotoPoints
+        Ideal image coordinates of the project.
+    frames : sequence of GroundFrame
+        Ground frames of the given points.
+    given : ControlPoints
+        All given points; the check points among them are compared with what is found.
+
+    Returns
+    -------
+    StripPrecision
+        Covariances of points and photos, test of the check points.
+    """
+    checks = check_points.check_points(strip, given, observations)
+    if strip.covariance is not None:
+        return _of_covariance(strip, strip.covariance, checks, frames)
+    found = propagation(strip, observations, frames)
+    errors, operator = found.errors, found.fit.operator
+    stated = float(np.median(observations.sigma[measured(strip.strip, observations) >= 0]))
+    factor, basis = covariances.image_variance(strip.orientation, stated)
+    parameters = covariances.fitted(errors, found.control, operator, factor)
+    points = covariances.covariances(errors, errors.points, parameters, found.influence) * factor
+    photos = np.full((len(strip.strip.photos), 6, 6), np.nan)
+    photos[found.oriented] = covariances.covariances(errors, found.photos, parameters, found.photo_influence) * factor
+    numbers = strip.formed.point[strip.control_rows][found.control.point]
+    return StripPrecision(
+        *_turned(strip, points, photos),
+        lambda rows, columns: strip.intermediate.axes @ found.influence[rows] @ operator[:, columns],
+        np.column_stack([numbers, found.control.axis]),
+        found.control.variance,
+        stated * float(np.sqrt(factor)),
+        basis,
+        check_points.by_fit(found, check_points.given_at(strip, errors, checks, frames), checks[1], factor)
+        if len(checks[1])
+        else None,
+    )
+
+
+def _of_covariance(
+    strip: StripResult,
+    adjusted: CovarianceAdjustment,
+    checks: tuple[ControlPoints, Numbers],
+    frames: Sequence[GroundFrame],
+) -> StripPrecision:
+    """Covariances that the adjustment with the strip's own covariance has found already."""
+    numbers = strip.formed.point[strip.control_rows][adjusted.control.point]
+
+    def by_control(rows: Numbers, columns: Numbers) -> Floats:
+        axes: Floats = strip.intermediate.axes
+        return np.asarray(axes @ adjusted.by_control(rows, columns), float)
+
+    return StripPrecision(
+        *_turned(strip, adjusted.points, adjusted.photos),
+        by_control,
+        np.column_stack([numbers, adjusted.control.axis]),
+        adjusted.control.variance,
+        adjusted.sigma,
+        adjusted.basis,
+        check_points.by_covariance(adjusted, check_points.given_at(strip, adjusted.errors, checks, frames))
+        if len(checks[1])
+        else None,
+    )
+
+
+def _turned(strip: StripResult, points: Floats, photos: Floats) -> tuple[Floats, Floats]:
+    """Covariances from the intermediate to the Cartesian frame."""
+    axes, both = strip.intermediate.axes, np.zeros((6, 6))
+    both[:3, :3] = both[3:, 3:] = axes
+    return axes @ points @ axes.T, both @ photos @ both.T
+
+
+def joined(
+    strips: Sequence[StripPrecision], results: Sequence[StripResult | LinkedStrip], points: Adjusted
+) -> Precision:
+    """Precision of all strips together; a point of several strips is their mean.
+
+    Parameters
+    ----------
+    strips : sequence of StripPrecision
+        Precision of each strip.
+    results : sequence of StripResult or LinkedStrip
+        The strips.
+    points : Adjusted
+        Points of all strips.
+
+    Returns
+    -------
+    Precision
+        Covariances of points and photos. Strips have no image coordinate in common; what their points share are the
+        errors of common control.
+    """
+    rows = [np.searchsorted(points.number, result.formed.point) for result in results]
+    count = np.bincount(np.concatenate(rows), minlength=len(points.number))
+    total = np.zeros((len(points.number), 3, 3))
+    for row, strip in zip(rows, strips, strict=True):
+        total[row] += strip.points
+    for (row_a, a), (row_b, b) in combinations(zip(rows, strips, strict=True), 2):
+        shared, in_a, in_b = np.intersect1d(row_a, row_b, return_indices=True)
+        _, of_a, of_b = np.intersect1d(_keys(a), _keys(b), return_indices=True)
+        if not len(shared):
+            continue
+        for start in range(0, len(of_a), AT_A_TIME):
+            part = slice(start, start + AT_A_TIME)
+            seen_a, seen_b = a.by_control(in_a, of_a[part]), b.by_control(in_b, of_b[part])
+            mixed = (seen_a * a.variance[of_a[part]]) @ seen_b.transpose(0, 2, 1)
+            total[shared] += mixed + mixed.transpose(0, 2, 1)
+    return Precision(
+        total / (count**2)[:, None, None],
+        tuple(strip.photos for strip in strips),
+        tuple(strip.sigma for strip in strips),
+        tuple(strip.basis for strip in strips),
+        tuple(strip.check for strip in strips),
+    )
+
+
+def _keys(strip: StripPrecision) -> Numbers:
+    """One number for each control coordinate."""
+    return np.asarray(strip.control[:, 0] * 3 + strip.control[:, 1], np.intp)

@@ -1,0 +1,1 @@
+"""What `photostrip check` looks at."""

@@ -1,0 +1,367 @@
+"""What can be said about a project before anything is adjusted: ``photostrip check``.
+
+The faults of the files were found while they were read. Here is the rest: whether photos, pairs, strips and control
+have what an adjustment needs, what the ground frames make of a coordinate, which standard deviation each control
+coordinate gets and from where, and what became of every row of every table.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from photostrip.errors import Fault, GeometryError, InputError
+from photostrip.formats.text.findings import Findings
+from photostrip.geodesy.crs import tie_frames
+from photostrip.pipeline import overruling
+from photostrip.pipeline.plausibility import gate
+from photostrip.pipeline.run import require_whole
+from photostrip.project.checks.model_checking import (
+    counts_of_models,
+    links_of_models,
+    model_sigma,
+    photos_of_points,
+    points_of_strip,
+    source_of,
+)
+from photostrip.project.checks.rows import gaps_of, observations_used, table_rows
+from photostrip.project.loading import load_project
+from photostrip.project.yaml.document import fault_at
+from photostrip.triangulation.image_coordinates import corrections, interior
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from photostrip.formats.measured.control import ControlTable
+    from photostrip.geodesy.crs import GroundFrame
+    from photostrip.notes import Finding, Note
+    from photostrip.points import PhotoPoints
+    from photostrip.project.loading import Project
+
+    Floats = NDArray[np.float64]
+    Document = dict[str, Any]
+
+LEAST_PLAN, LEAST_HEIGHT = 2, 3  # control coordinates that seven parameters need
+MILLIMETRES = 1000.0  # in a metre
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What was found in one project.
+
+    Parameters
+    ----------
+    path : str
+        The project file as the user named it.
+    faults : tuple of Fault
+        What must be put right before the project can be adjusted.
+    findings : tuple of Finding
+        What the data say against themselves.
+    notes : tuple of Note
+        What the surveyor should know.
+    document : dict
+        What was decoded: counts, rows, frames, control; empty when the files could not be read.
+    """
+
+    path: str
+    faults: tuple[Fault, ...]
+    findings: tuple[Finding, ...]
+    notes: tuple[Note, ...]
+    document: Document
+
+    @property
+    def told(self) -> tuple[Fault | Finding | Note, ...]:
+        """Faults, then findings, then notes."""
+        return (*self.faults, *self.findings, *self.notes)
+
+    @property
+    def wrong(self) -> int:
+        """How much must be put right: faults, and findings that stand against the whole result."""
+        return len(self.faults) + sum(each.is_error for each in self.findings)
+
+    @property
+    def remarks(self) -> int:
+        """How much else is told."""
+        return len(self.told) - self.wrong
+
+
+def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
+    """Check a project as far as that goes without adjusting it.
+
+    Parameters
+    ----------
+    path : Path
+        The project file.
+    overrides : sequence of str
+        Assignments ``key.path=value`` that replace values of the file.
+
+    Returns
+    -------
+    Checked
+        Every fault and every note; nothing is raised for a faulty project.
+    """
+    try:
+        project = load_project(path, overrides)
+    except InputError as error:
+        return Checked(str(path), error.faults, (), (), {})
+    faults = _refused(project, partial(overruling.require, project.settings.relative, project.inputs.observations))
+    if project.inputs.models is not None:
+        from photostrip.pipeline.models.model_strips import require_named  # strips of photos need none of it
+
+        faults += _refused(project, partial(require_named, project.settings.links, project.inputs.models.points))
+    notes = list(project.hints)
+    notes += _image_coordinates(project, faults)
+    faults += [*_pairs(project), *_joints(project)] if project.inputs.models is None else links_of_models(project)
+    if project.settings.adjustment != "bundle":  # strips of a block may hang on others
+        faults += _control_of_strips(project)
+    frames = _frames(project, faults)
+    document: Document = {
+        "name": project.inputs.name,
+        "counts": _counts(project),
+        **({"model_sigma": model_sigma(project)} if project.inputs.models else {"image_sigma": _image_sigma(project)}),
+        "frames": frames,
+        "control": list(_control(project)),
+        "rows": table_rows(project),
+    }
+    counted = Findings()  # of too many faults in one file they only count the rest
+    counted.add(*dict.fromkeys(faults))
+    return Checked(str(path), counted.faults, _against_themselves(project), tuple(notes), document)
+
+
+def _against_themselves(project: Project) -> tuple[Finding, ...]:
+    """Let the gate examine the data as far as that needs no adjustment."""
+    try:
+        return project.placed(gate.of_inputs(project.inputs, project.settings, project.directory))
+    except (InputError, GeometryError):
+        return ()  # what is wrong is told as a fault
+
+
+def _refused(project: Project, test: Callable[[], None]) -> list[Fault]:
+    """Give what a test of the pipeline refuses, with its place in the project file."""
+    try:
+        with project.places():
+            test()
+    except InputError as error:
+        return list(error.faults)
+    return []
+
+
+# ----------------------------------------------------------------------------------------------- the photos
+
+
+def _image_coordinates(project: Project, faults: list[Fault]) -> list[Note]:
+    """Look at fiducial marks and distortion; what is refused there refuses the project."""
+    inputs, notes = project.inputs, []
+    cameras = {photo: strip.camera for strip in inputs.strips for photo in strip.photos}
+    observations = inputs.observations
+    try:
+        with project.places():
+            if inputs.fiducials is not None:
+                oriented = interior.orient(inputs.fiducials, cameras, project.settings.interior)
+                notes = list(oriented.notes)
+                observations = interior.transform(observations, oriented)
+            # refraction and curvature need heights that only a run can find; they refuse nothing in a file
+            wanted = replace(project.settings.refinement, refraction=False, earth_radius=None)
+            corrections.refine(observations, cameras, wanted)
+    except InputError as error:
+        faults += error.faults
+    except GeometryError as error:
+        faults.append(fault_at(project.tree, ("cameras",), str(error), error.code))
+    return notes
+
+
+def _seen(observations: PhotoPoints) -> dict[str, set[int]]:
+    """Points of each photo, by number."""
+    order = np.argsort(observations.photo, kind="stable")
+    ends = np.cumsum(np.bincount(observations.photo, minlength=len(observations.photo_ids)))
+    parts = np.split(observations.point[order], ends[:-1])
+    return {name: set(part.tolist()) for name, part in zip(observations.photo_ids, parts, strict=True)}
+
+
+def _pairs(project: Project) -> Iterator[Fault]:
+    """Refuse neighbouring photos with too few common points for their relative orientation."""
+    from photostrip.triangulation.relative_orientation.relative import MINIMUM_POINTS
+
+    seen = _seen(project.inputs.observations)
+    for i, strip in enumerate(project.inputs.strips):
+        for j, (left, right) in enumerate(zip(strip.photos, strip.photos[1:], strict=False)):
+            common = len(seen.get(left, set()) & seen.get(right, set()))
+            if common < MINIMUM_POINTS:
+                message = f"photos {left} and {right} have {common} points in common"
+                fix = "measure more, or correct the order of the photos"
+                expected = f"at least {MINIMUM_POINTS}, better 12"
+                path = ("strips", i, "photos", j + 1)
+                yield fault_at(project.tree, path, message, "too-few-common-points", expected=expected, fix=fix)
+
+
+def _joints(project: Project) -> Iterator[Fault]:
+    """Refuse three photos in a row without a common point: nothing would carry the scale on."""
+    seen = _seen(project.inputs.observations)
+    for i, strip in enumerate(project.inputs.strips):
+        for j, names in enumerate(zip(strip.photos, strip.photos[1:], strip.photos[2:], strict=False)):
+            if set.intersection(*(seen.get(name, set()) for name in names)):
+                continue
+            message = f"no point is common to photos {', '.join(names[:2])} and {names[2]}: nothing carries the scale"
+            fix = "measure at least one pass point on all three"
+            yield fault_at(project.tree, ("strips", i, "photos", j + 1), message, "broken-joint", fix=fix)
+
+
+def _control_of_strips(project: Project) -> Iterator[Fault]:
+    """Refuse strips with too little measured control for seven parameters."""
+    inputs = project.inputs
+    number = {name: code for code, name in enumerate(inputs.observations.point_ids)}
+    given = np.array([number.get(name, -1) for name in inputs.control.ids], np.intp)
+    usable = observations_used(inputs) if inputs.models is None else np.zeros(0, np.intp)
+    for i, strip in enumerate(inputs.flights):
+        here = points_of_strip(inputs, i) if inputs.models else np.unique(inputs.observations.point[usable == i])
+        rows = np.isin(given, here) & ~inputs.control.check
+        plan, height = (int(inputs.control.use[rows, axis].sum()) for axis in (0, 2))
+        if plan >= LEAST_PLAN and height >= LEAST_HEIGHT:
+            continue
+        message = f"strip {strip.id} has {plan} control points in plan and {height} in height on neighbouring photos"
+        expected = f"at least {LEAST_PLAN} in plan and {LEAST_HEIGHT} in height, not on one line"
+        path = ("strips", i, "id")
+        fix = "measure more of the control on its photos"
+        yield fault_at(project.tree, path, message, "too-little-control", expected=expected, fix=fix)
+
+
+def _counts(project: Project) -> Document:
+    inputs = project.inputs
+    given, measured = inputs.control, set(inputs.observations.point_ids)
+    seen = np.array([name in measured for name in given.ids], bool)
+    new = measured - set(given.ids)
+    return {
+        "files": len(project.files),
+        "strips": len(inputs.flights),
+        "photos": sum(len(strip.photos) for strip in inputs.flights),
+        **({} if inputs.models is None else counts_of_models(inputs.models)),
+        "image_points": len(inputs.observations),
+        "points": len(measured),
+        "new": len(new),
+        "control_plan": int((given.use[:, 0] & ~given.check & seen).sum()),
+        "control_height": int((given.use[:, 2] & ~given.check & seen).sum()),
+        "check_plan": int((given.use[:, 0] & given.check & seen).sum()),
+        "check_height": int((given.use[:, 2] & given.check & seen).sum()),
+        "without_neighbour": len(gaps_of(inputs)) if inputs.models is None else 0,
+    }
+
+
+def _image_sigma(project: Project) -> Document:
+    """Say which standard deviation the image coordinates get, and how many rows have their own."""
+    table = project.tables.observations
+    own = 0 if table is None else int((~np.isnan(table.sigma).any(axis=1)).sum())
+    rows = 0 if table is None else len(table.table)
+    sigma = project.inputs.observations.sigma * 1000.0
+    return {
+        "rows_with_own": own,
+        "rows_with_default": rows - own,
+        "default_from": source_of(project, ("observations", "sigma")),
+        "smallest_um": float(sigma.min(initial=np.inf)) if len(sigma) else None,
+        "largest_um": float(sigma.max(initial=0.0)) if len(sigma) else None,
+    }
+
+
+# ---------------------------------------------------------------------------------------------- the ground
+
+
+def _frames(project: Project, faults: list[Fault]) -> list[Document]:
+    """Decode the frame of each control list at its first point, there and back."""
+    inputs = project.inputs
+    with project.places():
+        frames, output = tie_frames(inputs.frames, inputs.output, directory=project.directory)
+    faults += _refused(project, partial(require_whole, inputs, frames))
+    found = []
+    for number, frame in enumerate(frames):
+        read = project.tables.control[number]
+        rows = np.flatnonzero((inputs.control.frame == number) & inputs.control.use[:, :2].all(axis=1))
+        block: Document = {
+            "file": "" if read is None else read.table.file,
+            "frame": frame.describe(),
+            "kind": frame.kind,
+            "axes": list(frame.axes),
+            "is_output": frame is output,
+            "datum_accuracy": frame.datum_accuracy,
+        }
+        try:
+            block |= _decoded(project, frame, rows)
+        except (InputError, GeometryError) as error:
+            path = ("control", number, "crs")
+            texts = [fault.message for fault in error.faults] if isinstance(error, InputError) else [str(error)]
+            fix = "are the axes in the order of the columns, is the crs the right one?"
+            faults += [fault_at(project.tree, path, text, "ground-domain", fix=fix) for text in texts]
+        found.append(block)
+    if all(frame is not output for frame in frames):
+        found.append({"file": "", "frame": output.describe(), "kind": output.kind, "is_output": True})
+    return found
+
+
+def _decoded(project: Project, frame: GroundFrame, rows: NDArray[np.intp]) -> Document:
+    """One point to longitude, latitude, height and back; the size of the convergence over all points."""
+    control = project.inputs.control
+    if not len(rows):
+        return {}
+    enu = control.enu[rows].copy()
+    heights = enu[:, 2][~np.isnan(enu[:, 2])]
+    enu[np.isnan(enu[:, 2]), 2] = heights.mean() if len(heights) else 0.0
+    ids = [control.ids[row] for row in rows]
+    cartesian = frame.cartesian_from_ground(enu, ids=ids)
+    back = frame.ground_from_cartesian(cartesian[:1], ids=ids[:1])
+    centre = cartesian.mean(axis=0)
+    found: Document = {
+        "point": ids[0],
+        "given": frame.user_from_internal(control.enu[rows[0]]).tolist(),
+        "cartesian": cartesian[0].tolist(),
+        "back_mm": float(np.abs(frame.difference(back, enu[:1])).max() * MILLIMETRES),
+        "span_m": float(2.0 * np.linalg.norm(cartesian - centre, axis=1).max()),
+    }
+    if frame.kind != "local":
+        longitude, latitude, height = frame.geodetic(cartesian[:1])[0]
+        found["geodetic"] = [float(np.degrees(longitude)), float(np.degrees(latitude)), float(height)]
+    if frame.kind == "projected":
+        angles = np.degrees(frame.convergence(cartesian))
+        found["convergence_deg"] = [float(angles.min()), float(angles.max())]
+    return found
+
+
+def _control(project: Project) -> Iterator[Document]:
+    """Give the standard deviation of every control coordinate, in the user's order, and where it comes from."""
+    photos = {name: set[str]() for name in project.inputs.observations.point_ids}
+    observations = project.inputs.observations
+    if project.inputs.models is not None:
+        photos = photos_of_points(project.inputs.models)
+    for photo, point in zip(observations.photo.tolist(), observations.point.tolist(), strict=True):
+        photos[observations.point_ids[point]].add(observations.photo_ids[photo])
+    for number, read in enumerate(project.tables.control):
+        if read is not None:
+            yield from _of_list(project, number, read, photos)
+
+
+def _of_list(project: Project, number: int, read: ControlTable, photos: dict[str, set[str]]) -> Iterator[Document]:
+    frame = project.inputs.frames[number]
+    default = project.tree.find("control", number, "sigma")
+    values = [] if default is None else [float(each.text) for each in default.elements]
+    source = source_of(project, ("control", number, "sigma"))
+    for row, name in enumerate(read.ids):
+        own = ~np.isnan(read.sigma[row])
+        sigma = [float(read.sigma[row, axis]) if own[axis] else values[axis] if values else None for axis in range(3)]
+        line = {"source": "row", "file": read.table.file, "line": int(read.table.lines[row]), "key": ""}
+        use = read.use[row].tolist()
+        yield {
+            "id": name,
+            "role": "check" if read.check[row] else "control",
+            "file": read.table.file,
+            "line": int(read.table.lines[row]),
+            "axes": list(frame.axes),
+            "counts": use,
+            "sigma": [value if counts else None for value, counts in zip(sigma, use, strict=True)],
+            "sigma_from": [
+                None if not counts else line if its else source for its, counts in zip(own, use, strict=True)
+            ],
+            "photos": len(photos.get(name, ())),
+        }

@@ -1,0 +1,143 @@
+"""What can be said about independent models before anything is adjusted."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from photostrip.errors import GeometryError, InputError
+from photostrip.project.yaml.document import fault_at, key_path
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from photostrip.errors import Fault
+    from photostrip.pipeline import Inputs, MeasuredModels
+    from photostrip.project.loading import Project
+
+    Numbers = NDArray[np.intp]
+    Document = dict[str, Any]
+
+MICROMETRES = 1000.0  # in a millimetre
+
+
+def links_of_models(project: Project) -> Iterator[Fault]:
+    """Refuse neighbouring models that cannot be linked, and models of the other hand.
+
+    Parameters
+    ----------
+    project : Project
+        The project.
+
+    Yields
+    ------
+    Fault
+        One for each strip at most.
+    """
+    from photostrip.pipeline.models.model_strips import form_models  # strips of photos need none of it
+
+    models = project.inputs.models
+    for number, strip in enumerate(() if models is None else models.strips):
+        try:
+            if models is not None:
+                form_models(strip, models.points, project.settings)
+        except GeometryError as error:
+            yield fault_at(project.tree, ("strips", number, "id"), str(error), error.code)
+        except InputError as error:
+            for fault in error.faults:
+                words = {"expected": fault.expected, "fix": fault.fix}
+                yield fault_at(project.tree, ("models", "file"), fault.message, fault.code, **words)
+
+
+def source_of(project: Project, path: tuple[str | int, ...]) -> Document | None:
+    """Say where a value of the project stands: in which file, line and key; None when it is not given.
+
+    Parameters
+    ----------
+    project : Project
+        The project.
+    path : tuple
+        Keys and numbers that lead to the value.
+    """
+    if not project.tree.has(*path):
+        return None
+    place = project.tree.place_of(path)
+    return {"source": "default", "file": place.file, "line": place.line, "key": key_path(path)}
+
+
+def counts_of_models(models: MeasuredModels) -> Document:
+    """Count models, their points and their perspective centres.
+
+    Parameters
+    ----------
+    models : MeasuredModels
+        The models.
+    """
+    points = models.points.node < len(models.points.point_ids)
+    return {
+        "models": sum(len(strip.models) for strip in models.strips),
+        "model_points": int(points.sum()),
+        "model_centers": int((~points).sum()),
+    }
+
+
+def model_sigma(project: Project) -> Document:
+    """Say which standard deviations the model coordinates get, and how many rows have their own.
+
+    Parameters
+    ----------
+    project : Project
+        The project.
+    """
+    tables, models = project.tables.models, project.inputs.models
+    tables_read = [] if tables is None else [each for each in (tables.points, tables.centers) if each is not None]
+    rows = sum(len(each.table) for each in tables_read)
+    own = sum(int((~np.isnan(each.sigma).any(axis=1)).sum()) for each in tables_read)
+    sigma = np.zeros((0, 3)) if models is None else models.points.sigma * MICROMETRES
+    return {
+        "rows_with_own": own,
+        "rows_with_default": rows - own,
+        "default_from": source_of(project, ("models", "sigma")),
+        "smallest_um": float(sigma.min()) if len(sigma) else None,
+        "largest_um": float(sigma.max()) if len(sigma) else None,
+    }
+
+
+def points_of_strip(inputs: Inputs, number: int) -> Numbers:
+    """Points that the models of a strip hold, by number.
+
+    Parameters
+    ----------
+    inputs : Inputs
+        What is given.
+    number : int
+        The strip.
+    """
+    if inputs.models is None:
+        return np.zeros(0, np.intp)
+    points = inputs.models.points
+    known = set(inputs.models.strips[number].models)
+    inside = np.array([name in known for name in points.model_ids], bool)[points.model]
+    return np.unique(points.node[inside & (points.node < len(points.point_ids))])
+
+
+def photos_of_points(models: MeasuredModels) -> dict[str, set[str]]:
+    """Give the photos of the models that hold each point.
+
+    Parameters
+    ----------
+    models : MeasuredModels
+        The models.
+    """
+    shown = {
+        name: strip.photos[place : place + 2] for strip in models.strips for place, name in enumerate(strip.models)
+    }
+    points = models.points
+    found = {name: set[str]() for name in points.point_ids}
+    for model, node in zip(points.model.tolist(), points.node.tolist(), strict=True):
+        if node < len(points.point_ids):
+            found[points.point_ids[node]].update(shown[points.model_ids[model]])
+    return found

@@ -1,0 +1,202 @@
+"""What became of every row of every table, with the reason for those that are not used."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from photostrip.formats.measured.exterior import OrientationTable, PositionTable
+from photostrip.project.tables import rays
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from photostrip.formats.measured.control import ControlTable
+    from photostrip.formats.measured.measurements import Measurements
+    from photostrip.pipeline import Inputs, MeasuredModels
+    from photostrip.project.loading import Project
+    from photostrip.project.tables import Tables
+
+    Numbers = NDArray[np.intp]
+    Document = dict[str, Any]
+    Reason = tuple[str, NDArray[np.bool_], NDArray[np.object_]]
+
+IN_NO_STRIP = "its photo belongs to no strip"
+ONCE = "the point is measured on one photo only"
+NO_NEIGHBOUR = "the point is on no two neighbouring photos of one strip"
+IN_NO_MODEL = "its model belongs to no strip"
+NO_MODEL = "not measured in any model of the strips"
+OFF = "switched off (use: off)"
+NO_BUNDLE = "only the bundle adjustment uses it"
+NOT_MEASURED = "not measured on any photo of the strips"
+
+
+def observations_used(inputs: Inputs) -> Numbers:
+    """Find the strip in which each image point takes part.
+
+    Parameters
+    ----------
+    inputs : Inputs
+        What is given.
+
+    Returns
+    -------
+    ndarray of int, shape (n,)
+        Number of the strip; -1 for points that no neighbouring photo of the strip shows: they are in no pair.
+    """
+    observations = inputs.observations
+    places = {photo: (i, j) for i, strip in enumerate(inputs.strips) for j, photo in enumerate(strip.photos)}
+    strip, place = np.array([places[name] for name in observations.photo_ids], np.intp).reshape(-1, 2).T
+    strip, place = strip[observations.photo], place[observations.photo]
+    # a photo's number in one long row of all strips, with a gap between strips: neighbours differ by one
+    starts = np.cumsum([0, *(len(each.photos) + 1 for each in inputs.strips)])
+    position = starts[strip] + place
+    key = observations.point * (int(starts[-1]) + 1) + position
+    present = np.sort(key)
+
+    def shown(wanted: Numbers) -> NDArray[np.bool_]:
+        at = np.searchsorted(present, wanted)
+        return np.asarray(present[np.minimum(at, len(present) - 1)] == wanted)
+
+    if not len(key):
+        return np.zeros(0, np.intp)
+    return np.where(shown(key - 1) | shown(key + 1), strip, -1)
+
+
+def gaps_of(inputs: Inputs) -> list[str]:
+    """Name the points measured on two photos or more, of which no two are neighbours in a strip."""
+    observations = inputs.observations
+    paired = np.zeros(len(observations.point_ids), bool)
+    paired[observations.point[observations_used(inputs) >= 0]] = True
+    count = np.bincount(observations.point, minlength=len(observations.point_ids))
+    return [observations.point_ids[code] for code in np.flatnonzero(~paired & (count > 1))]
+
+
+def table_rows(project: Project) -> list[Document]:
+    """Count what became of the rows of each table.
+
+    Parameters
+    ----------
+    project : Project
+        The project.
+
+    Returns
+    -------
+    list of dict
+        ``file``, ``rows``, ``used`` and ``unused``: reason, number of rows, ids, first line. Used and unused rows add
+        up to all rows.
+    """
+    tables, inputs = project.tables, project.inputs
+    photos = {photo for strip in inputs.strips for photo in strip.photos}
+    if tables.models is not None and inputs.models is not None:
+        return model_rows(tables, inputs.models)
+    found = []
+    bundle = project.settings.adjustment == "bundle"
+    apart = set() if bundle else set(gaps_of(inputs))  # a bundle takes points of any two photos
+    control = {name for name, use in zip(inputs.control.ids, inputs.control.use, strict=True) if use.all()}
+    if tables.observations is not None:
+        found.append(_measured(tables.observations, photos, apart, control if bundle else set()))
+    if tables.fiducials is not None:
+        found.append(_marks(tables.fiducials, photos))
+    count = {} if tables.observations is None else rays(tables.observations, photos)
+    if bundle:  # and control of a single one
+        count = {name: max(number, 2) for name, number in count.items()}
+    found += [_given(read, count, apart) for read in tables.control if read is not None]
+    found += [_cameras(read, photos, bundle) for read in (tables.positions, tables.orientations) if read is not None]
+    return found
+
+
+def model_rows(tables: Tables, models: MeasuredModels) -> list[Document]:
+    """Count what became of the rows of each table of a project of independent models.
+
+    Parameters
+    ----------
+    tables : Tables
+        The tables.
+    models : MeasuredModels
+        The models of the strips.
+
+    Returns
+    -------
+    list of dict
+        As ``table_rows``.
+    """
+    found = []
+    known = set(models.points.model_ids)
+    read = tables.models
+    for each in () if read is None else (read.points, read.centers):
+        if each is not None:
+            stranger = np.array([name not in known for name in each.model_ids], bool)[each.models]
+            owners = np.array(each.model_ids, object)[each.models]
+            found.append(_block(each.table.file, each.table.lines, [(IN_NO_MODEL, stranger, owners)]))
+    points = set(models.points.point_ids)
+    for control in tables.control:
+        if control is not None:
+            names = np.array(control.ids, object)
+            missing = np.array([name not in points for name in control.ids], bool)
+            reasons = [(OFF, ~control.used, names), (NO_MODEL, control.used & missing, names)]
+            found.append(_block(control.table.file, control.table.lines, reasons))
+    return found
+
+
+def _cameras(read: PositionTable | OrientationTable, photos: set[str], bundle: bool) -> Document:  # noqa: FBT001
+    names = np.array(read.ids, object)
+    stranger = np.array([name not in photos for name in read.ids], bool)
+    off = ~read.used if isinstance(read, PositionTable) else np.zeros(len(names), bool)
+    idle = ~stranger & ~off & (not bundle)
+    reasons = [(IN_NO_STRIP, stranger, names), (OFF, ~stranger & off, names), (NO_BUNDLE, idle, names)]
+    return _block(read.table.file, read.table.lines, reasons)
+
+
+def _measured(read: Measurements, photos: set[str], gaps: set[str], whole: set[str]) -> Document:
+    """Sort the rows of measured points by what becomes of them."""
+    stranger = np.array([name not in photos for name in read.photo_ids], bool)[read.photo]
+    count = rays(read, photos)
+    once = np.array([count.get(name) == 1 and name not in whole for name in read.target_ids], bool)[read.target]
+    apart = np.array([name in gaps for name in read.target_ids], bool)[read.target]
+    names = np.array(read.target_ids, object)[read.target]
+    owners = np.array(read.photo_ids, object)[read.photo]
+    reasons = [
+        (IN_NO_STRIP, stranger, owners),
+        (ONCE, ~stranger & once, names),
+        (NO_NEIGHBOUR, ~stranger & ~once & apart, names),
+    ]
+    return _block(read.table.file, read.table.lines, reasons, read.times)
+
+
+def _marks(read: Measurements, photos: set[str]) -> Document:
+    stranger = np.array([name not in photos for name in read.photo_ids], bool)[read.photo]
+    owners = np.array(read.photo_ids, object)[read.photo]
+    return _block(read.table.file, read.table.lines, [(IN_NO_STRIP, stranger, owners)], read.times)
+
+
+def _given(read: ControlTable, count: dict[str, int], gaps: set[str]) -> Document:
+    number = np.array([count.get(name, 0) for name in read.ids], np.intp)
+    apart = np.array([name in gaps for name in read.ids], bool)
+    names = np.array(read.ids, object)
+    reasons = [
+        (OFF, ~read.used, names),
+        (NOT_MEASURED, read.used & (number == 0), names),
+        (ONCE, read.used & (number == 1), names),
+        (NO_NEIGHBOUR, read.used & (number > 1) & apart, names),
+    ]
+    return _block(read.table.file, read.table.lines, reasons)
+
+
+def _block(file: str, lines: Numbers, reasons: list[Reason], times: Numbers | None = None) -> Document:
+    """Count the rows of a table; `times` says of how many rows of the file each of them is made."""
+    times = np.ones(len(lines), np.intp) if times is None else times
+    unused = list(_unused(lines, reasons, times))
+    rows = int(times.sum())
+    return {"file": file, "rows": rows, "used": rows - sum(each["rows"] for each in unused), "unused": unused}
+
+
+def _unused(lines: Numbers, reasons: list[Reason], times: Numbers) -> Iterator[Document]:
+    for why, which, names in reasons:
+        rows = np.flatnonzero(which)
+        if len(rows):
+            ids = list(dict.fromkeys(names[rows].tolist()))
+            yield {"why": why, "rows": int(times[rows].sum()), "ids": ids, "first_line": int(lines[rows[0]])}

@@ -1,0 +1,124 @@
+"""What the files of all plans have in common: how they are read, and what is flown.
+
+A file is not needed: every key has a default or can be set on the command line, whose options are assignments to
+these keys.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Self, TypeVar
+
+from pydantic import AfterValidator, model_validator
+
+from photostrip.errors import InputError
+from photostrip.formats.text.findings import Findings
+from photostrip.planning.ideal_strip import StripGeometry
+from photostrip.project.simulation_spec import SimulatedCamera, Three
+from photostrip.project.terrestrial.terrestrial_ranges import Range, bounded
+from photostrip.project.yaml.document import COMMAND_LINE, Node, Place, fault_at
+from photostrip.project.yaml.merging import override, read_tree
+from photostrip.project.yaml.schema import Positive, Section, Words, key, wrong
+from photostrip.project.yaml.validation import checked
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from photostrip.camera import Camera
+
+T = TypeVar("T", bound=Section)
+
+SCHEMA_NUMBER = "1"
+NUMBER_KEYS = {  # and the commands that take them
+    "photostrip_plan_model": "plan model",
+    "photostrip_plan_strip": "plan strip",
+    "photostrip_plan_cameras": "plan camera",
+}
+OVERLAP = Range(1.0, 99.0, "%")
+IMAGE_SIGMA_UM = Range(1e-3, 1e4, "µm")
+
+Percent = Annotated[Positive, AfterValidator(bounded(OVERLAP))]
+SigmaUm = Annotated[Positive, AfterValidator(bounded(IMAGE_SIGMA_UM))]
+
+
+def all_positive(value: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Require three standard deviations that are not negative, at least one of them positive."""
+    if min(value) < 0 or max(value) == 0:
+        raise wrong("standard deviations are negative or all zero", code="range", expected="metres, 0 or more")
+    return value
+
+
+Sigmas = Annotated[Three, AfterValidator(all_positive)]
+
+
+class Flown(Section):
+    """A plan of something that is flown: camera, overlap, scale, measuring."""
+
+    extends: Words | None = key("Another file whose keys are taken where this one has none", None)
+    camera: SimulatedCamera = key("Camera; its lens counts as ideal", SimulatedCamera.model_construct())
+    end_lap_percent: Percent = key("Overlap of neighbouring photos", StripGeometry.end_lap_percent, unit="%")
+    scale: Positive | None = key("Denominator of the photo scale; default: 10000", None)
+    flying_height: Positive | None = key("Height above the ground, instead of `scale`", None, unit="m")
+    image_sigma_um: SigmaUm = key("Standard deviation of an image coordinate", 5.0, unit="um")
+
+    @model_validator(mode="after")
+    def _one_scale(self) -> Self:
+        if self.scale is not None and self.flying_height is not None:
+            raise wrong("photo scale and flying height are both given", at="flying_height", fix="remove one")
+        return self
+
+    def scale_of(self, camera: Camera) -> float:
+        """Denominator of the photo scale, given itself or by the flying height."""
+        by_height = (self.flying_height or 0.0) / camera.principal_distance * 1000.0
+        return self.scale or by_height or StripGeometry.scale
+
+
+def read_plan(kind: type[T], path: Path | None, assignments: Sequence[str]) -> tuple[T, tuple[str, ...], Node]:
+    """Read a plan file, or make one of assignments alone.
+
+    Parameters
+    ----------
+    kind : type
+        Schema of the file; one of its keys is the number of the schema.
+    path : Path, optional
+        The file.
+    assignments : sequence of str
+        Assignments ``key.path=value``.
+
+    Returns
+    -------
+    Section
+        What is given, with all defaults.
+    tuple of str
+        Every file that was read.
+    Node
+        The plan as a tree.
+
+    Raises
+    ------
+    InputError
+        With every fault.
+    """
+    findings, files = Findings(), list[str]()
+    if path is None:
+        place, number = Place(COMMAND_LINE), next(name for name in kind.model_fields if name in NUMBER_KEYS)
+        root: Node | None = Node({number: Node(SCHEMA_NUMBER, place)}, place, {number: place})
+    else:
+        root = read_tree(str(path), findings, files)
+    if root is None:
+        raise InputError(findings.faults)
+    _require_kind(kind, root)
+    root = override(root, assignments, findings)
+    given = checked(kind, root, findings)
+    findings.stop()
+    if given is None:  # cannot be: checked() had a reason, and stop() told it
+        raise InputError(f"{path} is not a valid plan")
+    return given, tuple(files), root
+
+
+def _require_kind(kind: type[Section], root: Node) -> None:
+    """Refuse a plan of something else by the command that is meant for it."""
+    given = [name for name in NUMBER_KEYS if name in root.entries]
+    if len(given) == 1 and given[0] not in kind.model_fields:
+        message = f"this is a plan for `photostrip {NUMBER_KEYS[given[0]]}`"
+        raise InputError(fault_at(root, (given[0],), message, "plan-kind"))

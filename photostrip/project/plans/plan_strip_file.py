@@ -1,0 +1,279 @@
+"""Plans of a strip and its control: the YAML file and its keys."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Annotated, Self
+
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+
+from photostrip.errors import InputError
+from photostrip.formats.text.findings import suggestion
+from photostrip.planning.control_layout import LAYOUTS, USES, Layout, Spot
+from photostrip.planning.ideal_strip import LEAST_PHOTOS, StripGeometry
+from photostrip.planning.placement import Placement, Required
+from photostrip.planning.strip_design import Design, plan_strip
+from photostrip.planning.strip_methods import BUNDLE, METHODS
+from photostrip.project.plans.plan_reading import SCHEMA_NUMBER, Flown, Sigmas, read_plan
+from photostrip.project.simulation_spec import Whole, camera_of
+from photostrip.project.terrestrial.terrestrial_presets import one_of
+from photostrip.project.terrestrial.terrestrial_ranges import Range, bounded
+from photostrip.project.yaml.document import fault_at
+from photostrip.project.yaml.merging import steps
+from photostrip.project.yaml.schema import Flag, Id, Positive, Section, Words, key, wrong
+from photostrip.simulate import Points
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from photostrip.errors import Fault
+    from photostrip.planning.strip_design import Report
+    from photostrip.project.yaml.document import Node
+
+MODELS = Range(LEAST_PHOTOS - 1, 400, "models")
+ROWS = Range(2, 20, "rows")
+EXTRA = Range(0, 200, "points")
+PLACED = Range(1, 40, "points")
+REACH = Range(5.0, 95.0, "%")
+USUAL, USUAL_LAYOUT = StripGeometry.points, Layout("")
+# Keys of a simulation by which the strip is refused, and those of the plan.
+SIMULATED = {"flight.end_lap_percent": "end_lap_percent", "flight.photos": "models", "flight": "end_lap_percent"}
+DEFAULT_LAYOUTS = {"3 bands": "bands=3", "4 bands": "bands=4", "corners": "corners"}
+
+
+class StripPoints(Section):
+    """Pass points."""
+
+    rows: Annotated[Whole, AfterValidator(bounded(ROWS))] = key("Points across the flight at each nadir", USUAL.rows)
+    reach_percent: Annotated[Positive, AfterValidator(bounded(REACH))] = key(
+        "Outermost rows, of half the width of the photo", USUAL.reach_percent, unit="%"
+    )
+    extra_per_model: Annotated[Whole, AfterValidator(bounded(EXTRA))] = key(
+        "Further points in each model", USUAL.extra_per_model
+    )
+
+
+class StripSpot(Section):
+    """One control point."""
+
+    at: tuple[Whole, Whole] = key("Photo at whose nadir it lies, and row from left to right, both counted from 1")
+    use: Annotated[Words, AfterValidator(one_of(*USES))] = key("`xyz`, `xy` or `z`", "xyz")
+
+
+def _spot(value: object) -> object:
+    """Let photo and row stand for a point that is given in full."""
+    return {"at": value} if isinstance(value, list) else value
+
+
+def _layout(value: object) -> object:
+    """Let a word stand for a layout: ``corners``, ``bands=3``, ``every=4``."""
+    if not isinstance(value, str) or not value:
+        return value
+    name, equals, number = value.partition("=")
+    return {name.strip(): number.strip()} if equals else {"layout": value}
+
+
+def layout_option(word: str) -> tuple[str, str]:
+    """Give the key and the value that add a layout to a plan.
+
+    Parameters
+    ----------
+    word : str
+        ``corners``, ``corners+centre``, ``bands=3``, ``every=4``.
+
+    Returns
+    -------
+    key, value : str
+        ``layouts."3 bands"``: a name without an equals sign, and the word, ``"bands=3"``.
+    """
+    kind, equals, number = word.partition("=")
+    name = f"{number} band{'' if number == '1' else 's'}" if kind == "bands" else f"{kind} {number}"
+    return f'layouts."{name if equals else word}"', f'"{word}"'
+
+
+class StripLayout(Section):
+    """One layout of control."""
+
+    layout: Annotated[Words, AfterValidator(one_of(*LAYOUTS))] = key(
+        "`bands`, `corners`, `corners+centre`, or `points` alone", USUAL_LAYOUT.kind
+    )
+    bands: Whole = key("Bands across the strip, from the first to the last photo", USUAL_LAYOUT.bands)
+    every: Annotated[Whole, AfterValidator(bounded(Range(1, 400, "models")))] | None = key(
+        "Models from band to band, instead of `bands`", None
+    )
+    per_band: Whole = key("Points of a band", USUAL_LAYOUT.per_band)
+    use: Annotated[Words, AfterValidator(one_of(*USES))] = key("`xyz`, `xy` or `z`", USUAL_LAYOUT.use)
+    points: list[Annotated[StripSpot, BeforeValidator(_spot)]] = key(
+        "Single points, further ones or instead of a band's: [photo, row], or {at: [photo, row], use: z}", []
+    )
+    sigma: Sigmas | None = key("Standard deviations along, across, in height; default: `control_sigma`", None, unit="m")
+    gnss: Sigmas | None = key(
+        "Standard deviations of measured perspective centres; default: none are measured", None, unit="m"
+    )
+    gnss_offset: Flag = key("Whether these have a constant offset to be determined", USUAL_LAYOUT.gnss_offset)
+
+    @model_validator(mode="after")
+    def _one_way_to_space_bands(self) -> Self:
+        if self.every is not None and "bands" in self.model_fields_set:
+            raise wrong("the number of bands and their distance are both given", at="every", fix="remove one")
+        return self
+
+
+class StripRequired(Section):
+    """The accuracy that every point must reach."""
+
+    plan: Positive | None = key("Standard deviation in plan, both coordinates together", None, unit="m")
+    height: Positive | None = key("Standard deviation in height", None, unit="m")
+
+
+class StripPlacement(Section):
+    """Further control points to be placed as well as possible."""
+
+    points: Annotated[Whole, AfterValidator(bounded(PLACED))] = key("How many")
+    into: Id | None = key("Layout that they are added to; default: the first", None)
+    method: Annotated[Words, AfterValidator(one_of(*METHODS))] = key("Method of adjustment", METHODS[-1])
+    use: Annotated[Words, AfterValidator(one_of(*USES))] = key("`xyz`, `xy` or `z`", "xyz")
+
+
+class StripPlanFile(Flown):
+    """A strip and layouts of its control. Every key but the first has a default."""
+
+    photostrip_plan_strip: Annotated[Words, AfterValidator(one_of(SCHEMA_NUMBER))] = key("Number of this schema: 1")
+    name: Words = key("Name of the plan", "strip")
+    models: Annotated[Whole, AfterValidator(bounded(MODELS))] = key("Models of the strip, one less than photos", 10)
+    points: StripPoints = key("Pass points", StripPoints.model_construct())
+    control_sigma: Sigmas = key("Standard deviations along, across and in height", USUAL_LAYOUT.sigma, unit="m")
+    gnss: Sigmas | None = key(
+        "Standard deviations of measured perspective centres: each layout is compared with and without them",
+        None,
+        unit="m",
+    )
+    layouts: Annotated[dict[Id, Annotated[StripLayout, BeforeValidator(_layout)]], Field(min_length=1)] | None = key(
+        f"Layouts by name; a word may stand for one. Default: {', '.join(DEFAULT_LAYOUTS)}", None
+    )
+    methods: Annotated[list[Annotated[Words, AfterValidator(one_of(*METHODS))]], Field(min_length=1)] = key(
+        f"Methods of adjustment: {', '.join(METHODS)}", list(METHODS)
+    )
+    required: StripRequired = key("Accuracy that every point must reach", StripRequired.model_construct())
+    place: StripPlacement | None = key("Further points to be placed as well as possible", None)
+
+    @model_validator(mode="after")
+    def _names_and_methods_fit(self) -> Self:
+        into = self.place.into if self.place is not None else None
+        names = list(self.layouts or DEFAULT_LAYOUTS)
+        if into is not None and into not in names:
+            message = f"there is no layout `{into}` that points could be added to"
+            fix = suggestion(into, names)
+            raise wrong(message, code="unknown-layout", at="place", expected=f"one of {', '.join(names)}", fix=fix)
+        measured = self.gnss is not None or any(each.gnss is not None for each in (self.layouts or {}).values())
+        if measured and BUNDLE not in self.methods:
+            message = "measured perspective centres are of use to the bundle alone, which is not among the methods"
+            raise wrong(message, at="methods", fix="add `bundle`, or leave `gnss` out")
+        return self
+
+
+@dataclass(frozen=True, eq=False)
+class StripPlan:
+    """A plan of a strip.
+
+    Parameters
+    ----------
+    name : str
+        Its name.
+    design : Design
+        What is to be designed.
+    files : tuple of str
+        Every file that was read.
+    root : Node
+        The plan as a tree.
+    """
+
+    name: str
+    design: Design
+    files: tuple[str, ...]
+    root: Node
+
+    def worked_out(self) -> Report:
+        """Work out the design.
+
+        Returns
+        -------
+        Report
+            Everything about it.
+
+        Raises
+        ------
+        InputError
+            With all that cannot be planned, each fault at its place in the file.
+        """
+        try:
+            return plan_strip(self.design)
+        except InputError as error:
+            raise InputError(self._placed(fault) for fault in error.faults) from None
+
+    def _placed(self, fault: Fault) -> Fault:
+        key = SIMULATED.get(fault.key, fault.key)
+        return fault_at(self.root, steps(key), fault.message, fault.code, expected=fault.expected, fix=fault.fix)
+
+
+def load_strip_plan(path: Path | None, assignments: Sequence[str]) -> StripPlan:
+    """Read the plan of a strip.
+
+    Parameters
+    ----------
+    path : Path, optional
+        The file; without one the assignments and defaults are the plan.
+    assignments : sequence of str
+        Assignments ``key.path=value``.
+
+    Returns
+    -------
+    StripPlan
+        The plan.
+
+    Raises
+    ------
+    InputError
+        With every fault.
+    """
+    given, files, root = read_plan(StripPlanFile, path, assignments)
+    camera = camera_of(given.camera)
+    points = Points(given.points.rows, given.points.reach_percent, 0.0, given.points.extra_per_model)
+    geometry = StripGeometry(
+        camera,
+        given.models + 1,
+        given.end_lap_percent,
+        given.scale_of(camera),
+        points,
+        given.image_sigma_um / 1000.0,
+    )
+    usual = {name: StripLayout.model_validate(_layout(word)) for name, word in DEFAULT_LAYOUTS.items()}
+    chosen = (given.layouts or usual).items()
+    layouts = tuple(_of_layout(str(name), each, given.control_sigma) for name, each in chosen)
+    if given.gnss is not None:
+        plain = [layout for layout in layouts if layout.gnss is None]
+        layouts += tuple(replace(each, name=f"{each.name} + GNSS", gnss=given.gnss) for each in plain)
+    placement = None
+    if given.place is not None:
+        into = str(given.place.into) if given.place.into is not None else layouts[0].name
+        placement = Placement(given.place.points, into, str(given.place.method), str(given.place.use))
+    methods = tuple(dict.fromkeys(str(method) for method in given.methods))
+    required = Required(given.required.plan, given.required.height)
+    return StripPlan(str(given.name), Design(geometry, layouts, methods, required, placement), files, root)
+
+
+def _of_layout(name: str, given: StripLayout, sigma: tuple[float, float, float]) -> Layout:
+    spots = tuple(Spot(spot.at[0], spot.at[1], str(spot.use)) for spot in given.points)
+    return Layout(
+        name,
+        str(given.layout),
+        given.bands,
+        given.every,
+        given.per_band,
+        str(given.use),
+        spots,
+        given.sigma or sigma,
+        given.gnss,
+        given.gnss_offset,
+    )

@@ -1,0 +1,186 @@
+"""The project file of a terrestrial survey: stations, epochs and measurements of displacements."""
+
+from __future__ import annotations
+
+from typing import Annotated, Self
+
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+
+from photostrip.geodesy.frame_spec import GROUND_AXES
+from photostrip.project.terrestrial.terrestrial_presets import Distance, Place, Size, one_of
+from photostrip.project.terrestrial.terrestrial_ranges import (
+    BASE,
+    DEGREES,
+    IMAGE_SIGMA,
+    POSITION,
+    SIGNIFICANCE,
+    TIME,
+    bounded,
+)
+from photostrip.project.yaml.schema import Axes, Id, Number, Positive, Section, Words, YAxis, key, wrong
+from photostrip.terrestrial.monitoring import MOVED_CAMERA, Settings
+
+SCHEMA_NUMBER = "1"
+MILLIMETRES = {"mm": 1.0, "um": 1e-3}
+USUAL = Settings()
+Coordinate = Annotated[Number, AfterValidator(bounded(POSITION))]
+Three = tuple[Coordinate, Coordinate, Coordinate]
+Angle = Annotated[Number, AfterValidator(bounded(DEGREES))]
+
+
+def _short_epoch(value: object) -> object:
+    """Let a single word stand for an epoch without a time."""
+    return {"id": value} if isinstance(value, str) else value
+
+
+def _ground_axes(value: tuple[str, str, str]) -> tuple[str, str, str]:
+    if sorted(value) != sorted(GROUND_AXES):
+        raise wrong("the axes of the stations are not on the ground", expected="a permutation of [east, north, up]")
+    return value
+
+
+class Camera(Section):
+    """One camera: a preset, or its own numbers, or a preset and what is different from it."""
+
+    preset: Words | None = key("Name of a camera of the list that comes with the program, or of `presets`", None)
+    principal_distance: Distance | None = key("Principal distance; default: that of the preset", None, unit="mm")
+    principal_point: Place | None = key(
+        "Principal point x0, z0 in the system of the image coordinates; default: that of the preset, or 0, 0",
+        None,
+        unit="mm",
+    )
+    format: Size | None = key("Width and height of the field in which points are measured", None, unit="mm")
+
+    @model_validator(mode="after")
+    def _has_a_principal_distance(self) -> Self:
+        if self.preset is None and self.principal_distance is None:
+            expected = "`preset`, or `principal_distance` in mm"
+            raise wrong("nothing says what the camera is", code="missing-key", expected=expected)
+        return self
+
+
+class Station(Section):
+    """One of the two stations. Position and angles belong together; without them it is the normal case."""
+
+    camera: Id = key("Camera, a key of `cameras`")
+    position: Three | None = key("Perspective centre in the order of `axes`", None, unit="m")
+    alpha: Angle | None = key("Azimuth of the optical axis, clockwise from north", None, unit="angle_unit")
+    omega: Angle | None = key("Elevation of the optical axis, upwards; default: 0", None, unit="angle_unit")
+    kappa: Angle | None = key(
+        "Roll, the photo's x axis turning counter-clockwise for the photographer; default: 0", None, unit="angle_unit"
+    )
+
+    @model_validator(mode="after")
+    def _is_complete(self) -> Self:
+        if (self.position is None) != (self.alpha is None):
+            missing, other = ("position", "alpha") if self.position is None else ("alpha", "position")
+            message = f"`{other}` is given and `{missing}` is not"
+            raise wrong(message, code="missing-key", expected="both, or neither in the normal case")
+        if self.position is None and (self.omega is not None or self.kappa is not None):
+            raise wrong("angles are given without a position", code="missing-key", expected="position and alpha too")
+        return self
+
+    @property
+    def free(self) -> bool:
+        """Whether it has a position and angles of its own."""
+        return self.position is not None
+
+
+class Stations(Section):
+    """The two stations."""
+
+    left: Station = key("The left station")
+    right: Station = key("The right station")
+
+
+class Epoch(Section):
+    """One epoch."""
+
+    id: Id = key("Id of the epoch, as in the table")
+    time: Annotated[Number, AfterValidator(bounded(TIME))] | None = key("Its time, for rates", None, unit="time_unit")
+
+
+class Measurements(Section):
+    """The table of measurements."""
+
+    coordinates: Words | None = key("Table `epoch,photo,point,x,z[,sx,sz]`, .csv or .csv.gz", None)
+    pseudo_parallaxes: Words | None = key(
+        "Table `point[,epoch],x,z,p[,q],dx,dz,dx_right[,dz_right][,sigma][,sigma_d]`, .csv or .csv.gz", None
+    )
+    unit: Annotated[Words, AfterValidator(one_of("mm", "um"))] = key("Unit of the table: `mm` or `um`")
+    z_axis: YAxis = key("Direction of z, `up` or `down`; x grows to the right", "up")
+    sigma: Positive | None = key("Standard deviation of a coordinate in rows without one", None, unit="unit")
+    sigma_d: Positive | None = key(
+        "Standard deviation of a pseudo-parallax in rows without one; default: `sigma`", None, unit="unit"
+    )
+
+    @model_validator(mode="after")
+    def _one_table(self) -> Self:
+        if (self.coordinates is None) == (self.pseudo_parallaxes is None):
+            what = "two tables are named" if self.coordinates is not None else "no table is named"
+            raise wrong(what, code="missing-key", expected="either `coordinates` or `pseudo_parallaxes`")
+        if self.coordinates is not None and self.sigma_d is not None:
+            message = "coordinates have no pseudo-parallaxes that could have a standard deviation"
+            raise wrong(message, at="sigma_d", fix="remove it; use `sigma`")
+        for name, value in (("sigma", self.sigma), ("sigma_d", self.sigma_d)):
+            if value is not None and not IMAGE_SIGMA.holds(value * MILLIMETRES[self.unit]):
+                message = f"{value:g} {self.unit} is out of range"
+                raise wrong(message, code="range", at=name, expected=f"{IMAGE_SIGMA}: is the unit right?")
+        return self
+
+
+class Processing(Section):
+    """How displacements are judged."""
+
+    significance: Annotated[Number, AfterValidator(bounded(SIGNIFICANCE))] = key(
+        "Probability of calling a point moved that did not move", USUAL.significance
+    )
+    moved_camera: Annotated[Words, AfterValidator(one_of(*MOVED_CAMERA))] = key(
+        "Turn of a camera that the stable points show: taken out `always`, when significant (`auto`), or `never`",
+        USUAL.moved_camera,
+    )
+
+
+class TerrestrialFile(Section):
+    """Displacements from photos of two stations."""
+
+    photostrip_terrestrial: Annotated[Words, AfterValidator(one_of(SCHEMA_NUMBER))] = key("Number of this schema: 1")
+    extends: Words | None = key("Another file whose keys are taken where this one has none", None)
+    name: Words = key("Name of the survey", "displacements")
+    presets: Words | None = key("A list of cameras of your own", None)
+    cameras: Annotated[dict[Id, Camera], Field(min_length=1)] = key("Cameras by name")
+    stations: Stations = key("The two stations")
+    axes: Annotated[Axes, AfterValidator(_ground_axes)] | None = key(
+        "Order of the coordinates of the stations and of the results: a permutation of east, north, up", None
+    )
+    angle_unit: Annotated[Words, AfterValidator(one_of("deg", "gon"))] = key("Unit of alpha, omega, kappa", "deg")
+    base: Annotated[Number, AfterValidator(bounded(BASE))] | None = key(
+        "Base of the normal case, instead of positions and angles", None, unit="m"
+    )
+    epochs: list[Annotated[Epoch, BeforeValidator(_short_epoch)]] | None = key(
+        "Epochs, the first being the reference; default: as they stand in the table", None
+    )
+    time_unit: Words = key("Unit of the times of the epochs, for rates", "year")
+    measurements: Measurements = key("The table of measurements")
+    stable: list[Id] = key("Points that are taken not to move", [])
+    processing: Processing = key("How displacements are judged", Processing.model_construct())
+
+    @model_validator(mode="after")
+    def _one_geometry(self) -> Self:
+        left, right = self.stations.left, self.stations.right
+        if left.free != right.free:
+            side = "right" if left.free else "left"
+            raise wrong(
+                f"the {side} station has no position", code="missing-key", at="stations", expected="both or none"
+            )
+        if left.free and self.base is not None:
+            raise wrong("the base follows from the positions of the stations", at="base", fix="remove it")
+        if not left.free and self.base is None:
+            expected = "`base` for the normal case, or position and alpha of both stations"
+            raise wrong("nothing says how far apart the stations are", code="missing-key", expected=expected)
+        if left.free and self.axes is None:
+            expected = "axes: [east, north, up], or [north, east, up] where x points north"
+            raise wrong("nothing says which coordinate of a station is east", code="missing-key", expected=expected)
+        if not left.free and self.axes is not None:
+            raise wrong("the normal case has axes of its own: right, ahead, up", at="axes", fix="remove it")
+        return self

@@ -1,0 +1,141 @@
+"""Phototheodolites by name: the list that comes with the program, and lists of the user."""
+
+from __future__ import annotations
+
+from importlib import resources
+from typing import TYPE_CHECKING, Annotated
+
+from pydantic import AfterValidator, Field
+
+from photostrip.errors import Fault, InputError
+from photostrip.formats.text.findings import Findings, suggestion
+from photostrip.formats.text.numbers import shown
+from photostrip.project.terrestrial.terrestrial_ranges import COORDINATE, FORMAT, PRINCIPAL_DISTANCE, bounded
+from photostrip.project.yaml.document import parse, read_document
+from photostrip.project.yaml.schema import Id, Number, Section, Words, key, wrong
+from photostrip.project.yaml.validation import checked
+from photostrip.terrestrial.directions import Phototheodolite
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from photostrip.project.yaml.document import Node
+
+OWN_LIST = "phototheodolites.yaml"
+SCHEMA_NUMBER = "1"
+
+
+def one_of(*words: str) -> Callable[[str], str]:
+    """Make the check of a word from a list."""
+
+    def check(value: str) -> str:
+        if value not in words:
+            expected = words[0] if len(words) == 1 else f"one of {', '.join(words)}"
+            fix = suggestion(value, words)
+            raise wrong(f"`{shown(value)}` is not known", code="word", expected=expected, fix=fix)
+        return str(value)
+
+    return check
+
+
+Distance = Annotated[Number, AfterValidator(bounded(PRINCIPAL_DISTANCE))]
+Place = tuple[
+    Annotated[Number, AfterValidator(bounded(COORDINATE))], Annotated[Number, AfterValidator(bounded(COORDINATE))]
+]
+Size = tuple[Annotated[Number, AfterValidator(bounded(FORMAT))], Annotated[Number, AfterValidator(bounded(FORMAT))]]
+
+
+class Preset(Section):
+    """One camera of a list."""
+
+    principal_distance: Distance = key("Principal distance", unit="mm")
+    principal_point: Place = key("Principal point x0, z0 in the system of the image coordinates", (0.0, 0.0), unit="mm")
+    format: Size | None = key("Width and height of the field in which points are measured", None, unit="mm")
+
+
+class PresetFile(Section):
+    """A list of cameras."""
+
+    photostrip_cameras: Annotated[Words, AfterValidator(one_of(SCHEMA_NUMBER))] = key("Number of this schema: 1")
+    cameras: Annotated[dict[Id, Preset], Field(min_length=1)] = key("Cameras by name")
+
+
+def own_presets() -> dict[str, Phototheodolite]:
+    """Give the cameras that come with the program.
+
+    Returns
+    -------
+    dict of str to Phototheodolite
+        By name.
+    """
+    text = resources.files("photostrip.terrestrial").joinpath(OWN_LIST).read_text(encoding="utf-8")
+    findings = Findings()
+    root = parse(text, OWN_LIST, findings)
+    found = _cameras(root, findings)
+    findings.stop()
+    return found
+
+
+def read_presets(file: str | None) -> dict[str, Phototheodolite]:
+    """Give all cameras that can be named.
+
+    Parameters
+    ----------
+    file : str, optional
+        A list of the user; its cameras come after those of the program and replace cameras of the same name.
+
+    Returns
+    -------
+    dict of str to Phototheodolite
+        By name.
+
+    Raises
+    ------
+    InputError
+        With every fault of the file.
+    """
+    if file is None:
+        return own_presets()
+    findings = Findings()
+    found = _cameras(read_document(file, findings), findings)
+    findings.stop()
+    return own_presets() | found
+
+
+def _cameras(root: Node | None, findings: Findings) -> dict[str, Phototheodolite]:
+    given = checked(PresetFile, root, findings) if root is not None else None
+    if given is None:
+        return {}
+    return {
+        str(name): Phototheodolite(str(name), each.principal_distance, each.principal_point, each.format)
+        for name, each in given.cameras.items()
+    }
+
+
+def preset(name: str, known: dict[str, Phototheodolite], where: str) -> Phototheodolite:
+    """Give a camera by name.
+
+    Parameters
+    ----------
+    name : str
+        What the user wrote.
+    known : dict of str to Phototheodolite
+        Cameras that can be named.
+    where : str
+        Option or key with the name, for the message.
+
+    Returns
+    -------
+    Phototheodolite
+        The camera.
+
+    Raises
+    ------
+    InputError
+        When there is no camera of this name.
+    """
+    if name not in known:
+        fix = suggestion(name, known) or "give --principal-distance, or a list of your own with --presets"
+        message = f"there is no camera `{shown(name)}`"
+        raise InputError(Fault(message, "unknown-camera", key=where, expected=f"one of {', '.join(known)}", fix=fix))
+    return known[name]

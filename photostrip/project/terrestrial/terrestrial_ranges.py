@@ -1,0 +1,132 @@
+"""What numbers of a terrestrial survey can be: wide limits that catch a wrong unit or a slip of the pen."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from photostrip.errors import Fault, InputError
+from photostrip.project.yaml.schema import wrong
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from photostrip.formats.text.findings import Findings
+    from photostrip.formats.text.tables import Table
+
+
+class Range(NamedTuple):
+    """Limits of a quantity.
+
+    Parameters
+    ----------
+    least, most : float
+        Smallest and largest value.
+    unit : str
+        Their unit.
+    """
+
+    least: float
+    most: float
+    unit: str
+
+    def __str__(self) -> str:
+        """Say what is expected."""
+        return f"{self.least:g} to {self.most:g} {self.unit}".rstrip()
+
+    def holds(self, value: float) -> bool:
+        """Whether a value lies within the limits; never for NaN."""
+        return self.least <= value <= self.most
+
+
+PRINCIPAL_DISTANCE = Range(1.0, 1e5, "mm")
+FORMAT = Range(1.0, 1e4, "mm")
+STEP = Range(1e-3, 1e5, "mm")
+COORDINATE = Range(-1e4, 1e4, "mm")
+IMAGE_SIGMA = Range(1e-6, 10.0, "mm")
+IMAGE_SIGMA_UM = Range(1e-3, 1e4, "µm")
+DIRECTION_SIGMA = Range(1e-4, 36_000.0, "″")
+DEGREES = Range(-1000.0, 1000.0, "deg")
+GON = Range(-1000.0, 1000.0, "gon")
+POSITION = Range(-1e8, 1e8, "m")
+BASE = Range(1e-3, 1e6, "m")
+TIME = Range(-1e9, 1e9, "")
+SIGNIFICANCE = Range(1e-6, 0.5, "")
+
+
+def within(option: str, value: float, limits: Range) -> float:
+    """Require that the value of an option lies within limits.
+
+    Parameters
+    ----------
+    option : str
+        Its name.
+    value : float
+        What the user typed.
+    limits : Range
+        Limits.
+
+    Returns
+    -------
+    float
+        The value.
+
+    Raises
+    ------
+    InputError
+        When it lies outside.
+    """
+    if not limits.holds(value):
+        raise InputError(Fault(f"{value:g} is out of range", "range", key=option, expected=str(limits)))
+    return value
+
+
+def bounded(limits: Range) -> Callable[[float], float]:
+    """Make the check of a key of a project.
+
+    Parameters
+    ----------
+    limits : Range
+        Limits.
+
+    Returns
+    -------
+    callable
+        Gives the value back, or raises.
+    """
+
+    def check(value: float) -> float:
+        if not limits.holds(value):
+            raise wrong(f"{value:g} is out of range", code="range", expected=str(limits))
+        return value
+
+    return check
+
+
+def refuse_outside(
+    table: Table, columns: Sequence[str], limits: Range, findings: Findings, *, scale: float = 1.0, unit: str = ""
+) -> None:
+    """Refuse numbers of a table outside limits; empty cells do not count.
+
+    Parameters
+    ----------
+    table : Table
+        The table.
+    columns : sequence of str
+        Its columns.
+    limits : Range
+        Limits.
+    findings : Findings
+        Where faults go.
+    scale : float
+        How much of the unit of the limits one unit of the table is.
+    unit : str
+        Unit of the table; default: that of the limits.
+    """
+    here = Range(limits.least / scale, limits.most / scale, unit or limits.unit)
+    for name in columns:
+        values = table.column(name)
+        for row in np.flatnonzero(~np.isnan(values) & ~((values >= here.least) & (values <= here.most))):
+            message = f"{values[row]:g} is out of range"
+            findings.add(table.fault(int(row), name, message, "range", expected=str(here)))

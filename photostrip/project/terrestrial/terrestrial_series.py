@@ -1,0 +1,236 @@
+"""From a table of measurements to a series of epochs: units, directions, standard deviations, and what must fit."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import Fault
+from photostrip.formats.measured.terrestrial import (
+    COORDINATES,
+    PSEUDO_PARALLAXES,
+    SIDES,
+    EpochTable,
+    read_coordinates,
+    read_pseudo_parallaxes,
+    reference_values,
+)
+from photostrip.formats.text.findings import counted, listed, suggestion
+from photostrip.notes import Note
+from photostrip.project.terrestrial.terrestrial_file import MILLIMETRES
+from photostrip.project.terrestrial.terrestrial_ranges import COORDINATE, IMAGE_SIGMA, refuse_outside
+from photostrip.terrestrial.monitoring import Series
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.formats.text.findings import Findings
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+LAYOUTS = {"coordinates": COORDINATES, "pseudo_parallaxes": PSEUDO_PARALLAXES}
+REFERENCE, SECOND = "first", "second"  # names of epochs that have none
+FEWEST_EPOCHS = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """What the numbers of a table mean.
+
+    Parameters
+    ----------
+    kind : str
+        ``"coordinates"`` or ``"pseudo_parallaxes"``.
+    unit : str
+        ``"mm"`` or ``"um"``.
+    z_axis : str
+        ``"up"`` or ``"down"``.
+    sigma, sigma_d : float or None
+        Standard deviations of coordinates and of pseudo-parallaxes, in the unit, of rows without one.
+    """
+
+    kind: str
+    unit: str
+    z_axis: str
+    sigma: float | None
+    sigma_d: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What the project says of epochs and points.
+
+    Parameters
+    ----------
+    epochs : tuple of str
+        Epochs in order, the first being the reference; empty: as they stand in the table.
+    times : tuple of float or None
+        Their times.
+    stable : tuple of str
+        Points that are taken not to move.
+    """
+
+    epochs: tuple[str, ...] = ()
+    times: tuple[float, ...] | None = None
+    stable: tuple[str, ...] = ()
+
+
+def read_series(file: str, table: Table, centre: Floats, wanted: Wanted, findings: Findings) -> Series | None:
+    """Read a table of measurements.
+
+    Parameters
+    ----------
+    file : str
+        Its path.
+    table : Table
+        What its numbers mean.
+    centre : ndarray, shape (2, 2)
+        Principal points of the left and right camera in mm, z up.
+    wanted : Wanted
+        Epochs and stable points.
+    findings : Findings
+        Where faults and notes go.
+
+    Returns
+    -------
+    Series or None
+        Measurements in mm, reduced to the principal points, z up; None when there are faults.
+    """
+    reader = read_coordinates if table.kind == "coordinates" else read_pseudo_parallaxes
+    read = reader(file, findings)
+    if read is None or findings.number(file):
+        return None
+    scale = MILLIMETRES[table.unit]
+    coordinates = [each.name for each in LAYOUTS[table.kind] if each.number and not each.positive]
+    deviations = [each.name for each in LAYOUTS[table.kind] if each.number and each.positive]
+    refuse_outside(read.table, coordinates, COORDINATE, findings, scale=scale, unit=table.unit)
+    refuse_outside(read.table, deviations, IMAGE_SIGMA, findings, scale=scale, unit=table.unit)
+    epochs = _epochs(read, table.kind, wanted, findings)
+    stable = _stable(read, wanted.stable, findings)
+    build = _from_coordinates if table.kind == "coordinates" else _from_pseudo_parallaxes
+    built = build(read, table, centre, epochs, findings)
+    if findings.number(file) or findings.number("") or built is None:
+        return None
+    times = None if wanted.times is None or len(wanted.times) != len(epochs) else np.array(wanted.times)
+    return Series(read.points, epochs, *built, stable, times)
+
+
+def _epochs(read: EpochTable, kind: str, wanted: Wanted, findings: Findings) -> tuple[str, ...]:
+    """Give the epochs in order and refuse those that are not measured."""
+    known = read.epochs
+    if kind != "coordinates":  # the reference epoch has no rows of its own
+        later = read.epochs or (wanted.epochs[1:] if len(wanted.epochs) == FEWEST_EPOCHS else (SECOND,))
+        known = (*(wanted.epochs[:1] or (REFERENCE,)), *later)
+    epochs = wanted.epochs or tuple(dict.fromkeys(known))
+    for name, times in Counter(epochs).items():
+        if times > 1:
+            findings.add(Fault(f"epoch {name} is named {times} times", "duplicate", key="epochs", fix="remove one"))
+    if len(epochs) < FEWEST_EPOCHS:
+        message = f"has only one epoch, {epochs[0]}" if epochs else "has no epoch"
+        file, key = ("", "epochs") if wanted.epochs else (read.table.file, "epoch")
+        message = f"the list {message}" if wanted.epochs else message
+        findings.add(Fault(message, "one-epoch", file, key=key, expected="two or more"))
+    missing = [(number, name) for number, name in enumerate(epochs) if name not in known]
+    for number, name in missing:
+        near = suggestion(name, [each for each in known if each not in epochs])
+        message = f"{read.table.file} has no measurement of epoch {name}"
+        fix = near or f"its epochs are {listed(read.epochs)}"
+        findings.add(Fault(message, "not-measured", key=f"epochs[{number}]", fix=fix))
+    if kind != "coordinates" and epochs and epochs[0] in read.epochs:
+        row = int(np.flatnonzero(read.epoch == read.epochs.index(epochs[0]))[0])
+        message = f"epoch {epochs[0]} is the reference, against which pseudo-parallaxes are measured"
+        fix = "name the reference epoch first in `epochs`, and only later epochs in the table"
+        findings.add(read.table.fault(row, "epoch", message, "reference-epoch", fix=fix))
+    others = [name for name in read.epochs if name not in epochs]
+    if others and not missing:
+        rows = int(np.isin(read.epoch, [read.epochs.index(name) for name in others]).sum())
+        message = (
+            f"{read.table.file}: {counted(rows, 'row')} of epochs that the project does not name: {listed(others)}"
+        )
+        findings.notes.append(Note("epoch-not-used", message))
+    return epochs
+
+
+def _stable(read: EpochTable, stable: tuple[str, ...], findings: Findings) -> NDArray[np.bool_]:
+    """Mark the points that are taken not to move, and refuse those that are not measured."""
+    for number, name in enumerate(stable):
+        if name not in read.points:
+            message = f"{read.table.file} has no point {name}"
+            fix = suggestion(name, read.points) or "correct the id, or remove it"
+            findings.add(Fault(message, "not-measured", key=f"stable[{number}]", fix=fix))
+    return np.array([name in set(stable) for name in read.points], bool)
+
+
+Built = tuple["Floats", "Floats", "Floats"]
+
+
+def _from_coordinates(
+    read: EpochTable, table: Table, centre: Floats, epochs: tuple[str, ...], findings: Findings
+) -> Built | None:
+    """Coordinates of each epoch have errors of their own and share none."""
+    sigma = _filled(read, ("sx", "sz"), table.sigma, "sigma", findings)
+    if sigma is None:
+        return None
+    place = {name: number for number, name in enumerate(epochs)}
+    number = np.array([place.get(name, -1) for name in read.epochs], np.intp)[read.epoch]
+    rows = np.flatnonzero(number >= 0)
+    shape = (len(epochs), len(read.points), len(SIDES), 2)
+    coordinates, own = np.full(shape, np.nan), np.ones(shape)
+    where = (number[rows], read.point[rows], read.side[rows])
+    flip = np.array([1.0, -1.0 if table.z_axis == "down" else 1.0])
+    scale = MILLIMETRES[table.unit]
+    coordinates[where] = read.columns("x", "z")[rows] * scale * flip - centre[read.side[rows]]
+    own[where] = (sigma[rows] * scale) ** 2
+    flat = (*shape[:2], 4)
+    return coordinates.reshape(flat), own.reshape(flat), np.zeros(flat[1:])
+
+
+def _from_pseudo_parallaxes(
+    read: EpochTable, table: Table, centre: Floats, epochs: tuple[str, ...], findings: Findings
+) -> Built | None:
+    """Pseudo-parallaxes have errors of their own; those of the reference photos all epochs share."""
+    sigma = _filled(read, ("sigma",), table.sigma, "sigma", findings)
+    usual = table.sigma if table.sigma_d is None else table.sigma_d
+    sigma_d = _filled(read, ("sigma_d",), usual, "sigma_d", findings)
+    reference = reference_values(read, findings)
+    if sigma is None or sigma_d is None or findings.number(read.table.file):
+        return None
+    scale = MILLIMETRES[table.unit] * np.array([1.0, -1.0 if table.z_axis == "down" else 1.0] * 2)
+    x, z, p, q = reference.T
+    first = np.column_stack([x, z, x - p, z - q]) * scale - centre.ravel()
+    place = {name: number for number, name in enumerate(epochs)}
+    names = read.epochs or epochs[1:2] or (SECOND,)
+    number = np.array([place.get(name, -1) for name in names], np.intp)[read.epoch]
+    rows = np.flatnonzero(number >= 0)
+    shape = (len(epochs), len(read.points), 4)
+    coordinates, own = np.full(shape, np.nan), np.zeros(shape)
+    coordinates[0] = first
+    change = read.columns("dx", "dz", "dx_right", "dz_right")[rows] * scale
+    coordinates[number[rows], read.point[rows]] = first[read.point[rows]] + change
+    own[1:] = 1.0
+    own[number[rows], read.point[rows]] = (sigma_d[rows] * MILLIMETRES[table.unit]) ** 2
+    shared = np.zeros((len(read.points), 4))
+    shared[read.point[::-1]] = (sigma[::-1] * MILLIMETRES[table.unit]) ** 2  # the first row of a point counts
+    return coordinates, own, shared
+
+
+def _filled(
+    read: EpochTable, columns: tuple[str, ...], usual: float | None, key: str, findings: Findings
+) -> Floats | None:
+    """Give standard deviations row by row, in the unit of the table."""
+    sigma = read.columns(*columns)
+    missing = np.flatnonzero(np.isnan(sigma).any(axis=1))
+    if usual is not None:
+        return np.where(np.isnan(sigma), usual, sigma)
+    if len(missing):
+        number = counted(len(missing), "row has no standard deviation", "rows have no standard deviation")
+        names = ", ".join(columns)
+        message = f"{number} ({names}), and none is given for all"
+        fix = f"set `measurements.{key}` in the project, or fill the column {names}"
+        findings.add(read.table.fault(int(missing[0]), columns[0], message, "no-sigma", fix=fix))
+        return None
+    return sigma

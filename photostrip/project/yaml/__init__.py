@@ -1,0 +1,1 @@
+"""The project file as YAML with positions: document, merging, validation, schema, references."""

@@ -1,0 +1,224 @@
+"""One project from several sources: what ``extends`` brings, what the file says, what ``--set`` overrides."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from photostrip.errors import Fault
+from photostrip.formats.text.findings import Findings
+from photostrip.formats.text.numbers import shown
+from photostrip.project.yaml.document import COMMAND_LINE, Node, Place, fault_at, parse, read_document
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+LONGEST_CHAIN = 8
+_STEP = re.compile(r'(?:^|\.)(?:"([^"]*)"|([^."\[\]]+))|\[([0-9]{1,6})\]')
+
+
+def path_of(node: Node, project: str) -> str:
+    """Path of the file that a value names.
+
+    Parameters
+    ----------
+    node : Node
+        A text that names a file.
+    project : str
+        Path of the project file; values from the command line are relative to it.
+
+    Returns
+    -------
+    str
+        The path as the user could type it: relative to where `project` is relative to.
+    """
+    owner = project if node.place.file == COMMAND_LINE else node.place.file
+    return str(Path(owner).parent / node.text)  # `..` stays: behind a link it does not cancel the folder before it
+
+
+def read_tree(file: str, findings: Findings, files: list[str]) -> Node | None:
+    """Read a project file and what it extends.
+
+    Parameters
+    ----------
+    file : str
+        Path of the project file.
+    findings : Findings
+        Where faults go.
+    files : list of str
+        Gets the path of every file read.
+
+    Returns
+    -------
+    Node or None
+        The project; None when the file cannot be read.
+    """
+    files.append(file)
+    root = read_document(file, findings)
+    if root is None:
+        return None
+    chain = [os.path.realpath(file)]
+    merged = child = root
+    while "extends" in child.entries:
+        parent = _parent(root, child, chain, findings, files)
+        if parent is None:
+            break
+        merged = merge(parent, merged)
+        child = parent
+    merged.entries.pop("extends", None)
+    return merged
+
+
+def _parent(root: Node, child: Node, chain: list[str], findings: Findings, files: list[str]) -> Node | None:
+    """Read the file that `child` extends."""
+    node = child.entries["extends"]
+    if not node.text:
+        what = "no value is given" if node.value == "" else "only one file can be extended"
+        findings.add(fault_at(child, ("extends",), what, "type", expected="the path of one file"))
+        return None
+    path = path_of(node, root.place.file)
+    real = os.path.realpath(path)
+    if real in chain or len(chain) > LONGEST_CHAIN:
+        message = f"{path} extends itself" if real in chain else f"more than {LONGEST_CHAIN} files extend each other"
+        findings.add(fault_at(child, ("extends",), message, "extends-cycle", fix="remove one `extends`"))
+        return None
+    chain.append(real)
+    files.append(path)
+    return read_named(path, child, ("extends",), findings)
+
+
+def read_named(path: str, owner: Node, key: tuple[str | int, ...], findings: Findings) -> Node | None:
+    """Read a YAML file that another one names; when the file as a whole is at fault, that place is told."""
+    inner = Findings(findings.notes)
+    parent = read_document(path, inner)
+    findings.absorb(inner, lambda fault: told_where_named(fault, owner, key))
+    return parent
+
+
+def told_where_named(fault: Fault, owner: Node, key: tuple[str | int, ...]) -> Fault:
+    """Give a fault of a file as a whole the place where the file is named; others keep their own.
+
+    Parameters
+    ----------
+    fault : Fault
+        A fault found while the file was read.
+    owner : Node
+        The project, or the file that names it.
+    key : tuple of str or int
+        Path of the value that names it.
+
+    Returns
+    -------
+    Fault
+        The fault with a line.
+    """
+    if fault.line:
+        return fault
+    message = f"{shown(fault.file, 200)} {fault.message}"
+    fix = fault.fix if fault.code != "file-directory" else ""  # there a project was looked for
+    return fault_at(owner, key, message, fault.code, expected=fault.expected, fix=fix)
+
+
+def merge(base: Node, own: Node) -> Node:
+    """Lay one tree over another: mappings are merged, lists and values replaced.
+
+    Parameters
+    ----------
+    base, own : Node
+        Trees; where both say something, `own` counts.
+
+    Returns
+    -------
+    Node
+        The merged tree; every value keeps the place where it stands.
+    """
+    if not (isinstance(base.value, dict) and isinstance(own.value, dict)):
+        return own
+    entries = dict(base.value)
+    for key, node in own.value.items():
+        entries[key] = merge(entries[key], node) if key in entries else node
+    return Node(entries, own.place, {**base.keys, **own.keys})
+
+
+def override(root: Node, assignments: Sequence[str], findings: Findings) -> Node:
+    """Apply ``path=value`` assignments.
+
+    Parameters
+    ----------
+    root : Node
+        The project.
+    assignments : sequence of str
+        For example ``processing.relative.grubbs_alpha=0.01`` or ``strips[0].camera=RC30``; the value is YAML.
+    findings : Findings
+        Where faults go; unknown keys are found by the schema later.
+
+    Returns
+    -------
+    Node
+        The project with the values replaced.
+    """
+    for assignment in assignments:
+        name, equals, text = assignment.partition("=")
+        path = steps(name.strip())
+        place = Place(COMMAND_LINE)
+        if not equals or not path:
+            message = f"`{shown(assignment)}` sets nothing"
+            fault = Fault(message, "set", COMMAND_LINE, expected="key.path=value, as in observations.sigma=0.004")
+            findings.add(fault)
+            continue
+        if path == ("extends",):
+            message = "`extends` cannot be set on the command line"
+            findings.add(Fault(message, "set", COMMAND_LINE, fix="set the keys themselves"))
+            continue
+        value = parse(text, COMMAND_LINE, findings)
+        if value is not None:
+            root = _assigned(root, path, _moved(value, place), name, findings)
+    return root
+
+
+def steps(name: str) -> tuple[str | int, ...]:
+    """Split ``cameras."RC.30".fiducials.F1[0]`` into its steps; none when it is no path."""
+    steps: list[str | int] = []
+    position = 0
+    while position < len(name):
+        match = _STEP.match(name, position)
+        if match is None:
+            return ()
+        steps.append(int(match[3]) if match[3] else match[1] or match[2])
+        position = match.end()
+    return tuple(steps)
+
+
+def _moved(node: Node, place: Place) -> Node:
+    """Give a tree from the command line one place, without a line."""
+    if isinstance(node.value, list):
+        return Node([_moved(each, place) for each in node.value], place)
+    if isinstance(node.value, dict):
+        entries = {key: _moved(each, place) for key, each in node.value.items()}
+        return Node(entries, place, dict.fromkeys(entries, place))
+    return Node(node.value, place)
+
+
+def _assigned(root: Node, path: tuple[str | int, ...], value: Node, name: str, findings: Findings) -> Node:
+    """Give a copy of the tree in which one value is replaced."""
+    if not path:
+        return value
+    step, rest = path[0], path[1:]
+    if isinstance(root.value, list):
+        number = int(step) if str(step).isdecimal() else len(root.value)
+        if number < len(root.value):
+            elements = list(root.value)
+            elements[number] = _assigned(elements[number], rest, value, name, findings)
+            return Node(elements, root.place)
+        message = f"there is no element {step} in a list of {len(root.value)}"
+        findings.add(Fault(message, "set", COMMAND_LINE, key=name, expected="a number, the first element being 0"))
+        return root
+    if isinstance(root.value, str) and root.value:
+        findings.add(Fault(f"there is nothing below the value `{shown(root.value)}`", "set", COMMAND_LINE, key=name))
+        return root
+    key = str(step)
+    inner = root.entries.get(key, Node({} if rest else "", value.place))
+    entries = {**root.entries, key: _assigned(inner, rest, value, name, findings)}
+    return Node(entries, root.place, {key: value.place, **root.keys})

@@ -1,0 +1,269 @@
+"""What the schema cannot see: values of the project file that must fit to each other.
+
+All checks look at the tree, not at the validated project, so that they also run when something else is at fault.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from photostrip.formats.text.findings import suggestion
+from photostrip.formats.text.numbers import shown
+from photostrip.project.yaml.document import COMMAND_LINE, fault_at
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from photostrip.formats.text.findings import Findings
+    from photostrip.project.yaml.document import Node
+
+    Path = tuple[str | int, ...]
+
+LEAST_MARKS = 2
+
+
+@dataclass(frozen=True, slots=True)
+class ListedPhoto:
+    """One photo of one strip: its id, where it stands, and the camera of its strip."""
+
+    id: str
+    path: Path
+    camera: str
+
+
+def listed_photos(root: Node) -> Iterator[ListedPhoto]:
+    """Give every photo of every strip.
+
+    Parameters
+    ----------
+    root : Node
+        The project.
+
+    Yields
+    ------
+    ListedPhoto
+        Photos in the order of the file.
+    """
+    strips = root.find("strips")
+    for i, strip in enumerate(strips.elements if strips is not None else []):
+        photos = strip.find("photos")
+        for j, photo in enumerate(photos.elements if photos is not None else []):
+            if photo.text:
+                yield ListedPhoto(photo.text, ("strips", i, "photos", j), strip.word("camera"))
+
+
+def check_references(root: Node, findings: Findings) -> None:
+    """Check what refers to something else in the project file.
+
+    Parameters
+    ----------
+    root : Node
+        The project.
+    findings : Findings
+        Where faults go.
+    """
+    _kind_of_measurements(root, findings)
+    _strips(root, findings)
+    _photos(root, findings)
+    _cameras(root, findings)
+    _system_of_coordinates(root, findings)
+    _units_of_sigma(root, findings)
+    _curvature(root, findings)
+    _needs_of_the_strip_method(root, findings)
+    _camera_positions(root, findings)
+
+
+NEEDED = {
+    "cameras": "cameras by name",
+    "observations": "points measured on photos, or `models` measured on a plotter",
+}
+NEEDS_IMAGES = {
+    "adjustment": (("bundle", "covariance"), "polynomial or similarity"),
+    "earth_curvature": (("image",), "auto, model or none"),
+    "refraction": (("true", "yes", "on"), "false"),
+}
+OF_PHOTOS = ("observations", "fiducial_measurements", "camera_positions", "orientations")
+
+
+def _kind_of_measurements(root: Node, findings: Findings) -> None:
+    """Ask for image coordinates and their cameras, or for models; refuse what needs the other kind."""
+    if root.has("models"):
+        _only_models(root, findings)
+    else:
+        _only_photos(root, findings)
+
+
+def _only_photos(root: Node, findings: Findings) -> None:
+    """Ask for what image coordinates need."""
+    for name, expected in NEEDED.items():
+        if not root.has(name):
+            findings.add(fault_at(root, (name,), f"`{name}` is missing", "missing-key", expected=expected))
+    strips = root.find("strips")
+    for number, strip in enumerate(strips.elements if strips is not None else []):
+        if isinstance(strip.value, dict) and not strip.has("camera"):
+            expected = "camera of all its photos, a key of `cameras`"
+            path = ("strips", number, "camera")
+            findings.add(fault_at(root, path, "`camera` is missing", "missing-key", expected=expected))
+        if strip.has("models"):
+            message, fix = "models are listed, and none are measured", "give their coordinates in `models`"
+            findings.add(fault_at(root, ("strips", number, "models"), message, "no-model", fix=fix))
+
+
+def _only_models(root: Node, findings: Findings) -> None:
+    """Refuse what model coordinates exclude."""
+    for name in OF_PHOTOS:
+        if root.has(name):
+            message = f"`{name}` and `models` exclude each other: a strip is made of photos or of models"
+            findings.add(fault_at(root, (name,), message, "photos-and-models", fix="remove one of the two"))
+    for name, (words, expected) in NEEDS_IMAGES.items():
+        word = root.word("processing", name)
+        if word.casefold() in words:
+            message = f"`{name}: {word}` needs image coordinates; the project gives model coordinates"
+            path = ("processing", name)
+            findings.add(fault_at(root, path, message, "needs-image-coordinates", expected=expected))
+
+
+def _strips(root: Node, findings: Findings) -> None:
+    """Refuse strips of the same name and cameras that do not exist."""
+    strips, cameras = root.find("strips"), root.find("cameras")
+    known = list(cameras.entries) if cameras is not None else []
+    first: dict[str, int] = {}
+    for number, strip in enumerate(strips.elements if strips is not None else []):
+        name, camera = strip.word("id"), strip.word("camera")
+        if name and first.setdefault(name, number) != number:
+            line = root.place_of(("strips", first[name], "id")).line
+            message = f"strip {shown(name)} exists already" + (f", in line {line}" if line else "")
+            findings.add(fault_at(root, ("strips", number, "id"), message, "duplicate-strip", fix="give it another id"))
+        if camera and known and camera not in known:
+            message = f"there is no camera `{shown(camera)}`"
+            expected, fix = f"one of {', '.join(known)}", suggestion(camera, known)
+            path = ("strips", number, "camera")
+            findings.add(fault_at(root, path, message, "unknown-camera", expected=expected, fix=fix))
+
+
+def _photos(root: Node, findings: Findings) -> None:
+    """Refuse a photo that is listed twice, in one strip or in two."""
+    first: dict[str, Path] = {}
+    for photo in listed_photos(root):
+        before = first.setdefault(photo.id, photo.path)
+        if before == photo.path:
+            continue
+        strip = root.word("strips", before[1], "id") or str(before[1])
+        place = root.place_of(before)
+        where = f"{place.file}:{place.line}:{place.column}" if place.line else place.file
+        message = f"photo {shown(photo.id)} is listed already, in strip {shown(strip)} ({where})"
+        findings.add(fault_at(root, photo.path, message, "duplicate-photo", fix="list every photo once"))
+
+
+def marks_of(camera: Node) -> Node | None:
+    """Give the fiducial marks of a camera by name: their coordinates, or their places; None when it has none.
+
+    Parameters
+    ----------
+    camera : Node
+        The camera.
+
+    Returns
+    -------
+    Node or None
+        A mapping with a key for each mark.
+    """
+    marks = camera.find("fiducials")
+    return camera.find("fiducial_places") if marks is None else marks
+
+
+def _cameras(root: Node, findings: Findings) -> None:
+    """Ask cameras for what their photos need: marks to orient by, the size of a pixel."""
+    cameras, strips = root.find("cameras"), root.find("strips")
+    used = dict.fromkeys(strip.word("camera") for strip in (strips.elements if strips is not None else []))
+    pixels = "px" in {root.word("observations", "unit"), root.word("fiducial_measurements", "unit")}
+    marked = root.has("fiducial_measurements")
+    origin = root.word("observations", "origin") or ("top-left" if root.word("observations", "unit") == "px" else "")
+    cornered = origin in {"top-left", "first-pixel"} and not marked
+    for name, camera in (cameras.entries if cameras is not None else {}).items():
+        path = ("cameras", name)
+        marks = marks_of(camera)
+        if marks is not None and len(marks.entries) == 1:
+            message = "one mark alone does not orient a photo"
+            findings.add(fault_at(root, (*path, "fiducials"), message, "length", expected="at least 2 marks"))
+        if name not in used or not isinstance(camera.value, dict):
+            continue
+        if marked and marks is None:
+            message = f"fiducial marks are measured, but camera {shown(name)} has none"
+            fix = "give their calibrated coordinates, or remove fiducial_measurements"
+            findings.add(fault_at(root, (*path, "fiducials"), message, "missing-key", fix=fix))
+        if (pixels or origin == "first-pixel") and "pixel_size" not in camera.entries:
+            message = f"coordinates are measured in pixels, but camera {shown(name)} has no pixel_size"
+            expected = "the size of a pixel in mm"
+            findings.add(fault_at(root, (*path, "pixel_size"), message, "missing-key", expected=expected))
+        if cornered and "format" not in camera.entries:
+            message = f"x and y begin at the {origin.replace('-', ' ')}, but camera {shown(name)} has no format"
+            expected = "width and height in mm; or `observations.origin: center`"
+            findings.add(fault_at(root, (*path, "format"), message, "missing-key", expected=expected))
+
+
+def _system_of_coordinates(root: Node, findings: Findings) -> None:
+    """Ask for the direction of y with pixels, and refuse an origin that would mean nothing."""
+    if root.word("observations", "unit") == "px" and not root.has("observations", "y_axis"):
+        message = "nothing says where y grows; with pixels both are in use"
+        expected = "down (rows, as image viewers count) or up"
+        findings.add(fault_at(root, ("observations", "y_axis"), message, "missing-key", expected=expected))
+    if root.has("fiducial_measurements") and root.has("observations", "origin"):
+        message = "an origin means nothing here: the measured fiducial marks say where the photo lies"
+        findings.add(fault_at(root, ("observations", "origin"), message, "origin", fix="remove it"))
+
+
+def _units_of_sigma(root: Node, findings: Findings) -> None:
+    """Refuse a standard deviation that would take its unit from another file, as when a preset changes below it."""
+    for section in ("observations", "fiducial_measurements"):
+        sigma, unit = root.find(section, "sigma"), root.find(section, "unit")
+        if sigma is None or unit is None or sigma.place.file in {unit.place.file, COMMAND_LINE}:
+            continue
+        message = f"sigma stands in {sigma.place.file}, its unit in {unit.place.file}"
+        findings.add(fault_at(root, (section, "sigma"), message, "unit-elsewhere", fix="write both in one file"))
+
+
+def _curvature(root: Node, findings: Findings) -> None:
+    """Refuse to count the Earth's curvature twice."""
+    if root.word("processing", "earth_curvature") not in {"model", "image"}:
+        return
+    control = root.find("control")
+    systems = [each.word("crs") for each in (control.elements if control is not None else [])]
+    curved = next((crs for crs in [*systems, root.word("output", "crs")] if crs not in {"", "local"}), "")
+    if curved:
+        message = f"Earth curvature would be counted twice: coordinates in {shown(curved)} carry it already"
+        fix = "remove earth_curvature, or give plane coordinates of an unknown projection as `crs: local`"
+        path = ("processing", "earth_curvature")
+        findings.add(fault_at(root, path, message, "curvature-twice", expected="auto", fix=fix))
+
+
+def _needs_of_the_strip_method(root: Node, findings: Findings) -> None:
+    """Ask for two photos in each strip and for control, which a bundle adjustment can do without."""
+    if root.word("processing", "adjustment") == "bundle":
+        return
+    strips, control = root.find("strips"), root.find("control")
+    for number, strip in enumerate(strips.elements if strips is not None else []):
+        photos = strip.find("photos")
+        if photos is not None and len(photos.elements) == 1:
+            path, fix = ("strips", number, "photos"), "or `processing.adjustment: bundle`, which takes single photos"
+            message = "there is only one photo"
+            findings.add(fault_at(root, path, message, "length", expected="at least 2 photos", fix=fix))
+    if control is None:
+        expected = "lists of given ground coordinates, each in its own frame"
+        findings.add(fault_at(root, ("control",), "`control` is missing", "missing-key", expected=expected))
+    elif isinstance(control.value, list) and not control.value:
+        expected = "at least 1 control list"
+        findings.add(fault_at(root, ("control",), "there is no control list", "length", expected=expected))
+
+
+def _camera_positions(root: Node, findings: Findings) -> None:
+    """Refuse curvature by eq. 153 for positions that carry it: they must lie in the control's frame."""
+    if root.word("processing", "earth_curvature") not in {"model", "image"}:
+        return
+    for section in ("camera_positions", "orientations"):
+        crs = root.word(section, "crs")
+        if crs not in {"", "local"}:
+            message = f"Earth curvature would be counted twice: {section} in {shown(crs)} carry it already"
+            fix = "remove earth_curvature, or give the positions in the `local` frame of the control"
+            findings.add(fault_at(root, (section, "crs"), message, "curvature-twice", expected="local", fix=fix))

@@ -1,0 +1,140 @@
+"""The summary of a batch as sections and tables: every project on a line, then what is wrong with which."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from photostrip.report.page.figures import counted, metres, micrometres
+from photostrip.report.page.junit import Case, to_junit
+from photostrip.report.page.parts import DASH, Column, Section, Table, Words
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    Document = dict[str, Any]
+
+COLUMNS = (
+    Column("project", left=True),
+    Column("status", left=True),
+    Column("photos", rank=1),
+    Column("points", rank=2),
+    Column("rejected", rank=2),
+    Column("σ0", "µm", rank=1),
+    Column("at", left=True, rank=1),
+    Column("plan", "m"),
+    Column("height", "m"),
+)
+ROWS = 60  # projects that are shown; more stand in summary.csv
+MESSAGES = 3  # of one project that are shown
+# How bad each status is, and the style in which it is told.
+ORDER = ("crashed", "timeout", "memory", "weak", "faulty", "unwritten", "failed", "not run", "look", "good")
+STYLES = {"good": "good", "look": "look", "not run": "look"}
+
+
+def batch_sections(outcomes: Sequence[Document], *, quiet: bool = False, everything: bool = False) -> list[Section]:
+    """Give the summary of a batch.
+
+    Parameters
+    ----------
+    outcomes : sequence of dict
+        The line of each project, in the order in which the user named them.
+    quiet : bool
+        Whether counts and what is wrong are enough.
+    everything : bool
+        Whether all projects and all messages are shown.
+
+    Returns
+    -------
+    list of Section
+        The projects, what is wrong, the counts.
+    """
+    sections = [] if quiet else [Section("Projects", (_table(outcomes, everything=everything),))]
+    wrong = [each for each in _worst_first(outcomes) if each["exit_code"]]
+    if wrong:
+        sections.append(Section("What is wrong", tuple(_told(wrong, everything=everything))))
+    return [*sections, Section("Verdict" if sections else "", (Words(counts(outcomes), _style(outcomes)),))]
+
+
+def _worst_first(outcomes: Sequence[Document]) -> list[Document]:
+    return sorted(outcomes, key=lambda each: ORDER.index(each["status"]))
+
+
+def _table(outcomes: Sequence[Document], *, everything: bool) -> Table:
+    """Give the table of the projects; of too many, the worst."""
+    shown = list(outcomes) if everything or len(outcomes) <= ROWS else _worst_first(outcomes)[:ROWS]
+    missing = len(outcomes) - len(shown)
+    note = f"{counted(missing, 'more project')} not shown, none worse: --verbose, or summary.csv" if missing else ""
+    return Table(COLUMNS, tuple(map(_row, shown)), note=note)
+
+
+def _row(outcome: Document) -> tuple[str, ...]:
+    numbers = (DASH if outcome[name] is None else str(outcome[name]) for name in ("photos", "points", "rejected"))
+    return (
+        outcome["project"],
+        outcome["status"],
+        *numbers,
+        micrometres(outcome["sigma0_um"]),
+        outcome["rms_at"] or DASH,
+        metres(outcome["rms_plan_m"]),
+        metres(outcome["rms_height_m"]),
+    )
+
+
+def _told(wrong: Sequence[Document], *, everything: bool) -> list[Words]:
+    """Give the messages of the projects that are not as they should be."""
+    shown = wrong if everything else wrong[:ROWS]
+    found = []
+    for each in shown:
+        messages = each["messages"] if everything else each["messages"][:MESSAGES]
+        found.append(Words(f"{each['project']}: {each['status']}", "failed"))
+        found += [Words(message, mark="-") for message in messages]
+        if len(each["messages"]) > len(messages):
+            found.append(Words(f"and {len(each['messages']) - len(messages)} more", mark="-"))
+    if len(wrong) > len(shown):
+        found.append(Words(f"and {counted(len(wrong) - len(shown), 'more project')}: --verbose, or summary.json"))
+    return found
+
+
+def counts(outcomes: Sequence[Document]) -> str:
+    """Say how many projects ended in which way: ``12 projects: 1 faulty, 11 good``."""
+    numbers = {status: sum(each["status"] == status for each in outcomes) for status in ORDER}
+    parts = [f"{number} {status}" for status, number in numbers.items() if number]
+    return f"{counted(len(outcomes), 'project')}: {', '.join(parts)}"
+
+
+def _style(outcomes: Sequence[Document]) -> str:
+    styles = {STYLES.get(each["status"], "failed") for each in outcomes}
+    return next((style for style in ("failed", "look", "good") if style in styles), "")
+
+
+def outcome_line(outcome: Document) -> str:
+    """Say in one line what became of a project: for logs, and above a table that moves."""
+    head = f"{outcome['project']}: {outcome['status']}"
+    if outcome["rms_at"] is None or outcome["status"] == "failed":
+        messages = outcome["messages"]
+        more = f" (and {len(messages) - 1} more)" if len(messages) > 1 else ""
+        return f"{head}: {messages[0]}{more}" if messages else head
+    parts = [
+        f"{metres(outcome[f'rms_{part}_m'])} m in {part}"
+        for part in ("plan", "height")
+        if outcome[f"rms_{part}_m"] is not None
+    ]
+    return f"{head}, rms {', '.join(parts)} at {outcome['rms_at']} points" if parts else head
+
+
+def batch_junit(outcomes: Sequence[Document]) -> str:
+    """Give the summary as JUnit XML.
+
+    A tolerance that is not kept is a failure; a project without a result is an error.
+    """
+    return to_junit("photostrip batch", map(_case, outcomes))
+
+
+def _case(outcome: Document) -> Case:
+    name, status = outcome["project"], outcome["status"]
+    if status == "not run":
+        return Case(name, skipped=status)
+    if not outcome["exit_code"]:
+        return Case(name)
+    message, details = outcome["messages"][0], "\n".join(outcome["messages"])
+    return Case(name, message, details) if status == "failed" else Case(name, details=details, error=message)

@@ -1,0 +1,174 @@
+"""What ``photostrip check`` prints of a project: contents, frames, standard deviations, rows that are not used.
+
+Rendered from plain values alone, as the accuracy report is; nothing is computed here.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from photostrip.report.page.figures import counted, listed, short
+from photostrip.report.page.parts import DASH, Column, Facts, Section, Table, Words
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+Document = dict[str, Any]
+
+CONTROL_SHOWN = 24  # rows of the table of control; --verbose prints all
+IDS_SHOWN = 8
+
+
+def check_sections(document: Document, *, everything: bool = False) -> tuple[Section, ...]:
+    """Give the sections for one project that could be read.
+
+    Parameters
+    ----------
+    document : dict
+        What was decoded, see ``checking.check_project``.
+    everything : bool
+        Whether all control points and all ids are wanted.
+
+    Returns
+    -------
+    tuple of Section
+        Contents, ground frames, standard deviations, rows not used.
+    """
+    return (
+        _contents(document),
+        _frames(document["frames"]),
+        _sigmas(document["control"], everything=everything),
+        _rows(document["rows"], everything=everything),
+    )
+
+
+def verdict(path: str, faults: int, notes: int) -> str:
+    """Say in one line how a project stands."""
+    if faults:
+        return f"{path}: FAULTY, {counted(faults, 'fault')}"
+    return f"{path}: OK, ready to run" + (f"; {counted(notes, 'remark')}" if notes else "")
+
+
+def _contents(document: Document) -> Section:
+    counts = document["counts"]
+    control = "control {control_plan} in plan, {control_height} in height; check {check_plan} in plan, {check_height}"
+    rows = [
+        ("project", document["name"]),
+        ("photos", f"{counts['photos']} in {counted(counts['strips'], 'strip')}"),
+        _measured(counts),
+        ("given and measured", f"{control.format(**counts)} in height"),
+        _sigma(document),
+    ]
+    return Section("Contents", (Facts(tuple(rows)),))
+
+
+def _measured(counts: Document) -> tuple[str, str]:
+    """Say how much was measured, on photos or in models."""
+    points = f"of {counted(counts['points'], 'point')}, {counts['new']} new"
+    if "models" not in counts:
+        return "image points", f"{counts['image_points']} {points}"
+    models, centers = counted(counts["models"], "model"), counted(counts["model_centers"], "perspective center")
+    return "model points", f"{counts['model_points']} {points}, in {models}; {centers}"
+
+
+def _sigma(document: Document) -> tuple[str, str]:
+    """Say what standard deviations the measurements get."""
+    models = document.get("model_sigma")
+    return ("model sigma", _image_sigma(models)) if models else ("image sigma", _image_sigma(document["image_sigma"]))
+
+
+def _image_sigma(sigma: Document) -> str:
+    if sigma["smallest_um"] is None:
+        return DASH
+    low, high = (short(sigma[key]) for key in ("smallest_um", "largest_um"))
+    size = f"{low} µm" if low == high else f"{low} to {high} µm"
+    parts = []
+    if sigma["rows_with_own"]:
+        parts.append(f"{counted(sigma['rows_with_own'], 'row')} with their own")
+    if sigma["rows_with_default"]:
+        parts.append(f"{counted(sigma['rows_with_default'], 'row')} from {_source(sigma['default_from'])}")
+    return f"{size}; {', '.join(parts)}"
+
+
+def _frames(frames: Sequence[Document]) -> Section:
+    parts: list[Words | Facts] = []
+    for frame in frames:
+        name = frame["file"] or "output"
+        also = " (also of the results)" if frame["is_output"] and frame["file"] else ""
+        parts.append(Words(f"{name}{also}: {frame['frame']}", "head"))
+        parts.append(Facts(tuple(_decoded(frame))))
+    return Section("Ground frames, decoded at one point", tuple(part for part in parts if part != Facts(())))
+
+
+def _decoded(frame: Document) -> Iterator[tuple[str, str]]:
+    """Give the facts of one frame: a point as given, as decoded, and back."""
+    if "point" not in frame:
+        return
+    places = 8 if frame["kind"] == "geographic" else 3
+    named = zip(frame["axes"], frame["given"], strict=True)
+    given = (f"{axis} {DASH if value != value else format(value, f'.{places}f')}" for axis, value in named)  # noqa: PLR0124
+    yield f"  point {frame['point']}", ", ".join(given)
+    if "geodetic" in frame:
+        longitude, latitude, height = frame["geodetic"]
+        east, north = "E" if longitude >= 0 else "W", "N" if latitude >= 0 else "S"
+        text = f"{abs(latitude):.7f} deg {north}, {abs(longitude):.7f} deg {east}, {height:.3f} m above the ellipsoid"
+        yield "  latitude, longitude", text
+        yield (
+            "  geocentric",
+            ", ".join(f"{axis} {value:.3f}" for axis, value in zip("XYZ", frame["cartesian"], strict=True)),
+        )
+    yield "  and back", f"{frame['back_mm']:.6f} mm from what is given"
+    if "convergence_deg" in frame:
+        low, high = (f"{value:+.4f}" for value in frame["convergence_deg"])
+        size = low if low == high else f"{low} to {high}"
+        yield "  grid convergence", f"{size} deg (grid north from true north, clockwise)"
+    if frame["kind"] != "local" and frame["datum_accuracy"] != 0.0:
+        accuracy = frame["datum_accuracy"]
+        yield "  datum shift", "accuracy not known" if accuracy is None else f"accuracy {accuracy:g} m"
+    yield "  extent", f"{frame['span_m'] / 1000:.3f} km"
+
+
+def _sigmas(control: Sequence[Document], *, everything: bool) -> Section:
+    """Table of the standard deviation that each control coordinate gets, and where it stands."""
+    shown = control if everything else control[:CONTROL_SHOWN]
+    axes = control[0]["axes"] if control and all(each["axes"] == control[0]["axes"] for each in control) else "xyz"
+    columns = (
+        Column("point", left=True),
+        Column("role", left=True),
+        *(Column(f"σ {axis}", "m") for axis in axes),
+        Column("photos"),
+        Column("from", left=True),
+    )
+    rows = tuple(
+        (
+            each["id"],
+            each["role"] if any(each["counts"]) else "off",
+            *(DASH if value is None else short(value) for value in each["sigma"]),
+            str(each["photos"]),
+            "; ".join(dict.fromkeys(_source(source) for source in each["sigma_from"] if source)) or DASH,
+        )
+        for each in shown
+    )
+    rest = len(control) - len(shown)
+    note = f"{rest} more; --verbose prints all" if rest else ""
+    return Section("Standard deviations of the control", (Table(columns, rows, note=note),))
+
+
+def _source(place: Document) -> str:
+    """Say where a standard deviation stands: its own row, or a key of the project; the file without its folder."""
+    name = place["file"].rpartition("/")[2]
+    where = f"{name}:{place['line']}" if place["line"] else name
+    return f"its row, {where}" if place["source"] == "row" else f"{place['key']}, {where}"
+
+
+def _rows(rows: Sequence[Document], *, everything: bool) -> Section:
+    """List what became of the rows of the tables."""
+    parts: list[Words] = []
+    for table in rows:
+        head = f"{table['file']}: {table['used']} of {counted(table['rows'], 'row')} used"
+        parts.append(Words(head, "head" if table["unused"] else ""))
+        for each in table["unused"]:
+            ids = listed(each["ids"], len(each["ids"]) if everything else IDS_SHOWN)
+            first = f"first in line {each['first_line']}"
+            parts.append(Words(f"{counted(each['rows'], 'row')}: {each['why']} ({first}): {ids}", mark="  -"))
+    return Section("Rows of the tables", tuple(parts))

@@ -1,0 +1,96 @@
+"""A comparison as findings with a file and a line, and as test cases."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from photostrip.report.commands.compare_sections import NAMES, allowed_words, place
+from photostrip.report.page.figures import short, unit
+from photostrip.report.page.junit import Case
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+Document = dict[str, Any]
+
+MOST = 50  # annotations of one comparison; a server shows no more
+
+
+def compare_findings(document: Document, line_of: Callable[[str, str], int]) -> list[Document]:
+    """Give what differs as findings, each at the line of the baseline in which the record stands.
+
+    Parameters
+    ----------
+    document : dict
+        The comparison.
+    line_of : callable
+        Gives the line of a block and an id in the baseline; 0 when it is not there.
+
+    Returns
+    -------
+    list of dict
+        Findings, worst first; what is too much to show is counted in the last one.
+    """
+    found = list(_findings(document, line_of))
+    if len(found) <= MOST:
+        return found
+    rest = f"and {len(found) - MOST} more differences; photostrip compare --verbose lists them"
+    return [*found[:MOST], _finding(document, 0, rest)]
+
+
+def _findings(document: Document, line_of: Callable[[str, str], int]) -> Iterator[Document]:
+    for each in document["sets"]:
+        if each["differs"]:
+            for name in ("missing", "new"):
+                for row in each[name]:
+                    line = line_of(row["block"], row["id"])
+                    yield _finding(document, line, f"{NAMES[each['kind']]}: {row['what']} is {name}")
+    for row in document["differences"]:
+        yield _finding(document, line_of(row["block"], row["id"]), sentence(row))
+
+
+def _finding(document: Document, line: int, message: str) -> Document:
+    places = {"file": document["baseline"], "line": line, "column": 0, "key": ""}
+    return {
+        "severity": "error",
+        "code": "different",
+        **places,
+        "message": message,
+        "expected": "",
+        "fix": "",
+        "photos": [],
+        "points": [],
+    }
+
+
+def sentence(row: Document) -> str:
+    """Say in a sentence how a number differs."""
+    name = unit(row["unit"])
+    what = place(row) if row["kind"] not in {"plan", "height"} else f"{place(row)}, {row['kind']}"
+    if row["difference"] is None:
+        before, now = (short(row[key], 9) if row[key] is not None else "nothing" for key in ("before", "now"))
+        return f"{what}: {now} where {before} was"
+    size = f"differs by {short(row['difference'], 3)} {name}".rstrip()
+    allowed = f"allowed {short(row['allowed'], 3)} {name}".rstrip()
+    values = "" if row["before"] is None else f" ({short(row['before'], 9)} before, {short(row['now'], 9)} now)"
+    return f"{what} {size}, {allowed}{values}"
+
+
+def compare_cases(document: Document) -> Iterator[Case]:
+    """Give a comparison as test cases: one for each kind of quantity and each set."""
+    for kind in document["kinds"]:
+        name = NAMES[kind["kind"]]
+        if kind["ignored"]:
+            yield Case(name, skipped="not compared")
+            continue
+        rows = [sentence(row) for row in document["differences"] if row["kind"] == kind["kind"]]
+        message = f"{kind['different']} of {kind['compared']} beyond {allowed_words(kind)}"
+        yield Case(name, message, "\n".join(rows)) if kind["different"] else Case(name)
+    for each in document["sets"]:
+        name = NAMES[each["kind"]]
+        if each["ignored"]:
+            yield Case(name, skipped="not compared")
+            continue
+        rows = [f"{key}: {row['what']}" for key in ("missing", "new") for row in each[key]]
+        message = f"{len(each['missing'])} missing, {len(each['new'])} new"
+        yield Case(name, message, "\n".join(rows)) if each["differs"] else Case(name)

@@ -1,0 +1,167 @@
+"""A comparison as sections: the verdict, each kind of quantity with its worst, what is missing and what is new."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from photostrip.report.page.figures import counted, short, unit
+from photostrip.report.page.parts import DASH, Column, Part, Section, Table, Words
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+Document = dict[str, Any]
+
+SMALL = 1e-4  # shares below are told in parts per million
+SHOWN = 20  # differences; --verbose prints all
+NAMES = {
+    "plan": "plan",
+    "height": "height",
+    "rotation": "rotations",
+    "sigma0": "sigma0",
+    "scale": "scale factors",
+    "precision": "precision",
+    "statistics": "statistics",
+    "counts": "counts",
+    "ids": "photos, points, models",
+    "choices": "choices and verdicts",
+    "rejected": "rejected measurements",
+    "findings": "findings",
+}
+ONE = {"photos": "photo", "points": "point", "models": "model", "strips": "strip", "junctions": "joint at"}
+
+
+def compare_title(document: Document) -> str:
+    """Give the title of a comparison."""
+    return f"Comparison: {document['name']}"
+
+
+def compare_sections(document: Document, *, quiet: bool = False, everything: bool = False) -> tuple[Section, ...]:
+    """Give the sections of a comparison.
+
+    Parameters
+    ----------
+    document : dict
+        The comparison, see ``compare.compare_results``.
+    quiet : bool
+        Whether the verdict is enough.
+    everything : bool
+        Whether all differences are wanted, not only the worst.
+
+    Returns
+    -------
+    tuple of Section
+        The verdict first.
+    """
+    same = document["status"] == "same"
+    verdict = Words(headline(document), "good" if same else "failed")
+    if quiet:
+        return (Section("", (verdict,)),)
+    found = [Section("", (verdict, _kinds(document["kinds"]))), *_sets(document["sets"], everything=everything)]
+    if document["differences"]:
+        found.insert(1, _differences(document["differences"], everything=everything))
+    return tuple(found)
+
+
+def headline(document: Document) -> str:
+    """Say in one sentence whether the results agree."""
+    names = f"{document['result'] or 'the result'} and {document['baseline'] or 'the baseline'}"
+    if document["status"] == "same":
+        compared = sum(kind["compared"] for kind in document["kinds"] if not kind["ignored"])
+        return f"SAME: {counted(compared, 'number')} of {names} agree within the tolerances."
+    numbers = len(document["differences"])
+    parts = [f"{counted(numbers, 'number')} beyond tolerance"] if numbers else []
+    parts += [_set_words(each) for each in document["sets"] if each["differs"]]
+    return f"DIFFERENT: {names} differ: {'; '.join(parts)}."
+
+
+def _set_words(each: Document) -> str:
+    return f"{NAMES[each['kind']]}: {len(each['missing'])} missing, {len(each['new'])} new"
+
+
+def allowed_words(kind: Document) -> str:
+    """Say what is allowed for a kind of quantity."""
+    if kind["ignored"]:
+        return "not compared"
+    allowed, name = kind["allowed"], unit(kind["unit"])
+    parts = [f"{short(allowed['absolute'])} {name}".rstrip()] if allowed["absolute"] else []
+    parts += [f"{short(allowed['absolute_um'])} µm"] if allowed.get("absolute_um") else []
+    share = allowed["relative"]
+    parts += [f"{short(100 * share)} %" if share >= SMALL else f"{short(1e6 * share)} ppm"] if share else []
+    return ", ".join(parts) or "none"
+
+
+def _kinds(kinds: Sequence[Document]) -> Table:
+    columns = (
+        Column("quantity", left=True),
+        Column("compared"),
+        Column("beyond"),
+        Column("largest"),
+        Column("", left=True),
+        Column("at", left=True),
+        Column("allowed", left=True),
+    )
+    rows = []
+    for kind in kinds:
+        worst = kind["worst"]
+        cells = (DASH, "", "") if worst is None else (_size(worst), unit(worst["unit"]), place(worst))
+        rows.append((NAMES[kind["kind"]], str(kind["compared"]), str(kind["different"]), *cells, allowed_words(kind)))
+    return Table(columns, tuple(rows))
+
+
+def place(row: Document) -> str:
+    """Say what a difference is of: the block of the result, the id, the quantity."""
+    block = ONE.get(row["block"], str(row["block"]))
+    where = f"{block} {row['id']}" if row["id"] else block
+    return where if row["name"] in {row["kind"], "rotation"} else f"{where}, {row['name']}"
+
+
+def _size(row: Document) -> str:
+    """Give the size of a difference."""
+    if row["difference"] is None:
+        return "new" if row["before"] is None and row["now"] is not None else "gone"
+    return short(row["difference"], 3)
+
+
+def _differences(rows: Sequence[Document], *, everything: bool) -> Section:
+    """Table of the differences beyond tolerance, worst first."""
+    columns = (
+        Column("of", left=True),
+        Column("baseline"),
+        Column("now"),
+        Column("difference"),
+        Column("allowed"),
+        Column("", left=True),
+    )
+    shown = rows if everything else rows[:SHOWN]
+    cells = tuple(
+        (
+            place(row) if row["kind"] not in {"plan", "height"} else f"{place(row)}, {row['kind']}",
+            short(row["before"], 9),
+            short(row["now"], 9),
+            _size(row),
+            short(row["allowed"], 3),
+            unit(row["unit"]),
+        )
+        for row in shown
+    )
+    rest = len(rows) - len(shown)
+    return Section(
+        "Beyond tolerance", (Table(columns, cells, note=f"{rest} more; --verbose prints all" if rest else ""),)
+    )
+
+
+def _sets(sets: Sequence[Document], *, everything: bool) -> list[Section]:
+    """List what is missing and what is new, of sets that differ."""
+    parts: list[Part] = []
+    for each in sets:
+        if not (each["missing"] or each["new"]):
+            continue
+        state = "not compared" if each["ignored"] else "more than allowed" if each["differs"] else "allowed"
+        parts.append(Words(f"{NAMES[each['kind']]} ({state})", "head"))
+        for name in ("missing", "new"):
+            shown = each[name] if everything else each[name][:SHOWN]
+            parts += [Words(f"{name}: {row['what']}", mark=" -") for row in shown]
+            if len(shown) < len(each[name]):
+                parts.append(Words(f"{name}: {len(each[name]) - len(shown)} more; --verbose names all", mark=" -"))
+    return [Section("Missing and new", tuple(parts))] if parts else []

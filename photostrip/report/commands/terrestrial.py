@@ -1,0 +1,329 @@
+"""Reports of direction computations: from their documents to sections of sentences, facts and tables."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from photostrip.report.page.figures import counted, fixed, short
+from photostrip.report.page.parts import DASH, Column, Facts, Part, Section, Table, Words
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+Document = dict[str, Any]
+
+ANGLE_DECIMALS = {"deg": 5, "gon": 5}  # 0.04 and 0.03 seconds of arc
+TITLES = {
+    "directions": "Directions of image points",
+    "photo-coordinates": "Image coordinates of directions",
+    "direction-accuracy": "Required accuracy of correction directions",
+    "theodolite-accuracy": "Image accuracy that a theodolite supports",
+    "worked-examples": "The worked examples of the source",
+    "photo-orientation": "Orientation of a photo by directions",
+    "cameras": "Cameras",
+}
+
+
+def direction_report(document: Document) -> tuple[str, tuple[Section, ...]]:
+    """Give the report of a direction computation.
+
+    Parameters
+    ----------
+    document : dict
+        Its document.
+
+    Returns
+    -------
+    title : str
+        Title of the report.
+    sections : tuple of Section
+        Its sections.
+    """
+    kind = document["kind"]
+    return TITLES[kind], BUILDERS[kind](document)
+
+
+def _camera_facts(document: Document) -> list[tuple[str, str]]:
+    """Describe the camera and how it looks."""
+    camera = document["camera"]
+    x0, z0 = camera["principal_point_mm"]
+    interior = f"f {short(camera['principal_distance_mm'], 9)} mm"
+    interior += f", principal point {short(x0, 9)}, {short(z0, 9)} mm" if (x0, z0) != (0.0, 0.0) else ""
+    rows = [("camera", f"{camera['name']}, {interior}")]
+    if "orientation" in document:
+        angles = document["orientation"]
+        unit = angles["unit"]
+        decimals = ANGLE_DECIMALS[unit]
+        words = ", ".join(f"{name} {fixed(angles[name], decimals)}" for name in ("alpha", "omega", "kappa"))
+        rows.append(("orientation", f"{words} {unit}"))
+    return rows
+
+
+def _sigma(document: Document) -> str:
+    return f"{short(document['image_sigma_um'])} µm in the photo, of x, z and the principal distance"
+
+
+# ---------------------------------------------------------------------------------------------------- conversion
+
+
+def _conversion(document: Document) -> tuple[Section, ...]:
+    unit = document["orientation"]["unit"]
+    decimals = ANGLE_DECIMALS[unit]
+    facts = _camera_facts(document)
+    columns = [Column("point", left=True), Column("x", "mm"), Column("z", "mm")]
+    columns += [Column("lambda", unit), Column("beta", unit)]
+    places = {"x": 4, "z": 4, "lambda": decimals, "beta": decimals}
+    if "image_sigma_um" in document:
+        facts.append(("standard error", _sigma(document)))
+        columns += [Column("m_lambda", "″"), Column("m_beta", "″")]
+        places |= {"sigma_lambda_arcsec": 2, "sigma_beta_arcsec": 2}
+    rows = [(row["id"], *(fixed(row[name], each) for name, each in places.items())) for row in document["points"]]
+    return (Section("", (Facts(tuple(facts)), Table(tuple(columns), tuple(rows)))),)
+
+
+# ------------------------------------------------------------------------------------------------------ accuracy
+
+
+def _accuracy(document: Document) -> tuple[Section, ...]:
+    printed = document["formulas"] == "as printed"
+    points = document["points"]
+    facts = [*_camera_facts(document), ("standard error", _sigma(document)), ("formulas", document["formulas"])]
+    strictest = {name: min(row[f"{name}_arcsec"] for row in points) for name in ("horizontal", "vertical")}
+    facts.append(
+        (
+            "needed everywhere",
+            f"horizontal {fixed(strictest['horizontal'], 2)}″, vertical {fixed(strictest['vertical'], 2)}″",
+        )
+    )
+    sections = [
+        Section("", (Facts(tuple(facts)),)),
+        Section("Horizontal directions, m_lambda in ″", (_matrix(points, "horizontal_arcsec", 2),)),
+    ]
+    if not printed:
+        sections.append(Section("Vertical directions, m_beta in ″", (_matrix(points, "vertical_arcsec", 2),)))
+        return tuple(sections)
+    note = (
+        "The vertical directions inherit sec(lambda') from eq. 3, where cos(lambda') is right; without --as-printed the"
+        " exact values are given."
+    )
+    sections += [
+        Section("Vertical directions as printed (eq. 6), m_beta in ″", (_matrix(points, "vertical_arcsec", 2),)),
+        Section("Vertical directions as printed (eq. 5), m_beta in ″", (_matrix(points, "vertical_eq5_arcsec", 2),)),
+        Section("Vertical directions, exact, m_beta in ″", (_matrix(points, "vertical_exact_arcsec", 2), Words(note))),
+    ]
+    return tuple(sections)
+
+
+def _matrix(points: Sequence[Document], name: str, decimals: int) -> Table:
+    """Arrange values over the photo as they lie in it: x to the right, z upwards."""
+    across = sorted({row["x"] for row in points})
+    upwards = sorted({row["z"] for row in points}, reverse=True)
+    value = {(row["x"], row["z"]): row[name] for row in points}
+    columns = (Column("z \\ x", "mm"), *(Column(short(x, 9)) for x in across))
+    rows = tuple((short(z, 9), *(fixed(value[x, z], decimals) for x in across)) for z in upwards)
+    return Table(columns, rows)
+
+
+def _theodolite(document: Document) -> tuple[Section, ...]:
+    given, supported = document["theodolite"], document["supported_um"]
+    one = f"horizontal {short(given['horizontal_arcsec'])}″, vertical {short(given['vertical_arcsec'])}″"
+    mean = (
+        f"horizontal {fixed(given['mean_horizontal_arcsec'], 2)}″, vertical {fixed(given['mean_vertical_arcsec'], 2)}″"
+    )
+    facts = [
+        *_camera_facts(document),
+        ("theodolite, one round", one),
+        (f"mean of {counted(given['rounds'], 'round')}", mean),
+        (
+            "supports in the photo",
+            (
+                f"{fixed(supported['by_both'], 2)} µm everywhere (horizontal {fixed(supported['by_horizontal'], 2)},"
+                f" vertical {fixed(supported['by_vertical'], 2)})"
+            ),
+        ),
+    ]
+    if "wanted" in document:
+        wanted = document["wanted"]
+        horizontal, vertical = wanted["rounds_horizontal"], wanted["rounds_vertical"]
+        facts.append(
+            (
+                f"for {short(wanted['image_sigma_um'])} µm",
+                f"{counted(max(horizontal, vertical), 'round')} (horizontal {horizontal}, vertical {vertical})",
+            )
+        )
+    return (
+        Section("", (Facts(tuple(facts)),)),
+        Section(
+            "Standard error of image coordinates that it supports, µm",
+            (_matrix(document["points"], "supported_um", 2),),
+        ),
+    )
+
+
+def _examples(document: Document) -> tuple[Section, ...]:
+    rows = tuple(
+        (
+            row["camera"],
+            short(row["f_mm"]),
+            fixed(row["horizontal_printed_arcsec"], 1),
+            fixed(row["horizontal_exact_arcsec"], 2),
+            fixed(row["vertical_printed_arcsec"], 1),
+            fixed(row["vertical_with_printed_factor_arcsec"], 2),
+            fixed(row["vertical_eq6_arcsec"], 2),
+            fixed(row["vertical_eq5_arcsec"], 2),
+            fixed(row["vertical_exact_arcsec"], 2),
+        )
+        for row in document["examples"]
+    )
+    columns = (
+        Column("camera", left=True),
+        Column("f", "mm"),
+        Column("m_lambda", "printed ″"),
+        Column("m_lambda", "exact ″"),
+        Column("m_beta", "printed ″"),
+        Column("with 1.18", "″"),
+        Column("eq. 6", "″"),
+        Column("eq. 5", "″"),
+        Column("m_beta", "exact ″"),
+    )
+    first = document["examples"][0]
+    facts = Facts(
+        (
+            ("point", f"x {short(first['x_mm'])} mm, z {short(first['z_mm'])} mm"),
+            ("standard error", f"{short(first['image_sigma_um'])} µm"),
+        )
+    )
+    return (Section("", (facts, Table(columns, rows))), Section("What is wrong in print", _misprints(document)))
+
+
+def _misprints(document: Document) -> tuple[Part, ...]:
+    """Explain the misprints with the numbers of the examples."""
+    first, second = document["examples"]
+    small = [100 * (1 - row["vertical_eq6_arcsec"] / row["vertical_eq5_arcsec"]) for row in (first, second)]
+    z = short(first["z_mm"])
+    texts = (
+        (
+            "Eq. 3 computes beta with sec(lambda') = sqrt(1 + x²/f²); it must be cos(lambda'). Put back into eq. 2, the"
+            f" printed form returns z = {fixed(first['z_returned_by_printed_eq3_mm'], 1)} mm for z = {z} mm with"
+            f" f = {short(first['f_mm'])} mm. The derivatives of beta (eq. 4) and m_beta (eq. 5, 6) inherit it."
+        ),
+        (
+            f"Eq. 6 also drops x² under the root of the numerator of eq. 5, which makes it {fixed(small[0], 0)} % and"
+            f" {fixed(small[1], 0)} % smaller in the two examples; the source admits 10-20 %."
+        ),
+        (
+            f"The factor 1 + x²/f² is {short(first['factor_of_camera'], 3)} for f = {short(first['f_mm'])} mm only."
+            f" The second example uses the same {short(second['factor_printed'], 3)}, but for f ="
+            f" {short(second['f_mm'])} mm it is {short(second['factor_of_camera'], 3)}."
+        ),
+        (
+            "With all terms of first order and the cosine, m_beta = m rho / sqrt(f² + x² + z²). m_lambda is right:"
+            " m rho / sqrt(2 (f² + x²))."
+        ),
+        (
+            "The printed results are rounded, mostly to 0.5″; m_lambda of the second example is printed as 6.0″ where"
+            f" its own formula gives {fixed(second['horizontal_exact_arcsec'], 2)}″."
+        ),
+    )
+    return tuple(Words(text, mark=f"{number}.") for number, text in enumerate(texts, 1))
+
+
+# --------------------------------------------------------------------------------------------------- orientation
+
+
+def _orientation(document: Document) -> tuple[Section, ...]:
+    summary = document["summary"]
+    lower, upper = summary["sigma0_range"]
+    facts = [
+        *_camera_facts(document),
+        ("points", f"{summary['points_used']} of {summary['points']} used, {summary['directions_used']} directions"),
+        ("redundancy", str(summary["redundancy"]) if summary["redundancy"] else "0: no check"),
+        (
+            "sigma0",
+            DASH
+            if summary["sigma0"] is None
+            else f"{fixed(summary['sigma0'], 2)} times the stated standard deviations; between {fixed(lower, 2)} and"
+            f" {fixed(upper, 2)} is as expected",
+        ),
+        ("condition number", short(summary["condition"], 3)),
+    ]
+    elements = Table(
+        (Column("element", left=True), Column("value"), Column("", left=True), Column("sigma"), Column("", left=True)),
+        tuple(_element(row) for row in document["elements"]),
+    )
+    points = Table(
+        (
+            Column("point", left=True),
+            Column("v lambda", "″"),
+            Column("v beta", "″"),
+            Column("redundancy", "lambda"),
+            Column("redundancy", "beta"),
+            Column("", left=True),
+        ),
+        tuple(
+            (
+                row["id"],
+                fixed(row["v_lambda_arcsec"], 1),
+                fixed(row["v_beta_arcsec"], 1),
+                fixed(row["redundancy_lambda"], 2),
+                fixed(row["redundancy_beta"], 2),
+                "" if row["used"] else "rejected",
+            )
+            for row in document["points"]
+        ),
+    )
+    parts: list[Part] = [Facts(tuple(facts))]
+    if summary["sigma0"] is not None and not lower <= summary["sigma0"] <= upper:
+        parts.append(Words("The scatter of the directions does not agree with the stated standard deviations.", "look"))
+    sections = [Section("", tuple(parts)), Section("Elements", (elements,)), Section("Residuals", (points,))]
+    if document["rejected"]:
+        sections.append(Section("Rejected", tuple(map(_rejected, document["rejected"]))))
+    return tuple(sections)
+
+
+def _element(row: Document) -> tuple[str, ...]:
+    if row["unit"] == "mm":
+        return row["name"], fixed(row["value"], 4), "mm", fixed(row["sigma"], 1), "µm"
+    return row["name"], fixed(row["value"], ANGLE_DECIMALS[row["unit"]]), row["unit"], fixed(row["sigma"], 1), "″"
+
+
+def _rejected(row: Document) -> Words:
+    test = (
+        f"p value {short(row['value'], 2)}, limit {short(row['limit'], 2)}"
+        if row["test"] == "deletion"
+        else f"chi-square {short(row['value'], 3)}, limit {short(row['limit'], 3)}"
+    )
+    miss = f"lambda {fixed(row['lambda_arcsec'], 1)}″, beta {fixed(row['beta_arcsec'], 1)}″"
+    return Words(f"{row['point']}: {miss} off the orientation without it ({test})", mark="-")
+
+
+def _cameras(document: Document) -> tuple[Section, ...]:
+    columns = (
+        Column("camera", left=True),
+        Column("f", "mm"),
+        Column("x0", "mm"),
+        Column("z0", "mm"),
+        Column("format", "mm"),
+    )
+    rows = tuple(
+        (
+            row["id"],
+            short(row["principal_distance_mm"], 9),
+            short(row["x0_mm"], 9),
+            short(row["z0_mm"], 9),
+            DASH if row["width_mm"] is None else f"{short(row['width_mm'])} × {short(row['height_mm'])}",
+        )
+        for row in document["cameras"]
+    )
+    return (Section("", (Table(columns, rows),)),)
+
+
+BUILDERS = {
+    "directions": _conversion,
+    "photo-coordinates": _conversion,
+    "direction-accuracy": _accuracy,
+    "theodolite-accuracy": _theodolite,
+    "worked-examples": _examples,
+    "photo-orientation": _orientation,
+    "cameras": _cameras,
+}

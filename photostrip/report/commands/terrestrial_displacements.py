@@ -1,0 +1,220 @@
+"""Reports of displacements: from their document to sections of sentences, facts and tables."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from photostrip.report.page.figures import counted, fixed, metres, micrometres, short, signed
+from photostrip.report.page.parts import DASH, Column, Facts, Part, Section, Table, Words
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+Document = dict[str, Any]
+
+VERDICTS = {True: "moved", False: "", None: "not tested"}
+
+
+def displacement_report(document: Document) -> tuple[str, tuple[Section, ...]]:
+    """Give the report of displacements.
+
+    Parameters
+    ----------
+    document : dict
+        The document of displacements.
+
+    Returns
+    -------
+    title : str
+        Title of the report.
+    sections : tuple of Section
+        Verdict and set-up, the cameras, displacements of each epoch, rates, notes.
+    """
+    sections = [_overview(document)]
+    if any(row["determined"] for row in document["cameras"]):
+        sections.append(_camera_section(document))
+    for number in range(1, len(document["epochs"])):
+        sections += _epoch_sections(document, number)
+    if any("rate" in point for point in document["points"]):
+        sections.append(_rates(document))
+    if document["notes"]:
+        sections.append(_notes(document))
+    return f"Displacements: {document['name']}", tuple(sections)
+
+
+def _overview(document: Document) -> Section:
+    summary, settings = document["summary"], document["settings"]
+    left, right = (station["camera"] for station in document["stations"])
+    cameras = [f"{each['name']} (f {short(each['principal_distance_mm'], 9)} mm)" for each in (left, right)]
+    epochs = [epoch["id"] for epoch in document["epochs"]]
+    verdict = (
+        f"{counted(summary['significant'], 'point')} of {summary['determined'] - _stable_determined(document)} moved"
+        f" between {epochs[0]} and {epochs[-1]} by more than chance allows ({short(100 * settings['significance'])} %"
+        " level)."
+    )
+    facts = [
+        ("cameras", cameras[0] if left == right else " and ".join(cameras)),
+        ("base", f"{metres(document['base'])} m"),
+        ("axes", ", ".join(document["frame"]["axes"])),
+        ("epochs", ", ".join(epochs)),
+        ("points", f"{summary['points']}, {summary['stable']} of them stable"),
+        ("vertical parallaxes, rms", _parallaxes(document)),
+        ("stable points, scatter", _scatter(summary)),
+    ]
+    return Section("", (Words(verdict, "look" if summary["significant"] else "good"), Facts(tuple(facts))))
+
+
+def _stable_determined(document: Document) -> int:
+    last = [point for point in document["points"] if point["stable"]]
+    return sum("since_first" in point["epochs"][-1] for point in last)
+
+
+def _parallaxes(document: Document) -> str:
+    values = document["summary"]["parallax_rms_um"]
+    if all(value is None for value in values):
+        return "not measured: the rays were made to meet"
+    return ", ".join(micrometres(value) for value in values) + " µm"
+
+
+def _scatter(summary: Document) -> str:
+    if summary["stable_scatter"] is None:
+        return DASH
+    lower, upper = summary["stable_scatter_range"]
+    return (
+        f"{fixed(summary['stable_scatter'], 2)} times the stated standard deviations; between {fixed(lower, 2)} and"
+        f" {fixed(upper, 2)} is as expected"
+    )
+
+
+def _camera_section(document: Document) -> Section:
+    """Table of the turns of the cameras."""
+    columns = (
+        Column("epoch", left=True),
+        Column("camera", left=True),
+        Column("right", "″"),
+        Column("up", "″"),
+        Column("ccw", "″"),
+        Column("±", "″"),
+        Column("±", "″"),
+        Column("±", "″"),
+        Column("points"),
+        Column("test"),
+        Column("limit"),
+        Column("", left=True),
+    )
+    names = ("right", "up", "counter_clockwise")
+    rows = []
+    for row in document["cameras"]:
+        if not row["determined"]:
+            rows.append((row["epoch"], row["side"], *[DASH] * 9, "not determined"))
+            continue
+        verdict = f"{'turned' if row['turned'] else 'stood still'}, {'removed' if row['removed'] else 'left in'}"
+        rows.append(
+            (
+                row["epoch"],
+                row["side"],
+                *(fixed(row[f"{name}_arcsec"], 1) for name in names),
+                *(fixed(row[f"sigma_{name}_arcsec"], 1) for name in names),
+                str(row["stable_points"]),
+                fixed(row["statistic"], 1),
+                fixed(row["limit"], 1),
+                verdict,
+            )
+        )
+    note = "Turns against the first epoch in the camera's own axes; ccw: counter-clockwise for the photographer."
+    return Section("Cameras", (Table(columns, tuple(rows), note=note),))
+
+
+def _epoch_sections(document: Document, number: int) -> Iterator[Section]:
+    """Tables of one epoch: since the first epoch, and since the one before."""
+    epochs = [epoch["id"] for epoch in document["epochs"]]
+    yield Section(f"{epochs[0]} to {epochs[number]}", (_steps(document, number, "since_first"),))
+    if number > 1:
+        yield Section(f"{epochs[number - 1]} to {epochs[number]}", (_steps(document, number, "since_previous"),))
+
+
+def _steps(document: Document, number: int, key: str) -> Table:
+    axes = document["frame"]["axes"]
+    columns = (
+        Column("point", left=True),
+        *(Column(f"d {axis}", "m") for axis in axes),
+        *(Column("±", "m") for _ in axes),
+        Column("length", "m"),
+        Column("ellipse", "m", rank=1),
+        Column("azimuth", "deg", rank=1),
+        Column("test"),
+        Column("", left=True),
+    )
+    rows = []
+    for point in document["points"]:
+        entry = point["epochs"][number]
+        step = entry.get(key)
+        if step is None:
+            rows.append((point["id"], *[DASH] * (len(columns) - 2), entry.get("reason", "")))
+            continue
+        ellipse = step["ellipse"]
+        verdict = VERDICTS[step["significant"]]
+        words = [word for word in ("stable" if point["stable"] else "", verdict) if word]
+        axes_of_ellipse = f"{metres(ellipse['major'])} × {metres(ellipse['minor'])}"
+        rows.append(
+            (
+                point["id"],
+                *(signed(step[f"d{axis}"]) for axis in "xyz"),
+                *(metres(step[f"sigma_{axis}"]) for axis in "xyz"),
+                metres(step["length"]),
+                axes_of_ellipse if ellipse["major"] is not None else DASH,
+                fixed(ellipse["azimuth_deg"], 0),
+                fixed(step["statistic"], 1),
+                ", ".join(words),
+            )
+        )
+    settings = document["settings"]
+    note = (
+        f"Test: d' C⁻¹ d, limit {fixed(settings['limit'], 2)}; ± standard deviations; ellipse in plan,"
+        f" {short(100 * (1 - settings['significance']))} %, azimuth of its major axis."
+    )
+    return Table(columns, tuple(rows), note=note)
+
+
+def _rates(document: Document) -> Section:
+    """Table of uniform motions."""
+    unit = document["units"]["rate"].replace("metres", "m").replace(" per ", "/")
+    axes = document["frame"]["axes"]
+    columns = (
+        Column("point", left=True),
+        *(Column(f"v {axis}", unit) for axis in axes),
+        *(Column("±", unit) for _ in axes),
+        Column("speed", unit),
+        Column("test"),
+        Column("misfit"),
+        Column("limit"),
+        Column("", left=True),
+    )
+    rows = []
+    for point in document["points"]:
+        rate = point.get("rate")
+        if rate is None:
+            continue
+        words = [VERDICTS[rate["significant"]], "not uniform" if rate["uniform"] is False else ""]
+        rows.append(
+            (
+                point["id"],
+                *(f"{rate[f'd{axis}']:+z.4f}" for axis in "xyz"),
+                *(fixed(rate[f"sigma_{axis}"], 4) for axis in "xyz"),
+                fixed(rate["length"], 4),
+                fixed(rate["statistic"], 1),
+                fixed(rate["misfit"], 1),
+                fixed(rate["misfit_limit"], 1),
+                ", ".join(word for word in words if word),
+            )
+        )
+    note = "Misfit: what a uniform motion leaves, chi-square; above its limit the motion is not uniform."
+    return Section("Rates", (Table(columns, tuple(rows), note=note),))
+
+
+def _notes(document: Document) -> Section:
+    parts: list[Part] = [
+        Words(f"{note['severity']}: {note['message']}", "look" if note["severity"] == "warning" else "", "-")
+        for note in document["notes"]
+    ]
+    return Section("Notes", tuple(parts))

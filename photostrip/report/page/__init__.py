@@ -1,0 +1,1 @@
+"""Parts of a page and the ways to show them: text, console, HTML, JUnit."""

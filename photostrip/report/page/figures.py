@@ -1,0 +1,69 @@
+"""Numbers as the report prints them: fixed decimals for each quantity, a dash where there is none."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from photostrip.report.page.parts import DASH
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+Number = float | None
+
+
+def fixed(value: Number, decimals: int) -> str:
+    """Give a number with fixed decimals, never -0."""
+    return DASH if value is None else f"{value:z.{decimals}f}"
+
+
+def metres(value: Number) -> str:
+    """Give metres to the millimetre."""
+    return fixed(value, 3)
+
+
+def signed(value: Number) -> str:
+    """Give metres with their sign."""
+    return DASH if value is None else f"{value:+z.3f}"
+
+
+def micrometres(value: Number) -> str:
+    """Give micrometres to the tenth."""
+    return fixed(value, 1)
+
+
+def ratio(value: Number) -> str:
+    """Give a ratio without unit."""
+    return fixed(value, 2)
+
+
+def short(value: Number, digits: int = 4) -> str:
+    """Give a number with significant digits."""
+    return DASH if value is None else f"{value:.{digits}g}"
+
+
+def power(value: Number, digits: int = 4) -> str:
+    """Give a number in scientific form."""
+    return DASH if value is None else f"{value:.{digits}e}"
+
+
+def percent(part: float, whole: float) -> str:
+    """Give a share in percent."""
+    return f"{100 * part / whole:.1f} %" if whole else DASH
+
+
+def counted(number: int, one: str, many: str = "") -> str:
+    """Give a number with its noun: ``1 photo``, ``2 photos``."""
+    return f"{number} {one if number == 1 else many or one + 's'}"
+
+
+def listed(names: Iterable[str], limit: int) -> str:
+    """Name some ids and count the rest."""
+    given = list(names)
+    head = ", ".join(given[:limit])
+    return head if len(given) <= limit else f"{head} and {len(given) - limit} more"
+
+
+def unit(name: str) -> str:
+    """Give a unit of the document as it is printed."""
+    return name.replace("um", "µm")

@@ -1,0 +1,88 @@
+"""The report as plain text and as Markdown."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from photostrip.report.page.layout import USUAL, lay_out
+from photostrip.report.page.parts import Facts, Table, Words
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from photostrip.report.page.parts import Part, Section
+
+BEFORE = str.maketrans({sign: f"\\{sign}" for sign in "\\`*_[]<>|#"})
+
+
+def to_text(title: str, sections: Iterable[Section], width: int = USUAL, *, ascii_only: bool = False) -> str:
+    """Give a report as plain text.
+
+    Parameters
+    ----------
+    title : str
+        Its title.
+    sections : iterable of Section
+        Its sections.
+    width : int
+        Width of the page in characters.
+    ascii_only : bool
+        Whether the page can show ASCII only.
+
+    Returns
+    -------
+    str
+        The text, ending with a line feed.
+    """
+    lines = lay_out(title, sections, width, ascii_only=ascii_only)
+    return "".join(f"{line.text}\n" for line in lines)
+
+
+def to_markdown(title: str, sections: Iterable[Section]) -> str:
+    """Give a report as Markdown, all columns of all tables shown.
+
+    Parameters
+    ----------
+    title : str
+        Its title.
+    sections : iterable of Section
+        Its sections.
+
+    Returns
+    -------
+    str
+        The text, ending with a line feed.
+    """
+    blocks = [f"# {_safe(title)}"] if title else []
+    for section in sections:
+        blocks += [f"## {_safe(section.title)}"] if section.title else []
+        blocks += ["\n".join(_block(part)) for part in section.parts]
+    return "\n\n".join(blocks) + "\n"
+
+
+def _safe(text: str) -> str:
+    """Keep signs of Markdown in ids and sentences from being read as such."""
+    return text.translate(BEFORE)
+
+
+def _block(part: Part) -> Iterator[str]:
+    if isinstance(part, Words):
+        text = f"**{_safe(part.text)}**" if part.style else _safe(part.text)
+        yield f"{part.mark} {text}" if part.mark else text
+    elif isinstance(part, Facts):
+        yield from (f"- {_safe(label)}: {_safe(value)}" for label, value in part.rows)
+    else:
+        yield from _table(part)
+
+
+def _table(table: Table) -> Iterator[str]:
+    heads = [f"{column.name}, {column.unit}" if column.unit else column.name for column in table.columns]
+    yield _row(heads)
+    yield "|" + "|".join(":--" if column.left else "--:" for column in table.columns) + "|"
+    yield from map(_row, (*table.rows, *table.foot))
+    if table.note:
+        yield f"\n{_safe(table.note)}"
+
+
+def _row(cells: Iterable[str]) -> str:
+    return f"| {' | '.join(map(_safe, cells))} |"

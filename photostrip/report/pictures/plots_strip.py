@@ -1,0 +1,246 @@
+"""Pictures of a strip: its plan with residual vectors and error ellipses, heights and precision along it."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from photostrip.report.page.figures import counted, short
+from photostrip.report.pictures import svg
+from photostrip.report.pictures.plan_view import plan_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from photostrip.report.pictures.plan_view import Plan, Spot
+    from photostrip.report.pictures.svg import Axis, Picture
+
+Document = dict[str, Any]
+
+WIDTH, LOWEST, HIGHEST = 960.0, 220.0, 560.0  # of a picture
+LEFT, RIGHT, TOP, BOTTOM = 70.0, 24.0, 64.0, 54.0  # margins
+LONGEST = 70.0  # the longest vector or half axis on the plan
+MOST_ELLIPSES = 90  # more of them are a grey cloud: new points go without
+CROWDED = 12.0  # photos nearer to each other on the plan are drawn smaller
+SHAPES = {"control": "triangle", "check": "square", "new": "dot", "photo": "diamond"}
+WORDS = {"control": "control point", "check": "check point", "new": "new point", "photo": "photo"}
+
+
+def strip_pictures(document: Document) -> list[Picture]:
+    """Draw a result.
+
+    Parameters
+    ----------
+    document : dict
+        The document of a result.
+
+    Returns
+    -------
+    list of Picture
+        The plan; heights along the strip, where there are given heights; precision, where it is known.
+    """
+    plan = plan_of(document)
+    found = [_plan_picture(document, plan)]
+    if any(spot.up is not None for spot in plan.spots):
+        found.append(_height_picture(document, plan))
+    if document.get("precision", {}).get("along"):
+        found.append(_precision_picture(document))
+    return found
+
+
+# --------------------------------------------------------------------------------------------------------- plan
+
+
+def _plan_picture(document: Document, plan: Plan) -> Picture:
+    """Draw photos, points, residual vectors and ellipses from above."""
+    everything = [*plan.spots, *(spot for strip in plan.strips for spot in strip)]
+    low = min(spot.along for spot in everything), min(spot.across for spot in everything)
+    high = max(spot.along for spot in everything), max(spot.across for spot in everything)
+    room = WIDTH - 2 * LONGEST
+    scale = min(room / max(high[0] - low[0], 1e-9), (HIGHEST - TOP - 2 * LONGEST) / max(high[1] - low[1], 1e-9))
+    height = max(TOP + 2 * LONGEST + (high[1] - low[1]) * scale + 30.0, LOWEST)
+    shift = (WIDTH - (high[0] - low[0]) * scale) / 2
+
+    def place(along: float, across: float) -> svg.Point:
+        return shift + (along - low[0]) * scale, height - 30.0 - LONGEST - (across - low[1]) * scale
+
+    longest = max(_longest(plan), 1e-9)
+    bar = svg.nice(longest / 2)
+    factor = LONGEST / max(longest, bar)  # picture units for each metre of a residual
+    drawn = [svg.path((place(spot.along, spot.across) for spot in strip), "flight") for strip in plan.strips]
+    drawn += _ellipses(plan.spots, place, factor)
+    drawn += [_vector(spot, place, factor) for spot in plan.spots if spot.shift is not None]
+    spacing = (high[0] - low[0]) * scale / max(len(plan.strips[0]), 1)
+    drawn += [_spot(spot, place, min(1.0, spacing / CROWDED)) for spot in everything]
+    drawn += _legend([role for role in WORDS if any(spot.role == role for spot in everything)], TOP - 40.0)
+    drawn += _bars(scale, (bar, factor), plan.north, height)
+    enlarged = f"{float(f'{factor / scale:.2g}'):.0f}" if factor > scale else short(factor / scale, 2)
+    caption = (
+        "Vectors: adjusted minus given in plan; ellipses: standard deviations"
+        f"{'' if _all_ellipses(plan.spots) else ' of given points'}. Both are {enlarged} times as large as the ground."
+        " The first strip runs to the right."
+    )
+    counts = counted(len(plan.strips), "strip"), counted(len(plan.spots), "point")
+    words = f"{', '.join(counts)}; the tables of control and check points have the numbers."
+    return svg.picture("plan", (WIDTH, height), (f"Plan of {document['name']}", caption, words), drawn)
+
+
+def _longest(plan: Plan) -> float:
+    """Give the longest vector or half axis."""
+    vectors = [math.hypot(*spot.shift) for spot in plan.spots if spot.shift is not None]
+    return max([*vectors, *(spot.ellipse[0] for spot in plan.spots if spot.ellipse is not None)], default=0.0)
+
+
+def _all_ellipses(spots: Sequence[Spot]) -> bool:
+    """Whether there is room for the ellipses of new points, too."""
+    return sum(spot.ellipse is not None for spot in spots) <= MOST_ELLIPSES
+
+
+def _ellipses(spots: Sequence[Spot], place: Any, factor: float) -> list[str]:  # noqa: ANN401 (a function)
+    everything = _all_ellipses(spots)
+    found = []
+    for spot in spots:
+        if spot.ellipse is not None and (everything or spot.role != "new"):
+            a, b, angle = spot.ellipse
+            x, y = place(spot.along, spot.across)
+            turn = f"rotate({svg.number(-math.degrees(angle))} {svg.number(x)} {svg.number(y)})"
+            found.append(
+                svg.element("ellipse", cx=x, cy=y, rx=a * factor, ry=b * factor, transform=turn, kind="ellipse")
+            )
+    return found
+
+
+def _vector(spot: Spot, place: Any, factor: float) -> str:  # noqa: ANN401 (a function)
+    along, across = spot.shift or (0.0, 0.0)
+    x, y = place(spot.along, spot.across)
+    return svg.line((x, y), (x + along * factor, y - across * factor), f"vector {spot.role}")
+
+
+def _spot(spot: Spot, place: Any, share: float) -> str:  # noqa: ANN401 (a function)
+    """Draw the mark of a spot, smaller in a long strip; its hint has its id and numbers."""
+    hint = f"{WORDS[spot.role]} {spot.id}"
+    if spot.shift is not None:
+        hint += f", plan {short(math.hypot(*spot.shift), 3)} m"
+    if spot.up is not None:
+        hint += f", height {spot.up:+.3g} m"
+    if spot.ellipse is not None:
+        hint += f", ellipse {short(spot.ellipse[0], 3)} x {short(spot.ellipse[1], 3)} m"
+    size = {"new": 3.0 * share, "photo": 4.0 * share}.get(spot.role, 5.0)
+    return svg.mark(place(spot.along, spot.across), SHAPES[spot.role], f"mark {spot.role}", hint, size)
+
+
+def _legend(roles: Iterable[str], y: float, x: float = LEFT) -> list[str]:
+    """Give marks with their meaning in a row."""
+    found = []
+    for role in roles:
+        found += [svg.mark((x, y), SHAPES[role], f"mark {role}", "", 5.0), svg.text((x + 12.0, y + 4.5), WORDS[role])]
+        x += 24.0 + 7.5 * len(WORDS[role])
+    return found
+
+
+def _bars(scale: float, bar: tuple[float, float], north: tuple[float, float], height: float) -> list[str]:
+    """Give the scale bars of the ground and of the residuals, and the direction of north."""
+    ground = svg.nice(90.0 / scale)
+    found, x, y = [], LEFT, height - 18.0
+    for length, words, kind in (
+        (ground * scale, f"ground {_metres(ground)}", "bar"),
+        (bar[0] * bar[1], f"residuals {_metres(bar[0])}", "bar vector"),
+    ):
+        found += [svg.line((x, y), (x + length, y), kind), svg.text((x + length + 8.0, y + 4.5), words)]
+        x += length + 30.0 + 7.5 * len(words)
+    middle = (WIDTH - 60.0, 40.0)
+    tip = (middle[0] + 16.0 * north[0], middle[1] - 16.0 * north[1])
+    tail = (middle[0] - 16.0 * north[0], middle[1] + 16.0 * north[1])
+    return [*found, svg.line(tail, tip, "north"), svg.mark(tip, "dot", "north", "", 4.0),
+            svg.text((tip[0] + 14.0 * north[0], tip[1] - 14.0 * north[1] + 4.5), "N", "", "middle")]  # fmt: skip
+
+
+def _metres(size: float) -> str:
+    return f"{size / 1000:g} km" if size >= 1000 else f"{size:g} m" if size >= 1 else f"{size * 1000:g} mm"
+
+
+# ------------------------------------------------------------------------------------------------- along the strip
+
+
+def _axes(xs: Sequence[float], ys: Sequence[float], height: float) -> tuple[Axis, Axis]:
+    """Give axes that hold all numbers and zero, with a little room."""
+    low, high = min(*ys, 0.0), max(*ys, 0.0)
+    if high - low < 1e-12:  # noqa: PLR2004
+        high = 1.0
+    room = 0.06 * (high - low)
+    low, high = low - room if low < 0 else 0.0, high + room
+    spare = 0.02 * max(max(xs) - min(xs), 1e-6)
+    return (
+        svg.Axis(min(xs) - spare, max(xs) + spare, LEFT, WIDTH - RIGHT),
+        svg.Axis(low, high, height - BOTTOM, TOP),
+    )
+
+
+def _height_picture(document: Document, plan: Plan) -> Picture:
+    """Draw what is left in height at given points, and what was there before the polynomial."""
+    spots = [spot for spot in plan.spots if spot.up is not None]
+    ups = {spot.id: (spot.along / 1000, spot.up or 0.0) for spot in spots}
+    before = [
+        (ups[row["id"]][0], row["up"])
+        for row in document["misclosures"]
+        if document.get("polynomials") and row["id"] in ups and row.get("up") is not None
+    ]
+    height = 320.0
+    places = [*ups.values(), *before]
+    x, y = _axes([each[0] for each in places], [each[1] for each in places], height)
+    drawn = svg.frame(x, y, ("along the strip, km", "m"))
+    drawn += [svg.element("circle", cx=x(at), cy=y(size), r=4.5, kind="before") for at, size in before]
+    for spot in spots:
+        at, size = ups[spot.id]
+        hint = f"{WORDS[spot.role]} {spot.id}: {size:+.3f} m"
+        drawn.append(svg.line((x(at), y(0.0)), (x(at), y(size)), f"stem {spot.role}"))
+        drawn.append(svg.mark((x(at), y(size)), SHAPES[spot.role], f"mark {spot.role}", hint))
+    roles = [role for role in ("control", "check") if any(spot.role == role for spot in spots)]
+    drawn += _legend(roles, 20.0)
+    if before:
+        drawn += [
+            svg.element("circle", cx=LEFT + 270.0, cy=20.0, r=4.5, kind="before"),
+            svg.text((LEFT + 282.0, 24.5), "control before the polynomial"),
+        ]
+    caption = "Adjusted minus given heights along the first strip" + (
+        "; circles: strip minus given after the similarity, before the polynomial." if before else "."
+    )
+    largest = max(spots, key=lambda spot: abs(spot.up or 0.0))
+    words = f"{len(spots)} given heights; the largest difference is {largest.up:+.3f} m at {largest.id}."
+    return svg.picture("heights", (WIDTH, height), ("Heights along the strip", caption, words), drawn)
+
+
+CURVES = (
+    ("plan", "points, plan", "curve-1"),
+    ("height", "points, height", "curve-2"),
+    ("centre_plan", "perspective centres, plan", "curve-3"),
+    ("centre_height", "perspective centres, height", "curve-4"),
+)
+
+
+def _precision_picture(document: Document) -> Picture:
+    """Draw the standard deviations of points and perspective centres along every strip."""
+    rows = document["precision"]["along"]
+    height = 320.0
+    values = [row[key] for row in rows for key, *_ in CURVES if row[key] is not None]
+    x, y = _axes([row["distance"] / 1000 for row in rows], values or [1.0], height)
+    drawn = svg.frame(x, y, ("along the strip, km", "m"))
+    place = LEFT
+    for key, words, kind in CURVES:
+        for strip in dict.fromkeys(row["strip"] for row in rows):
+            curve = [
+                (x(row["distance"] / 1000), y(row[key]))
+                for row in rows
+                if row["strip"] == strip and row[key] is not None
+            ]
+            drawn.append(svg.path(curve, f"curve {kind}"))
+        drawn += [svg.line((place, 20.0), (place + 28.0, 20.0), f"curve {kind}"), svg.text((place + 34.0, 24.5), words)]
+        place += 52.0 + 7.0 * len(words)
+    caption = (
+        "Standard deviations along each strip, mean of the points near each photo: they are smallest where the control"
+        " stands."
+    )
+    points = document["precision"]["points"]
+    worst = [f"{name} {short(points[name]['max'], 3)} m at {points[name]['worst']}" for name in ("plan", "height")
+             if points[name]["max"] is not None]  # fmt: skip
+    return svg.picture("precision", (WIDTH, height), ("Precision along the strip", caption, "; ".join(worst)), drawn)

@@ -1,0 +1,79 @@
+"""Section on strips that were adjusted with their own covariance."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from photostrip.report.page.figures import counted, fixed, ratio, signed
+from photostrip.report.page.parts import Column, Facts, Part, Section, Table, Words
+from photostrip.report.sections.strip_sections import worst_first
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+Document = dict[str, Any]
+
+
+def covariance_section(document: Document, *, everything: bool) -> Section:
+    """Show the test of the whole adjustment and of each control coordinate.
+
+    Parameters
+    ----------
+    document : dict
+        The document of a result that has the block ``covariance``.
+    everything : bool
+        Whether all control coordinates are shown.
+    """
+    blocks = document["covariance"]
+    # a result that was written before the choice existed has none
+    distances = document["settings"].get("covariance", {}).get("distances", True)
+    text = (
+        f"The misclosures at the control {'and the distances of the pass points ' if distances else 'alone '}go to "
+        "every point by least-squares prediction with the covariance of the strip itself; there is no polynomial and "
+        "nothing to choose."
+    )
+    parts: list[Part] = [Words(text)]
+    for block in blocks:
+        parts += [Facts(tuple(_facts(block, several=len(blocks) > 1))), _control(block, everything=everything)]
+    return Section("Adjustment with the covariance of the strip", tuple(parts))
+
+
+def _facts(block: Document, *, several: bool) -> Sequence[tuple[str, str]]:
+    rows: list[tuple[str, str]] = [("strip", block["strip"])] if several else []
+    conditions = (
+        f"{counted(block['control_coordinates'], 'control coordinate')}, "
+        f"{counted(block['distances'], 'distance')} of pass points, {counted(block['models'], 'model')}"
+    )
+    test = f"σ0 {ratio(block['sigma0'])} (1 when all standard deviations are right), redundancy {block['redundancy']}"
+    if block["p"] is not None:
+        test += f", probability of a larger one by chance {fixed(100 * block['p'], 1)} %"
+    if block.get("passes", 1) > 1:
+        rows.append(
+            ("passes", f"{block['passes']}: the strip was so bent that it was formed again from corrected images")
+        )
+    return [*rows, ("conditions", conditions), ("test of the whole", test)]
+
+
+def _control(block: Document, *, everything: bool) -> Table:
+    shown, note = worst_first(
+        block["control"], lambda row: abs(row["test"] or 0.0), "in `covariance`", everything=everything
+    )
+    columns = (
+        Column("control", left=True),
+        Column("axis", left=True),
+        Column("test"),
+        Column("error that would explain it", "m"),
+        Column("", left=True),
+    )
+    rows = tuple(
+        (
+            row["id"],
+            row["axis"],
+            fixed(row["test"], 2),
+            signed(row["size"]),
+            "WRONG?" if row["test"] is not None and abs(row["test"]) > block["limit"] else "",
+        )
+        for row in shown
+    )
+    below = f"test: standard normal for right control; beyond {ratio(block['limit'])} it is doubtful"
+    return Table(columns, rows, note=f"{note}; {below}" if note else below)

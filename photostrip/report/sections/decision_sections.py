@@ -1,0 +1,118 @@
+"""What was decided without being asked for, with the reason; and what each control coordinate weighed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from photostrip.report.page.figures import counted, metres, micrometres, short
+from photostrip.report.page.parts import DASH, Column, Facts, Section, Table, Words
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+Document = dict[str, Any]
+
+WEIGHTS_SHOWN = 24  # control points; --verbose prints all
+LEAST_SHOWN = 0.001  # probabilities below are not told apart
+
+
+def decisions_section(document: Document) -> Section:
+    """Say what `auto` came to, and why."""
+    rows = tuple(_decisions(document))
+    parts = (Facts(rows),) if rows else (Words("Nothing: every choice stands in the project file."),)
+    return Section("Decided automatically", parts)
+
+
+def _decisions(document: Document) -> Iterator[tuple[str, str]]:
+    settings = document["settings"]
+    for block in document.get("polynomials", []):
+        if block["asked"] == "auto":
+            label = "polynomial" if len(document["strips"]) == 1 else f"polynomial of {block['strip']}"
+            yield label, _degree(block)
+    if "relative" in settings:
+        yield from _screening(document, settings["relative"])
+    elif settings["links"]["screening"] == "auto":
+        gone = counted(document["counts"]["rejected_in_links"], "point")
+        yield "screening", f"every common point of each link tested as a whole, the worst left out first; {gone} out"
+    interior = document["corrections"]["interior"]
+    if interior and settings["interior"]["transform"] == "auto":
+        what = " and ".join(interior["transforms"])
+        yield "fiducial marks", f"{what} transformation: affine where four marks or more determine it, else conformal"
+    curvature = document["corrections"]["earth_curvature"]
+    if curvature["asked"] == "auto":
+        yield "Earth curvature", f"{curvature['treatment']}; that is what the frame of the control asks for"
+    yield from _heights(document, settings.get("refinement", {}))
+
+
+def _degree(block: Document) -> str:
+    """Say which degree was taken in plan and in height, and what spoke for it."""
+    parts = []
+    for group in ("plan", "height"):
+        taken = [row for row in block["evidence"] if row["group"] == group and row["accepted"] and row["degree"]]
+        parts.append(f"{_step(taken[-1])} in {group}" if taken else f"none in {group}")
+    if all(part.startswith("none") for part in parts):
+        return "none: no degree brings more than chance, or serves control that took no part"
+    return f"{' and '.join(parts)}; F is the ratio of the gain over the degree before, p its probability by chance"
+
+
+def _step(row: Document) -> str:
+    """Name an accepted degree with its test."""
+    if row["f"] is None or row["p"] is None:
+        return f"degree {row['degree']}"
+    probability = f"p = {row['p']:.3f}" if row["p"] >= LEAST_SHOWN else f"p below {LEAST_SHOWN:g}"
+    return f"degree {row['degree']} (F = {row['f']:.1f}, {probability})"
+
+
+def _screening(document: Document, settings: Document) -> Iterator[tuple[str, str]]:
+    counts = document["counts"]
+    if settings["screening"] == "auto":
+        gone = counted(counts["rejected_in_pairs"], "point")
+        yield (
+            "screening",
+            f"robust start, then a global test of each pair, points left out singly and in sets; {gone} out",
+        )
+    elif settings["screening"] == "parallax+grubbs" and settings["parallax_limit"] is None:
+        sigma = micrometres(document["summary"]["sigma_given_um"])
+        text = f"four of its standard deviations, from {sigma} µm stated for an image coordinate"
+        yield "limit of y parallax", text
+
+
+def _heights(document: Document, settings: Document) -> Iterator[tuple[str, str]]:
+    wanted = [name for name, key in (("refraction", "refraction"), ("curvature", "earth_radius")) if settings.get(key)]
+    if wanted and (settings["flying_height"] is None or settings["ground_height"] is None):
+        heights = ", ".join(f"{short(strip['flying_height'])} m" for strip in document["strips"])
+        without = "it" if len(wanted) == 1 else "them"
+        label = f"heights for {' and '.join(wanted)}"
+        yield label, f"from a first run without {without}; flying height above ground {heights}"
+
+
+def weights_section(document: Document, *, everything: bool) -> Section:
+    """Give the standard deviation of every control coordinate as stated and as it counted in the fit."""
+    control = [row for row in document["control"] if row["role"] == "control" and row["measured"]]
+    shown = control if everything else control[:WEIGHTS_SHOWN]
+    axes = document["frame"]["axes"]
+    columns = (
+        Column("point", left=True),
+        Column("use", left=True),
+        *(Column(f"σ {axis}", "given, m", rank=1) for axis in axes),
+        *(Column(f"σ {axis}", "in fit, m") for axis in axes),
+        Column("list", left=True, rank=2),
+    )
+    up = next((number for number, axis in enumerate(axes) if axis in {"up", "z"}), 2)
+    rows = tuple(
+        (row["id"], row["use"], *_sigmas(row, "sigma", up), *_sigmas(row, "sigma_fit", up), str(row["list"]))
+        for row in shown
+    )
+    rest = len(control) - len(shown)
+    more = f"{rest} more in `control` of result.json; " if rest else ""
+    note = f"{more}in fit: together with a point of one model; a coordinate weighs 1 / σ² there"
+    if len({row["list"] for row in control}) > 1:
+        note += "; columns in the order of the axes of each list"
+    parts = (Table(columns, rows, note=note),) if rows else (Words("No control point was measured."),)
+    return Section("Weights of the control", parts)
+
+
+def _sigmas(row: Document, key: str, up: int) -> list[str]:
+    """Give the standard deviations of the coordinates that count: plan, height or both."""
+    counts = ["z" in row["use"] if column == up else "x" in row["use"] for column in range(3)]
+    return [metres(value) if used else DASH for value, used in zip(row[key], counts, strict=True)]

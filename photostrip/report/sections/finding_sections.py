@@ -1,0 +1,54 @@
+"""What the data say against themselves, told at the top of the report: each finding, its numbers and its cure."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from photostrip.notes import before
+from photostrip.report.page.parts import Section, Words
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from photostrip.report.page.parts import Part
+
+Document = dict[str, Any]
+
+
+def findings_sections(document: Document) -> tuple[Section, ...]:
+    """Give the section of the findings; none when there are none.
+
+    Parameters
+    ----------
+    document : dict
+        The document of a result; those of older versions have no findings.
+
+    Returns
+    -------
+    tuple of Section
+        One, or none.
+    """
+    findings = document.get("findings", [])
+    if not findings:
+        return ()
+    parts = tuple(part for each in findings for part in _told(each))
+    return (Section("Plausibility of the data", parts),)
+
+
+def _told(finding: Document) -> Iterator[Part]:
+    """Tell one finding in up to three paragraphs."""
+    place = before(finding["file"], finding["line"], finding["column"])
+    word = "accepted" if finding["accepted"] else finding["severity"]
+    colour = "" if finding["accepted"] else "failed" if finding["severity"] == "error" else "look"
+    yield Words(f"{finding['code']} {finding['title']} ({word}): {place}{finding['message']}.", colour, "-")
+    if finding["evidence"]:
+        numbers = ", ".join(f"{_name(name)} {value}" for name, value in finding["evidence"].items())
+        yield Words(f"Evidence: {numbers}.", "", " ")
+    if finding["fix"] and not finding["accepted"]:
+        cure = finding["fix"]
+        yield Words(f"To put it right: {cure}{'' if cure.endswith('?') else '.'}", "", " ")
+
+
+def _name(name: str) -> str:
+    """Write the name of a number as words."""
+    return name.replace("_", " ")

@@ -1,0 +1,260 @@
+"""Sections on given points, ties, photos, points, what was rejected and what is not determined."""
+
+from __future__ import annotations
+
+from itertools import groupby
+from operator import itemgetter
+from typing import TYPE_CHECKING, Any
+
+from photostrip.notes import before
+from photostrip.report.page.figures import counted, listed, metres, micrometres, ratio, signed, unit
+from photostrip.report.page.parts import DASH, Column, Facts, Part, Section, Table, Words
+from photostrip.report.sections.model_sections import scale_word
+from photostrip.report.sections.strip_sections import WORST_SHOWN, worst_first
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+Document = dict[str, Any]
+
+AXES = ("x", "y", "z")
+LETTERS = {"east": "x", "north": "y", "up": "z"}  # of `use`
+IDS_NAMED = 12
+WORST_POINTS = 8
+
+
+def control_section(document: Document, *, everything: bool) -> Section:
+    """Residuals at the control."""
+    rows = [row for row in document["control"] if row["role"] == "control" and row["measured"] and row["use"] != "off"]
+    text = (
+        "Adjusted minus given. The adjustment has seen these points: what is left here is smaller than the errors "
+        "between them."
+    )
+    if any(row.get("rejected", "") for row in rows):
+        text += (
+            " Coordinates with a minus in the column `use` were found wrong and took no part; the last lines leave "
+            "them out."
+        )
+    parts: list[Part] = [Words(text), _given(document, rows, "control", everything=everything), *_unused(document)]
+    return Section("Control points", tuple(parts))
+
+
+def check_section(document: Document, *, everything: bool) -> Section:
+    """Differences at the check points."""
+    rows = [row for row in document["control"] if row["role"] == "check" and row["measured"]]
+    if not rows:
+        text = "None. What lies between the control points is not proven by anything in this report."
+        return Section("Check points", (Words(text),))
+    text = "Adjusted minus given. These points took no part in anything: they say how good the new points are."
+    return Section("Check points", (Words(text), _given(document, rows, "check", everything=everything)))
+
+
+def _given(document: Document, given: Sequence[Document], role: str, *, everything: bool) -> Table:
+    axes, summary = document["frame"]["axes"], document["summary"]
+    shown, note = worst_first(given, lambda row: row["normalised"] or 0.0, "points in `control`", everything=everything)
+    columns = (
+        Column("point", left=True),
+        Column("use", left=True),
+        *(Column(f"d {axis}", "m") for axis in axes),
+        Column("plan", "µm"),
+        Column("height", "µm"),
+        Column("ratio", rank=1),
+        *(Column(f"σ {axis}", "m", rank=2) for axis in axes),
+        Column("strips", left=True, rank=3),
+    )
+    rows = tuple(
+        (
+            row["id"],
+            _used(row),
+            *(signed(row[key]) for key in ("dx", "dy", "dz")),
+            micrometres(row["plan_um"]),
+            micrometres(row["height_um"]),
+            ratio(row["normalised"]),
+            *map(metres, row["sigma"]),
+            ", ".join(row["strips"]),
+        )
+        for row in shown
+    )
+    plan, height = summary[role]["plan"], summary[role]["height"]
+    rms, mean = summary[f"{role}_rms"], summary[f"{role}_mean"]
+    blank = ("",) * (len(columns) - 8)
+    foot = (
+        (
+            "rms",
+            "",
+            *(metres(rms[a]) for a in AXES),
+            micrometres(plan["rms_um"]),
+            micrometres(height["rms_um"]),
+            ratio(summary[role]["normalised"]),
+            *blank,
+        ),
+        ("mean", "", *(signed(mean[a]) for a in AXES), "", "", "", *blank),
+        (
+            "largest",
+            "",
+            *(_largest(given, key, axis) for key, axis in zip(("dx", "dy", "dz"), axes, strict=True)),
+            micrometres(plan["max_um"]),
+            micrometres(height["max_um"]),
+            _most(given),
+            *blank,
+        ),
+    )
+    other = "the adjustment" if "bundle" in document else "a point of one model"
+    scale = scale_word(document)
+    below = f"plan, height: at {scale} scale; ratio: to the standard deviation of the given point and of {other}"
+    return Table(columns, rows, foot, f"{note}; {below}" if note else below)
+
+
+def _used(row: Document) -> str:
+    """Coordinates that count, then with a minus those that were found wrong."""
+    if not row.get("rejected", ""):
+        return str(row["use"])
+    kept = "".join(letter for letter in row["use"] if letter not in row.get("rejected", ""))
+    return f"{kept} -{row['rejected']}".strip()
+
+
+def _largest(rows: Sequence[Document], key: str, axis: str) -> str:
+    letter = LETTERS.get(axis, axis)
+    rows = [row for row in rows if letter not in row.get("rejected", "")]
+    return signed(max((row[key] for row in rows if row[key] is not None), key=abs, default=None))
+
+
+def _most(rows: Sequence[Document]) -> str:
+    known = (row["normalised"] for row in rows if row["normalised"] is not None and not row.get("rejected", ""))
+    return ratio(max(known, default=None))
+
+
+def _unused(document: Document) -> list[Part]:
+    """Given points that were not used, and why."""
+    rows = document["control"]
+    lost = [row["id"] for row in rows if not row["measured"]]
+    off = [row["id"] for row in rows if row["measured"] and row["role"] == "control" and row["use"] == "off"]
+    facts = [
+        (label, listed(names, IDS_NAMED))
+        for label, names in (("given, but not in the strips", lost), ("switched off", off))
+        if names
+    ]
+    return [Facts(tuple(facts))] if facts else []
+
+
+def ties_section(document: Document, *, everything: bool) -> Section:
+    """Differences of points that two strips share."""
+    ties, axes = document["ties"], document["frame"]["axes"]
+    if not ties:
+        return Section("Ties between strips", (Words("The strips have no point in common."),))
+    shown, note = worst_first(
+        ties, lambda t: max(t["plan_um"], abs(t["height_um"])), "points in `ties`", everything=everything
+    )
+    columns = (
+        Column("point", left=True),
+        Column("strips", left=True),
+        *(Column(f"d {axis}", "m") for axis in axes),
+        Column("plan", "µm"),
+        Column("height", "µm"),
+    )
+    rows = tuple(
+        (
+            t["id"],
+            " – ".join(t["strips"]),
+            *(signed(t[key]) for key in ("dx", "dy", "dz")),
+            micrometres(t["plan_um"]),
+            micrometres(t["height_um"]),
+        )
+        for t in shown
+    )
+    foot = (("rms", "", *(metres(_rms(ties, k)) for k in ("dx", "dy", "dz")), *_rms_um(ties)),)
+    below = "second strip minus first; the result has their mean"
+    return Section("Ties between strips", (Table(columns, rows, foot, f"{note}; {below}" if note else below),))
+
+
+def _rms(rows: Sequence[Document], key: str) -> float:
+    return float((sum(row[key] ** 2 for row in rows) / len(rows)) ** 0.5)
+
+
+def _rms_um(rows: Sequence[Document]) -> tuple[str, str]:
+    return micrometres(_rms(rows, "plan_um")), micrometres(_rms(rows, "height_um"))
+
+
+def image_section(document: Document) -> Section:
+    """Photos and points with the largest image residuals under the final orientations."""
+    summary = document["summary"]
+    text = (
+        "Photos and points come out of one adjustment. "
+        if "bundle" in document
+        else "Every photo is oriented anew on its adjusted points, so that orientations and points belong together. "
+    )
+    text += f"rms of the image residuals {micrometres(summary['image_rms_um'])} µm."
+    photos = sorted(document["photos"], key=lambda p: p["image_rms_um"] or 0.0, reverse=True)[:WORST_POINTS]
+    points = sorted(document["points"], key=lambda p: p["image_rms_um"] or 0.0, reverse=True)[:WORST_POINTS]
+    rays: dict[int, int] = {}
+    for point in document["points"]:
+        rays[point["rays"]] = rays.get(point["rays"], 0) + 1
+    facts = Facts((("points by photos", ", ".join(f"{rays[n]} on {counted(n, 'photo')}" for n in sorted(rays))),))
+    worst_photos = Table(
+        (Column("worst photos", left=True), Column("rms", "µm"), Column("points"), Column("strip", left=True, rank=1)),
+        tuple((p["id"], micrometres(p["image_rms_um"]), str(p["points"]), p["strip"]) for p in photos),
+    )
+    worst_points = Table(
+        (Column("worst points", left=True), Column("rms", "µm"), Column("photos"), Column("role", left=True, rank=1)),
+        tuple((p["id"], micrometres(p["image_rms_um"]), str(p["rays"]), p["role"]) for p in points),
+    )
+    return Section("Image residuals", (Words(text), facts, worst_photos, worst_points))
+
+
+def rejected_section(document: Document, *, everything: bool) -> Section:
+    """Measurements that were taken out."""
+    rejected = [row for row in document["rejected"] if not row.get("readmitted", False)]
+    if not rejected:
+        return Section("Rejected", (Words("Nothing was rejected."),))
+    shown, note = worst_first(rejected, lambda r: abs(r["parallax_um"] or 0.0), "in `rejected`", everything=everything)
+    columns = (
+        Column("point", left=True),
+        Column("photos", left=True),
+        Column("test", left=True),
+        Column("value"),
+        Column("limit"),
+        Column("", left=True),
+        Column("why", left=True, rank=1),
+    )
+    rows = tuple(
+        (
+            r["point"] or DASH,
+            " – ".join(photo for photo in (r["photo"], r["other_photo"]) if photo is not None),
+            r["test"],
+            micrometres(r["value"]) if r["unit"] else ratio(r["value"]),
+            micrometres(r["limit"]) if r["unit"] else ratio(r["limit"]),
+            unit(r["unit"]),
+            r["reason"],
+        )
+        for r in shown
+    )
+    return Section("Rejected", (Table(columns, rows, note=note),))
+
+
+def not_determined_section(document: Document, *, everything: bool) -> Section:
+    """Points that have no coordinates, by reason."""
+    missing = sorted(document["not_determined"], key=itemgetter("reason"))
+    parts: list[Part] = []
+    for reason, group in groupby(missing, key=itemgetter("reason")):
+        names = [row["id"] for row in group]
+        named = listed(names, len(names) if everything else IDS_NAMED)
+        parts.append(Words(f"{counted(len(names), 'point')} {reason}: {named}", mark="-"))
+    return Section("Points without coordinates", tuple(parts) or (Words("None."),))
+
+
+def notes_section(document: Document, *, everything: bool) -> Section:
+    """Give the notes of the run, said again at the end."""
+    notes = document["notes"]
+    limit = len(notes) if everything else 2 * WORST_SHOWN
+    parts: list[Part] = [
+        Words(f"{note['severity']}: {_told(note)}", "look" if note["severity"] == "warning" else "", "-")
+        for note in notes[:limit]
+    ]
+    if len(notes) > limit:
+        parts.append(Words(f"{len(notes) - limit} more in `notes` of result.json"))
+    return Section("Notes", tuple(parts) or (Words("None."),))
+
+
+def _told(note: Document) -> str:
+    """Give a note with its place; results of older versions have none."""
+    return before(note.get("file", ""), note.get("line", 0), note.get("column", 0)) + str(note["message"])

@@ -1,0 +1,155 @@
+"""Sections on independent models: how they fit each other, and how they lie in the strip."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from photostrip.report.page.figures import counted, fixed, metres, micrometres, percent, ratio
+from photostrip.report.page.parts import DASH, Column, Facts, Section, Table, Words
+from photostrip.report.sections.strip_sections import DIRECTIONS, worst_first
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+Document = dict[str, Any]
+
+
+def of_models(document: Document) -> bool:
+    """Whether a result is one of independent models."""
+    return "links" in document
+
+
+def scale_word(document: Document) -> str:
+    """Give the scale to which differences on the ground are brought: that of the photos or of the models."""
+    return "model" if of_models(document) else "photo"
+
+
+def links_section(document: Document, *, everything: bool) -> Section:
+    """Links: how good the model coordinates are, link by link."""
+    summary, links = document["summary"], document["links"]
+    if not links:
+        return Section("Links of the models", (Words("One model: nothing was linked."),))
+    shown, note = worst_first(links, lambda link: link["sigma0"] or 0.0, "links in `links`", everything=everything)
+    sigma0 = (
+        f"{micrometres(summary['sigma0_um'])} µm, of a model coordinate, from a redundancy of {summary['redundancy']}"
+        f"; stated are {micrometres(summary['sigma_given_um'])} µm"
+    )
+    worst = max(links, key=lambda link: (link["largest"] or 0.0) / (link["limit"] or 1.0))
+    largest = (
+        f"{ratio(worst['largest'])} at {worst['largest_point']} of models {worst['before']} and {worst['after']}, "
+        f"limit {ratio(worst['limit'])}"
+    )
+    out = sum(len(link["points_rejected"]) for link in links)
+    total = out + sum(link["points_used"] + link["center"] for link in links)
+    gone = f"{out} of {counted(total, 'common point')}, {percent(out, total)}"
+    facts = Facts((("σ0", sigma0), ("largest test value", largest), ("rejected", gone)))
+    return Section("Links of the models", (facts, _links(shown, note)))
+
+
+def _links(links: Sequence[Document], note: str) -> Table:
+    columns = (
+        Column("models", left=True),
+        Column("points"),
+        Column("center", left=True),
+        Column("rej."),
+        Column("σ0"),
+        *(Column(name, "m") for name in DIRECTIONS),
+        *(Column(name, "µm", rank=2) for name in DIRECTIONS),
+        Column("scale ratio", rank=2),
+        Column("far end", "σ", rank=1),
+        Column("detect.", "µm", rank=3),
+        Column("strip", left=True, rank=4),
+    )
+    rows = tuple(
+        (
+            f"{link['before']} – {link['after']}",
+            str(link["points_used"]),
+            "yes" if link["center"] else "no",
+            str(len(link["points_rejected"])),
+            ratio(link["sigma0"]),
+            *(metres(link["discrepancy"][name]) for name in DIRECTIONS),
+            *(micrometres(link["discrepancy_um"][name]) for name in DIRECTIONS),
+            fixed(link["factor"], 6),
+            ratio(link["far_end"]),
+            micrometres(link["detectable_um"]),
+            link["strip"],
+        )
+        for link in links
+    )
+    below = (
+        "σ0: ratio to what the standard deviations of both models let expect; along, across, up: rms differences of "
+        "the common points; far end: uncertainty of the second model's far end, in standard deviations of a coordinate"
+    )
+    return Table(columns, rows, note=f"{note}; {below}" if note else below)
+
+
+def models_section(document: Document, *, everything: bool) -> Section:
+    """Models: what each one holds, and its scale."""
+    models = document["models"]
+    middle = document["summary"]["model_scale"] or 1.0
+    shown, note = worst_first(
+        models, lambda m: abs(m["model_scale"] / middle - 1), "models in `models`", everything=everything
+    )
+    columns = (
+        Column("model", left=True),
+        Column("photos", left=True),
+        Column("points"),
+        Column("rej."),
+        Column("centers"),
+        Column("scale 1:"),
+        Column("base", "m"),
+        Column("strip", left=True, rank=2),
+    )
+    rows = tuple(
+        (
+            m["id"],
+            f"{m['left']} – {m['right']}",
+            str(m["points_used"]),
+            str(m["points_rejected"]),
+            str(m["centers"]),
+            fixed(m["model_scale"], 0),
+            fixed(m["base"], 2),
+            m["strip"],
+        )
+        for m in shown
+    )
+    text = (
+        "The models are independent: each has a scale, a rotation and an origin of its own, and takes its place from "
+        "the model before it. A point of several models is the mean of its positions. The rotations of the photos are "
+        "not known from model coordinates."
+    )
+    counts: dict[int, int] = {}
+    for point in document["points"]:
+        counts[point["models"]] = counts.get(point["models"], 0) + 1
+    by_models = ", ".join(f"{counts[n]} in {counted(n, 'model')}" for n in sorted(counts))
+    missing = [photo["id"] for photo in document["photos"] if photo["x"] is None]
+    facts = [("points by models", by_models)]
+    if missing:
+        facts.append(("photos without a center", ", ".join(missing)))
+    return Section("Models", (Words(text), Facts(tuple(facts)), Table(columns, rows, note=note)))
+
+
+def project_rows(document: Document) -> list[tuple[str, str]]:
+    """Give what the section on the project says of the links.
+
+    Parameters
+    ----------
+    document : dict
+        The document of a result of independent models.
+    """
+    settings = document["settings"]["links"]
+    text = str(settings["screening"])
+    if text == "auto":
+        text = f"each common point as a whole, level {settings['alpha']:g} for a link"
+    named = [f"{name} {', '.join(settings[name])}" for name in ("keep", "drop") if settings[name]]
+    return [("screening", "; ".join([text, *named])), ("links", "a similarity in space from model to model")]
+
+
+def measured(document: Document) -> tuple[tuple[str, str], ...]:
+    """Give the counts of what was measured."""
+    counts = document["counts"]
+    points = (
+        f"{counts['model_points']} of points, {counts['model_points_used']} used; {counts['model_centers']} of centers"
+    )
+    gone = counts["rejected_in_links"]
+    return (("model coordinates", points), ("rejected", f"{gone} in links" if gone else DASH))

@@ -1,0 +1,141 @@
+"""Section on the precision that error propagation gives to points and photos."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from photostrip.report.page.figures import counted, fixed, metres, micrometres, ratio
+from photostrip.report.page.parts import Column, Facts, Section, Table, Words
+from photostrip.report.sections.strip_sections import ALL_SHOWN
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+Document = dict[str, Any]
+
+WORST_POINTS = 8
+STATIONS_SHOWN = 12
+BASES = {"a-priori": "as stated", "a-posteriori": "found by the adjustment"}
+PARTS = (("plan", "east and north together"), ("height", "up"))
+
+
+def precision_section(document: Document, *, everything: bool) -> Section:
+    """Show standard deviations carried from the image coordinates and the control to points and photos.
+
+    Parameters
+    ----------
+    document : dict
+        The document of a result that has the block ``precision``.
+    everything : bool
+        Whether every photo is shown.
+    """
+    block = document["precision"]
+    measured = "model" if "links" in document else "image"
+    text = (
+        f"Standard deviations carried from the {measured} coordinates and the control through every step of the "
+        "adjustment. They hold for random errors: what a lens, the film or the refraction does to a whole strip is "
+        "not in them."
+    )
+    facts = [(f"{measured} coordinates", _basis(block["basis"]))]
+    for name, meaning in PARTS:
+        part = block["points"][name]
+        facts.append(
+            (
+                f"points, {name}",
+                f"rms {metres(part['rms'])} m ({meaning}), largest {metres(part['max'])} m at point {part['worst']}",
+            )
+        )
+    facts += _check(block.get("check"))
+    tables = (_worst(document), _along(document, block["along"], everything=everything))
+    return Section("Precision", (Words(text), Facts(tuple(facts)), *tables))
+
+
+def _basis(rows: Sequence[Document]) -> str:
+    if len(rows) == 1:
+        return f"{micrometres(rows[0]['sigma_um'])} µm, {BASES[rows[0]['basis']]}"
+    return ", ".join(f"strip {r['strip']} {micrometres(r['sigma_um'])} µm, {BASES[r['basis']]}" for r in rows)
+
+
+def _check(check: Document | None) -> list[tuple[str, str]]:
+    """Say how the errors at check points go with the standard deviations."""
+    if not check:
+        return []
+    parts = [
+        f"{check[name]['inside_95']} of {check[name]['count']} inside the 95 % {what}, rms {ratio(check[name]['rms'])}"
+        for name, what in (("plan", "ellipse in plan"), ("height", "interval in height"))
+        if check[name]["count"]
+    ]
+    rows = [("check points", f"{'; '.join(parts)} in units of their standard deviations")]
+    for test in check["tests"]:
+        name = "all of them together" if len(check["tests"]) == 1 else f"together, strip {test['strip']}"
+        text = (
+            f"sum of squares {fixed(test['squares'], 1)} of {counted(test['coordinates'], 'coordinate')}, probability "
+            f"of a larger one by chance {fixed(100 * test['p'], 1)} %"
+        )
+        rows.append((name, text))
+    return rows
+
+
+def _worst(document: Document) -> Table:
+    """Points with the largest error ellipse, and with the largest standard deviation in height."""
+    known = [point for point in document["points"] if point["sigma_x"] is not None]
+    by_plan = sorted(known, key=lambda p: p["ellipse_a"], reverse=True)[: WORST_POINTS // 2]
+    by_height = [p for p in sorted(known, key=lambda p: p["sigma_z"], reverse=True) if p not in by_plan]
+    axes = document["frame"]["axes"]
+    columns = (
+        Column("least precise points", left=True),
+        *(Column(f"σ {axis}", "m") for axis in axes),
+        Column("ellipse a", "m"),
+        Column("b", "m"),
+        Column("azimuth", "deg", rank=1),
+        Column("photos", rank=2),
+        Column("role", left=True, rank=3),
+    )
+    rows = tuple(
+        (
+            p["id"],
+            *(metres(p[f"sigma_{axis}"]) for axis in "xyz"),
+            metres(p["ellipse_a"]),
+            metres(p["ellipse_b"]),
+            fixed(p["ellipse_azimuth_deg"], 0),
+            str(p["rays"]),
+            p["role"],
+        )
+        for p in (*by_plan, *by_height[: WORST_POINTS - len(by_plan)])
+    )
+    note = "the worst in plan, then in height; a, b: semi-axes of the standard error ellipse in plan (39 %)"
+    return Table(columns, rows, note=note)
+
+
+def _along(document: Document, rows: Sequence[Document], *, everything: bool) -> Table:
+    """How the precision changes along the strips."""
+    several = len(document["strips"]) > 1
+    shown, left_out = list(rows), 0
+    if not everything and len(rows) > ALL_SHOWN:
+        step = (len(rows) - 1) / (STATIONS_SHOWN - 1)
+        shown = [rows[round(number * step)] for number in range(STATIONS_SHOWN)]
+        left_out = len(rows) - STATIONS_SHOWN
+    columns = (
+        Column("at photo", left=True),
+        Column("distance", "m"),
+        Column("points"),
+        Column("σ plan", "m"),
+        Column("σ height", "m"),
+        Column("center plan", "m", rank=1),
+        Column("height", "m", rank=1),
+        *([Column("strip", left=True, rank=2)] if several else []),
+    )
+    cells = tuple(
+        (
+            row["photo"],
+            fixed(row["distance"], 0),
+            str(row["points"]),
+            *(metres(row[key]) for key in ("plan", "height", "centre_plan", "centre_height")),
+            *([row["strip"]] if several else []),
+        )
+        for row in shown
+    )
+    note = "rms of the points nearest to each photo, and its perspective center"
+    if left_out:
+        note += f"; {left_out} more photos in `precision` of result.json"
+    return Table(columns, cells, note=note)

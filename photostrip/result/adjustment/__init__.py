@@ -1,0 +1,1 @@
+"""Blocks of the document about pairs, strips, models and their adjustment."""

@@ -1,0 +1,142 @@
+"""What the numbers of a result mean: units, axes, signs; what was asked for and which corrections were made."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, fields, is_dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.result.numbers import GROUND, Document, micrometres, rms, rounded
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.camera import Camera
+    from photostrip.pipeline import Result
+
+    Floats = NDArray[np.float64]
+
+ROTATION = {
+    "projected": "grid east, grid north and the ellipsoid's normal at the perspective center",
+    "geographic": "true east, true north and the ellipsoid's normal at the perspective center",
+    "geocentric": "the geocentric axes X, Y, Z",
+    "local": "the axes east, north, up of the local frame",
+}
+OF_PHOTOS, OF_MODELS = ("relative", "formation", "covariance", "interior", "refinement"), ("links",)
+EFFECTS = ("principal point", "distortion", "refraction")
+MEANT_OF_PHOTOS = ("vx_um, vy_um", "q_um")
+MEANT_OF_MODELS = {
+    "_um": "micrometres in the model; of ground differences at model scale",
+    "rotation": "of photos: not known from model coordinates; of models: rows of the matrix that takes model axes to "
+    "the axes along, across, up of the strip",
+    "vx_um, vy_um, vz_um": "model after minus model before at their common points, along the axes of the model before",
+}
+CURVATURE = "earth curvature"  # told with the other ways to treat it
+
+
+def conventions_of(result: Result) -> Document:
+    """Give the block ``conventions``: units, axes and signs of everything in the result."""
+    frame = result.output
+    found: Document = {
+        "lengths": "metres, unless the key ends in _mm or _um",
+        "x, y, z": f"{', '.join(frame.axes)}; plan in {frame.plan_unit}, heights in {frame.height_unit}",
+        "dx, dy, dz": f"adjusted minus given, metres, along {', '.join(frame.axes)}",
+        "plan, height": "length of a difference in plan and difference in height, metres",
+        "_um": "micrometres in the photo; of ground differences at photo scale",
+        "rotation": "rows of the matrix that takes image axes (x right, y up, the camera looks along -z) to "
+        f"{ROTATION[frame.kind]}",
+        "angles": f"{result.settings.angle_system}, {result.settings.angle_unit}",
+        "vx_um, vy_um": "image residuals, measured minus computed, under the final orientations and points",
+        "q_um": "y parallax y1 - y2 in the base frame; an image coordinate is better by the square root of 2",
+        "along, across, up": "X along the strip, Y to its left, Z up: the axes of the polynomials",
+        "rms": "square root of the mean square",
+        "order": "photos in flight order, points in natural order of their ids",
+    }
+    if not result.linked:
+        return found
+    return {key: value for key, value in found.items() if key not in MEANT_OF_PHOTOS} | MEANT_OF_MODELS
+
+
+def settings_of(result: Result) -> Document:
+    """Give the block ``settings``: what was asked for, with the keys and units of the project file."""
+    settings = result.settings
+    found: Document = {"adjustment": settings.adjustment}
+    for field in fields(settings):
+        value = getattr(settings, field.name)
+        if field.name in {"bundle", "covariance"} and settings.adjustment != field.name:
+            continue
+        if field.name in (OF_PHOTOS if result.linked else OF_MODELS):
+            continue
+        if is_dataclass(value) and not isinstance(value, type):
+            found[field.name] = asdict(value)
+    return found
+
+
+def cameras_of(result: Result) -> list[Document]:
+    """Give the list ``cameras``, in the order of the strips."""
+    cameras = {strip.camera.name: strip.camera for strip in result.inputs.strips}
+    return [_camera(camera) for camera in cameras.values()]
+
+
+def _camera(camera: Camera) -> Document:
+    distortion = camera.distortion
+    return {
+        "id": camera.name,
+        "principal_distance_mm": camera.principal_distance,
+        "principal_point_mm": list(camera.principal_point),
+        "format_mm": None if camera.format is None else list(camera.format),
+        "fiducials": len(camera.fiducials),
+        "distortion": None if distortion is None else f"{distortion.model}, {distortion.direction}",
+    }
+
+
+def corrections_of(result: Result) -> Document:
+    """Give the block ``corrections``: what was done to the measured coordinates, and how large it was."""
+    largest = result.refined.largest_um
+    found: Document = {
+        effect.replace(" ", "_"): {"applied": effect in largest, "largest_um": rounded(largest.get(effect, 0.0), 2)}
+        for effect in EFFECTS
+    }
+    found["interior"] = _interior(result)
+    found["earth_curvature"] = _curvature(result)
+    return found
+
+
+def _interior(result: Result) -> Document | None:
+    """Sum up the interior orientation; None without fiducial marks."""
+    found = result.interior
+    if found is None:
+        return None
+    lengths = [np.hypot(each[:, 0], each[:, 1]) for each in found.residuals]
+    worst = max(range(len(lengths)), key=lambda n: float(lengths[n].max(initial=0.0)), default=-1)
+    mark = int(np.argmax(lengths[worst])) if worst >= 0 and len(lengths[worst]) else -1
+    return {
+        "photos": len(found.photo_ids),
+        "transforms": sorted(set(found.transforms)),
+        "rms_um": micrometres(rms(np.concatenate([each.ravel() for each in found.residuals] or [np.zeros(0)]))),
+        "largest_um": micrometres(lengths[worst][mark]) if mark >= 0 else None,
+        "largest_photo": found.photo_ids[worst] if mark >= 0 else None,
+        "largest_mark": found.marks[worst][mark] if mark >= 0 else None,
+        "without_marks": list(found.without_marks),
+        "interpolated": found.film is not None,
+    }
+
+
+def _curvature(result: Result) -> Document:
+    """Say how the Earth's curvature was treated, and what it makes of the heights at the ends of the strips."""
+    wanted, radius = result.settings.absolute.earth_curvature, result.output.spec.curvature_radius
+    if CURVATURE in (shifts := result.refined.largest_um):
+        how = f"image points shifted outwards, R = {result.settings.refinement.earth_radius:.0f} m"
+        return {"asked": wanted, "treatment": how, "largest": 0.0, "largest_um": rounded(shifts[CURVATURE], 2)}
+    if radius is not None:
+        points = result.points
+        size = float(np.abs(points.ground[:, 2] - points.cartesian[:, 2]).max(initial=0.0))
+        how = f"heights corrected by D^2/2R, R = {radius:.0f} m"
+    elif result.output.kind == "local":
+        size, how = 0.0, "none: the local frame is taken as truly Cartesian"
+    else:
+        a, b = result.output.ellipsoid or (6378137.0, 6356752.3)
+        reach = max(float(np.linalg.norm(s.xyz[:, :2], axis=1).max(initial=0.0)) for s in result.flights)
+        size, how = reach**2 / (a + b), "carried by the frames: coordinates go through geocentric space"
+    return {"asked": wanted, "treatment": how, "largest": rounded(size, GROUND)}

@@ -1,0 +1,129 @@
+"""The document of a result: one plain dictionary, the content of result.json; everything else is rendered from it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from photostrip import __version__
+from photostrip.result import conventions, summary
+from photostrip.result.adjustment import bundle, covariance, deformation, models, pairs, strips
+from photostrip.result.numbers import Document, natural_rank
+from photostrip.result.points import ground, photos, precision
+from photostrip.result.verdict import verdict_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from photostrip.notes import Finding, Note
+    from photostrip.pipeline import Result
+
+SCHEMA = 1
+
+
+def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
+    """Turn a result into the content of result.json.
+
+    Parameters
+    ----------
+    result : Result
+        What a run found.
+    notes : iterable of Note
+        What was noticed before the run, while the project was read; they come first.
+
+    Returns
+    -------
+    dict
+        Text, numbers, None, lists and dictionaries only; the same for the same inputs, without times and paths.
+        Numbers are rounded to decimals that lie well below what they are good for.
+    """
+    rank = natural_rank(result.refined.observations.point_ids)
+    images = [photos.ImageResiduals.of(result, strip, rank) for strip in result.strips]
+    singles = photos.singles_of(result, rank)
+    found = ground.differences(result)
+    numbers = summary.summary_of(result, found)
+    polynomials = strips.polynomials_of(result)
+    body: Document = {
+        "adjustment": result.settings.adjustment,
+        "frame": ground.frame_of(result),
+        "summary": numbers,
+        "tolerances": summary.tolerances_of(result, numbers),
+        "counts": summary.counts_of(result, sum(len(image.rows) for image in (*images, *singles))),
+        "conventions": conventions.conventions_of(result),
+        "settings": conventions.settings_of(result),
+        "corrections": conventions.corrections_of(result),
+        "cameras": conventions.cameras_of(result),
+        "strips": models.strips_of(result) if result.linked else strips.strips_of(result),
+        "absolute": strips.absolute_of(result),
+        **({"polynomial": polynomials[0], "polynomials": polynomials} if polynomials else {}),
+        **covariance.covariances_of(result),
+        **precision.precision_of(result),
+        **bundle.bundle_of(result),
+        "control": ground.control_of(result, found),
+        "misclosures": ground.misclosures_of(result),
+        "ties": ground.ties_of(result, rank),
+        "rejected": bundle.with_bundle(result, [*models.rejected_of(result), *pairs.rejected_of(result)]),
+        "not_determined": ground.not_determined_of(result),
+        "findings": [_finding(each) for each in result.findings],
+        "notes": [_note(note) for note in (*notes, *result.notes)],
+        "models": models.models_of(result) if result.linked else pairs.models_of(result),
+        **({"links": models.links_of(result)} if result.linked else {}),
+        **deformation.deformations_of(result),
+        "junctions": pairs.junctions_of(result),
+        "photos": models.photos_of(result)
+        if result.linked
+        else [*photos.photos_of(result, images), *photos.single_photos_of(result, singles)],
+        "points": ground.points_of(result, photos.point_rms(result, [*images, *singles]), rank),
+        "residuals": bundle.with_reliability(
+            result, [*photos.residuals_of(result, images), *photos.single_residuals_of(result, singles)]
+        ),
+        "parallaxes": pairs.parallaxes_of(result, rank),
+        **({"link_residuals": models.residuals_of(result, rank)} if result.linked else {}),
+    }
+    verdict = verdict_of(body)
+    head = {
+        "photostrip_result": SCHEMA,
+        "version": __version__,
+        "name": result.inputs.name,
+        "status": verdict.pop("status"),
+        "verdict": verdict,
+    }
+    return head | body
+
+
+def _finding(finding: Finding) -> Document:
+    """Give a finding; the numbers of its evidence have six digits."""
+    return {
+        "code": finding.code,
+        "title": finding.title,
+        "severity": finding.severity,
+        "accepted": finding.accepted,
+        "message": finding.message,
+        "fix": finding.fix,
+        "evidence": {name: _six_digits(value) for name, value in sorted(finding.evidence.items())},
+        "strips": list(finding.strips),
+        "photos": list(finding.photos),
+        "points": list(finding.points),
+        "file": finding.file,
+        "line": finding.line,
+        "column": finding.column,
+        "key": finding.key,
+    }
+
+
+def _six_digits(value: float | str) -> float | str:
+    return float(f"{value:.6g}") if isinstance(value, float) else value
+
+
+def _note(note: Note) -> Document:
+    return {
+        "code": note.code,
+        "severity": note.severity,
+        "message": note.message,
+        "strip": note.strip,
+        "photos": list(note.photos),
+        "points": list(note.points),
+        "file": note.file,
+        "line": note.line,
+        "column": note.column,
+        "key": note.key,
+    }

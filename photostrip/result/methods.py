@@ -1,0 +1,68 @@
+"""One project adjusted in several ways, side by side: the document of ``photostrip run --compare-methods``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from photostrip import __version__
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from photostrip.errors import PhotostripError
+    from photostrip.result.numbers import Document
+
+SCHEMA = 1
+PARTS = ("count", "rms", "max", "worst", "rms_um")
+
+
+def methods_document(name: str, found: Mapping[str, Document | PhotostripError]) -> Document:
+    """Put the results of several adjustments side by side.
+
+    Parameters
+    ----------
+    name : str
+        Name of the project.
+    found : mapping of str to dict or PhotostripError
+        For each adjustment the document of its result, or why there is none.
+
+    Returns
+    -------
+    dict
+        ``methods``: for each adjustment what is left at check and at control points, and its precision; ``best``: the
+        adjustment with the smallest rms at check points in plan and in height, None without check points.
+    """
+    rows = [_method(adjustment, each) for adjustment, each in found.items()]
+    return {
+        "photostrip_methods": SCHEMA,
+        "version": __version__,
+        "name": name,
+        "methods": rows,
+        "best": {part: _best(rows, part) for part in ("plan", "height")},
+    }
+
+
+def _method(adjustment: str, found: Document | PhotostripError) -> Document:
+    if not isinstance(found, dict):
+        return {"adjustment": adjustment, "status": "refused", "reason": str(found)}
+    summary, precision = found["summary"], found.get("precision")
+    return {
+        "adjustment": adjustment,
+        "status": found["status"],
+        "points": found["counts"]["points"],
+        "sigma0_um": summary["sigma0_um"],
+        "redundancy": summary["redundancy"],
+        **{
+            role: {part: {key: summary[role][part][key] for key in PARTS} for part in ("plan", "height")}
+            for role in ("check", "control")
+        },
+        "precision": None
+        if precision is None
+        else {part: precision["points"][part]["rms"] for part in ("plan", "height")},
+    }
+
+
+def _best(rows: list[Document], part: str) -> str | None:
+    """Find the adjustment with the smallest rms at check points."""
+    known = [row for row in rows if row["status"] != "refused" and row["check"][part]["rms"] is not None]
+    return min(known, key=lambda row: float(row["check"][part]["rms"]))["adjustment"] if known else None

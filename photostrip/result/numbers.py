@@ -1,0 +1,99 @@
+"""How numbers of a result are rounded, and in which order its points stand."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike, NDArray
+
+Plain = Any  # a number, None or nested lists of them
+Document = dict[str, Any]
+
+GROUND = 4  # decimals of metres
+GEOGRAPHIC = 10  # decimals of degrees: 0.01 mm
+MICROMETRES = 2  # decimals
+DEGREES = 6  # decimals; 0.02 mm at 1 km
+RADIANS = 9
+ROTATION = 12  # decimals of direction cosines
+SIGNIFICANT = 4  # digits of what has no natural size
+EXACT = 12  # digits of what others compute with
+DIGITS = re.compile("([0-9]+)")
+
+
+def rounded(values: ArrayLike, decimals: int) -> Plain:
+    """Round to decimals.
+
+    Parameters
+    ----------
+    values : array_like
+        Numbers of any shape.
+    decimals : int
+        Decimals kept.
+
+    Returns
+    -------
+    float, None or nested lists
+        The numbers in the shape of `values`; None where there is none (NaN, infinite). Never -0.
+    """
+    return plain(np.round(np.asarray(values, float), decimals) + 0.0)
+
+
+def plain(values: NDArray[np.float64]) -> Plain:
+    """Give an array as plain lists, None where a number is not finite."""
+    finite = np.isfinite(values)
+    if finite.all():
+        return values.tolist()
+    objects = np.array(values, dtype=object)
+    objects[~finite] = None
+    return objects.tolist()
+
+
+def significant(values: ArrayLike, digits: int = SIGNIFICANT) -> Plain:
+    """Round to significant digits; otherwise as ``rounded``."""
+    array = np.asarray(values, float)
+    flat = [float(f"{value:.{digits}g}") + 0.0 for value in array.ravel().tolist()]
+    return plain(np.array(flat).reshape(array.shape))
+
+
+def micrometres(millimetres: ArrayLike) -> Plain:
+    """Give millimetres of the image as rounded micrometres."""
+    return rounded(np.asarray(millimetres, float) * 1000.0, MICROMETRES)
+
+
+def natural(name: str) -> tuple[list[str | tuple[int, str]], str]:
+    """Give the key that puts ``P2`` before ``P10``; equal numbers (``7``, ``07``) by their text."""
+    parts: list[str | tuple[int, str]] = [*DIGITS.split(name)]
+    # numbers by length, then by digits: an id may have more digits than int() takes
+    parts[1::2] = [(len(digits), digits) for digits in (part.lstrip("0") for part in DIGITS.findall(name))]
+    return parts, name
+
+
+def natural_rank(names: Sequence[str]) -> NDArray[np.intp]:
+    """Place of each name in natural order.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names, all different.
+
+    Returns
+    -------
+    ndarray of int, shape (n,)
+        Rank of each, from 0.
+    """
+    keys = [natural(name) for name in names]
+    rank = np.empty(len(names), np.intp)
+    rank[sorted(range(len(names)), key=keys.__getitem__)] = np.arange(len(names))
+    return rank
+
+
+def rms(values: NDArray[np.float64]) -> float:
+    """Root mean square of what is not NaN; NaN when there is nothing."""
+    known = values[~np.isnan(values)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")

@@ -1,0 +1,1 @@
+"""Blocks of the document about points, control, photos and their precision."""

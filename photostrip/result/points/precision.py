@@ -1,0 +1,336 @@
+"""Precision of a result: standard deviations, covariances and error ellipses in the axes of the output."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import GeometryError
+from photostrip.geometry.rotation import angle_rates, angles
+from photostrip.result.numbers import GROUND, Document, micrometres, rms, rounded, significant
+from photostrip.statistics import chi2_quantile, normal_quantile
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.pipeline import LinkedStrip, Result, StripResult
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+COVARIANCE = 8  # decimals of metres^2: a tenth of a millimetre squared
+DIRECTION = 1  # decimals of degrees of the axes of an ellipse
+UNITS = {"deg": 180 / np.pi, "gon": 200 / np.pi, "rad": 1.0}
+UPPER = np.triu_indices(6)
+INSIDE = {"plan": float(np.sqrt(chi2_quantile(0.95, 2))), "height": normal_quantile(0.975)}
+EMPTY_POINT: Document = {"sigma_x": None, "sigma_y": None, "sigma_z": None}
+
+
+def turned(covariances: Floats, axes: Floats) -> Floats:
+    """Turn covariances from the Cartesian frame to other axes.
+
+    Parameters
+    ----------
+    covariances : ndarray, shape (n, 3, 3)
+        In the axes of the Cartesian frame.
+    axes : ndarray, shape (n, 3, 3)
+        Rows are the wanted axes, unit vectors in the Cartesian frame.
+    """
+    return np.asarray(axes @ covariances @ axes.transpose(0, 2, 1), float)
+
+
+def plan_and_height(level: Floats) -> Floats:
+    """Give standard deviations in plan (of both coordinates together) and in height.
+
+    Parameters
+    ----------
+    level : ndarray, shape (n, 3, 3)
+        Covariances along east, north and up.
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        Square roots of the variances of east plus north, and of up.
+    """
+    with np.errstate(invalid="ignore"):
+        return np.sqrt(np.column_stack([level[:, 0, 0] + level[:, 1, 1], level[:, 2, 2]]))
+
+
+def ellipses(level: Floats) -> tuple[Floats, Floats]:
+    """Give standard error ellipses in plan.
+
+    Parameters
+    ----------
+    level : ndarray, shape (n, 3, 3)
+        Covariances along east, north and up.
+
+    Returns
+    -------
+    axes : ndarray, shape (n, 2)
+        Semi-axes, the larger one first. The true point lies inside with a probability of 39 %, inside the ellipse
+        of 2.45 times the size with 95 %.
+    azimuth : ndarray, shape (n,)
+        Direction of the larger one, clockwise from north, radians, 0 to pi.
+    """
+    east, north, mixed = level[:, 0, 0], level[:, 1, 1], level[:, 0, 1]
+    middle, reach = (east + north) / 2, np.hypot((north - east) / 2, mixed)
+    axes = np.sqrt(np.column_stack([middle + reach, np.maximum(middle - reach, 0.0)]))
+    return axes, np.arctan2(mixed, (north - east) / 2) / 2 % np.pi
+
+
+# ------------------------------------------------------------------------------------------------------- columns
+
+
+def point_columns(result: Result) -> list[Document]:
+    """Give what is added to each point of ``points``: standard deviations, covariances, error ellipse in plan.
+
+    Parameters
+    ----------
+    result : Result
+        The result.
+
+    Returns
+    -------
+    list of dict
+        One for each point of ``result.points``; only empty standard deviations when nothing is known.
+    """
+    precision, frame, place = result.precision, result.output, result.points.cartesian
+    if precision is None:
+        return [EMPTY_POINT] * len(place)
+    level = turned(precision.points, frame.level_axes_at(place))
+    order = list(frame.order)
+    own = (precision.points if frame.kind == "geocentric" else level)[:, order][:, :, order]
+    with np.errstate(invalid="ignore"):
+        sigma = rounded(np.sqrt(np.diagonal(own, axis1=1, axis2=2)), GROUND)
+    mixed = rounded(own[:, (0, 0, 1), (1, 2, 2)], COVARIANCE)
+    size, azimuth = ellipses(level)
+    columns = zip(sigma, mixed, rounded(size, GROUND), rounded(np.degrees(azimuth), DIRECTION), strict=True)
+    return [
+        {
+            "sigma_x": x, "sigma_y": y, "sigma_z": z, "cov_xy": xy, "cov_xz": xz, "cov_yz": yz,
+            "ellipse_a": a, "ellipse_b": b, "ellipse_azimuth_deg": direction,
+        }
+        for (x, y, z), (xy, xz, yz), (a, b), direction in columns
+    ]  # fmt: skip
+
+
+def photo_columns(result: Result, number: int, place: Floats, rotations: Floats) -> list[Document]:
+    """Give what is added to each photo of a strip: standard deviations of centre and angles, and their covariances.
+
+    Parameters
+    ----------
+    result : Result
+        The result.
+    number : int
+        Number of the strip.
+    place : ndarray, shape (m, 3)
+        Perspective centres in the Cartesian frame.
+    rotations : ndarray, shape (m, 3, 3)
+        Photo to the axes of the output at the centres.
+
+    Returns
+    -------
+    list of dict
+        ``sigma`` with x, y, z in metres and the angles in their exported unit; ``covariance``, the upper triangle, row
+        by row, of the matrix of x, y, z and the three angles. An angle's rows take the small rotation about the axes
+        of the output to the angles of the system.
+    """
+    if result.precision is None:
+        return [{"sigma": None} for _ in place]
+    return columns_of_photos(result, place, rotations, result.precision.photos[number])
+
+
+def columns_of_photos(result: Result, place: Floats, rotations: Floats, given: Floats) -> list[Document]:
+    """Give the same for photos with given covariances.
+
+    Parameters
+    ----------
+    result : Result
+        The result: its frame and its angles count.
+    place, rotations : ndarray, shapes (m, 3), (m, 3, 3)
+        As for ``photo_columns``.
+    given : ndarray, shape (m, 6, 6)
+        Covariances in the axes of the Cartesian frame, as in ``pipeline.Precision``.
+
+    Returns
+    -------
+    list of dict
+        As ``photo_columns``.
+    """
+    axes = result.output.axes_at(place)
+    turn = np.zeros((len(place), 6, 6))
+    turn[:, :3, :3] = axes[:, list(result.output.order)]
+    turn[:, 3:, 3:] = _rates(rotations, result.settings.angle_system) @ axes * UNITS[result.settings.angle_unit]
+    covariances = turn @ given @ turn.transpose(0, 2, 1)
+    with np.errstate(invalid="ignore"):
+        sigma = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
+    columns = zip(
+        rounded(sigma[:, :3], GROUND), significant(sigma[:, 3:]), significant(covariances[:, *UPPER]), strict=True
+    )
+    return [
+        {"sigma": {"x": x, "y": y, "z": z, "angles": angle}, "covariance": mixed} for (x, y, z), angle, mixed in columns
+    ]
+
+
+def _rates(rotations: Floats, system: str) -> Floats:
+    """Give changes of the angles by small rotations about the output's axes; NaN where they cannot be separated."""
+    try:
+        return np.asarray(np.linalg.inv(angle_rates(angles(rotations, system), system)), float)
+    except GeometryError:  # some photo is the exception
+        single = [
+            _rates(rotation[None], system) if len(rotations) > 1 else np.full((1, 3, 3), np.nan)
+            for rotation in rotations
+        ]
+        return np.concatenate(single)
+
+
+# --------------------------------------------------------------------------------------------------------- block
+
+
+def precision_of(result: Result) -> Document:
+    """Give the block ``precision``: what the covariances rest on, how large they are, how they change along the strips.
+
+    Parameters
+    ----------
+    result : Result
+        The result.
+
+    Returns
+    -------
+    dict
+        The block under its key; empty when nothing is known.
+    """
+    precision = result.precision
+    if precision is None:
+        return {}
+    sigma = plan_and_height(turned(precision.points, result.output.level_axes_at(result.points.cartesian)))
+    ids = result.refined.observations.point_ids
+    block: Document = {
+        "basis": [
+            {"strip": strip.strip.id, "sigma_um": micrometres(value), "basis": basis}
+            for strip, value, basis in zip(result.flights, precision.sigma, precision.basis, strict=True)
+        ],
+        "points": {
+            name: _summed(column, [ids[number] for number in result.points.number])
+            for name, column in zip(("plan", "height"), sigma.T, strict=True)
+        },
+        "along": [
+            row
+            for strip, photos in zip(result.flights, precision.photos, strict=True)
+            for row in _along(result, strip, sigma, photos)
+        ],
+    }
+    check = _check(result)
+    return {"precision": block | ({"check": check} if check else {})}
+
+
+def _check(result: Result) -> Document:
+    """Compare the differences at check points with what the covariances let expect; empty without check points.
+
+    The covariance of a difference is that of the point and that of the given coordinate. Point by point the differences
+    are counted; their errors go together along a strip, so the test of all of them is made with their joint covariance.
+    """
+    rows, values = _normalised(result)
+    known = ~np.isnan(values)
+    if result.precision is None or not known.any():
+        return {}
+    ids = result.inputs.control.ids
+    tests = [
+        {
+            "strip": strip.strip.id,
+            "points": test.points,
+            "coordinates": test.coordinates,
+            "squares": significant(test.squares),
+            "p": significant(test.probability),
+        }
+        for strip, test in zip(result.flights, result.precision.checks, strict=False)
+        if test is not None
+    ]
+    return {
+        **{name: _inside(values[:, k], INSIDE[name], k) for k, name in enumerate(("plan", "height"))},
+        "points": [
+            {"id": ids[row], "plan": plan, "height": height}
+            for row, (plan, height) in zip(rows.tolist(), rounded(values, 2), strict=True)
+        ],
+        "tests": tests,
+    }
+
+
+def _inside(values: Floats, limit: float, height: int) -> Document:
+    """Count the differences within their 95 % ellipse or interval."""
+    known = values[~np.isnan(values)]
+    size = np.sqrt(np.mean(known**2) / (1 if height else 2)) if len(known) else float("nan")
+    return {"count": len(known), "inside_95": int((np.abs(known) <= limit).sum()), "rms": rounded(size, 2)}
+
+
+def _normalised(result: Result) -> tuple[Numbers, Floats]:
+    """Check points with coordinates, and their differences in units of their standard deviations.
+
+    In plan the length of the difference in the metric of its covariance, in height the difference with its sign.
+    """
+    control = result.inputs.control
+    rows = np.flatnonzero(control.check & (result.control_rows >= 0))
+    values = np.full((len(rows), 2), np.nan)
+    if result.precision is None or not result.frames:  # a free network has nothing to be compared with
+        return rows, values
+    for place, row in enumerate(rows.tolist()):
+        frame, point = result.frames[control.frame[row]], result.control_rows[row]
+        axes = frame.axes_at(result.points.cartesian[[point]])
+        covariance = turned(result.precision.points[[point]], axes)[0] + np.diag(np.nan_to_num(control.sigma[row]) ** 2)
+        difference = result.control_differences[row]
+        if frame.kind == "geocentric":
+            level = frame.level_axes_at(result.points.cartesian[[point]])[0] @ axes[0].T
+            difference, covariance = level @ difference, level @ covariance @ level.T
+        if not np.isnan(difference[:2]).any():
+            values[place, 0] = np.sqrt(difference[:2] @ np.linalg.solve(covariance[:2, :2], difference[:2]))
+        values[place, 1] = difference[2] / np.sqrt(covariance[2, 2])
+    return rows, values
+
+
+def _summed(sigma: Floats, names: list[str]) -> Document:
+    """Sum up standard deviations: root mean square, the largest, and whose it is."""
+    if np.isnan(sigma).all():
+        return {"rms": None, "max": None, "worst": None}
+    worst = int(np.nanargmax(sigma))
+    return {"rms": rounded(rms(sigma), GROUND), "max": rounded(sigma[worst], GROUND), "worst": names[worst]}
+
+
+def _along(result: Result, strip: StripResult | LinkedStrip, sigma: Floats, photos: Floats) -> list[Document]:
+    """Precision along a strip: of the points nearest to each photo, and of its perspective centre."""
+    centers = strip.centers
+    known = np.isfinite(centers[:, 0])
+    if not known.all():  # a photo without a centre stands at the others' mean distance
+        places = np.arange(len(centers))
+        centers = centers.copy()
+        if not known.any():
+            return []
+        centers[~known] = np.column_stack(
+            [np.interp(places[~known], places[known], column[known]) for column in centers.T]
+        )
+    along, count_of = centers[:, 0], len(centers)
+    order = np.argsort(along, kind="stable")
+    between = (along[order][1:] + along[order][:-1]) / 2
+    nearest = order[np.searchsorted(between, strip.xyz[:, 0])]
+    rows = np.searchsorted(result.points.number, strip.formed.point)
+    count = np.bincount(nearest, minlength=count_of)
+    with np.errstate(invalid="ignore"):
+        squares = [np.bincount(nearest, sigma[rows, axis] ** 2, count_of) for axis in (0, 1)]
+        size = np.sqrt(np.column_stack(squares) / count[:, None])
+    place = strip.intermediate.cartesian_from_intermediate(centers)
+    centres = plan_and_height(turned(photos[:, :3, :3], result.output.level_axes_at(place)))
+    columns = zip(
+        strip.strip.photos,
+        rounded(along - along[0], 1),
+        count.tolist(),
+        rounded(size, GROUND),
+        rounded(centres, GROUND),
+        strict=True,
+    )
+    return [
+        {
+            "strip": strip.strip.id, "photo": photo, "distance": distance, "points": points,
+            "plan": plan, "height": height, "centre_plan": centre_plan, "centre_height": centre_height,
+        }
+        for photo, distance, points, (plan, height), (centre_plan, centre_height) in columns
+    ]  # fmt: skip

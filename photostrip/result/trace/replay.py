@@ -1,0 +1,175 @@
+"""The iterations of a strip once more, step by step, for those who want to follow them.
+
+A run keeps what it found, not the way there. Here the same functions start again from the same values and tell each
+step; that they end where the run ended is tested.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.pipeline import overruling
+from photostrip.triangulation import absolute_orientation
+from photostrip.triangulation.relative_orientation import relative
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.geometry.similarity import Similarity
+    from photostrip.pipeline.models.model_results import LinkedStrip
+    from photostrip.pipeline.results import Result, StripResult
+    from photostrip.triangulation.relative_orientation.relative import Pairs
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+START_DIGITS = 1  # of radians: where a pair starts whose start values do not lead to its solution
+SAME = 1e-6  # rad
+
+
+@dataclass(frozen=True, eq=False)
+class PairStep:
+    """One step of the relative orientation of a pair.
+
+    Parameters
+    ----------
+    elements : ndarray, shape (5,)
+        alpha1', kappa1', alpha2', omega2', kappa2' before the step, radians.
+    squares : float
+        [w q q], sum of weighted squares of the y parallaxes before the step, mm^2.
+    step : ndarray, shape (5,)
+        What is added, radians.
+    """
+
+    elements: Floats
+    squares: float
+    step: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class PairRound:
+    """The iteration of a pair with one choice of points.
+
+    Parameters
+    ----------
+    points : int
+        Points used.
+    steps : tuple of PairStep
+        From the first to the last.
+    end : ndarray, shape (5,)
+        Elements in the end, radians.
+    """
+
+    points: int
+    steps: tuple[PairStep, ...]
+    end: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class SimilarityStep:
+    """One step of the absolute orientation.
+
+    Parameters
+    ----------
+    similarity : Similarity
+        Strip to intermediate frame before the step.
+    squares : float
+        [w v v] before the step, without unit.
+    step : ndarray, shape (7,)
+        Three shifts, three rotations and the scale, metres at the end of the strip.
+    """
+
+    similarity: Similarity
+    squares: float
+    step: Floats
+
+
+def pair_rounds(result: Result, strip: StripResult) -> list[list[PairRound]]:
+    """Repeat the relative orientation of every pair: with all its points, then without those that were rejected.
+
+    Parameters
+    ----------
+    result : Result
+        What the run found.
+    strip : StripResult
+        One of its strips.
+
+    Returns
+    -------
+    list of list of PairRound
+        For each pair one round, or two when points of it were rejected.
+    """
+    final = strip.orientation
+    given = _with_all_points(result, strip)
+    start = _starts(given, final.elements)
+    rounds = [[first] for first in _round(start, given)]
+    changed = np.unique(given.pair[given.weight != final.pairs.weight])
+    ends = np.array([each[-1].end for each in rounds])
+    for number, second in zip(changed.tolist(), _round(ends[changed], final.pairs.take(changed)[0]), strict=True):
+        rounds[number].append(second)
+    return rounds
+
+
+def _with_all_points(result: Result, strip: StripResult) -> Pairs:
+    """Give the pairs of a strip as they were before any point was rejected."""
+    photos, focal = strip.strip.photos, strip.strip.camera.principal_distance
+    pairs, point, rows = relative.collect_pairs(result.refined.observations, photos, focal)
+    taken = set(map(tuple, strip.orientation.rows.tolist()))
+    dropped = np.array([tuple(row) not in taken for row in rows.tolist()], bool)
+    return overruling.without(pairs, point, rows, dropped)[0]
+
+
+def _starts(pairs: Pairs, wanted: Floats) -> Floats:
+    """Start values; rounded elements for a pair that a run had to start from other azimuths."""
+    start = relative.start_values(pairs)
+    solved, *_ = relative.solve(pairs)
+    reached, *_ = relative.iterate(start, pairs)
+    turned = np.abs(np.sin((reached - solved) / 2)).max(axis=1) > SAME
+    start[turned] = np.round(np.where(np.isfinite(solved), solved, wanted)[turned], START_DIGITS)
+    return start
+
+
+def _round(start: Floats, pairs: Pairs) -> list[PairRound]:
+    """Iterate all pairs and keep their steps."""
+    steps: list[list[PairStep]] = [[] for _ in range(pairs.size)]
+
+    def watch(todo: Numbers, elements: Floats, squares: Floats, step: Floats) -> None:
+        for n, number in enumerate(todo.tolist()):
+            steps[number].append(PairStep(elements[n].copy(), float(squares[n]), step[n].copy()))
+
+    if not pairs.size:
+        return []
+    ends, *_ = relative.iterate(start, pairs, watch)
+    counts = pairs.sums((pairs.weight > 0).astype(float)).astype(int).tolist()
+    return [PairRound(*each) for each in zip(counts, map(tuple, steps), ends, strict=True)]
+
+
+def similarity_steps(result: Result, strip: StripResult | LinkedStrip) -> list[SimilarityStep]:
+    """Repeat the absolute orientation of a strip on the control that was used.
+
+    Parameters
+    ----------
+    result : Result
+        What the run found.
+    strip : StripResult or LinkedStrip
+        One of its strips.
+
+    Returns
+    -------
+    list of SimilarityStep
+        From the first to the last.
+    """
+    points = strip.formed.xyz[strip.control_rows]
+    targets = absolute_orientation.Targets(strip.control, result.frames, strip.intermediate)
+    weight = absolute_orientation.weights(targets.turned(strip.absolute.similarity(points)), strip.precision)
+    steps: list[SimilarityStep] = []
+
+    def watch(similarity: Similarity, step: Floats) -> None:
+        squares = float((weight * targets.misclosures(similarity(points)) ** 2).sum())
+        steps.append(SimilarityStep(replace(similarity), squares, step.copy()))
+
+    absolute_orientation.orient(points, targets, weight, strip.formed.xyz, watch)
+    return steps

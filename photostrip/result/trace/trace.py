@@ -1,0 +1,319 @@
+"""The document of a trace: every stage of every strip with the symbols of the formulas, for pencil and paper."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from photostrip.geometry.rotation import alpha_omega_kappa
+from photostrip.result.numbers import rounded, significant
+from photostrip.result.trace.replay import pair_rounds, similarity_steps
+from photostrip.triangulation import absolute_orientation
+from photostrip.triangulation.relative_orientation import relative
+from photostrip.triangulation.strip_formation.intersection import intersect
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.pipeline import Result
+    from photostrip.pipeline.models.model_results import LinkedStrip
+    from photostrip.pipeline.results import StripResult
+    from photostrip.result.trace.replay import PairRound, SimilarityStep
+
+    Floats = NDArray[np.float64]
+
+Document = dict[str, Any]
+
+SCHEMA = 1
+UNITS = {"deg": 180 / np.pi, "gon": 200 / np.pi, "rad": 1.0}
+ANGLE, STEP, SQUARES, MILLIMETRES, MODEL, COSINE, METRES = 9, 6, 6, 5, 9, 10, 4  # decimals, digits of steps and squares
+SYMBOLS = {
+    "x1, y1, x2, y2": "image coordinates of the left and right photo, mm from the principal point, corrected",
+    "alpha1 to kappa2": "elements of relative orientation in the base frame, written with a prime",
+    "q": "y1h - y2h, y parallax of the photos turned into the base frame, mm",
+    "[wqq]": "sum of the weighted squares of q, mm^2",
+    "tau, nu": "direction and inclination of the base in the frame of the first photo",
+    "A": "rotation of a photo, image to strip, by rows",
+    "BX, BY, BZ": "components of the base, scale of the strip",
+    "N": "ray factor of the left ray, from the model with base 1",
+    "D, D'": "distance of a pass point from the common centre, in the model before and after the joint",
+    "k": "scale factor of a model; k_t of one pass point",
+    "A0": "azimuth of X of the intermediate frame, clockwise from north",
+    "M": "axes of the intermediate frame, as columns, in the Cartesian frame",
+    "s, xi, eta, theta": "scale and angles of the similarity, in the sense of alpha, omega, kappa",
+    "[wvv]": "sum of the weighted squares of the misclosures, without unit",
+    "a0..a5": "coefficients of 1, X, Y, XY, X^2, X^3, what is added to a coordinate",
+    "l": "free term of eq. 151, given minus strip; v: what the polynomial leaves",
+}
+
+
+def trace_of(result: Result) -> Document:
+    """Give every stage of a run, iteration by iteration.
+
+    Parameters
+    ----------
+    result : Result
+        What the run found.
+
+    Returns
+    -------
+    dict
+        ``symbols``, and for each strip ``pairs``, ``chain``, ``scale_transfer``, ``absolute`` and ``polynomial``;
+        angles in the unit of the output.
+    """
+    unit = result.settings.angle_unit
+    return {
+        "photostrip_trace": SCHEMA,
+        "name": result.inputs.name,
+        "angles": unit,
+        "symbols": SYMBOLS,
+        "strips": [
+            *(_strip(result, strip, UNITS[unit]) for strip in result.strips),
+            *(_linked(result, strip, UNITS[unit]) for strip in result.linked),
+        ],
+    }
+
+
+def _linked(result: Result, strip: LinkedStrip, factor: float) -> Document:
+    """Give a strip of independent models: its links are in the result, the way to the ground is as for photos."""
+    return {
+        "strip": strip.strip.id,
+        "pairs": [],
+        "chain": [],
+        "scale_transfer": [],
+        "absolute": _absolute(result, strip, factor),
+        "polynomial": _polynomial(result, strip),
+    }
+
+
+def _strip(result: Result, strip: StripResult, factor: float) -> Document:
+    return {
+        "strip": strip.strip.id,
+        "pairs": _pairs(result, strip, factor),
+        "chain": _chain(strip, factor),
+        "scale_transfer": _scale_transfer(result, strip),
+        "absolute": _absolute(result, strip, factor),
+        "polynomial": _polynomial(result, strip),
+    }
+
+
+# -------------------------------------------------------------------------------------------------------- pairs
+
+
+def _pairs(result: Result, strip: StripResult, factor: float) -> list[Document]:
+    """Relative orientation of every pair: rounds of the iteration, rejections, parallaxes and model points."""
+    photos, orientation = strip.strip.photos, strip.orientation
+    found = []
+    for number, rounds in enumerate(pair_rounds(result, strip)):
+        found.append(
+            {
+                "left": photos[number],
+                "right": photos[number + 1],
+                "rounds": [_round(each, factor) for each in rounds],
+                "rejected": _rejected(result, strip, number),
+                "sigma0_um": rounded(orientation.sigma0[number] * 1000, 2),
+                "elements": _named(orientation.elements[number] * factor, ANGLE),
+                "points": _points(result, strip, number),
+            }
+        )
+    return found
+
+
+def _named(values: Floats, decimals: int) -> Document:
+    return dict(zip(relative.ELEMENTS, rounded(values, decimals), strict=True))
+
+
+def _round(each: PairRound, factor: float) -> Document:
+    steps = [
+        {
+            "iteration": number,
+            "elements": _named(step.elements * factor, ANGLE),
+            "[wqq]": significant(step.squares, SQUARES),
+            "d": dict(zip(relative.ELEMENTS, significant(step.step * factor, STEP), strict=True)),
+        }
+        for number, step in enumerate(each.steps, 1)
+    ]
+    return {"points": each.points, "steps": steps, "end": _named(each.end * factor, ANGLE)}
+
+
+def _rejected(result: Result, strip: StripResult, number: int) -> list[Document]:
+    ids, orientation = result.refined.observations.point_ids, strip.orientation
+    return [
+        {
+            "point": ids[orientation.point[each.row]],
+            "test": each.test,
+            "value": significant(each.value),
+            "limit": significant(each.limit),
+            "q": rounded(each.parallax, MILLIMETRES),
+            "readmitted": bool(each.readmitted),
+        }
+        for each in strip.rejections
+        if orientation.pairs.pair[each.row] == number
+    ]
+
+
+def _points(result: Result, strip: StripResult, number: int) -> list[Document]:
+    """Image coordinates, parallax, ray factor and strip coordinates of the points of a pair."""
+    orientation, ids = strip.orientation, result.refined.observations.point_ids
+    pairs, rows = orientation.pairs.take(np.array([number]))
+    left, right = relative.rays(orientation.elements[[number]], pairs)
+    model = intersect(np.array([1.0, 0.0, 0.0]), left, right, pairs.focal)
+    columns = (
+        rounded(np.column_stack([pairs.left, pairs.right]), MILLIMETRES),
+        rounded(orientation.parallax[rows], MILLIMETRES),
+        rounded(model.ray_factor, MODEL),
+        rounded(strip.formed.model_xyz[rows], MODEL),
+        (pairs.weight > 0).tolist(),
+    )
+    found = []
+    for row, image, q, factor, xyz, used in zip(rows.tolist(), *columns, strict=True):
+        point = {"point": ids[orientation.point[row]], **dict(zip(("x1", "y1", "x2", "y2"), image, strict=True))}
+        found.append(point | {"q": q, "N": factor, **dict(zip("XYZ", xyz, strict=True)), "used": used})
+    return found
+
+
+# ---------------------------------------------------------------------------------------------- chain and scales
+
+
+def _chain(strip: StripResult, factor: float) -> list[Document]:
+    """Orientation and place of every photo in the strip, and the base that leads to it."""
+    formed, found = strip.formed, []
+    for number, photo in enumerate(strip.strip.photos):
+        turn = dict(zip(("alpha", "omega", "kappa"), _angles(formed.rotations[number], factor), strict=True))
+        row: Document = {"photo": photo, **turn, "A": rounded(formed.rotations[number].ravel(), COSINE)}
+        row["S"] = rounded(formed.centers[number], MODEL)
+        if number:
+            base = formed.centers[number] - formed.centers[number - 1]
+            row |= {
+                "tau": rounded(formed.base_direction[number - 1] * factor, ANGLE),
+                "nu": rounded(formed.base_inclination[number - 1] * factor, ANGLE),
+                "B": rounded(base, MODEL),
+                "k": rounded(formed.scale[number - 1], MODEL),
+            }
+        found.append(row)
+    return found
+
+
+def _angles(rotation: Floats, factor: float) -> list[float]:
+    """Give alpha, omega, kappa of a rotation in the unit of the output."""
+    values: list[float] = rounded(np.array(alpha_omega_kappa(rotation)).ravel() * factor, ANGLE)
+    return values
+
+
+def _scale_transfer(result: Result, strip: StripResult) -> list[Document]:
+    """Pass points of every joint: distances, ratios, the factor."""
+    formed, ids = strip.formed, result.refined.observations.point_ids
+    joints, photos = formed.junctions, strip.strip.photos
+    found = []
+    for joint, factor in enumerate(joints.factor.tolist()):
+        rows = np.flatnonzero(joints.joint == joint)
+        center = formed.centers[joint + 1]
+        before = np.linalg.norm(formed.model_xyz[joints.before[rows]] - center, axis=1)
+        after = np.linalg.norm(formed.model_xyz[joints.after[rows]] - center, axis=1) / formed.scale[joint + 1]
+        points = [
+            {
+                "point": ids[joints.point[row]],
+                "D": rounded(d, MODEL),
+                "D'": rounded(d_model, MODEL),
+                "k_t": rounded(joints.ratio[row] * formed.scale[joint], MODEL),
+                "used": bool(joints.used[row]),
+            }
+            for row, d, d_model in zip(rows.tolist(), before, after, strict=True)
+        ]
+        found.append(
+            {
+                "photo": photos[joint + 1],
+                "form": result.settings.formation.scale_transfer,
+                "points": points,
+                "k": rounded(factor * formed.scale[joint], MODEL),
+                "sd_of_one": rounded(joints.spread[joint] * factor * formed.scale[joint], MODEL),
+            }
+        )
+    return found
+
+
+# ---------------------------------------------------------------------------------------------------- the ground
+
+
+def _absolute(result: Result, strip: StripResult | LinkedStrip, factor: float) -> Document:
+    """Absolute orientation: the frame, the control in it, the steps, the similarity."""
+    steps = similarity_steps(result, strip)
+    similarity, frame = strip.absolute.similarity, strip.intermediate
+    points = strip.formed.xyz[strip.control_rows]
+    moved = similarity(points)
+    given = absolute_orientation.Targets(strip.control, result.frames, frame).of(moved)
+    columns = (strip.control.ids, strip.control.use, rounded(points, MODEL), rounded(moved, METRES),
+               rounded(given, METRES))  # fmt: skip
+    control = [
+        {
+            "point": name,
+            "use": "".join(axis for axis, counts in zip("xyz", use.tolist(), strict=True) if counts),
+            "strip": strip_xyz,
+            "oriented": oriented,
+            "given": target,
+        }
+        for name, use, strip_xyz, oriented, target in zip(*columns, strict=True)
+    ]
+    return {
+        "A0": rounded(frame.azimuth * factor, ANGLE),
+        "origin": rounded(frame.origin, METRES),
+        "M": rounded(frame.axes.ravel(), COSINE),
+        "steps": [_similarity_step(number, step, factor) for number, step in enumerate(steps, 1)],
+        "s": significant(similarity.scale, 12),
+        **dict(zip(("xi", "eta", "theta"), _angles(similarity.rotation, factor), strict=True)),
+        "shift": rounded(similarity.shift, METRES),
+        "sigma0": significant(strip.absolute.sigma0),
+        "control": control,
+    }
+
+
+def _similarity_step(number: int, step: SimilarityStep, factor: float) -> Document:
+    return {
+        "iteration": number,
+        "[wvv]": significant(step.squares, SQUARES),
+        "s": significant(step.similarity.scale, 12),
+        **dict(zip(("xi", "eta", "theta"), _angles(step.similarity.rotation, factor), strict=True)),
+        "shift": rounded(step.similarity.shift, METRES),
+        "d_shift": significant(step.step[:3], STEP),
+        "d_rotation": significant(step.step[3:6], STEP),
+        "d_scale": significant(step.step[6], STEP),
+    }
+
+
+def _polynomial(result: Result, strip: StripResult | LinkedStrip) -> Document | None:
+    """Polynomials of a strip: coefficients by term, free terms and residuals at the control."""
+    found = strip.polynomial
+    if found is None:
+        return None
+    xyz = strip.absolute.similarity(strip.formed.xyz[strip.control_rows])
+    corrected = found(xyz)
+    targets = absolute_orientation.Targets(strip.control, result.frames, strip.intermediate)
+    free, left = targets.of(corrected) - xyz, corrected - targets.of(corrected)
+    axes = {
+        name: {
+            "terms": list(axis.terms),
+            "coefficients": significant(axis.coefficients, 10),
+            "sigmas": significant(axis.sigmas),
+            "sigma0": rounded(axis.sigma0, METRES),
+        }
+        for name, axis in zip("XYZ", found.axes, strict=True)
+    }
+    columns = (rounded(xyz[:, :2], METRES), rounded(free, METRES), rounded(left, METRES))
+    control = [
+        {"point": name, "X": place[0], "Y": place[1], "l": terms, "v": residual}
+        for name, place, terms, residual in zip(strip.control.ids, *columns, strict=True)
+    ]
+    evidence = [
+        {
+            "group": each.group,
+            "degree": each.degree,
+            "rms": rounded(each.rms, METRES),
+            "left_out": rounded(each.left_out, METRES),
+            "F": significant(each.f),
+            "p": significant(each.p),
+            "taken": each.accepted,
+        }
+        for each in found.evidence
+    ]
+    return {"degree": found.degree, "evidence": evidence, "axes": axes, "control": control}

@@ -1,0 +1,434 @@
+"""Absolute orientation: the formed strip brought to the control, in the intermediate frame.
+
+A control point gives up to three coordinates in its own ground frame. Each given coordinate is one observation: the
+strip point must agree with it along that axis of the ground frame at that place. So plan-only and
+height-only points, grids whose axes turn along the strip, and points given in several zones all come in by one rule:
+the *target* of a strip point is the point itself with the given coordinates put in place of its own.
+
+Source: [001] eq. 142-149; mixed control and its weights are derived.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import Fault, GeometryError, InputError
+from photostrip.geometry.rotation import cross_matrix, from_vector
+from photostrip.geometry.similarity import Similarity, collinearity
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.geodesy.crs import GroundFrame
+    from photostrip.geodesy.local_frame import IntermediateFrame
+    from photostrip.points import ControlPoints
+
+    Floats = NDArray[np.float64]
+
+LARGEST_STEP = 5.0  # of the logarithm of the scale, in one iteration
+ITERATIONS = 50
+CONVERGED = 1e-10  # of the strip's half length; the next step would be its square
+SETTLED = 2  # iteration after which the directions of the ground axes no longer change
+RANK_LIMIT = 1e-3  # smallest over largest singular value: a motion of the strip of which the control sees a thousandth
+WEAK_LIMIT = 1 / 8  # well spread control has about 1; at an eighth errors of the control grow eightfold somewhere
+PARAMETERS = 7
+NAMED = 6  # ids in a message
+PLAN, HEIGHT = slice(0, 2), 2
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How the Earth's shape enters.
+
+    Parameters
+    ----------
+    earth_curvature : str
+        ``"auto"`` or ``"none"``: the frames carry it (``local`` is truly Cartesian); ``"model"``: eq. 153, for plane
+        map coordinates of unknown projection given as ``local``; ``"image"``: in image space.
+    earth_radius : float
+        Radius in metres for ``"model"``.
+    """
+
+    earth_curvature: str = "auto"
+    earth_radius: float = 6_371_000.0
+
+
+@dataclass(frozen=True, eq=False)
+class Targets:
+    """Control points seen from an intermediate frame.
+
+    Parameters
+    ----------
+    control : ControlPoints
+        The points, none of them a check point.
+    frames : sequence of GroundFrame
+        Ground frames the points refer to.
+    intermediate : IntermediateFrame
+        The frame in which the strip is oriented.
+    """
+
+    control: ControlPoints
+    frames: Sequence[GroundFrame]
+    intermediate: IntermediateFrame
+
+    def of(self, xyz: Floats) -> Floats:
+        """Targets of the control points.
+
+        Parameters
+        ----------
+        xyz : ndarray, shape (n, 3)
+            Present positions of the points in the intermediate frame, metres.
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            The same positions with all given coordinates put in, intermediate frame, metres.
+        """
+        cartesian = self.intermediate.cartesian_from_intermediate(xyz)
+        result = np.empty_like(cartesian)
+        for number, frame in enumerate(self.frames):
+            rows = self.control.frame == number
+            if rows.any():
+                ground = frame.ground_from_cartesian(cartesian[rows])
+                ground = np.where(self.control.use[rows], self.control.enu[rows], ground)
+                result[rows] = frame.cartesian_from_ground(ground)
+        return self.intermediate.intermediate_from_cartesian(result)
+
+    def axes(self, xyz: Floats) -> Floats:
+        """Directions along which the control points are compared with the strip.
+
+        Parameters
+        ----------
+        xyz : ndarray, shape (n, 3)
+            Positions in the intermediate frame, metres.
+
+        Returns
+        -------
+        ndarray, shape (n, 3, 3)
+            Rows are unit vectors in the intermediate frame: the point's ground axes; east, north and up
+            for geocentric points, whose coordinates come three together.
+        """
+        cartesian = self.intermediate.cartesian_from_intermediate(xyz)
+        return self._by_frame(cartesian, lambda frame, points: frame.level_axes_at(points)) @ self.intermediate.axes
+
+    def turned(self, xyz: Floats) -> ControlPoints:
+        """Give the control with its standard deviations along ``axes``.
+
+        Parameters
+        ----------
+        xyz : ndarray, shape (n, 3)
+            Positions in the intermediate frame, metres.
+
+        Returns
+        -------
+        ControlPoints
+            The same points; the standard deviations differ where the coordinates are geocentric.
+        """
+        if not any(frame.kind == "geocentric" for frame in self.frames):
+            return self.control
+        cartesian = self.intermediate.cartesian_from_intermediate(xyz)
+        turn = self.axes(xyz) @ self.intermediate.axes.T  # compared axes in the Cartesian frame
+        given = self._by_frame(cartesian, lambda frame, points: frame.axes_at(points))
+        share = np.einsum("nij,nkj->nik", turn, given) ** 2  # the identity but for geocentric points
+        sigma = np.where(self.control.use, self.control.sigma, 0.0)
+        return replace(self.control, sigma=np.sqrt(np.einsum("nik,nk->ni", share, sigma**2)))
+
+    def _by_frame(self, cartesian: Floats, directions: Callable[[GroundFrame, Floats], Floats]) -> Floats:
+        """Collect directions at points from the ground frame of each."""
+        result = np.empty((len(cartesian), 3, 3))
+        for number, frame in enumerate(self.frames):
+            rows = self.control.frame == number
+            if rows.any():
+                result[rows] = directions(frame, cartesian[rows])
+        return result
+
+    def misclosures(self, xyz: Floats) -> Floats:
+        """Present minus given coordinates, along the ground axes.
+
+        Parameters
+        ----------
+        xyz : ndarray, shape (n, 3)
+            Positions in the intermediate frame, metres.
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            Differences in metres; 0 where a coordinate does not count.
+        """
+        difference = np.einsum("nij,nj->ni", self.axes(xyz), xyz - self.of(xyz))
+        return np.where(self.control.use, difference, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class AbsoluteOrientation:
+    """The similarity from the strip to the intermediate frame, and how well it fits.
+
+    Parameters
+    ----------
+    similarity : Similarity
+        Strip to intermediate frame.
+    misclosures : ndarray, shape (n, 3)
+        Strip minus control along the axes compared (``Targets.axes``) in metres, after the similarity; 0 where a
+        coordinate does not count.
+    sigma0 : float
+        Standard deviation of unit weight, without unit (1 when the strip fits within the sigmas of the control and the
+        a-priori precision of its points); NaN without redundancy.
+    redundancy : int
+        Control coordinates minus seven.
+    condition : float
+        Largest over smallest singular value of the design for motions of the strip of the same size.
+    iterations : int
+        Steps of the least-squares iteration.
+    """
+
+    similarity: Similarity
+    misclosures: Floats
+    sigma0: float
+    redundancy: int
+    condition: float
+    iterations: int
+
+
+def weights(control: ControlPoints, precision: tuple[float, float]) -> Floats:
+    """Weights of the control coordinates against the strip.
+
+    Parameters
+    ----------
+    control : ControlPoints
+        Control points with the standard deviations along the axes compared (``Targets.turned``).
+    precision : tuple of float
+        A-priori standard deviation of a strip point in plan and in height, metres.
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+        1/(sigma_control^2 + sigma_point^2) in metres^-2 along the axes compared; 0 where a coordinate does not count.
+    """
+    point = np.array([precision[0], precision[0], precision[1]])
+    return np.where(control.use, 1 / (control.sigma**2 + point**2), 0.0)
+
+
+def orient(
+    strip: Floats,
+    targets: Targets,
+    weight: Floats,
+    reach: Floats | None = None,
+    watch: Callable[[Similarity, Floats], None] | None = None,
+) -> AbsoluteOrientation:
+    """Similarity of the strip on its control.
+
+    Parameters
+    ----------
+    strip : ndarray, shape (n, 3)
+        Strip coordinates of the control points.
+    targets : Targets
+        The control points.
+    weight : ndarray, shape (n, 3)
+        Weights of their coordinates, metres^-2.
+    reach : ndarray, shape (q, 3), optional
+        All points of the strip, strip coordinates. What the control must determine is their position: control far along
+        a narrow strip is enough when it spans the strip's width. Without them a square of the control's length counts.
+    watch : callable, optional
+        Told of every step: the similarity before it, and shifts, rotations and scale of the step, metres at the end of
+        the strip.
+
+    Returns
+    -------
+    AbsoluteOrientation
+        The similarity and its fit.
+
+    Raises
+    ------
+    GeometryError
+        When the control does not determine seven parameters; the free motion is named.
+    InputError
+        When the strip comes out upside down: the control is left-handed.
+
+    Notes
+    -----
+    Source: [001] eq. 145-149; start from the closed form of the full points, or from plan and height apart.
+    """
+    _refuse_too_few(targets.control)
+    similarity = _start(strip, targets, weight)
+    half = max(float(np.ptp(similarity(strip), axis=0).max()) / 2, 1e-6)
+    axes = targets.axes(similarity(strip))
+    for iteration in range(1, ITERATIONS + 1):
+        xyz = similarity(strip)
+        if iteration == SETTLED:
+            axes = targets.axes(xyz)
+        plain, free = _design(xyz, targets, axes, half)
+        root = _motion(None if reach is None else similarity(reach), xyz.mean(axis=0), half)
+        _refuse_deficient(plain, root, xyz, targets, half)  # weights do not decide what is free
+        share = np.sqrt(weight[targets.control.use])
+        step = np.asarray(np.linalg.lstsq(plain * share[:, None], free * share, rcond=None)[0], float)
+        if watch is not None:
+            watch(similarity, step)
+        similarity = _corrected(similarity, step, xyz.mean(axis=0), half)
+        if np.abs(step).max() < CONVERGED * half:
+            break
+    if similarity.rotation[2, 2] < 0:
+        raise InputError(
+            Fault(
+                "the strip fits the control only upside down: the control coordinates are left-handed",
+                code="left-handed-control",
+                key="control.axes",
+                expected="the axes in the order of the columns, [north, east, up] where X is north",
+            )
+        )
+    misclosures = targets.misclosures(similarity(strip))
+    values = np.linalg.svd(_seen(plain, root), compute_uv=False)
+    redundancy = int(targets.control.use.sum()) - PARAMETERS
+    squares = float((weight * misclosures**2).sum())
+    sigma0 = float(np.sqrt(squares / redundancy)) if redundancy > 0 else float("nan")
+    return AbsoluteOrientation(similarity, misclosures, sigma0, redundancy, float(values[0] / values[-1]), iteration)
+
+
+def _refuse_too_few(control: ControlPoints) -> None:
+    plan, height = int(control.use[:, 0].sum()), int(control.use[:, HEIGHT].sum())
+    if plan >= 2 and height >= 3:
+        return
+    msg = (
+        "absolute orientation needs at least 2 control points in plan and 3 in height on the strip, not on one line; "
+        f"there are {plan} in plan and {height} in height"
+    )
+    heights = [name for name, used in zip(control.ids, control.use[:, HEIGHT], strict=True) if used]
+    if plan >= 2 and height == 2:
+        msg += f": the rotation about the line of control points {heights[0]} and {heights[1]} stays free"
+    raise GeometryError(msg, points=control.ids, code="too-little-control")
+
+
+def _start(strip: Floats, targets: Targets, weight: Floats) -> Similarity:
+    """Similarity to start from: closed form of the full points, else plan and height apart."""
+    full = targets.control.use.all(axis=1)
+    if full.sum() >= 3 and collinearity(strip[full]) > RANK_LIMIT**2:
+        return Similarity.from_points(strip[full], targets.of(strip)[full], weight[full].mean(axis=1))
+    return _start_apart(strip, targets)
+
+
+def _start_apart(strip: Floats, targets: Targets) -> Similarity:
+    """Four parameters from the plan, then three from the heights, for a strip that is nearly level."""
+    plan, height = targets.control.use[:, 0], targets.control.use[:, HEIGHT]
+    at_sea = np.zeros_like(strip)
+    target = targets.of(at_sea)[plan]
+    z = strip[plan, 0] + 1j * strip[plan, 1]
+    t = target[:, 0] + 1j * target[:, 1]
+    dz = z - z.mean()
+    if np.abs(dz).max() <= 1e-6 * np.ptp(strip, axis=0).max():
+        names = ", ".join(name for name, used in zip(targets.control.ids, plan, strict=True) if used)
+        msg = f"absolute orientation: control points {names} lie at one place in plan: scale and azimuth stay free"
+        raise GeometryError(msg, points=targets.control.ids, code="control-deficient")
+    turn = (dz.conj() @ (t - t.mean())) / (dz.conj() @ dz).real
+    scale, angle = abs(turn), np.angle(turn)
+    shift = t.mean() - turn * z.mean()
+    level = Similarity(scale, from_vector([0.0, 0.0, angle]), np.array([shift.real, shift.imag, 0.0]))
+    xyz = level(strip)
+    rise = targets.of(xyz)[height, 2] - xyz[height, 2]
+    x, y = (xyz[height, axis] - xyz[height, axis].mean() for axis in (0, 1))
+    (up, along, across), *_ = np.linalg.lstsq(np.column_stack([np.ones(len(x)), x, y]), rise, rcond=1e-6)
+    tilt = from_vector([np.arctan(across), -np.arctan(along), 0.0])
+    center = np.array([xyz[height, 0].mean(), xyz[height, 1].mean(), 0.0])
+    rotation = tilt @ level.rotation
+    middle = level.inverse(center[None, :])[0]
+    lift = np.array([0.0, 0.0, up])
+    return Similarity(scale, rotation, center + lift - scale * rotation @ middle)
+
+
+def _design(xyz: Floats, targets: Targets, axes: Floats, half: float) -> tuple[Floats, Floats]:
+    """Design and free terms of one step: shifts, rotations, scale, all in metres at the strip's end."""
+    arm = (xyz - xyz.mean(axis=0)) / half
+    columns = np.empty((len(xyz), 3, PARAMETERS))
+    columns[:, :, :3] = axes
+    columns[:, :, 3:6] = axes @ -cross_matrix(arm)  # axes . (theta x arm)
+    columns[:, :, 6] = np.einsum("nij,nj->ni", axes, arm)
+    free = -np.einsum("nij,nj->ni", axes, xyz - targets.of(xyz))
+    used = targets.control.use
+    return columns[used], free[used]
+
+
+def _corrected(similarity: Similarity, step: Floats, center: Floats, half: float) -> Similarity:
+    """Compose the similarity with a small one about a centre."""
+    turn = from_vector(step[3:6] / half)
+    # control that is wrong beyond measure asks for steps that no number holds
+    growth = float(np.exp(np.clip(step[6] / half, -LARGEST_STEP, LARGEST_STEP)))
+    shift = center + step[:3] + growth * turn @ (similarity.shift - center)
+    return Similarity(similarity.scale * growth, _orthonormal(turn @ similarity.rotation), shift)
+
+
+def _orthonormal(matrix: Floats) -> Floats:
+    """Remove the rounding that many small rotations leave."""
+    u, _, vt = np.linalg.svd(matrix)
+    result: Floats = u @ vt
+    return result
+
+
+def _motion(reach: Floats | None, center: Floats, half: float) -> Floats:
+    """Triangular root of the matrix that gives the mean square motion of the strip's points from seven parameters."""
+    if reach is None:
+        return np.eye(PARAMETERS)
+    arm = (reach - center) / half
+    columns = np.zeros((len(arm), 3, PARAMETERS))
+    columns[:, :, :3] = np.eye(3)
+    columns[:, :, 3:6] = -cross_matrix(arm)  # theta x arm
+    columns[:, :, 6] = arm
+    flat = columns.reshape(-1, PARAMETERS)
+    return np.asarray(np.linalg.cholesky(flat.T @ flat / len(arm) + 1e-15 * np.eye(PARAMETERS)), float)
+
+
+def _seen(design: Floats, root: Floats) -> Floats:
+    """Design for motions of unit size, so that its singular values say how much of each the control sees."""
+    return np.asarray(np.linalg.solve(root, design.T).T, float)
+
+
+def _refuse_deficient(design: Floats, root: Floats, xyz: Floats, targets: Targets, half: float) -> None:
+    """Raise when the control leaves a motion free, and name that motion."""
+    seen = _seen(design, root)
+    # the triangular factor has the same singular values and directions, however many control points there are
+    _, values, vt = np.linalg.svd(np.linalg.qr(seen, mode="r") if len(seen) > PARAMETERS else seen)
+    if len(values) == PARAMETERS and values[-1] > RANK_LIMIT * values[0]:
+        return
+    points = targets.control.ids
+    free = free_motion(np.linalg.solve(root.T, vt[-1]), xyz, targets.control, half)
+    msg = f"absolute orientation: the control does not determine {free}"
+    raise GeometryError(msg, points=points, code="control-deficient")
+
+
+def free_motion(direction: Floats, xyz: Floats, control: ControlPoints, half: float) -> str:
+    """Name a motion of the strip that the control leaves free.
+
+    Parameters
+    ----------
+    direction : ndarray, shape (7,)
+        Shifts, rotations and scale of the motion, as in the design of the orientation.
+    xyz : ndarray, shape (n, 3)
+        Control points in the intermediate frame, metres.
+    control : ControlPoints
+        The control points.
+    half : float
+        Half length of the strip in metres.
+
+    Returns
+    -------
+    str
+        For example ``"the rotation about the line of control points A1, A4"``.
+    """
+    shift, turn, growth = direction[:3], direction[3:6], direction[6]
+    sizes = np.array([np.linalg.norm(shift), np.linalg.norm(turn), abs(growth)])
+    if sizes[2] > 0.7 * np.linalg.norm(sizes):
+        return "the scale"
+    if sizes[1] < 0.3 * np.linalg.norm(sizes):
+        return "the height" if abs(shift[2]) > np.hypot(shift[0], shift[1]) else "the plan position"
+    axis = turn / sizes[1]
+    foot = np.cross(turn, shift) / sizes[1] ** 2  # a point of the axis, from the centre, in half lengths
+    offset = np.linalg.norm(np.cross((xyz - xyz.mean(axis=0)) / half - foot, axis), axis=1)
+    near = [name for name, distance in zip(control.ids, offset, strict=True) if distance < 0.02]  # noqa: PLR2004
+    if len(near) >= 2:
+        named = ", ".join(near) if len(near) <= NAMED else f"{', '.join(near[:NAMED])} and {len(near) - NAMED} more"
+        return f"the rotation about the line of control points {named}"
+    if abs(axis[2]) > 0.7:  # noqa: PLR2004
+        return "the azimuth (rotation about the vertical)"
+    return "the rotation about the flight line" if abs(axis[0]) > abs(axis[1]) else "the tilt along the flight line"

@@ -1,0 +1,1 @@
+"""Reduced normal equations of the bundle: their structure, solvers, datum and defects."""

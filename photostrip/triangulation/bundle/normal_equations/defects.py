@@ -1,0 +1,372 @@
+"""What the observations do not determine, by name: points, the datum, photos, common parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NoReturn
+
+import numpy as np
+
+from photostrip.errors import Fault, GeometryError, InputError
+from photostrip.triangulation.bundle.normal_equations import datum
+from photostrip.triangulation.bundle.normal_equations.reduced import factored, given_at
+from photostrip.triangulation.bundle.observations.linearise import PHOTO
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.triangulation.bundle.normal_equations.reduced import Reduced
+    from photostrip.triangulation.bundle.observations.layout import Batch
+    from photostrip.triangulation.bundle.observations.linearise import Eliminated
+    from photostrip.triangulation.bundle.observations.model import Model, State
+    from photostrip.triangulation.bundle.observations.problem import Problem
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+PARALLEL = 1e-10  # square of the sine of the angle between rays
+LOOSE = 0.1  # standard deviation, as a part of the size of the network, from which a datum parameter is not determined
+ALIKE = 0.95  # part of a named movement that lies among the undetermined ones
+ALONG = 0.94  # cosine of 20 degrees: a line counts as the flight line
+LEFT_OVER = 1e-11  # part of its information that the other parameters leave a common parameter
+STRAIGHT = 1e-3  # breadth of control on one line, as part of its length
+ITERATIONS = 3
+SHARE = 0.5  # of the largest element of a null vector: what is named with it
+TINY = 1e-9
+NAMED = 8
+MOVES = ("shift along its x", "shift along its y", "shift along its z", "roll about x", "turn about y", "turn about z")
+
+
+def refuse_repeated(problem: Problem) -> None:
+    """Refuse rays that stand twice.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+
+    Raises
+    ------
+    InputError
+        With every point that is measured twice on a photo (``bundle-repeated``).
+    """
+    key = np.sort(problem.images.point * np.intp(problem.photos) + problem.images.photo)
+    again = np.unique(key[1:][key[1:] == key[:-1]])
+    if len(again):
+        pairs = zip(*(part.tolist() for part in np.divmod(again, problem.photos)), strict=True)
+        raise InputError(
+            [
+                Fault(
+                    f"point {problem.point_name(point)} is measured twice on photo {problem.photo_name(photo)}",
+                    code="bundle-repeated",
+                    fix="leave one of the measurements out",
+                )
+                for point, photo in pairs
+            ]
+        )
+
+
+def refuse_weak_points(model: Model, reduced: Reduced) -> None:
+    """Refuse points whose rays, with their control, do not meet at an angle.
+
+    Parameters
+    ----------
+    model : Model
+        The problem.
+    reduced : Reduced
+        Its normal equations, without damping.
+
+    Raises
+    ------
+    GeometryError
+        With all of these points (``bundle-rays``).
+    """
+    refuse_weak(model, model.structure.batches, reduced.points)
+
+
+def refuse_weak(model: Model, batches: Sequence[Batch], eliminated: Sequence[Eliminated]) -> None:
+    """Refuse weak points of some batches; see ``refuse_weak_points``."""
+    weak = [
+        model.problem.point_name(number)
+        for batch, each in zip(batches, eliminated, strict=True)
+        for number in batch.point[batch.real][~(each.strength[batch.real] > PARALLEL)].tolist()
+    ]
+    if weak:
+        raise GeometryError(
+            f"rays and control do not determine {listed('point', weak)}: "
+            "a point needs two rays that meet at an angle, or one and its given height",
+            points=weak,
+            code="bundle-rays",
+        )
+
+
+def listed(noun: str, names: list[str]) -> str:
+    """Name some of many.
+
+    Parameters
+    ----------
+    noun : str
+        What they are, in the singular.
+    names : list of str
+        Their names.
+
+    Returns
+    -------
+    str
+        The first few, and how many more.
+    """
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return f"{noun}{'s' if len(names) > 1 else ''} {', '.join(names[:NAMED])}{more}"
+
+
+# --------------------------------------------------------------------------------------------------- the datum
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """How a connected part of the network is held by what is given.
+
+    Parameters
+    ----------
+    photos : ndarray of int
+        Its photos, in the order of the problem.
+    origin : ndarray, shape (3,)
+        Mean of what is given, metres.
+    radius : float
+        Size of the part, metres.
+    normal : ndarray, shape (7, 7)
+        Information on shift (in radii), rotation about the origin and scale.
+    control : ndarray, shape (c, 3)
+        Positions that are given at all, of points and photos.
+    """
+
+    photos: Numbers
+    origin: Floats
+    radius: float
+    normal: Floats
+    control: Floats
+
+
+def refuse_loose(model: Model, state: State) -> None:
+    """Refuse parts of the network that what is given does not hold in place.
+
+    Parameters
+    ----------
+    model : Model
+        The problem.
+    state : State
+        Start of the adjustment.
+
+    Raises
+    ------
+    GeometryError
+        Naming shift, rotation or scale that is not determined (``bundle-rank``).
+    """
+    parts = _parts(model)
+    for photos in parts:
+        held = _held(model, state, photos)
+        values, vectors = np.linalg.eigh(held.normal)
+        loose = vectors[:, values < LOOSE**-2.0]
+        if loose.shape[1]:
+            names = [model.problem.photo_name(number) for number in photos.tolist()]
+            whole = "" if len(parts) == 1 else f" of {listed('photo', names)}"
+            raise GeometryError(
+                f"what is given does not determine {_moves(model, state, held, loose)}{whole}: {_reason(held)}",
+                photos=() if len(parts) == 1 else names,
+                code="bundle-rank",
+            )
+
+
+def _parts(model: Model) -> list[Numbers]:
+    """Photos of the parts of the network that share no points."""
+    structure = model.structure
+    label = np.arange(len(structure.order))
+    while True:
+        least = label.copy()
+        np.minimum.at(least, structure.rows, label[structure.columns])
+        np.minimum.at(least, structure.columns, label[structure.rows])
+        least = least[least]
+        if (least == label).all():
+            break
+        label = least
+    return [np.sort(structure.order[label == first]) for first in np.unique(label)]
+
+
+def _held(model: Model, state: State, photos: Numbers) -> Held:
+    """Sum up how one part is held."""
+    problem = model.problem
+    inside = np.zeros(problem.photos, bool)
+    inside[photos] = True
+    seen = np.zeros(problem.points, bool)
+    seen[problem.images.point[inside[problem.images.photo]]] = True
+    control = problem.control
+    given = seen[control.point] & np.isfinite(control.sigma).any(axis=1)
+    positions, attitudes = given_at(model, state)
+    at = inside[positions.photo] & (positions.weight > 0.0).any(axis=1)
+    places = np.concatenate([control.xyz[given], problem.positions.xyz[at]])
+    around = state.centers[photos]
+    origin = places.mean(axis=0) if len(places) else around.mean(axis=0)
+    everything = np.concatenate([around, problem.start.points[seen]])
+    radius = float(np.linalg.norm(everything - everything.mean(axis=0), axis=1).max())
+    units = np.array([radius, radius, radius, 1.0, 1.0, 1.0, 1.0])
+    rows = np.einsum("nij,njd->nid", control.axes[given], datum.generators(control.xyz[given], origin)) * units
+    rows /= control.sigma[given][:, :, None]
+    normal = np.einsum("nad,nae->de", rows, rows)
+    of_photos = datum.photo_generators(model, state, origin)[model.structure.rank] * units
+    for linear in (positions, attitudes):
+        normal += _information(linear.by_photo, linear.by_common, linear.weight, of_photos, linear.photo, inside, model)
+    return Held(photos, origin, radius, normal, places)
+
+
+def _information(
+    by_photo: Floats,
+    by_common: Floats,
+    weight: Floats,
+    moves: Floats,
+    photo: Numbers,
+    inside: NDArray[np.bool_],
+    model: Model,
+) -> Floats:
+    """Information of given orientations on the similarity, with offsets and drifts unknown."""
+    rows = inside[photo]
+    own = (by_photo[rows] @ moves[photo[rows]]) * weight[rows][:, :, None]
+    common = by_common[rows] * weight[rows][:, :, None]
+    whole = np.concatenate([own, common], axis=2).reshape(-1, datum.DEFECT + by_common.shape[2])
+    normal = whole.T @ whole
+    seven = datum.DEFECT
+    corner = normal[seven:, seven:] + np.diag(model.prior**-2.0)
+    left: Floats = normal[:seven, :seven] - normal[:seven, seven:] @ np.linalg.pinv(corner) @ normal[seven:, :seven]
+    return left
+
+
+def _moves(model: Model, state: State, held: Held, loose: Floats) -> str:
+    """Name the movements that are not determined."""
+    flight, across, up = _directions(model, state, held.photos)
+    line = _line(held.control)
+    zero = np.zeros(3)
+    turns = {"roll about the flight line": flight, "pitch": across, "heading": up}
+    candidates: list[tuple[str, Floats]] = []
+    if line is not None:
+        alike = [name for name, axis in turns.items() if abs(line @ axis) > ALONG]
+        name = alike[0] if alike else "the rotation about the line of control"
+        candidates.append((name, np.concatenate([zero, line, [0.0]])))
+    candidates += [
+        ("shift along the flight", np.concatenate([flight, zero, [0.0]])),
+        ("shift across the flight", np.concatenate([across, zero, [0.0]])),
+        ("height", np.concatenate([up, zero, [0.0]])),
+        *((name, np.concatenate([zero, axis, [0.0]])) for name, axis in turns.items()),
+        ("scale", np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])),
+    ]
+    found = [name for name, move in candidates if np.linalg.norm(loose.T @ move) > ALIKE]
+    return ", ".join(dict.fromkeys(found)) or f"{loose.shape[1]} of the seven parameters of shift, rotation and scale"
+
+
+def _directions(model: Model, state: State, photos: Numbers) -> tuple[Floats, Floats, Floats]:
+    """Direction of flight, across and up of a part: unit vectors."""
+    del model
+    up = state.rotations[photos, :, 2].mean(axis=0)
+    up /= np.linalg.norm(up)
+    centers = state.centers[photos] - state.centers[photos].mean(axis=0)
+    flight = np.linalg.svd(centers, full_matrices=False)[2][0] if len(photos) > 1 else state.rotations[photos[0], :, 0]
+    flight = flight - up * (up @ flight)
+    flight /= np.linalg.norm(flight)
+    return flight, np.cross(up, flight), up
+
+
+def _line(control: Floats) -> Floats | None:
+    """Direction of the line on which all that is given lies, or None."""
+    if len(control) < 2:
+        return None
+    _, spread, axes = np.linalg.svd(control - control.mean(axis=0), full_matrices=False)
+    straight = spread[0] > 0.0 and (len(spread) == 1 or spread[1] < STRAIGHT * spread[0])
+    return axes[0] if straight else None
+
+
+def _reason(held: Held) -> str:
+    """Say why."""
+    if not len(held.control):
+        return "no control and no camera positions"
+    if len(np.unique(held.control, axis=0)) == 1:
+        return "one given position only"
+    if _line(held.control) is not None:
+        return "all control on one line"
+    return "too few of its coordinates are given"
+
+
+# ------------------------------------------------------------------------------------ photos and common parameters
+
+
+def refuse_singular(model: Model, reduced: Reduced, extra: Floats | None) -> NoReturn:
+    """Refuse normal equations that cannot be factored, naming the photos that are not determined.
+
+    Parameters
+    ----------
+    model : Model
+        The problem.
+    reduced : Reduced
+        The normal equations.
+    extra : ndarray, shape (m, 6, 6), or None
+        What was added to them as a datum.
+
+    Raises
+    ------
+    GeometryError
+        Always (``bundle-rank``).
+    """
+    own = reduced.blocks[model.structure.own] + (0.0 if extra is None else extra)
+    diagonal = np.maximum(np.einsum("nii->ni", own), 0.0)
+    least = TINY * np.where(diagonal > 0.0, diagonal, max(float(diagonal.max()), 1.0))
+    add = np.zeros_like(own)
+    add[:, range(PHOTO), range(PHOTO)] = least
+    band = factored(model, reduced, add if extra is None else add + extra)
+    photos, names = [], []
+    if band is not None:
+        vector = np.sqrt(diagonal + least).reshape(-1, 1)
+        for _ in range(ITERATIONS):
+            vector = band.solve(vector * np.maximum(diagonal, least).reshape(-1, 1))
+            vector /= np.abs(vector).max()
+        size = np.abs(vector.reshape(-1, PHOTO)) * np.sqrt(np.maximum(diagonal, least))
+        worst = size.max(axis=1)
+        numbers = model.structure.order[worst > SHARE * worst.max()]
+        photos = [model.problem.photo_name(number) for number in np.sort(numbers).tolist()]
+        names = [MOVES[int(np.argmax(size[int(np.argmax(worst))]))]]
+    what = f"; least of all the {names[0]}" if names else ""
+    raise GeometryError(
+        f"the observations do not determine {listed('photo', photos) or 'the photos'}{what}: "
+        "they need more points in common with the others, or control",
+        photos=photos,
+        code="bundle-rank",
+    )
+
+
+def refuse_common(model: Model, before: Floats, left: Floats) -> None:
+    """Refuse common parameters that the observations do not determine.
+
+    Parameters
+    ----------
+    model : Model
+        The problem.
+    before : ndarray, shape (p, p)
+        Normal matrix of the common parameters with all others known.
+    left : ndarray, shape (p, p)
+        The same with all others unknown.
+
+    Raises
+    ------
+    GeometryError
+        Naming the parameters (``bundle-rank``).
+    """
+    if not len(left):
+        return
+    scale = np.sqrt(np.maximum(np.diag(before), np.finfo(float).tiny))
+    values, vectors = np.linalg.eigh(left / np.outer(scale, scale))
+    bad = np.abs(vectors[:, values < LEFT_OVER])
+    if bad.shape[1]:
+        all_names = model.problem.common_names()
+        names = [all_names[n] for n in np.flatnonzero((bad > SHARE * bad.max(axis=0)).any(axis=1)).tolist()]
+        raise GeometryError(
+            f"the observations do not determine {', '.join(names)}: hold one of them, or give it an a-priori sigma",
+            code="bundle-rank",
+        )

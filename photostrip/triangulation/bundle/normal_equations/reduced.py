@@ -1,0 +1,194 @@
+"""Normal equations of the photos and the common parameters, after all points are eliminated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.triangulation.bundle.normal_equations.band import Band
+from photostrip.triangulation.bundle.normal_equations.sparse import Sparse
+from photostrip.triangulation.bundle.observations import given
+from photostrip.triangulation.bundle.observations.linearise import PHOTO, by_photo, eliminate, squares
+from photostrip.triangulation.bundle.observations.structure import blocks_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.triangulation.bundle.observations.linearise import Eliminated
+    from photostrip.triangulation.bundle.observations.model import Model, State
+
+    Floats = NDArray[np.float64]
+
+Factor = Band | Sparse
+WIDE = 1e11  # multiplications for the factor of a band, some seconds: from there a sparse factor is tried
+
+
+@dataclass(frozen=True, eq=False)
+class Reduced:
+    """Normal equations at one state.
+
+    Parameters
+    ----------
+    blocks : ndarray, shape (b, 6, 6)
+        Blocks of pairs of photos.
+    border : ndarray, shape (m, 6, p + 1)
+        Photos with common parameters, and right-hand sides, in the order of the band.
+    corner : ndarray, shape (p + 1, p + 1)
+        Common parameters, their right-hand sides; last the sum of squares that no step can reach below, before
+        the photos and common parameters move.
+    chi_square : float
+        Weighted sum of squares of all misfits at the state.
+    points : tuple of Eliminated
+        The eliminated points of each batch.
+    """
+
+    blocks: Floats
+    border: Floats
+    corner: Floats
+    chi_square: float
+    points: tuple[Eliminated, ...]
+
+
+def reduce(model: Model, state: State, damping: float = 0.0) -> Reduced:
+    """Linearise everything at a state and eliminate the points.
+
+    Parameters
+    ----------
+    model : Model
+        The problem.
+    state : State
+        Where.
+    damping : float
+        Part of its diagonal by which the normal matrix of each point is made larger.
+
+    Returns
+    -------
+    Reduced
+        The normal equations.
+    """
+    structure, p, more = model.structure, len(state.common), len(model.calibrated)
+    blocks = np.zeros((len(structure.rows), PHOTO, PHOTO))
+    border, corner = np.zeros((len(structure.order), PHOTO, p + 1)), np.zeros((p + 1, p + 1))
+    inner = np.r_[0:more, p]
+    table, chi_square, points = model.table(state), 0.0, []
+    narrow = border if more == p else np.zeros((len(border), PHOTO, more + 1))
+    every = zip(structure.batches, state.xyz, structure.pairs, structure.singles, strict=True)
+    for batch, xyz, pairs, singles in every:
+        rays, common = model.rays(batch, xyz, table, state.common)
+        eliminated = eliminate(batch, xyz, rays, common, damping)
+        partials = by_photo(rays, more)
+        if common is not None:
+            partials[PHOTO:-1] = common
+        added, taken = squares(batch, partials, eliminated.rows)
+        chi_square += float(added[0, 0, -1, -1])
+        of_pairs, of_photos, of_common = blocks_of(added, taken, len(batch.photo))
+        pairs.add(of_pairs, blocks)
+        singles.add(of_photos, narrow)
+        corner[np.ix_(inner, inner)] += of_common
+        points.append(eliminated)
+    if narrow is not border:
+        border[:, :, inner] = narrow
+    if not all(np.isfinite(each.strength).all() for each in points):
+        chi_square = np.inf  # a step too far: rays that do not meet
+    chi_square += _add_given(model, state, blocks, border, corner)
+    chi_square += control_squares(model, state)
+    return Reduced(blocks, border, corner, chi_square, tuple(points))
+
+
+def _add_given(model: Model, state: State, blocks: Floats, border: Floats, corner: Floats) -> float:
+    """Add camera positions, attitudes and a-priori values; give their sum of squares."""
+    structure, total = model.structure, 0.0
+    given_too = len(model.problem.positions) or len(model.problem.attitudes)
+    for linear in given_at(model, state) if given_too else ():
+        by_own, others = linear.scaled()
+        place = structure.rank[linear.photo]
+        np.add.at(blocks, structure.own[place], by_own.swapaxes(1, 2) @ by_own)
+        np.add.at(border, place, by_own.swapaxes(1, 2) @ others)
+        corner += np.einsum("gai,gaj->ij", others, others)
+        total += float((others[:, :, -1] ** 2).sum())
+    weight = model.prior**-2.0
+    diagonal = np.arange(len(weight))
+    corner[diagonal, diagonal] += weight
+    corner[diagonal, -1] -= weight * state.common
+    corner[-1, diagonal] -= weight * state.common
+    return total + float((weight * state.common**2).sum())
+
+
+def given_at(model: Model, state: State) -> tuple[given.Linear, given.Linear]:
+    """Linearise camera positions and attitudes at a state."""
+    problem = model.problem
+    return (
+        given.positions_at(problem.positions, state.centers, state.rotations, state.common, len(model.calibrated)),
+        given.attitudes_at(problem.attitudes, state.rotations, len(state.common)),
+    )
+
+
+def points_of(model: Model, state: State) -> Floats:
+    """Collect the points from the batches, shape (q, 3); a point without rays keeps its start."""
+    points = np.array(model.problem.start.points, float)
+    for batch, xyz in zip(model.structure.batches, state.xyz, strict=True):
+        points[batch.point[batch.real]] = xyz[:, batch.real].T
+    return points
+
+
+def control_residuals(model: Model, state: State) -> Floats:
+    """Give adjusted minus given coordinates of control along its axes, metres, shape (c, 3)."""
+    control = model.problem.control
+    if not len(control):
+        return np.zeros((0, 3))
+    points = np.array(model.problem.start.points[control.point], float)
+    where = np.zeros(model.problem.points, np.intp)
+    where[control.point] = np.arange(len(control))
+    for batch, xyz in zip(model.structure.batches, state.xyz, strict=True):
+        points[where[batch.point[batch.control]]] = xyz[:, batch.control].T
+    points = points[where[control.point]]
+    found: Floats = np.einsum("nij,nj->ni", control.axes, points - control.xyz)
+    return found
+
+
+def control_squares(model: Model, state: State) -> float:
+    """Weighted sum of squares of the control of points with rays."""
+    control = model.problem.control
+    if not len(control):
+        return 0.0
+    return float(((control_residuals(model, state) / control.sigma) ** 2).sum())
+
+
+def factored(model: Model, reduced: Reduced, add: Floats | None = None) -> Factor | None:
+    """Assemble the matrix of the photos and factor it: in a band, or sparse where the band is wide.
+
+    Parameters
+    ----------
+    model : Model
+        The problem.
+    reduced : Reduced
+        Its normal equations.
+    add : ndarray, shape (m, 6, 6), or None
+        What is added to the photos' own blocks.
+
+    Returns
+    -------
+    Band, Sparse or None
+        The factor; None when the matrix is not positive definite.
+    """
+    structure = model.structure
+    blocks = reduced.blocks
+    if add is not None:
+        blocks = blocks.copy()
+        blocks[structure.own] += add
+    if PHOTO * len(structure.order) * (PHOTO * structure.width) ** 2 > WIDE:
+        matrix = Sparse(len(structure.order), structure.rows, structure.columns, blocks)
+        return matrix if matrix.factor() else None
+    band = Band(PHOTO * len(structure.order), PHOTO * (structure.width + 1) - 1)
+    element = np.arange(PHOTO)
+    row = (PHOTO * structure.rows)[:, None, None] + element[:, None]
+    column = (PHOTO * structure.columns)[:, None, None] + element
+    places = band.place(row, column)
+    upper = np.zeros(places.shape, bool)
+    upper[structure.own] = element[:, None] < element
+    places[upper] = len(band.flat) - 1  # of the diagonal blocks only the lower half belongs into the band
+    band.flat[places] = blocks
+    band.flat[-1] = 0.0
+    return band if band.factor() else None

@@ -1,0 +1,1 @@
+"""What a bundle adjustment is given, what it estimates, and the derivatives between them."""

@@ -1,0 +1,117 @@
+"""Self-calibration: what the parameters of a camera change at an image point, and their partials."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.triangulation.bundle.observations.problem import CALIBRATION
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.triangulation.bundle.observations.problem import Cameras
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+PRINCIPAL_DISTANCE = CALIBRATION.index("c")
+
+
+@dataclass(frozen=True, eq=False)
+class Calibrated:
+    """Which parameters of which cameras are unknown.
+
+    Parameters
+    ----------
+    camera, kind : ndarray of int, shape (c,)
+        Camera and number within ``CALIBRATION`` of each parameter.
+    sigma : ndarray, shape (c,)
+        A-priori standard deviations; infinite: free.
+    """
+
+    camera: Numbers
+    kind: Numbers
+    sigma: Floats
+
+    def __len__(self) -> int:
+        """Count the parameters."""
+        return len(self.kind)
+
+
+def parameters(cameras: Cameras) -> Calibrated:
+    """List the parameters to be calibrated.
+
+    Parameters
+    ----------
+    cameras : Cameras
+        The cameras.
+
+    Returns
+    -------
+    Calibrated
+        The parameters, by camera.
+    """
+    sigma = np.zeros((len(cameras.focal), len(CALIBRATION))) if cameras.sigma is None else cameras.sigma
+    camera, kind = np.nonzero(sigma > 0.0)
+    return Calibrated(camera, kind, sigma[camera, kind])
+
+
+def corrections(xy: Floats) -> Floats:
+    """Corrections of image coordinates by each parameter at one.
+
+    Parameters
+    ----------
+    xy : ndarray, shape (2, ...)
+        Ideal image coordinates, mm.
+
+    Returns
+    -------
+    ndarray, shape (10, 2, ...)
+        What is added to x and y, mm; zero for the principal distance.
+    """
+    x, y = xy
+    r2 = x * x + y * y
+    one, zero = np.ones_like(x), np.zeros_like(x)
+    return np.array(
+        [
+            [zero, zero],
+            [-one, zero],
+            [zero, -one],
+            [x * r2, y * r2],
+            [x * r2**2, y * r2**2],
+            [x * r2**3, y * r2**3],
+            [r2 + 2.0 * x * x, 2.0 * x * y],
+            [2.0 * x * y, r2 + 2.0 * y * y],
+            [x, zero],
+            [y, zero],
+        ]
+    )
+
+
+def partials(wanted: Calibrated, xy: Floats, ratio: Floats, camera: Numbers) -> Floats:
+    """Give partials of the computed image coordinates by the parameters.
+
+    Parameters
+    ----------
+    wanted : Calibrated
+        The parameters.
+    xy : ndarray, shape (2, ...)
+        Measured ideal image coordinates, mm.
+    ratio : ndarray, shape (2, ...)
+        Computed image coordinates divided by the principal distance.
+    camera : ndarray of int, shape (...)
+        Camera of each ray.
+
+    Returns
+    -------
+    ndarray, shape (c, 2, ...)
+        Partials, mm by the unit of the parameter; a correction of the measurement counts as a change of the
+        computed coordinate with the opposite sign.
+    """
+    table = -corrections(xy)
+    table[PRINCIPAL_DISTANCE] = ratio
+    found: Floats = table[wanted.kind] * (camera == wanted.camera.reshape(-1, *[1] * camera.ndim))[:, None]
+    return found

@@ -1,0 +1,150 @@
+"""Observations of photos other than rays: camera positions with lever arm, offset and drift; attitudes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.geometry.rotation import cross_matrix, to_vector
+from photostrip.triangulation.bundle.observations.linearise import PHOTO, SIGNS
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.triangulation.bundle.observations.problem import Attitudes, Positions
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+SMALL = 1e-4  # radians: below it the series of the rotation's derivative is exact
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """Linearised observations of photos, three in each row.
+
+    Parameters
+    ----------
+    photo : ndarray of int, shape (g,)
+        Photo of each row.
+    residual : ndarray, shape (g, 3)
+        Computed minus given, metres or radians.
+    by_photo : ndarray, shape (g, 3, 6)
+        Partials by the photo's parameters, as ``linearise`` counts them.
+    by_common : ndarray, shape (g, 3, p)
+        Partials by the common parameters.
+    weight : ndarray, shape (g, 3)
+        Reciprocal sigmas.
+    """
+
+    photo: Numbers
+    residual: Floats
+    by_photo: Floats
+    by_common: Floats
+    weight: Floats
+
+    def scaled(self) -> tuple[Floats, Floats]:
+        """Give partials by photo and common parameters with the misfit as last column, (g, 3, 6 + p + 1); in sigmas."""
+        whole = np.concatenate([self.by_photo, self.by_common, -self.residual[:, :, None]], axis=2)
+        whole *= self.weight[:, :, None]
+        return whole[:, :, :PHOTO], whole[:, :, PHOTO:]
+
+
+def drift_columns(positions: Positions, first: int) -> tuple[Numbers, Numbers]:
+    """Where offset and drift of each group stand among the common parameters.
+
+    Parameters
+    ----------
+    positions : Positions
+        The positions.
+    first : int
+        Number of common parameters before them.
+
+    Returns
+    -------
+    offset, drift : ndarray of int, shape (groups + 1,)
+        First of three columns; -1: not a parameter, as for the group -1 at the end.
+    """
+    columns = []
+    for sigma in (positions.offset_sigma, positions.drift_sigma):
+        used = sigma > 0.0
+        columns.append(np.append(np.where(used, first + 3 * (np.cumsum(used) - 1), -1), -1))
+        first += 3 * int(used.sum())
+    return columns[0], columns[1]
+
+
+def positions_at(positions: Positions, centers: Floats, rotations: Floats, common: Floats, calibrated: int) -> Linear:
+    """Linearise camera positions.
+
+    Parameters
+    ----------
+    positions : Positions
+        What is given.
+    centers : ndarray, shape (m, 3)
+        Perspective centres, metres.
+    rotations : ndarray, shape (m, 3, 3)
+        Rotations, photo to Cartesian frame.
+    common : ndarray, shape (p,)
+        Common parameters.
+    calibrated : int
+        How many of them are calibration parameters, which stand first.
+
+    Returns
+    -------
+    Linear
+        The linearised observations.
+    """
+    turn = positions.axes @ rotations[positions.photo]
+    arm = np.einsum("gij,gj->gi", turn, positions.lever)
+    residual = np.einsum("gij,gj->gi", positions.axes, centers[positions.photo] - positions.xyz) + arm
+    by_photo = np.concatenate([turn, -turn @ cross_matrix(positions.lever)], axis=2) * SIGNS
+    by_common = np.zeros((len(positions), 3, len(common)))
+    factors = (np.ones(len(positions)), positions.time)
+    for columns, factor in zip(drift_columns(positions, calibrated), factors, strict=True):
+        column = columns[positions.group]
+        rows = np.flatnonzero(column >= 0)
+        for axis in range(3):
+            by_common[rows, axis, column[rows] + axis] = -factor[rows]
+    residual += by_common @ common
+    return Linear(positions.photo, residual, by_photo, by_common, 1.0 / positions.sigma)
+
+
+def attitudes_at(attitudes: Attitudes, rotations: Floats, common: int) -> Linear:
+    """Linearise given attitudes.
+
+    Parameters
+    ----------
+    attitudes : Attitudes
+        What is given.
+    rotations : ndarray, shape (m, 3, 3)
+        Rotations, photo to Cartesian frame.
+    common : int
+        Number of common parameters, on which attitudes do not depend.
+
+    Returns
+    -------
+    Linear
+        The linearised observations.
+    """
+    turn = to_vector(np.swapaxes(attitudes.rotations, 1, 2) @ rotations[attitudes.photo])
+    by_photo = np.zeros((len(attitudes), 3, PHOTO))
+    by_photo[:, :, 3:] = _vector_by_turn(turn)
+    return Linear(
+        attitudes.photo,
+        turn,
+        by_photo * SIGNS,
+        np.zeros((len(attitudes), 3, common)),
+        1.0 / attitudes.sigma,
+    )
+
+
+def _vector_by_turn(vector: Floats) -> Floats:
+    """Give the derivative of a rotation vector by a further small rotation about the turned axes, shape (n, 3, 3)."""
+    angle = np.linalg.norm(vector, axis=1)
+    safe = np.where(angle < SMALL, 1.0, angle)
+    factor = np.where(angle < SMALL, 1.0 / 12.0, 1.0 / safe**2 - (1.0 + np.cos(safe)) / (2.0 * safe * np.sin(safe)))
+    cross = cross_matrix(vector)
+    derivative: Floats = np.eye(3) + 0.5 * cross + factor[:, None, None] * (cross @ cross)
+    return derivative

@@ -1,0 +1,221 @@
+"""How the rays lie in memory: points that are seen by the same photos stand side by side.
+
+Eliminating a point leaves a dense square over its photos in the normal equations of the photos. Points with the same
+photos fill the same square, so their contributions are one product of matrices: a few thousand products instead
+of one for every point, and no index arithmetic inside. A *batch* holds points with the same number of rays;
+within it, a *run* holds groups of the same size, each group the points of one set of photos. Groups are filled up with
+*dummies* (copies of a point with zero weights) to a few sizes, so that a run is a plain three-dimensional array.
+
+Batches are cut so small that what is computed for one stays in the cache of the processor.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.triangulation.bundle.observations.problem import Images
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+LARGEST_GROUP = 64  # points; larger groups are split
+RAYS_OF_BATCH = 6144  # the arrays of a batch then fill some 2 MB
+_SIZES = np.array([1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 28, 32, 40, 48, 56, LARGEST_GROUP])
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Points with the same number of rays k, in S slots.
+
+    Parameters
+    ----------
+    point : ndarray of int, shape (S,)
+        Point of each slot; that of a dummy is a point of its group.
+    real : ndarray of int, shape (r,)
+        Slots that are not dummies.
+    dummy : ndarray of int, shape (S - r,)
+        The others.
+    photo : ndarray of int, shape (k, S)
+        Photos of each slot, as numbered by the order of the band, ascending.
+    row : ndarray of int, shape (k, S)
+        Row of each ray in the observations.
+    xy : ndarray, shape (2, k, S)
+        Image coordinates, mm.
+    weight : ndarray, shape (2, k, S)
+        Reciprocal sigmas, 1/mm; zero for dummies.
+    runs : tuple of tuple (int, int, int, int)
+        First and last slot, number of groups, points of a group, for each run.
+    sets : ndarray of int, shape (groups, k)
+        Photos of each group.
+    control : ndarray of int, shape (c,)
+        Slots with control.
+    control_normal : ndarray, shape (3, 3, c)
+        Normal matrices of the control of these slots, 1/m^2.
+    control_right : ndarray, shape (3, c)
+        These matrices times the given positions, 1/m.
+    """
+
+    point: Numbers
+    real: Numbers
+    dummy: Numbers
+    photo: Numbers
+    row: Numbers
+    xy: Floats
+    weight: Floats
+    runs: tuple[tuple[int, int, int, int], ...]
+    sets: Numbers
+    control: Numbers
+    control_normal: Floats
+    control_right: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Sorted:
+    """Rays sorted by point, then photo.
+
+    Parameters
+    ----------
+    row : ndarray of int, shape (n,)
+        Rows of the observations in this order.
+    photo : ndarray of int, shape (n,)
+        Photos of these, as places in the band.
+    point : ndarray of int, shape (n,)
+        Points of these.
+    counts : ndarray of int, shape (q,)
+        Number of rays of each point.
+    """
+
+    row: Numbers
+    photo: Numbers
+    point: Numbers
+    counts: Numbers
+
+
+def sort_rays(images: Images, points: int, rank: Numbers) -> Sorted:
+    """Sort rays by point, then photo.
+
+    Parameters
+    ----------
+    images : Images
+        The rays.
+    points : int
+        Number of points q.
+    rank : ndarray of int, shape (m,)
+        Place of each photo in the band.
+
+    Returns
+    -------
+    Sorted
+        The rays in this order.
+    """
+    photo = rank[images.photo]
+    row = np.argsort(images.point * np.intp(len(rank)) + photo)
+    return Sorted(row, photo[row], images.point[row], np.bincount(images.point, minlength=points))
+
+
+def arrange(images: Images, rays: Sorted, photos: int) -> tuple[Batch, ...]:
+    """Arrange sorted rays in batches, without control.
+
+    Parameters
+    ----------
+    images : Images
+        The rays.
+    rays : Sorted
+        The same, sorted.
+    photos : int
+        Number of photos m.
+
+    Returns
+    -------
+    tuple of Batch
+        All rays of all points.
+    """
+    first = np.cumsum(rays.counts) - rays.counts
+    batches: list[Batch] = []
+    for count in np.flatnonzero(np.bincount(rays.counts)).tolist():
+        if count:
+            members = np.flatnonzero(rays.counts == count)
+            at = first[members] + np.arange(count)[:, None]
+            batches += _batches(images, members, rays.photo[at], rays.row[at], photos)
+    return tuple(batches)
+
+
+def _batches(images: Images, members: Numbers, photo: Numbers, row: Numbers, photos: int) -> list[Batch]:
+    """Arrange points with the same number of rays; `photo` and `row` have shape (k, points)."""
+    order, first, count = _groups(photo, photos)
+    pieces = -(-count // LARGEST_GROUP)
+    size = -(-count // pieces)
+    slots = _SIZES[np.searchsorted(_SIZES, size)]
+    # A row for each piece of a group, pieces of one size together.
+    group = np.repeat(np.arange(len(count)), pieces)
+    piece = np.arange(len(group)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
+    begin = first[group] + piece * size[group]
+    length = np.minimum(size[group], first[group] + count[group] - begin)
+    by_size = np.argsort(slots[group], kind="stable")
+    begin, length, slots = begin[by_size], length[by_size], slots[group][by_size]
+    ends = np.cumsum(slots)
+    batch = (ends - 1) * len(photo) // RAYS_OF_BATCH
+    cuts = [0, *(np.flatnonzero(np.diff(batch)) + 1).tolist(), len(slots)]
+    return [
+        _batch(images, members, photo, row, order, (begin[a:b], length[a:b], slots[a:b])) for a, b in pairwise(cuts)
+    ]
+
+
+def _groups(photo: Numbers, photos: int) -> tuple[Numbers, Numbers, Numbers]:
+    """Sort points by their sets of photos: the order, and first place and number of points of each set."""
+    key = photo[0].astype(np.int64)
+    largest = photos
+    for column in photo[1:]:
+        if largest > np.iinfo(np.int64).max // photos:
+            key, largest = np.unique(key, return_inverse=True)[1], len(key)
+        key = key * photos + column
+        largest *= photos
+    order = np.argsort(key, kind="stable")
+    ordered = key[order]
+    first = np.flatnonzero(np.concatenate([[True], ordered[1:] != ordered[:-1]]))
+    return order, first, np.diff(first, append=len(order))
+
+
+def _batch(
+    images: Images,
+    members: Numbers,
+    photo: Numbers,
+    row: Numbers,
+    order: Numbers,
+    groups: tuple[Numbers, Numbers, Numbers],
+) -> Batch:
+    """Fill the slots of one batch: first place in `order`, number of points and number of slots of each group."""
+    begin, length, slots = groups
+    start = np.cumsum(slots) - slots
+    place = np.arange(slots.sum()) - np.repeat(start, slots)
+    held = np.repeat(length, slots)
+    real = place < held
+    member = order[np.repeat(begin, slots) + np.where(real, place, 0)]
+    rows = row[:, member]
+    weight = np.zeros((2, *rows.shape))
+    shown = rows[:, real]
+    weight[:, :, real] = 1.0 / np.moveaxis(images.sigma[shown], 2, 0)
+    changes = [0, *(np.flatnonzero(np.diff(slots)) + 1).tolist(), len(slots)]
+    edges = np.append(start, slots.sum())
+    runs = tuple((int(edges[a]), int(edges[b]), b - a, int(slots[a])) for a, b in pairwise(changes))
+    return Batch(
+        point=members[member],
+        real=np.flatnonzero(real),
+        dummy=np.flatnonzero(~real),
+        photo=np.ascontiguousarray(photo[:, member]),
+        row=rows,
+        xy=np.ascontiguousarray(np.moveaxis(images.xy[rows], 2, 0)),
+        weight=weight,
+        runs=runs,
+        sets=np.ascontiguousarray(photo[:, order[begin]].T),
+        control=np.zeros(0, np.intp),
+        control_normal=np.zeros((3, 3, 0)),
+        control_right=np.zeros((3, 0)),
+    )

@@ -1,0 +1,139 @@
+"""A problem made ready: its structure, the values of all parameters, and a step of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.triangulation.bundle.observations import calibration
+from photostrip.triangulation.bundle.observations.linearise import view
+from photostrip.triangulation.bundle.observations.structure import build
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.triangulation.bundle.observations.calibration import Calibrated
+    from photostrip.triangulation.bundle.observations.layout import Batch
+    from photostrip.triangulation.bundle.observations.linearise import Rays
+    from photostrip.triangulation.bundle.observations.problem import Problem
+    from photostrip.triangulation.bundle.observations.structure import Structure
+
+    Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Values of all parameters.
+
+    Parameters
+    ----------
+    centers : ndarray, shape (m, 3)
+        Perspective centres in the order of the problem, metres.
+    rotations : ndarray, shape (m, 3, 3)
+        Rotations in that order, photo to Cartesian frame.
+    xyz : tuple of ndarray, shape (3, S)
+        Points of each batch.
+    common : ndarray, shape (p,)
+        Calibration parameters, offsets, drifts.
+    """
+
+    centers: Floats
+    rotations: Floats
+    xyz: tuple[Floats, ...]
+    common: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A problem with everything about it that does not change during the adjustment.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    structure : Structure
+        Its structure.
+    calibrated : Calibrated
+        Its calibration parameters.
+    prior : ndarray, shape (p,)
+        A-priori sigmas of all common parameters.
+    """
+
+    problem: Problem
+    structure: Structure
+    calibrated: Calibrated
+    prior: Floats
+
+    def table(self, state: State) -> Floats:
+        """Columns of ``view`` for all photos in the order of the band, shape (13, m)."""
+        cameras, order = self.problem.cameras, self.structure.order
+        focal = cameras.focal.astype(float)
+        distance = self.calibrated.kind == calibration.PRINCIPAL_DISTANCE
+        np.add.at(focal, self.calibrated.camera[distance], state.common[: len(distance)][distance])
+        turn = state.rotations[order].transpose(2, 1, 0).reshape(9, -1)
+        return np.concatenate([turn, state.centers[order].T, focal[cameras.of_photo[order]][None]])
+
+    def rays(self, batch: Batch, xyz: Floats, table: Floats, common: Floats) -> tuple[Rays, Floats | None]:
+        """View a batch; its partials by calibration parameters in units of sigma, or None."""
+        rays = view(batch, xyz, table)
+        if not len(self.calibrated):
+            return rays, None
+        camera = self.problem.cameras.of_photo[self.structure.order][batch.photo]
+        partials = calibration.partials(self.calibrated, batch.xy, rays.ratio, camera)
+        partials *= batch.weight
+        bends = self.calibrated.kind != calibration.PRINCIPAL_DISTANCE
+        np.subtract(
+            rays.misfit,
+            np.einsum("p,pakr->akr", common[: len(bends)][bends], partials[bends]),
+            out=rays.misfit,
+        )
+        return rays, partials
+
+
+@dataclass(frozen=True, eq=False)
+class Move:
+    """A step of all parameters.
+
+    Parameters
+    ----------
+    photos : ndarray, shape (m, 6)
+        Steps of the photos in the order of the band, in their own axes.
+    common : ndarray, shape (p,)
+        Steps of the common parameters.
+    points : tuple of ndarray, shape (3, S)
+        Steps of the points of each batch, metres.
+    length : float
+        Length in standard deviations.
+    """
+
+    photos: Floats
+    common: Floats
+    points: tuple[Floats, ...]
+    length: float
+
+
+def model_of(problem: Problem) -> Model:
+    """Prepare a problem.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+
+    Returns
+    -------
+    Model
+        The same, with its structure.
+    """
+    calibrated = calibration.parameters(problem.cameras)
+    drifts = (problem.positions.offset_sigma, problem.positions.drift_sigma)
+    sigmas = [calibrated.sigma, *(np.repeat(sigma[sigma > 0.0], 3) for sigma in drifts)]
+    return Model(problem, build(problem), calibrated, np.concatenate(sigmas))
+
+
+def state_of(model: Model, centers: Floats, rotations: Floats, points: Floats, common: Floats) -> State:
+    """Lay parameters out for a model."""
+    xyz = tuple(np.ascontiguousarray(points[batch.point].T) for batch in model.structure.batches)
+    return State(np.asarray(centers, float), np.asarray(rotations, float), xyz, common)

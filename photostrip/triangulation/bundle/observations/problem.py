@@ -1,0 +1,270 @@
+"""What a bundle adjustment is given: frozen arrays, in one Cartesian frame, without files and without ids to look up.
+
+All coordinates are metres in one right-handed Cartesian frame whose origin lies near the points (a geocentric frame
+is shifted: 6 400 km in front of every number would cost three digits). All image coordinates are ideal: millimetres,
+relative to the principal point, without distortion. Rotations take photo axes to the Cartesian frame.
+
+A sigma that is infinite switches an observation off; a sigma of zero is refused.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+CALIBRATION = ("c", "x0", "y0", "k1", "k2", "k3", "p1", "p2", "b1", "b2")
+"""Names of the calibration parameters of a camera, in the order of the columns of ``Calibration``.
+
+With the ideal coordinates x, y as given, r2 = x^2 + y^2, and all parameters zero at the start, what a ray should
+have measured is found from
+
+    x + Dx = -(f + c) u / w        Dx = -x0 + x (k1 r2 + k2 r2^2 + k3 r2^3) + p1 (r2 + 2 x^2) + 2 p2 x y + b1 x + b2 y
+    y + Dy = -(f + c) v / w        Dy = -y0 + y (k1 r2 + k2 r2^2 + k3 r2^3) + p2 (r2 + 2 y^2) + 2 p1 x y
+
+so that c, x0, y0 (mm) are corrections of the principal distance and the principal point, k and p are those of
+Brown's model from image to ideal coordinates, b1 is the affinity and b2 the shear.
+"""
+
+
+def _no_rows(*shape: int) -> Floats:
+    return np.zeros((0, *shape))
+
+
+def _no_numbers() -> Numbers:
+    return np.zeros(0, np.intp)
+
+
+@dataclass(frozen=True, eq=False)
+class Images:
+    """Measured rays.
+
+    Parameters
+    ----------
+    photo, point : ndarray of int, shape (n,)
+        Photo and point of each ray. A point is measured at most once on a photo. Any order; by photo is fastest.
+    xy : ndarray, shape (n, 2)
+        Ideal image coordinates in mm, relative to the principal point.
+    sigma : ndarray, shape (n, 2)
+        Their standard deviations in mm.
+    """
+
+    photo: Numbers
+    point: Numbers
+    xy: Floats
+    sigma: Floats
+
+    def __len__(self) -> int:
+        """Count the rays."""
+        return len(self.photo)
+
+
+@dataclass(frozen=True, eq=False)
+class Control:
+    """Given coordinates of points. What is observed are ``axes @ (X - xyz)``, each with its own sigma.
+
+    Parameters
+    ----------
+    point : ndarray of int, shape (c,)
+        Point of each row; a point may stand in several rows.
+    xyz : ndarray, shape (c, 3)
+        Given position, Cartesian, metres. Where a coordinate is not given (height of a plan-only point) any value
+        near the truth does: its sigma is infinite.
+    axes : ndarray, shape (c, 3, 3)
+        Directions of the three coordinates as rows, orthonormal: east, north, up of the frame of the list at the
+        point (``GroundFrame.axes_at``), so that plan-only and height-only mean what they say in every frame.
+    sigma : ndarray, shape (c, 3)
+        Standard deviations along the three axes, metres; infinite: not given.
+    """
+
+    point: Numbers = field(default_factory=_no_numbers)
+    xyz: Floats = field(default_factory=lambda: _no_rows(3))
+    axes: Floats = field(default_factory=lambda: _no_rows(3, 3))
+    sigma: Floats = field(default_factory=lambda: _no_rows(3))
+
+    def __len__(self) -> int:
+        """Count the rows."""
+        return len(self.point)
+
+
+@dataclass(frozen=True, eq=False)
+class Positions:
+    """Given camera positions, of the perspective centre or of an antenna.
+
+    What is observed are ``axes @ (S + R @ lever - xyz) - offset - drift * time``, with offset and drift of the group.
+
+    Parameters
+    ----------
+    photo : ndarray of int, shape (g,)
+        Photo of each row.
+    xyz : ndarray, shape (g, 3)
+        Given position, Cartesian, metres.
+    axes : ndarray, shape (g, 3, 3)
+        Directions of the three coordinates as rows, as for ``Control``.
+    sigma : ndarray, shape (g, 3)
+        Standard deviations along the axes, metres; infinite: not given.
+    lever : ndarray, shape (g, 3)
+        Antenna minus perspective centre in photo axes, metres.
+    group : ndarray of int, shape (g,)
+        Group (a strip, say) whose offset and drift count; -1: none.
+    time : ndarray, shape (g,)
+        What the drift is multiplied with: time or place along the strip, best centred.
+    offset_sigma, drift_sigma : ndarray, shape (groups,)
+        A-priori standard deviations of each of the three components of a group's offset (metres) and drift (metres
+        per unit of time) about zero; infinite: free; 0: there is none. They are what has to be added to what is given.
+    """
+
+    photo: Numbers = field(default_factory=_no_numbers)
+    xyz: Floats = field(default_factory=lambda: _no_rows(3))
+    axes: Floats = field(default_factory=lambda: _no_rows(3, 3))
+    sigma: Floats = field(default_factory=lambda: _no_rows(3))
+    lever: Floats = field(default_factory=lambda: _no_rows(3))
+    group: Numbers = field(default_factory=_no_numbers)
+    time: Floats = field(default_factory=_no_rows)
+    offset_sigma: Floats = field(default_factory=_no_rows)
+    drift_sigma: Floats = field(default_factory=_no_rows)
+
+    def __len__(self) -> int:
+        """Count the rows."""
+        return len(self.photo)
+
+
+@dataclass(frozen=True, eq=False)
+class Attitudes:
+    """Given attitudes of photos; a given perspective centre is a row of ``Positions``.
+
+    Parameters
+    ----------
+    photo : ndarray of int, shape (a,)
+        Photo of each row.
+    rotations : ndarray, shape (a, 3, 3)
+        Given rotations, photo to Cartesian frame.
+    sigma : ndarray, shape (a, 3)
+        Standard deviations of the rotations about the three photo axes, radians; infinite: not given.
+    """
+
+    photo: Numbers = field(default_factory=_no_numbers)
+    rotations: Floats = field(default_factory=lambda: _no_rows(3, 3))
+    sigma: Floats = field(default_factory=lambda: _no_rows(3))
+
+    def __len__(self) -> int:
+        """Count the rows."""
+        return len(self.photo)
+
+
+@dataclass(frozen=True, eq=False)
+class Cameras:
+    """Cameras of the photos, and what is to be calibrated.
+
+    Parameters
+    ----------
+    of_photo : ndarray of int, shape (m,)
+        Camera of each photo.
+    focal : ndarray, shape (cameras,)
+        Principal distances in mm.
+    sigma : ndarray, shape (cameras, 10), or None
+        A-priori standard deviations of the parameters ``CALIBRATION`` about zero, in mm and powers of mm;
+        infinite: free; 0: not a parameter. None: no calibration.
+    """
+
+    of_photo: Numbers
+    focal: Floats
+    sigma: Floats | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Where the adjustment starts.
+
+    Parameters
+    ----------
+    centers : ndarray, shape (m, 3)
+        Perspective centres, Cartesian, metres.
+    rotations : ndarray, shape (m, 3, 3)
+        Rotations, photo to Cartesian frame.
+    points : ndarray, shape (q, 3)
+        Points, Cartesian, metres.
+    """
+
+    centers: Floats
+    rotations: Floats
+    points: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """All observations and all start values of one bundle adjustment.
+
+    Parameters
+    ----------
+    images : Images
+        Measured rays.
+    cameras : Cameras
+        Cameras of the photos.
+    start : Start
+        Start values; they say how many photos (m) and points (q) there are.
+    control : Control
+        Given coordinates of points.
+    positions : Positions
+        Given camera positions.
+    attitudes : Attitudes
+        Given attitudes.
+    photo_ids, point_ids, camera_ids, group_ids : tuple of str
+        Names for messages; empty: the numbers.
+    """
+
+    images: Images
+    cameras: Cameras
+    start: Start
+    control: Control = field(default_factory=Control)
+    positions: Positions = field(default_factory=Positions)
+    attitudes: Attitudes = field(default_factory=Attitudes)
+    photo_ids: tuple[str, ...] = ()
+    point_ids: tuple[str, ...] = ()
+    camera_ids: tuple[str, ...] = ()
+    group_ids: tuple[str, ...] = ()
+
+    @property
+    def photos(self) -> int:
+        """Number of photos m."""
+        return len(self.start.centers)
+
+    @property
+    def points(self) -> int:
+        """Number of points q."""
+        return len(self.start.points)
+
+    def photo_name(self, number: int) -> str:
+        """Name of a photo for a message."""
+        return self.photo_ids[number] if self.photo_ids else f"number {number}"
+
+    def point_name(self, number: int) -> str:
+        """Name of a point for a message."""
+        return self.point_ids[number] if self.point_ids else f"number {number}"
+
+    def common_names(self) -> tuple[str, ...]:
+        """Names of the parameters that many photos share, in the order of ``Solution.common``.
+
+        Returns
+        -------
+        tuple of str
+            First the calibration parameters (``camera RC30: k1``), then offsets and drifts of positions
+            (``positions A: offset 1``; the component counts along the rows of the axes).
+        """
+        names = []
+        if self.cameras.sigma is not None:
+            for camera, row in enumerate(self.cameras.sigma):
+                name = self.camera_ids[camera] if self.camera_ids else f"number {camera}"
+                names += [f"camera {name}: {CALIBRATION[k]}" for k in np.flatnonzero(row > 0.0)]
+        for title, sigma in (("offset", self.positions.offset_sigma), ("drift", self.positions.drift_sigma)):
+            for group in np.flatnonzero(sigma > 0.0).tolist():
+                name = self.group_ids[group] if self.group_ids else f"group {group}"
+                names += [f"positions {name}: {title} {axis}" for axis in (1, 2, 3)]
+        return tuple(names)

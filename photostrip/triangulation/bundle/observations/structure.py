@@ -1,0 +1,277 @@
+"""Which photos share points, in which order their normal equations are a narrow band, and where a block goes in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.triangulation.bundle.observations.layout import Batch, Sorted, arrange, sort_rays
+from photostrip.triangulation.bundle.observations.linearise import PHOTO
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.triangulation.bundle.observations.problem import Control, Problem
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+NARROW = 12  # photos: a band as narrow as this is not worth another order
+TABLE = 3_000  # photos: up to here pairs are marked in a square table, which is faster than sorting them
+
+
+@dataclass(frozen=True, eq=False)
+class Gather:
+    """Sum of blocks that go to the same place.
+
+    Parameters
+    ----------
+    target : ndarray of int, shape (t,)
+        Places, each once.
+    order : ndarray of int, shape (b,), or None
+        Blocks in the order of their targets; None when every block has its own target, in order.
+    first : ndarray of int, shape (t,)
+        First block of each target in that order.
+    """
+
+    target: Numbers
+    order: Numbers | None
+    first: Numbers
+
+    def add(self, blocks: Floats, total: Floats) -> None:
+        """Add blocks (b, ...) to the rows of `total`, in place."""
+        flat = blocks.reshape(len(blocks), -1)
+        if self.order is not None:
+            flat = np.add.reduceat(flat[self.order], self.first, axis=0)
+        total.reshape(len(total), -1)[self.target] += flat
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """Shape of the normal equations.
+
+    Parameters
+    ----------
+    order : ndarray of int, shape (m,)
+        Photos in the order of the band.
+    rank : ndarray of int, shape (m,)
+        Place of each photo in that order.
+    rows, columns : ndarray of int, shape (b,)
+        Pairs of photos that share points (places in the band, row >= column), every photo with itself among them.
+    own : ndarray of int, shape (m,)
+        Which of the pairs is each photo with itself.
+    width : int
+        Largest distance of a pair.
+    batches : tuple of Batch
+        The rays.
+    pairs, singles : tuple of Gather
+        For each batch: of its blocks to the pairs (by pair within the set of photos, then group), and of its rays to
+        photos (by ray, then group).
+    """
+
+    order: Numbers
+    rank: Numbers
+    rows: Numbers
+    columns: Numbers
+    own: Numbers
+    width: int
+    batches: tuple[Batch, ...]
+    pairs: tuple[Gather, ...]
+    singles: tuple[Gather, ...]
+
+
+def build(problem: Problem) -> Structure:
+    """Find the structure of a problem.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+
+    Returns
+    -------
+    Structure
+        Order, pairs and batches.
+    """
+    m = problem.photos
+    rank = np.arange(m)
+    rays = sort_rays(problem.images, problem.points, rank)
+    rows, columns = _pairs(rays, m)
+    if (rows - columns).max(initial=0) > NARROW:
+        better = _narrower(rows, columns, m)
+        if better is not None:
+            rank = better
+            rays = sort_rays(problem.images, problem.points, rank)
+            one, other = rank[rows], rank[columns]
+            rows, columns = np.maximum(one, other), np.minimum(one, other)
+    key = np.sort(rows * m + columns)
+    rows, columns = np.divmod(key, m)
+    control = control_normals(problem.control, problem.points)
+    batches = tuple(_with_control(batch, *control) for batch in arrange(problem.images, rays, m))
+    return Structure(
+        order=np.argsort(rank),
+        rank=rank,
+        rows=rows,
+        columns=columns,
+        own=np.flatnonzero(rows == columns),
+        width=int((rows - columns).max(initial=0)),
+        batches=batches,
+        pairs=tuple(_gather(_keys(batch.sets, m).ravel(), key) for batch in batches),
+        singles=tuple(_gather(batch.sets.T.ravel(), None) for batch in batches),
+    )
+
+
+@cache
+def triangle(rays: int) -> tuple[Numbers, Numbers]:
+    """Pairs of a set of photos, the later one first: positions within the set.
+
+    Parameters
+    ----------
+    rays : int
+        Size of the set.
+
+    Returns
+    -------
+    tuple of ndarray of int, shape (rays (rays + 1) / 2,)
+        Row and column.
+    """
+    row, column = np.tril_indices(rays)
+    return row, column
+
+
+def _keys(sets: Numbers, photos: int) -> Numbers:
+    """Keys of the pairs of each set, shape (pairs, groups)."""
+    row, column = triangle(sets.shape[1])
+    keys: Numbers = sets.T[row] * photos + sets.T[column]
+    return keys
+
+
+def _gather(wanted: Numbers, keys: Numbers | None) -> Gather:
+    """Make the sum of blocks with the keys `wanted`, to their places in `keys` (sorted; None: the key is the place)."""
+    order = np.argsort(wanted, kind="stable")
+    ordered = wanted[order]
+    first = np.flatnonzero(np.concatenate([[True], ordered[1:] != ordered[:-1]]))
+    if len(first) == len(wanted):
+        target = wanted if keys is None else np.searchsorted(keys, wanted)
+        return Gather(target, None, first)
+    target = ordered[first] if keys is None else np.searchsorted(keys, ordered[first])
+    return Gather(target, order, first)
+
+
+def _pairs(rays: Sorted, photos: int) -> tuple[Numbers, Numbers]:
+    """Pairs of photos that share a point, each once, the later photo first; every photo with itself."""
+    own = np.arange(photos) * (photos + 1)
+    table = np.zeros(photos * photos, bool) if photos <= TABLE else None
+    found = [own]
+    longest = int(rays.counts.max(initial=1))
+    for lag in range(1, longest):
+        same = rays.point[lag:] == rays.point[:-lag]
+        keys = (rays.photo[lag:] * photos + rays.photo[:-lag])[same]
+        if table is None:
+            found.append(np.unique(keys))
+        else:
+            table[keys] = True
+    if table is None:
+        keys = np.unique(np.concatenate(found))
+    else:
+        table[own] = True
+        keys = np.flatnonzero(table)
+    row, column = np.divmod(keys, photos)
+    return row, column
+
+
+def _narrower(rows: Numbers, columns: Numbers, photos: int) -> Numbers | None:
+    """Give the rank of the photos in the reverse Cuthill-McKee order, or None when that is not narrower."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+    ones = np.ones(2 * len(rows), np.int8)
+    graph = coo_array(
+        (ones, (np.concatenate([rows, columns]), np.concatenate([columns, rows]))), shape=(photos, photos)
+    )
+    order = reverse_cuthill_mckee(graph.tocsr(), symmetric_mode=True)
+    rank = np.empty(photos, np.intp)
+    rank[order] = np.arange(photos)
+    narrower = np.abs(rank[rows] - rank[columns]).max() < np.abs(rows - columns).max()
+    return rank if narrower else None
+
+
+def _with_control(batch: Batch, normal: Floats, right: Floats, where: Numbers) -> Batch:
+    """Give a batch the control of its points."""
+    if not len(normal):
+        return batch
+    slots = batch.real[where[batch.point[batch.real]] >= 0]
+    at = where[batch.point[slots]]
+    return replace(
+        batch,
+        control=slots,
+        control_normal=np.ascontiguousarray(normal[at].transpose(1, 2, 0)),
+        control_right=np.ascontiguousarray(right[at].T),
+    )
+
+
+def control_normals(control: Control, points: int) -> tuple[Floats, Floats, Numbers]:
+    """Sum the control of each point.
+
+    Parameters
+    ----------
+    control : Control
+        The rows.
+    points : int
+        Number of points q.
+
+    Returns
+    -------
+    normal : ndarray, shape (c, 3, 3)
+        Normal matrices of the points with control, 1/m^2.
+    right : ndarray, shape (c, 3)
+        These matrices times the given positions, 1/m.
+    where : ndarray of int, shape (q,)
+        Row of each point in these; -1: no control.
+    """
+    controlled, row = np.unique(control.point, return_inverse=True)
+    where = np.full(points, -1)
+    where[controlled] = np.arange(len(controlled))
+    normals = np.einsum("nai,na,naj->nij", control.axes, control.sigma**-2.0, control.axes)
+    normal, right = np.zeros((len(controlled), 3, 3)), np.zeros((len(controlled), 3))
+    np.add.at(normal, row, normals)
+    np.add.at(right, row, np.einsum("nij,nj->ni", normals, control.xyz))
+    return normal, right, where
+
+
+def blocks_of(added: Floats, taken: Floats, rays: int) -> tuple[Floats, Floats, Floats]:
+    """Cut the products of a batch into what goes to pairs, to the border of photos and to the corner.
+
+    Parameters
+    ----------
+    added, taken : ndarray
+        Of ``linearise.squares``.
+    rays : int
+        Number of rays k.
+
+    Returns
+    -------
+    pairs : ndarray, shape (k (k + 1) / 2 * groups, 6, 6)
+        Blocks of pairs of photos.
+    border : ndarray, shape (k * groups, 6, more + 1)
+        Blocks of photos with common parameters and right-hand side.
+    corner : ndarray, shape (more + 1, more + 1)
+        Common parameters and right-hand side among themselves.
+    """
+    n = PHOTO * rays
+    groups = len(taken)
+    row, column = triangle(rays)
+    squares = taken[:, :n, :n].reshape(groups, rays, PHOTO, rays, PHOTO)
+    pairs = squares.transpose(1, 3, 0, 2, 4)[row, column]
+    np.negative(pairs, out=pairs)
+    pairs[row == column] += added[:, :, :PHOTO, :PHOTO]
+    border = added[:, :, :PHOTO, PHOTO:] - taken[:, :n, n:].reshape(groups, rays, PHOTO, -1).transpose(1, 0, 2, 3)
+    corner = added[:, :, PHOTO:, PHOTO:].sum(axis=(0, 1)) - taken[:, n:, n:].sum(axis=0)
+    return (
+        pairs.reshape(-1, PHOTO, PHOTO),
+        border.reshape(rays * groups, PHOTO, -1),
+        corner,
+    )

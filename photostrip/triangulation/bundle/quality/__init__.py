@@ -1,0 +1,1 @@
+"""How good a bundle is: precision, correlations, reliability, variance components, self-calibration."""

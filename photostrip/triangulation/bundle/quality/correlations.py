@@ -1,0 +1,94 @@
+"""Parameters that the observations hardly tell apart: correlations by name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.triangulation.bundle.observations.linearise import PHOTO
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from photostrip.triangulation.bundle.solution import Precision, Solution
+
+    Floats = NDArray[np.float64]
+
+LIMIT = 0.95
+ELEMENTS = (
+    "shift along x",
+    "shift along y",
+    "shift along z",
+    "rotation about x",
+    "rotation about y",
+    "rotation about z",
+)
+"""Elements of a photo, along and about its own axes: there shift and rotation that replace each other are seen."""
+
+
+@dataclass(frozen=True)
+class Correlation:
+    """Two parameters that depend on each other.
+
+    Parameters
+    ----------
+    first, second : str
+        Names: ``camera RC30: c``, ``photo 1003: shift along x``.
+    value : float
+        Their correlation.
+    """
+
+    first: str
+    second: str
+    value: float
+
+
+def correlations(solution: Solution, precision: Precision, limit: float = LIMIT) -> tuple[Correlation, ...]:
+    """List correlations above a limit: between common parameters, between these and photos, and within photos.
+
+    Parameters
+    ----------
+    solution : Solution
+        The adjusted problem.
+    precision : Precision
+        Its cofactors.
+    limit : float
+        Least absolute value.
+
+    Returns
+    -------
+    tuple of Correlation
+        Common parameters first, then with photos, then within photos; each the largest first.
+    """
+    problem = solution.model.problem
+    names = problem.common_names()
+    turn = np.zeros((len(solution.centers), PHOTO, PHOTO))
+    turn[:, :3, :3] = turn[:, 3:, 3:] = np.swapaxes(solution.rotations, 1, 2)
+    photos = turn @ precision.photos @ turn.swapaxes(1, 2)
+    cross = turn @ precision.photo_common
+    own = np.sqrt(np.einsum("nii->ni", photos))
+
+    def element(photo: int, number: int) -> str:
+        return f"photo {problem.photo_name(photo)}: {ELEMENTS[number]}"
+
+    shared = np.sqrt(np.diag(precision.common))
+    found = _named(precision.common[None] / np.outer(shared, shared), limit, lambda _, i, j: (names[i], names[j]))
+    found += _named(cross / (own[:, :, None] * shared), limit, lambda n, i, j: (element(n, i), names[j]), lower=False)
+    found += _named(photos / (own[:, :, None] * own[:, None]), limit, lambda n, i, j: (element(n, i), element(n, j)))
+    return tuple(found)
+
+
+def _named(
+    ratio: Floats, limit: float, name: Callable[[int, int, int], tuple[str, str]], *, lower: bool = True
+) -> list[Correlation]:
+    """Name the elements (n, i, j) above a limit, the largest first; of squares only the lower half."""
+    chosen = np.abs(ratio) > limit
+    if lower:
+        chosen &= np.tri(ratio.shape[1], k=-1, dtype=bool)
+    places, values = np.argwhere(chosen), ratio[chosen]
+    order = np.argsort(-np.abs(values), kind="stable")
+    return [Correlation(*name(*places[k].tolist()), float(values[k])) for k in order]

@@ -1,0 +1,329 @@
+"""Cofactors of everything that was adjusted, from the elements of the inverse within the band.
+
+The photos of a point lie within the band, so that the joint cofactors of its photos are at hand, and with them those of
+the point and of its residuals: with T, L as in ``linearise`` and Z of the photos and common parameters,
+Y = Z T and M = I + T'Y give the cofactors L^-T M L^-1 of the point and -Y L^-1 between photos and point.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import GeometryError
+from photostrip.triangulation.bundle.normal_equations import datum
+from photostrip.triangulation.bundle.normal_equations.reduced import factored, given_at, reduce
+from photostrip.triangulation.bundle.observations.linearise import PHOTO, SIGNS, backward, by_photo, by_point, forward
+from photostrip.triangulation.bundle.observations.model import state_of
+from photostrip.triangulation.bundle.solution import Precision
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.triangulation.bundle.normal_equations.reduced import Factor, Reduced
+    from photostrip.triangulation.bundle.observations.given import Linear
+    from photostrip.triangulation.bundle.observations.layout import Batch
+    from photostrip.triangulation.bundle.observations.linearise import Eliminated
+    from photostrip.triangulation.bundle.observations.model import Model, State
+    from photostrip.triangulation.bundle.solution import Solution
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Inverse:
+    """Inverse normal matrix of photos and common parameters, as far as it is known.
+
+    Parameters
+    ----------
+    band : Band or Sparse
+        Elements within the band, or at pairs, of the inverse of the photos' part alone.
+    cross : ndarray, shape (m, 6, p)
+        That inverse times the border.
+    common : ndarray, shape (p, p)
+        Cofactors of the common parameters.
+    factor : Band or Sparse
+        Factor of the photos' part: for photos farther apart than the band is wide.
+    """
+
+    band: Factor
+    cross: Floats
+    common: Floats
+    factor: Factor
+
+    def joint(self, sets: Numbers, more: int) -> Floats:
+        """Joint cofactors of sets of photos and the first common parameters.
+
+        Parameters
+        ----------
+        sets : ndarray of int, shape (g, k)
+            Photos of each set, places in the band.
+        more : int
+            How many common parameters.
+
+        Returns
+        -------
+        ndarray, shape (g, 6 k + more, 6 k + more)
+            Cofactors, photos in their own axes and signs.
+        """
+        groups, n = len(sets), PHOTO * sets.shape[1]
+        number = (PHOTO * sets[:, :, None] + np.arange(PHOTO)).reshape(groups, n)
+        row, column = number[:, :, None], number[:, None, :]
+        whole = np.empty((groups, n + more, n + more))
+        late, early = np.maximum(row, column), np.minimum(row, column)
+        near = self.band.holds(late, early)
+        if near.all():
+            whole[:, :n, :n] = self.band.at(late, early)
+        else:
+            whole[:, :n, :n][near] = self.band.at(late[near], early[near])
+            far = np.unique(number[~near.all(axis=(1, 2))])
+            columns = self.factor.solve(np.eye(self.factor.size)[:, far])
+            row, column = np.broadcast_arrays(row, column)
+            whole[:, :n, :n][~near] = columns[row[~near], np.searchsorted(far, column[~near])]
+        if len(self.common):
+            cross = self.cross[sets].reshape(groups, n, -1)
+            whole[:, :n, :n] += cross @ self.common @ cross.swapaxes(1, 2)
+            whole[:, :n, n:] = -cross @ self.common[:, :more]
+            whole[:, n:, :n] = whole[:, :n, n:].swapaxes(1, 2)
+            whole[:, n:, n:] = self.common[:more, :more]
+        return whole
+
+
+def precision(solution: Solution) -> Precision:
+    """Give the cofactors of all parameters and residuals.
+
+    Parameters
+    ----------
+    solution : Solution
+        An adjusted problem.
+
+    Returns
+    -------
+    Precision
+        The cofactors.
+
+    Raises
+    ------
+    GeometryError
+        When the normal matrix is singular at the solution (``bundle-rank``).
+    """
+    model = solution.model
+    state, reduced, band = _at(solution)
+    inverse = _inverse(reduced, band)
+    points = np.full((model.problem.points, 3, 3), np.nan)
+    residuals = np.zeros((len(model.problem.images), 2, 2))
+    table = model.table(state)
+    for batch, xyz, eliminated in zip(model.structure.batches, state.xyz, reduced.points, strict=True):
+        of_points, of_rays = _batch(model, batch, eliminated, inverse, (xyz, table))
+        points[batch.point[batch.real]] = of_points[batch.real]
+        residuals[batch.row[:, batch.real].ravel()] = of_rays[:, batch.real].reshape(-1, 2, 2)
+    joint = inverse.joint(np.arange(len(table[0]))[:, None], len(state.common))
+    positions, attitudes = (_given(model, linear, joint) for linear in given_at(model, state))
+    if solution.free:
+        points, joint = _inner(model, state, (band, reduced), points, joint)
+    photos, cross = _turned(model, state, joint)
+    weights = model.prior**-2.0
+    residuals *= model.problem.images.sigma[:, :, None] * model.problem.images.sigma[:, None, :]
+    return Precision(
+        points=points,
+        photos=photos,
+        common=inverse.common,
+        image_residuals=residuals,
+        control_residuals=_control(model, points),
+        position_residuals=positions,
+        attitude_residuals=attitudes,
+        common_residuals=np.where(weights > 0.0, model.prior**2 - np.diag(inverse.common), 0.0),
+        photo_common=cross,
+    )
+
+
+def _at(solution: Solution) -> tuple[State, Reduced, Factor]:
+    """Linearise and factor at a solution."""
+    model = solution.model
+    state = state_of(model, solution.centers, solution.rotations, solution.points, solution.common)
+    reduced = reduce(model, state)
+    own = reduced.blocks[model.structure.own]
+    band = factored(model, reduced, datum.anchor(model, state, own) if solution.free else None)
+    if band is None:
+        raise GeometryError("the normal matrix is singular at the solution", code="bundle-rank")
+    return state, reduced, band
+
+
+def _inverse(reduced: Reduced, band: Factor) -> Inverse:
+    """Invert photos and common parameters."""
+    p = len(reduced.corner) - 1
+    border = reduced.border.reshape(-1, p + 1)[:, :p]
+    cross = band.solve(border) if p else np.zeros_like(border)
+    common = np.linalg.inv(reduced.corner[:p, :p] - border.T @ cross)
+    cross = cross.reshape(len(reduced.border), PHOTO, p)
+    return Inverse(band.inverse(), cross, 0.5 * (common + common.T), band)
+
+
+def _batch(
+    model: Model, batch: Batch, eliminated: Eliminated, inverse: Inverse, place: tuple[Floats, Floats]
+) -> tuple[Floats, Floats]:
+    """Cofactors of the points (S, 3, 3), m^2, and of the residuals (k, S, 2, 2), in units of sigma."""
+    xyz, table = place
+    more, k, slots = len(model.calibrated), *batch.photo.shape
+    rays, common = model.rays(batch, xyz, table, np.zeros(0) if not more else np.zeros(more))
+    white = by_point(rays)
+    forward(eliminated.root, white)
+    joint = inverse.joint(batch.sets, more)
+    spread = _carried(batch, joint, eliminated.rows[:-1])
+    of_point = np.einsum("pcs,pds->cds", eliminated.rows[:-1], spread)
+    of_point[range(3), range(3)] += 1.0
+    partials = by_photo(rays, more)[:-1]
+    if common is not None:
+        partials[PHOTO:] = common
+    mixed = np.einsum(
+        "pakr,kpcr->ackr", partials[:PHOTO], spread[: PHOTO * k].reshape(k, PHOTO, 3, slots), optimize=False
+    )
+    if more:
+        mixed += np.einsum("pakr,pcr->ackr", partials[PHOTO:], spread[PHOTO * k :])
+    fitted = _quadratic(batch, joint, partials)
+    # white M white' - B Y white' - (B Y white')' + B Z B'
+    half = 0.5 * np.einsum("cds,daks->caks", of_point, white) - mixed.transpose(1, 0, 2, 3)
+    product = np.einsum("caks,cbks->abks", half, white)
+    fitted += product + product.transpose(1, 0, 2, 3)
+    found = -fitted.transpose(2, 3, 0, 1)
+    found[..., range(2), range(2)] += 1.0
+    backward(eliminated.root, of_point)
+    of_point = of_point.transpose(1, 0, 2)
+    backward(eliminated.root, of_point)
+    return of_point.transpose(2, 0, 1), found
+
+
+def _carried(batch: Batch, joint: Floats, rows: Floats) -> Floats:
+    """Multiply the rows T of a batch with the joint cofactors of their photos: Z T, shape (q, 3, S)."""
+    product = np.empty_like(rows)
+    q, done = len(rows), 0
+    for first, last, count, size in batch.runs:
+        part = rows[..., first:last].reshape(q, 3, count, size).transpose(1, 2, 0, 3)
+        own = joint[done : done + count] @ part
+        product[..., first:last] = own.transpose(2, 0, 1, 3).reshape(q, 3, -1)
+        done += count
+    return product
+
+
+def _quadratic(batch: Batch, joint: Floats, partials: Floats) -> Floats:
+    """Give B Z B' of each ray, with the photo's and the common parameters, shape (2, 2, k, S)."""
+    q, _, k, slots = partials.shape
+    n = PHOTO * k
+    found, done = np.empty((2, 2, k, slots)), 0
+    for first, last, count, size in batch.runs:
+        groups = slice(done, done + count)
+        own = np.empty((k, count, q, q))
+        for ray in range(k):
+            number = np.r_[PHOTO * ray : PHOTO * (ray + 1), n : n + q - PHOTO]
+            own[ray] = joint[groups][:, number[:, None], number]
+        part = partials[..., first:last].reshape(q, 2, k, count, size)
+        product = own @ part.transpose(1, 2, 3, 0, 4)
+        found[..., first:last] = np.einsum("pakgn,bkgpn->abkgn", part, product).reshape(2, 2, k, -1)
+        done += count
+    return found
+
+
+def _control(model: Model, points: Floats) -> Floats:
+    """Cofactors of the residuals of control, along its axes."""
+    control = model.problem.control
+    found = -control.axes @ points[control.point] @ control.axes.swapaxes(1, 2)
+    found[:, range(3), range(3)] += np.where(np.isfinite(control.sigma), control.sigma, 0.0) ** 2
+    return found
+
+
+def _given(model: Model, linear: Linear, joint: Floats) -> Floats:
+    """Cofactors of the residuals of camera positions or attitudes."""
+    partials = np.concatenate([linear.by_photo, linear.by_common], axis=2)
+    found: Floats = -partials @ joint[model.structure.rank[linear.photo]] @ partials.swapaxes(1, 2)
+    with np.errstate(divide="ignore"):
+        variance = np.where(linear.weight > 0.0, linear.weight**-2.0, 0.0)
+    found[:, range(3), range(3)] += variance
+    return found
+
+
+def _turned(model: Model, state: State, joint: Floats) -> tuple[Floats, Floats]:
+    """Turn the cofactors of photos (and common parameters) into the Cartesian frame and the problem's order."""
+    rank = model.structure.rank
+    turn = np.zeros((len(rank), PHOTO, PHOTO))
+    turn[:, :3, :3] = turn[:, 3:, 3:] = state.rotations
+    turn *= SIGNS
+    own = turn @ joint[rank, :PHOTO, :PHOTO] @ turn.swapaxes(1, 2)
+    return own, turn @ joint[rank, :PHOTO, PHOTO:]
+
+
+def _inner(
+    model: Model, state: State, system: tuple[Factor, Reduced], points: Floats, joint: Floats
+) -> tuple[Floats, Floats]:
+    """Carry cofactors of points and photos over to inner constraints on the points.
+
+    With G the generators of the similarity, E the choice of the points, H = (G'EG)^-1 and P = Q E G H: the cofactors
+    are Q - G P' - P G' + G (H G'E P) G'.
+    """
+    band, reduced = system
+    origin, inverse = datum.inner(model, state)
+    p = len(state.common)
+    moves = [datum.generators(xyz.T, origin).transpose(1, 2, 0) for xyz in state.xyz]  # (3, 7, S)
+    right = np.zeros((len(model.structure.order), PHOTO, datum.DEFECT))
+    corner = np.zeros((p, datum.DEFECT))
+    white = []
+    for batch, eliminated, move in zip(model.structure.batches, reduced.points, moves, strict=True):
+        pushed = move.copy()
+        pushed[..., batch.dummy] = 0.0
+        forward(eliminated.root, pushed)
+        white.append(pushed)
+        _push(batch, eliminated, pushed, right, corner)
+    photos, common = _solved(reduced, band, right, corner)
+    total = np.zeros((datum.DEFECT, datum.DEFECT))
+    shifts = []
+    for batch, eliminated, pushed, move in zip(model.structure.batches, reduced.points, white, moves, strict=True):
+        k = len(batch.photo)
+        of_sets = photos[batch.photo]  # (k, S, 6, 7)
+        rows = eliminated.rows[: PHOTO * k].reshape(k, PHOTO, 3, -1)
+        shift = pushed - np.einsum("kpcs,kspd->cds", rows, of_sets)
+        if len(model.calibrated):
+            shift -= np.einsum("pcs,pd->cds", eliminated.rows[PHOTO * k : -1], common[: len(model.calibrated)])
+        backward(eliminated.root, shift)
+        total += np.einsum("cas,cbs->ab", move[..., batch.real], shift[..., batch.real])
+        shifts.append(shift)
+    middle = inverse @ total @ inverse
+    found = points.copy()
+    for batch, move, shift in zip(model.structure.batches, moves, shifts, strict=True):
+        real = batch.real
+        own, swept = move[..., real].transpose(2, 0, 1), shift[..., real].transpose(2, 0, 1) @ inverse
+        found[batch.point[real]] += _carried_over(own, swept, middle)
+    turned = np.zeros((len(photos), PHOTO + p, datum.DEFECT))
+    turned[:, :PHOTO] = datum.photo_generators(model, state, origin)
+    swept = np.concatenate([photos, np.broadcast_to(common, (len(photos), *common.shape))], axis=1) @ inverse
+    return found, joint + _carried_over(turned, swept, middle)
+
+
+def _carried_over(moves: Floats, swept: Floats, middle: Floats) -> Floats:
+    """Give G M G' - G P' - P G'."""
+    product = moves @ swept.swapaxes(1, 2)
+    changed: Floats = moves @ middle @ moves.swapaxes(1, 2) - product - product.swapaxes(1, 2)
+    return changed
+
+
+def _push(batch: Batch, eliminated: Eliminated, pushed: Floats, right: Floats, corner: Floats) -> None:
+    """Subtract what right-hand sides (3, c, S) of points, multiplied with L^-1, leave for photos and common."""
+    k, n = len(batch.photo), PHOTO * len(batch.photo)
+    left = np.einsum("kpcs,cds->kspd", eliminated.rows[:n].reshape(k, PHOTO, 3, -1), pushed)
+    np.subtract.at(right, batch.photo, left)
+    calibrated = len(eliminated.rows) - 1 - n
+    corner[:calibrated] -= np.einsum("pcs,cds->pd", eliminated.rows[n:-1], pushed)
+
+
+def _solved(reduced: Reduced, band: Factor, right: Floats, corner: Floats) -> tuple[Floats, Floats]:
+    """Solve for right-hand sides of photos (m, 6, c) and common parameters (p, c)."""
+    p = len(corner)
+    border = reduced.border.reshape(-1, p + 1)[:, :p]
+    alone = band.solve(right.reshape(-1, right.shape[-1]))
+    if not p:
+        return alone.reshape(right.shape), corner
+    cross = band.solve(border)
+    common = np.linalg.solve(reduced.corner[:p, :p] - border.T @ cross, corner - border.T @ alone)
+    photos: Floats = (alone - cross @ common).reshape(right.shape)
+    return photos, np.asarray(common, float)

@@ -1,0 +1,229 @@
+"""How well each observation is controlled by the others: test values, detectable errors, what undetected ones can do.
+
+The residual ``v`` of an observation of standard deviation ``sigma`` has the variance ``r sigma^2``, r its redundancy
+number: the share of an error of the observation that shows in its own residual.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.statistics import chi2_quantile, normal_quantile, t_quantile
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.triangulation.bundle.observations.problem import Problem
+    from photostrip.triangulation.bundle.solution import Precision, Solution
+
+    Floats = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
+
+IMAGE, CONTROL, POSITION, ATTITUDE = "image", "control", "position", "attitude"
+UNCONTROLLED = 0.01  # redundancy number below which an observation cannot be tested
+SIGMA0_LEVEL = 0.05  # probability that the test of sigma0 fails with right standard deviations
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Observations of one kind after the adjustment; one row each, k coordinates.
+
+    Parameters
+    ----------
+    kind : str
+        ``IMAGE``, ``CONTROL``, ``POSITION`` or ``ATTITUDE``.
+    error : ndarray, shape (n, k)
+        Observed minus adjusted: mm in the image, metres, radians for attitudes; NaN where nothing is given.
+    sigma : ndarray, shape (n, k)
+        Stated standard deviations; NaN where nothing is given.
+    redundancy : ndarray, shape (n, k)
+        Redundancy numbers, 0 to 1; NaN where nothing is given.
+    """
+
+    kind: str
+    error: Floats
+    sigma: Floats
+    redundancy: Floats
+
+    @property
+    def standardised(self) -> Floats:
+        """Errors over their standard deviations, shape (n, k); NaN where the redundancy is too small to tell."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            value = self.error / (self.sigma * np.sqrt(self.redundancy))
+        return np.where(self.redundancy >= UNCONTROLLED, value, np.nan)
+
+    @property
+    def gross(self) -> Floats:
+        """What error of the observation would explain its residual, in its unit, shape (n, k)."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.where(self.redundancy >= UNCONTROLLED, self.error / self.redundancy, np.nan)
+
+    def detectable(self, shift: float) -> Floats:
+        """Smallest errors that are found with the wanted power.
+
+        Parameters
+        ----------
+        shift : float
+            Shift of the test value, ``noncentrality``.
+
+        Returns
+        -------
+        ndarray, shape (n, k)
+            In the unit of the observation; infinite where it is not controlled at all.
+        """
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.asarray(self.sigma * shift / np.sqrt(np.maximum(self.redundancy, 0.0)), float)
+
+    def external(self, shift: float) -> Floats:
+        """How far an error that is just not found can move any coordinate, in standard deviations of that coordinate.
+
+        Parameters
+        ----------
+        shift : float
+            Shift of the test value, ``noncentrality``.
+
+        Returns
+        -------
+        ndarray, shape (n, k)
+            ``shift sqrt((1 - r) / r)``: no coordinate, and no function of coordinates, moves by more.
+
+        Notes
+        -----
+        Source: Baarda 1968.
+        """
+        r = np.clip(self.redundancy, 0.0, 1.0)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.asarray(shift * np.sqrt((1.0 - r) / r), float)
+
+
+def groups_of(problem: Problem, solution: Solution, precision: Precision) -> tuple[Group, ...]:
+    """Give all observations with their redundancy numbers.
+
+    Parameters
+    ----------
+    problem : Problem
+        What was given.
+    solution : Solution
+        Its solution.
+    precision : Precision
+        Cofactors.
+
+    Returns
+    -------
+    tuple of Group
+        Image coordinates first; kinds without observations are left out.
+    """
+    found = [
+        (IMAGE, solution.image_residuals, problem.images.sigma, precision.image_residuals),
+        (CONTROL, -solution.control_residuals, problem.control.sigma, precision.control_residuals),
+        (POSITION, -solution.position_residuals, problem.positions.sigma, precision.position_residuals),
+        (ATTITUDE, -solution.attitude_residuals, problem.attitudes.sigma, precision.attitude_residuals),
+    ]
+    return tuple(_group(*each) for each in found if len(each[1]))
+
+
+def _group(kind: str, error: Floats, sigma: Floats, cofactors: Floats) -> Group:
+    given = np.isfinite(sigma)
+    known = np.where(given, sigma, np.nan)
+    redundancy = np.diagonal(cofactors, axis1=1, axis2=2) / known**2
+    return Group(kind, np.where(given, error, np.nan), known, redundancy)
+
+
+def noncentrality(alpha: float, power: float) -> float:
+    """Shift of a test value by the smallest error that is found with a wanted probability.
+
+    Parameters
+    ----------
+    alpha : float
+        Probability of rejecting a good observation.
+    power : float
+        Probability of finding the error.
+
+    Returns
+    -------
+    float
+        In standard deviations; 4.13 for 0.001 and 0.80.
+
+    Notes
+    -----
+    Source: Baarda 1968.
+    """
+    return normal_quantile(1 - alpha / 2) + normal_quantile(power)
+
+
+def limit(test: str, alpha: float, redundancy: int) -> float:
+    """Largest standardised residual of a good observation.
+
+    Parameters
+    ----------
+    test : str
+        ``"baarda"`` or ``"tau"``.
+    alpha : float
+        Probability that a good one is beyond it.
+    redundancy : int
+        Redundancy of the whole adjustment, for ``tau``.
+
+    Returns
+    -------
+    float
+        The limit; infinite when the redundancy does not allow the tau test.
+
+    Notes
+    -----
+    Source: Baarda 1968; Pope 1976 for tau.
+    """
+    if test == "baarda":
+        return normal_quantile(1 - alpha / 2)
+    if redundancy < 2:
+        return float("inf")
+    t = t_quantile(1 - alpha / 2, redundancy - 1)
+    return float(t * np.sqrt(redundancy / (redundancy - 1 + t**2)))
+
+
+@dataclass(frozen=True)
+class Sigma0Test:
+    """Whether the stated standard deviations are right on the whole.
+
+    Parameters
+    ----------
+    sigma0 : float
+        Standard deviation of unit weight found.
+    redundancy : int
+        Redundancy.
+    lower, upper : float
+        Limits of sigma0 between which it lies with the probability 1 - ``SIGMA0_LEVEL``; NaN without redundancy.
+    """
+
+    sigma0: float
+    redundancy: int
+    lower: float
+    upper: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether sigma0 lies between its limits."""
+        return self.lower <= self.sigma0 <= self.upper
+
+
+def sigma0_test(solution: Solution) -> Sigma0Test:
+    """Test sigma0 against 1.
+
+    Parameters
+    ----------
+    solution : Solution
+        A solution.
+
+    Returns
+    -------
+    Sigma0Test
+        Chi-square test, both sides.
+    """
+    f = solution.redundancy
+    if f < 1:
+        return Sigma0Test(solution.sigma0, f, float("nan"), float("nan"))
+    ends = (chi2_quantile(p, f) for p in (SIGMA0_LEVEL / 2, 1 - SIGMA0_LEVEL / 2))
+    lower, upper = (float(np.sqrt(end / f)) for end in ends)
+    return Sigma0Test(solution.sigma0, f, lower, upper)

@@ -1,0 +1,226 @@
+"""Self-calibration: what its parameters do to image coordinates, and which of them mean anything."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.statistics import t_p_value
+from photostrip.triangulation.bundle.observations.problem import CALIBRATION
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.triangulation.bundle.observations.problem import Problem
+    from photostrip.triangulation.bundle.solution import Precision, Solution
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+COLUMNS = {
+    "principal_distance": ("c",),
+    "principal_point": ("x0", "y0"),
+    "k1": ("k1",),
+    "k2": ("k2",),
+    "k3": ("k3",),
+    "p1": ("p1",),
+    "p2": ("p2",),
+    "affinity": ("b1",),
+    "shear": ("b2",),
+}
+"""Columns of ``CALIBRATION`` of each parameter that a user can ask for."""
+TITLES = {
+    "c": "principal_distance",
+    "x0": "principal_point x",
+    "y0": "principal_point y",
+    "b1": "affinity",
+    "b2": "shear",
+}
+UNITS = {"c": "mm", "x0": "mm", "y0": "mm", "k1": "mm^-2", "k2": "mm^-4", "k3": "mm^-6", "p1": "mm^-1", "p2": "mm^-1"}
+SIGNIFICANCE = 0.05
+KEPT = 0.3  # of a loose a-priori standard deviation that a parameter keeps which is not determined
+INSEPARABLE = 0.9999  # correlations of what cannot be told apart
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One calibration parameter after the adjustment.
+
+    Parameters
+    ----------
+    camera, name, unit : str
+        Which it is.
+    value, sigma : float
+        Correction of the given calibration, and its standard deviation with the sigma0 found.
+    p : float
+        Probability of a value so large or larger when the true one is zero.
+    prior : float
+        A-priori standard deviation; infinite for a free parameter.
+    redundancy : float
+        Share of the a-priori value that the measurements control; NaN for a free parameter.
+    """
+
+    camera: str
+    name: str
+    unit: str
+    value: float
+    sigma: float
+    p: float
+    prior: float
+    redundancy: float
+
+    @property
+    def significant(self) -> bool:
+        """Whether the parameter differs from zero."""
+        return self.p < SIGNIFICANCE
+
+
+def sigmas(asked: Sequence[Sequence[str]], prior: dict[str, float]) -> Floats | None:
+    """A-priori standard deviations as a problem takes them.
+
+    Parameters
+    ----------
+    asked : sequence of sequence of str
+        Parameters wanted of each camera.
+    prior : dict of str to float
+        Their a-priori standard deviations; free without one.
+
+    Returns
+    -------
+    ndarray, shape (cameras, 10), or None
+        Infinite for free parameters, 0 for those that are none; None when nothing is asked for.
+    """
+    found = np.zeros((len(asked), len(CALIBRATION)))
+    for row, names in enumerate(asked):
+        for name in names:
+            for column in COLUMNS[name]:
+                found[row, CALIBRATION.index(column)] = prior.get(name, np.inf)
+    return found if found.any() else None
+
+
+def millimetre(xy: Floats) -> Floats:
+    """Give the values of the parameters that move a point at the edge of the measured part of a photo by 1 mm.
+
+    Parameters
+    ----------
+    xy : ndarray, shape (n, 2)
+        Image coordinates, mm.
+
+    Returns
+    -------
+    ndarray, shape (10,)
+        In the order of ``CALIBRATION``.
+    """
+    edge = max(float(np.hypot(xy[:, 0], xy[:, 1]).max(initial=1.0)), 1e-3)
+    powers = np.array([0, 0, 0, 3, 5, 7, 2, 2, 1, 1])
+    return np.asarray(edge ** -powers.astype(float), float)
+
+
+def columns(xy: Floats) -> Floats:
+    """Shift of image points by each parameter of one unit, the principal distance apart.
+
+    Parameters
+    ----------
+    xy : ndarray, shape (n, 2)
+        Ideal image coordinates, mm.
+
+    Returns
+    -------
+    ndarray, shape (n, 2, 10)
+        In the order of ``CALIBRATION``; 0 for the principal distance.
+    """
+    x, y = xy[:, 0], xy[:, 1]
+    square, zero, one = x**2 + y**2, np.zeros(len(xy)), np.ones(len(xy))
+    powers = [square, square**2, square**3]
+    by_x = [zero, -one, zero, *(x * power for power in powers), square + 2 * x**2, 2 * x * y, x, y]
+    by_y = [zero, zero, -one, *(y * power for power in powers), 2 * x * y, square + 2 * y**2, zero, zero]
+    return np.stack([np.stack(by_x, axis=1), np.stack(by_y, axis=1)], axis=1)
+
+
+def values_of(problem: Problem, common: Floats) -> Floats:
+    """Give the calibration parameters camera by camera.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    common : ndarray, shape (p,)
+        Common parameters of its solution.
+
+    Returns
+    -------
+    ndarray, shape (cameras, 10)
+        0 for what was not estimated.
+    """
+    sigma = problem.cameras.sigma
+    found = np.zeros((len(problem.cameras.focal), len(CALIBRATION)))
+    if sigma is not None:
+        found[sigma > 0.0] = common[: int((sigma > 0.0).sum())]
+    return found
+
+
+def image_shift(problem: Problem, common: Floats, xy: Floats, photo: Numbers) -> Floats:
+    """Give the correction that makes ideal image coordinates of the given principal distance.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    common : ndarray, shape (p,)
+        Common parameters of its solution.
+    xy : ndarray, shape (n, 2)
+        Image coordinates, mm.
+    photo : ndarray of int, shape (n,)
+        Photo of each row.
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        To be added to `xy`, mm. A change of the principal distance is turned into a change of scale of the photo.
+    """
+    values = values_of(problem, common)
+    if not values.any():
+        return np.zeros_like(xy)
+    camera = problem.cameras.of_photo[photo]
+    shifted = xy + np.einsum("nij,nj->ni", columns(xy), values[camera])
+    focal = problem.cameras.focal[camera]
+    return np.asarray(shifted * (focal / (focal + values[camera, 0]))[:, None] - xy, float)
+
+
+def parameters_of(problem: Problem, solution: Solution, precision: Precision) -> tuple[Parameter, ...]:
+    """Give every calibration parameter with its precision and significance.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    solution : Solution
+        Its solution.
+    precision : Precision
+        Cofactors.
+
+    Returns
+    -------
+    tuple of Parameter
+        By camera, in the order of ``CALIBRATION``.
+    """
+    sigma = problem.cameras.sigma
+    if sigma is None:
+        return ()
+    unit = solution.sigma0 if solution.redundancy > 0 else 1.0
+    found = []
+    for number, (camera, column) in enumerate(np.argwhere(sigma > 0.0).tolist()):
+        name = CALIBRATION[column]
+        value, cofactor = float(solution.common[number]), float(precision.common[number, number])
+        deviation = float(np.sqrt(cofactor)) * unit
+        p = t_p_value(value / deviation, solution.redundancy) if deviation > 0 and solution.redundancy > 0 else 1.0
+        prior = float(sigma[camera, column])
+        share = float(precision.common_residuals[number]) / prior**2 if np.isfinite(prior) else float("nan")
+        camera_id = problem.camera_ids[camera] if problem.camera_ids else str(camera)
+        title = TITLES.get(name, name)
+        found.append(Parameter(camera_id, title, UNITS.get(name, "1"), value, deviation, p, prior, share))
+    return tuple(found)

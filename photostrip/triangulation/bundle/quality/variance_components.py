@@ -1,0 +1,193 @@
+"""Variance components: how good each kind of observation really is, out of its own residuals.
+
+The stated variances of a group are multiplied with the ratio of the weighted sum of squares of its residuals and its
+share of the redundancy, until the ratios are one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.triangulation.bundle.quality import reliability
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.triangulation.bundle.observations.problem import Problem
+    from photostrip.triangulation.bundle.solution import Precision, Solution
+
+    Floats = NDArray[np.float64]
+
+LEAST_REDUNDANCY = 3.0  # of a group, below which its residuals say nothing about it
+ITERATIONS = 12
+CONVERGED = 0.005  # relative change of a standard deviation
+SMALLEST, LARGEST = 0.05, 20.0  # factors of a stated standard deviation in one step: rounding of a perfect fit
+
+
+@dataclass(frozen=True)
+class Component:
+    """The standard deviations of one group.
+
+    Parameters
+    ----------
+    name : str
+        ``image``, ``control plan``, ``control height``, ``control``, ``positions plan``, ``positions height`` or
+        ``attitudes``.
+    observations : int
+        Coordinates in it.
+    redundancy : float
+        Its share of the redundancy.
+    factor : float
+        What its stated standard deviations are to be multiplied with; 1 when it was not estimated.
+    sigma : float
+        Relative standard deviation of the factor.
+    estimated : bool
+        Whether its redundancy was enough.
+    """
+
+    name: str
+    observations: int
+    redundancy: float
+    factor: float
+    sigma: float
+    estimated: bool
+
+
+def labels(kind: str, rows: int, level: Sequence[bool]) -> list[tuple[str, slice | NDArray[np.bool_]]]:
+    """Split a kind of observations into groups of their own variance.
+
+    Parameters
+    ----------
+    kind : str
+        A kind of ``reliability``.
+    rows : int
+        Number of its rows.
+    level : sequence of bool
+        Whether the axes of a row are plan and height; others, as of geocentric coordinates, stay one group.
+
+    Returns
+    -------
+    list of tuple
+        Name of each group and which coordinates belong to it, shape (rows, 3).
+    """
+    if kind not in {reliability.CONTROL, reliability.POSITION}:
+        return [(kind if kind == reliability.IMAGE else "attitudes", slice(None))]
+    name = "control" if kind == reliability.CONTROL else "positions"
+    flat = np.array(level, bool).reshape(rows, 1)
+    height = np.arange(3) == 2
+    return [(f"{name} plan", flat & ~height), (f"{name} height", flat & height), (name, ~flat & np.ones(3, bool))]
+
+
+def components(
+    problem: Problem, solution: Solution, precision: Precision, level: Mapping[str, Sequence[bool]]
+) -> tuple[Component, ...]:
+    """Compare each group's residuals with its standard deviations, once.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    solution : Solution
+        Its solution.
+    precision : Precision
+        Cofactors.
+    level : mapping of str to sequence of bool
+        For ``control`` and ``position``: whether the axes of each row are plan and height.
+
+    Returns
+    -------
+    tuple of Component
+        Factors of one step; groups without observations are left out.
+
+    Notes
+    -----
+    Source: Förstner 1979, the simplified form of Helmert's estimation.
+    """
+    found = []
+    for group in reliability.groups_of(problem, solution, precision):
+        for name, where in labels(group.kind, len(group.error), level.get(group.kind, ())):
+            given = np.isfinite(group.sigma)
+            if not isinstance(where, slice):
+                given &= where
+            if given.any():
+                found.append(_component(name, group, given))
+    return tuple(found)
+
+
+def _component(name: str, group: reliability.Group, given: NDArray[np.bool_]) -> Component:
+    squares = float(((group.error[given] / group.sigma[given]) ** 2).sum())
+    redundancy = float(group.redundancy[given].sum())
+    estimated = redundancy >= LEAST_REDUNDANCY
+    factor = float(np.clip(np.sqrt(squares / redundancy), SMALLEST, LARGEST)) if estimated else 1.0
+    sigma = float(1 / np.sqrt(2 * redundancy)) if estimated else float("nan")
+    return Component(name, int(given.sum()), redundancy, factor, sigma, estimated)
+
+
+def scaled(problem: Problem, found: Sequence[Component], level: Mapping[str, Sequence[bool]]) -> Problem:
+    """Multiply the standard deviations of a problem with the factors of their groups.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    found : sequence of Component
+        The factors.
+    level : mapping of str to sequence of bool
+        As for ``components``.
+
+    Returns
+    -------
+    Problem
+        The same problem with other standard deviations.
+    """
+    factor = {each.name: each.factor for each in found}
+
+    def with_factors(kind: str, sigma: Floats) -> Floats:
+        result = sigma.copy()
+        for name, where in labels(kind, len(sigma), level.get(kind, ())):
+            if name in factor:
+                result[where] = result[where] * factor[name]
+        return result
+
+    return replace(
+        problem,
+        images=replace(problem.images, sigma=with_factors(reliability.IMAGE, problem.images.sigma)),
+        control=replace(problem.control, sigma=with_factors(reliability.CONTROL, problem.control.sigma)),
+        positions=replace(problem.positions, sigma=with_factors(reliability.POSITION, problem.positions.sigma)),
+        attitudes=replace(problem.attitudes, sigma=with_factors(reliability.ATTITUDE, problem.attitudes.sigma)),
+    )
+
+
+def combined(before: Sequence[Component], step: Sequence[Component]) -> tuple[Component, ...]:
+    """Multiply the factors of a step onto those found before.
+
+    Parameters
+    ----------
+    before : sequence of Component
+        Factors so far; empty at the first step.
+    step : sequence of Component
+        Factors of the step.
+
+    Returns
+    -------
+    tuple of Component
+        The last step's redundancies with all factors together.
+    """
+    known = {each.name: each.factor for each in before}
+    return tuple(replace(each, factor=each.factor * known.get(each.name, 1.0)) for each in step)
+
+
+def settled(step: Sequence[Component]) -> bool:
+    """Whether a step changes nothing worth another adjustment.
+
+    Parameters
+    ----------
+    step : sequence of Component
+        Factors of the step.
+    """
+    return all(abs(each.factor - 1.0) < CONVERGED for each in step)

@@ -1,0 +1,1 @@
+"""A strip adjusted to its control by its own covariance."""

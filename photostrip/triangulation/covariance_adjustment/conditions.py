@@ -1,0 +1,285 @@
+"""What an adjusted strip has to fulfil: steps between models, control, distances of pass points.
+
+Unknowns are the similarities of all models. Each is taken about the left perspective centre of its model and in metres
+at the distance of a base, so that a strip of any length makes a system of the same condition.
+
+Source: derived; see docs/precision.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.geometry.rotation import cross_matrix
+from photostrip.triangulation.error_propagation.derivatives import ELEMENTS, PARAMETERS, UNITS, Rows, similarity_rows
+from photostrip.triangulation.error_propagation.strip_errors import scale_shares
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.geometry.similarity import Similarity
+    from photostrip.triangulation.error_propagation.control_errors import Misclosures
+    from photostrip.triangulation.error_propagation.strip_errors import StripErrors
+    from photostrip.triangulation.relative_orientation.relative import Orientation
+    from photostrip.triangulation.strip_formation.formation import FormedStrip
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+JOINT, CONTROL, DISTANCE = 0, 1, 2
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Which misclosures an adjustment with the covariance of the strip distributes.
+
+    Parameters
+    ----------
+    distances : bool
+        Whether distances of pass points from the common centres of their models count beside the control.
+    """
+
+    distances: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Local:
+    """Similarities of the models about their own left photos.
+
+    Parameters
+    ----------
+    to_common : ndarray, shape (p, 7, 7)
+        From the unknowns of each model to the similarity about the common origin.
+    from_common : ndarray, shape (p, 7, 7)
+        The way back.
+    """
+
+    to_common: Floats
+    from_common: Floats
+
+    @classmethod
+    def about(cls, centers: Floats, length: float) -> Local:
+        """Make them for models whose left centres are given from the common origin, metres."""
+        count = len(centers)
+        shift = np.tile(np.eye(PARAMETERS), (count, 1, 1))
+        shift[:, :3, 3:6], shift[:, :3, 6] = cross_matrix(centers), -centers
+        back = np.tile(np.eye(PARAMETERS), (count, 1, 1))
+        back[:, :3, 3:6], back[:, :3, 6] = -cross_matrix(centers), centers
+        size = np.array([1.0] * 3 + [length] * 4)
+        return cls(shift / size, back * size[:, None])
+
+
+@dataclass(frozen=True, eq=False)
+class Conditions:
+    """Conditions ``w = A y + H v + g``, in the order of the strip.
+
+    Parameters
+    ----------
+    rows : Rows
+        H, d = 1; ``frame`` is A in the columns of the condition's own model.
+    following : ndarray, shape (n, 7)
+        A in the columns of the next model.
+    value : ndarray, shape (n,)
+        w, metres.
+    noise : ndarray, shape (n,)
+        Variance of g, metres^2.
+    kind : ndarray of int, shape (n,)
+        ``JOINT``, ``CONTROL`` or ``DISTANCE``.
+    source : ndarray of int, shape (n,)
+        Joint; row of the misclosures; row of the junctions.
+    """
+
+    rows: Rows
+    following: Floats
+    value: Floats
+    noise: Floats
+    kind: Numbers
+    source: Numbers
+
+
+def conditions(
+    errors: StripErrors,
+    strip: tuple[Orientation, FormedStrip],
+    control: tuple[Misclosures, Floats],
+    local: Local,
+    *,
+    distances: bool = True,
+) -> Conditions:
+    """Collect all conditions of a strip.
+
+    Parameters
+    ----------
+    errors : StripErrors
+        The formed strip.
+    strip : tuple of Orientation and FormedStrip
+        Its pairs and their points.
+    control : tuple of Misclosures and ndarray
+        Control coordinates that count, and strip minus given in metres.
+    local : Local
+        Unknowns of the models.
+    distances : bool
+        Whether distances of pass points from the common centres count.
+
+    Returns
+    -------
+    Conditions
+        Joints, control and distances, model by model.
+    """
+    slots = errors.points.core.shape[1]
+    parts = [_joints(errors, local, slots), _control(*control, local)]
+    if distances:
+        parts.append(_distances(errors, *strip, max(slots, 2)))
+    return _sorted(parts, max(slots, 2))
+
+
+def misclosures_at(wanted: Conditions, formed: FormedStrip, similarity: Similarity, control: Floats) -> Floats:
+    """Misclosures of the same conditions in the strip as it is formed from other image coordinates.
+
+    Parameters
+    ----------
+    wanted : Conditions
+        The conditions.
+    formed : FormedStrip
+        The strip, with the same joints.
+    similarity : Similarity
+        From there to the ground.
+    control : ndarray, shape (w,)
+        Strip minus given of the control coordinates, metres.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Misclosures, metres.
+    """
+    result = np.zeros(len(wanted.value))
+    is_control, is_distance = wanted.kind == CONTROL, wanted.kind == DISTANCE
+    result[is_control] = control[wanted.source[is_control]]
+    rows = wanted.source[is_distance]
+    joined = formed.junctions
+    center = formed.centers[joined.joint[rows] + 1]
+    before, after = (formed.model_xyz[side[rows]] - center for side in (joined.before, joined.after))
+    ray = before / np.linalg.norm(before, axis=1)[:, None] + after / np.linalg.norm(after, axis=1)[:, None]
+    along = ((after - before) * ray).sum(axis=1) / np.linalg.norm(ray, axis=1)
+    result[is_distance] = similarity.scale * along
+    return result
+
+
+def _sorted(parts: Sequence[Conditions], slots: int) -> Conditions:
+    """Put conditions together, model by model."""
+    count = np.concatenate([[0], np.cumsum([len(part.value) for part in parts])])
+    order = np.argsort(np.concatenate([part.rows.first for part in parts]), kind="stable")
+    place = np.empty(len(order), np.intp)
+    place[order] = np.arange(len(order))
+    item = place[np.concatenate([part.rows.item + start for part, start in zip(parts, count[:-1], strict=True)])]
+    entry = np.argsort(item, kind="stable")
+    core = np.zeros((len(order), slots, 1, UNITS))
+    for part, start in zip(parts, count[:-1], strict=True):
+        core[start : start + len(part.value), : part.rows.core.shape[1]] = part.rows.core
+    rows = Rows(
+        np.concatenate([part.rows.first for part in parts])[order],
+        np.concatenate([part.rows.frame for part in parts])[order],
+        core[order],
+        item[entry],
+        np.concatenate([part.rows.image for part in parts])[entry],
+        np.concatenate([part.rows.own for part in parts])[entry],
+    )
+    columns = (
+        np.concatenate([getattr(part, name) for part in parts])[order]
+        for name in ("following", "value", "noise", "kind", "source")
+    )
+    return Conditions(rows, *columns)
+
+
+def _joints(errors: StripErrors, local: Local, slots: int) -> Conditions:
+    """Seven for each joint: 0 = y(i+1) - y(i) carried over - step."""
+    joints = errors.models - 1
+    count = joints * PARAMETERS
+    carried = -local.from_common[1:] @ local.to_common[:-1]
+    core = np.zeros((joints, PARAMETERS, slots, 1, UNITS))
+    core[:, :, 0, 0] = -local.from_common[1:] @ errors.steps[:-1]
+    none = np.zeros(0, np.intp)
+    number = np.repeat(np.arange(joints), PARAMETERS)
+    rows = Rows(
+        number,
+        carried.reshape(count, 1, PARAMETERS),
+        core.reshape(count, slots, 1, UNITS),
+        none,
+        none,
+        np.zeros((0, 1, 2)),
+    )
+    zero = np.zeros(count)
+    return Conditions(rows, np.tile(np.eye(PARAMETERS), (joints, 1)), zero, zero, np.full(count, JOINT), number)
+
+
+def _control(control: Misclosures, given: Floats, local: Local) -> Conditions:
+    rows, count = control.rows, len(given)
+    frame = rows.frame @ local.to_common[rows.first]
+    placed = Rows(rows.first, frame, rows.core, rows.item, rows.image, rows.own)
+    zero = np.zeros((count, PARAMETERS))
+    return Conditions(placed, zero, given, control.variance, np.full(count, CONTROL), np.arange(count))
+
+
+def _distances(errors: StripErrors, orientation: Orientation, formed: FormedStrip, slots: int) -> Conditions:
+    """Distances of pass points from the common centre, after minus before the joint.
+
+    What lies across the ray is left out: its variance nearly vanishes to first order, and what is left of it would
+    count as information. One point of each joint is left out too, the scale transfer having used up one of them.
+    """
+    joined, pairs = formed.junctions, errors.pairs
+    chosen = np.flatnonzero(joined.used)
+    before_share, _ = scale_shares(orientation, formed, pairs)
+    size = (before_share[chosen] ** 2).sum(axis=1)
+    order = np.lexsort((size, joined.joint[chosen]))
+    number = joined.joint[chosen][order]
+    last = np.append(number[1:] != number[:-1], np.ones(min(len(number), 1), bool))
+    chosen = np.sort(chosen[order[~last]])
+    joint, before, after = joined.joint[chosen], joined.before[chosen], joined.after[chosen]
+    arms = (pairs.arm[before] - pairs.reach[joint], pairs.arm[after])
+    lengths = [np.linalg.norm(arm, axis=1) for arm in arms]
+    ray = (arms[0] + arms[1]) / (lengths[0] + lengths[1])[:, None]
+    along = (ray / np.linalg.norm(ray, axis=1)[:, None])[:, None]
+    core = np.zeros((len(chosen), slots, 1, UNITS))
+    center = centers_of(errors)[joint + 1]
+    place = similarity_rows(center + arms[0], np.zeros(3))
+    core[:, 0] = along @ place @ errors.steps[joint]
+    core[:, 0, :, ELEMENTS] -= along @ pairs.deformation[before]
+    core[:, 1, :, ELEMENTS] += along @ pairs.deformation[after]
+    item, image, own = _own_of_distances(errors, orientation, (before, after), along)
+    zero, count = np.zeros((len(chosen), 1, PARAMETERS)), len(chosen)
+    rows = Rows(joint, zero, core, item, image, own)
+    value = np.einsum("ni,ni->n", along[:, 0], arms[1] - arms[0])
+    return Conditions(rows, zero[:, 0], value, np.zeros(count), np.full(count, DISTANCE), chosen)
+
+
+def centers_of(errors: StripErrors) -> Floats:
+    """Perspective centres of all photos, from the common origin, shape (p + 1, 3), metres."""
+    # the step's scale column is minus the centre that joins its model to the next
+    following = -errors.steps[:, :3, 5]
+    return np.concatenate([following[:1] - errors.pairs.reach[:1], following])
+
+
+def _own_of_distances(
+    errors: StripErrors, orientation: Orientation, rows: tuple[Numbers, Numbers], along: Floats
+) -> tuple[Numbers, Numbers, Floats]:
+    """Image points of the three photos by which a distance is seen from both models."""
+    images, pairs = errors.images, errors.pairs
+    lookup = np.full(int(images.row.max()) + 1, -1)
+    lookup[images.row] = np.arange(len(images.row))
+    before, after = rows
+    own_before, own_after = along @ pairs.own[before], along @ pairs.own[after]
+    image = np.column_stack(
+        [
+            lookup[orientation.rows[before, 0]],
+            lookup[orientation.rows[before, 1]],
+            lookup[orientation.rows[after, 1]],
+        ]
+    )
+    own = np.stack([-own_before[..., :2], own_after[..., :2] - own_before[..., 2:], own_after[..., 2:]], axis=1)
+    item = np.repeat(np.arange(len(before)), 3)
+    flat = image.ravel()
+    return item, flat, own.reshape(-1, 1, 2) * images.sigma[flat][:, None, :]

@@ -1,0 +1,87 @@
+"""A strip formed once more from measurements that changed a little, with every decision kept as it was.
+
+Which points take part, their weights, and the pass points that join models stay. Only coordinates move, so that the
+new strip is the old one at another place of its measurements, and derivatives of the one continue those of the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.triangulation.relative_orientation import relative
+from photostrip.triangulation.strip_formation import formation, non_neighbours
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.points import PhotoPoints
+    from photostrip.triangulation.relative_orientation.relative import Orientation
+    from photostrip.triangulation.strip_formation.formation import FormedStrip, Junctions
+
+    Floats = NDArray[np.float64]
+
+
+def oriented_again(orientation: Orientation, xy: Floats) -> Orientation:
+    """Orient the pairs of a strip on other image coordinates.
+
+    Parameters
+    ----------
+    orientation : Orientation
+        The pairs; their elements are where the iteration starts.
+    xy : ndarray, shape (k, 2)
+        Image coordinates of all image points, mm.
+
+    Returns
+    -------
+    Orientation
+        The pairs with new coordinates, elements and parallaxes; what is said of their precision stays.
+    """
+    left, right = (xy[orientation.rows[:, side]] for side in (0, 1))
+    pairs = replace(orientation.pairs, left=left, right=right)
+    elements, _, _ = relative.iterate(orientation.elements, pairs)
+    return replace(orientation, pairs=pairs, elements=elements, parallax=relative.parallaxes(elements, pairs))
+
+
+def formed_again(
+    formed: FormedStrip, orientation: Orientation, observations: PhotoPoints, photos: Sequence[str]
+) -> FormedStrip:
+    """Form a strip from pairs that were oriented again.
+
+    Parameters
+    ----------
+    formed : FormedStrip
+        The strip as it was formed at first.
+    orientation : Orientation
+        Its pairs, as ``oriented_again`` gives them.
+    observations : PhotoPoints
+        The image points that these were oriented on.
+    photos : sequence of str
+        Photos of the strip in flight order.
+
+    Returns
+    -------
+    FormedStrip
+        The same points and joints; ``model_xyz`` holds the points that were left out, too.
+    """
+    vectors, gap, _ = formation.model_points(orientation)
+    junctions = _joined(formed.junctions, orientation, vectors)
+    there = np.asarray(np.isfinite(formed.model_xyz).all(axis=1), bool)
+    again = formation.placed(orientation, vectors, gap, junctions, orientation.used & there)
+    if not len(formed.bridging):
+        return again
+    return non_neighbours.bridge(again, observations, photos, orientation.pairs.focal, formed.bridging)
+
+
+def _joined(joined: Junctions, orientation: Orientation, vectors: Floats) -> Junctions:
+    """Give the scale transfer with the same pass points and weights."""
+    base, _ = orientation.relative
+    before = np.linalg.norm(vectors[joined.before] - base[joined.joint], axis=1)
+    ratio = before / np.linalg.norm(vectors[joined.after], axis=1)
+    total = np.bincount(joined.joint, joined.weight, len(joined.factor))
+    factor = np.bincount(joined.joint, joined.weight * ratio, len(joined.factor)) / total
+    return replace(joined, ratio=ratio, factor=factor)

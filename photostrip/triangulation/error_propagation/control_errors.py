@@ -1,0 +1,201 @@
+"""The fit to the control as a linear operator: parameters of similarity and polynomials by misclosures.
+
+Every control coordinate that counts gives one misclosure, along its own ground axis, so that points in plan only and
+in height only come in by the same rule as full ones. The operator holds the weights of the fit and the terms of the
+polynomials as they were used.
+
+Source: derived; [001] eq. 145-151 for the fit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.triangulation.error_propagation.derivatives import PARAMETERS, Rows, similarity_rows
+from photostrip.triangulation.polynomial.terms import POWERS
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.points import ControlPoints
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Misclosures:
+    """Control coordinates that count, one row each.
+
+    Parameters
+    ----------
+    point : ndarray of int, shape (w,)
+        Control point of each.
+    axis : ndarray of int, shape (w,)
+        0, 1, 2: along its first, second, third ground axis.
+    direction : ndarray, shape (w, 3)
+        That axis as a unit vector in the intermediate frame.
+    variance : ndarray, shape (w,)
+        Variance of the given coordinate, metres^2.
+    rows : Rows
+        Error of the strip along the axis, d = 1.
+    """
+
+    point: Numbers
+    axis: Numbers
+    direction: Floats
+    variance: Floats
+    rows: Rows
+
+
+@dataclass(frozen=True, eq=False)
+class Correction:
+    """What is subtracted from the strip: ``X - Phi theta`` with ``theta = M w``, w the misclosures strip minus given.
+
+    Parameters
+    ----------
+    operator : ndarray, shape (t, w)
+        M: seven parameters of the similarity, then those of the polynomials.
+    terms : tuple of tuple of str
+        Terms of the polynomials of X, Y, Z.
+    reach, breadth : float
+        Lengths by which X and Y are divided in the terms, metres.
+    origin : ndarray, shape (3,)
+        Origin of the similarity.
+    """
+
+    operator: Floats
+    terms: tuple[tuple[str, ...], ...]
+    reach: float
+    breadth: float
+    origin: Floats
+
+    def influence(self, xyz: Floats) -> Floats:
+        """Phi: displacement of points by the parameters.
+
+        Parameters
+        ----------
+        xyz : ndarray, shape (n, 3)
+            Points after the similarity, intermediate frame, metres.
+
+        Returns
+        -------
+        ndarray, shape (n, 3, t)
+            Derivatives.
+        """
+        columns = self.polynomial_columns(xyz)
+        result = np.zeros((len(xyz), 3, len(self.operator)))
+        result[:, :, :PARAMETERS] = similarity_rows(xyz, self.origin)
+        start = PARAMETERS
+        for axis, values in enumerate(columns):
+            result[:, axis, start : start + values.shape[1]] = values
+            start += values.shape[1]
+        return result
+
+    def polynomial_columns(self, xyz: Floats) -> list[Floats]:
+        """Terms of the three polynomials at points, scaled to about one."""
+        x, y = xyz[:, 0] / self.reach, xyz[:, 1] / self.breadth
+        return [
+            np.column_stack([x**i * y**j for i, j in (POWERS[t] for t in terms)] or [np.zeros((len(x), 0))])
+            for terms in self.terms
+        ]
+
+
+def misclosures(points: Rows, control: ControlPoints, control_rows: Numbers, axes: Floats) -> Misclosures:
+    """Rows of derivatives of the misclosures.
+
+    Parameters
+    ----------
+    points : Rows
+        Points of the strip.
+    control : ControlPoints
+        The control, with standard deviations along `axes`.
+    control_rows : ndarray of int, shape (c,)
+        Its rows in `points`.
+    axes : ndarray, shape (c, 3, 3)
+        Directions along which it is compared, rows, in the intermediate frame.
+
+    Returns
+    -------
+    Misclosures
+        In the order of the points, each with its coordinates that count.
+    """
+    point, axis = np.nonzero(control.use)
+    chosen, direction = control_rows[point], axes[point, axis]
+    starts = np.searchsorted(points.item, chosen)
+    counts = np.searchsorted(points.item, chosen, side="right") - starts
+    item = np.repeat(np.arange(len(point)), counts)
+    entry = np.arange(len(item)) - np.repeat(np.cumsum(counts) - counts, counts) + starts[item]
+    along = direction[:, None]
+    rows = Rows(
+        points.first[chosen],
+        along @ points.frame[chosen],
+        along[:, None] @ points.core[chosen],
+        item,
+        points.image[entry],
+        along[item] @ points.own[entry],
+    )
+    return Misclosures(point, axis, direction, control.sigma[point, axis] ** 2, rows)
+
+
+def correction(
+    found: Misclosures, weight: Floats, xyz: Floats, terms: Sequence[tuple[str, ...]], origin: Floats
+) -> Correction:
+    """Operator of the similarity and the polynomials.
+
+    Parameters
+    ----------
+    found : Misclosures
+        The control coordinates.
+    weight : ndarray, shape (c, 3)
+        Weights of the control coordinates in the fit, as ``absolute_orientation.weights`` gives them.
+    xyz : ndarray, shape (c, 3)
+        Control points after the similarity, intermediate frame, metres.
+    terms : sequence of tuple of str
+        Terms of the polynomials of X, Y, Z; all empty without.
+    origin : ndarray, shape (3,)
+        Origin of the similarities.
+
+    Returns
+    -------
+    Correction
+        The operator.
+    """
+    design, share = found.rows.frame[:, 0], np.sqrt(weight[found.point, found.axis])
+    size = np.abs(design).max(axis=0)
+    size = np.where(size > 0, size, 1.0)
+    similarity = np.linalg.pinv(design / size * share[:, None]) * share / size[:, None]
+    reach, breadth = (max(float(np.abs(xyz[:, k]).max()), 1e-6) for k in (0, 1))
+    result = Correction(similarity, tuple(terms), reach, breadth, origin)
+    if not any(terms):
+        return result
+    after = _polynomials(found, weight, xyz, result)  # by misclosures that the similarity has left
+    operator = np.concatenate([similarity, after - after @ design @ similarity])
+    return Correction(operator, result.terms, reach, breadth, origin)
+
+
+def _polynomials(found: Misclosures, weight: Floats, xyz: Floats, fit: Correction) -> Floats:
+    """Parameters of the polynomials by misclosures after the similarity.
+
+    Each axis of the intermediate frame has its own fit; a point that gives only some of its ground coordinates takes
+    the others from the fit itself, so the residual that counts is its projection on the axes given.
+    """
+    columns = fit.polynomial_columns(xyz)
+    plan = weight[:, :2].mean(axis=1)
+    by_axis = (plan, plan, weight[:, 2])
+    given = np.zeros((len(xyz), 3, 3))
+    np.add.at(given, found.point, found.direction[:, :, None] * found.direction[:, None, :])
+    weighted = [c * w[:, None] for c, w in zip(columns, by_axis, strict=True)]
+    normal = np.block(
+        [
+            [weighted[a].T @ (given[:, a, b, None] * columns[b]) for b in range(3)]
+            for a in range(3)
+        ]
+    )  # fmt: skip
+    right = np.concatenate([(weighted[a][found.point] * found.direction[:, [a]]).T for a in range(3)])
+    return np.asarray(np.linalg.solve(normal, right), float)

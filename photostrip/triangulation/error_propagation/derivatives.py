@@ -1,0 +1,127 @@
+"""Sparse rows of derivatives by the image coordinates, and what their columns are.
+
+Source: derived; see docs/precision.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.geometry.rotation import cross_matrix
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+UNITS, PARAMETERS = 6, 7
+ELEMENTS, SCALE = slice(0, 5), 5  # units of a model
+REACH = 2  # models between which units share image coordinates
+SPAN = REACH + 1  # photos on which the image coordinates of a unit lie
+
+
+@dataclass(frozen=True, eq=False)
+class Images:
+    """Image points that take part, ordered by photo, and how units depend on them.
+
+    Parameters
+    ----------
+    row : ndarray of int, shape (n,)
+        Row in the table of image points.
+    photo : ndarray of int, shape (n,)
+        Place of its photo in the strip, ascending.
+    sigma : ndarray, shape (n, 2)
+        Stated standard deviations of x and y, mm.
+    units : ndarray, shape (n, 3, 6, 2)
+        Units of the models photo - 2, photo - 1 and photo by x and y in units of their standard deviations.
+    """
+
+    row: Numbers
+    photo: Numbers
+    sigma: Floats
+    units: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Errors of things with d coordinates as rows of derivatives, sparse.
+
+    The error is ``frame xi + sum_s core[s] u[first + s] + sum own l`` with xi the similarity of model ``first``, u the
+    units of the models and l the errors of image coordinates in units of their standard deviations.
+
+    Parameters
+    ----------
+    first : ndarray of int, shape (n,)
+        Model whose similarity moves the thing as a whole.
+    frame : ndarray, shape (n, d, 7)
+        Coefficients of that similarity.
+    core : ndarray, shape (n, s, d, 6)
+        Coefficients of the units of the models from ``first`` on.
+    item : ndarray of int, shape (e,)
+        Thing of each image point that enters by itself, ascending.
+    image : ndarray of int, shape (e,)
+        That image point, a row of ``Images``.
+    own : ndarray, shape (e, d, 2)
+        Its coefficients.
+    """
+
+    first: Numbers
+    frame: Floats
+    core: Floats
+    item: Numbers
+    image: Numbers
+    own: Floats
+
+    def taken(self, order: Numbers) -> Rows:
+        """Give the rows of some things, or of all in another order."""
+        back = np.full(len(self.first), -1)
+        back[order] = np.arange(len(order))
+        item = back[self.item]
+        entry = np.argsort(item, kind="stable")[int((item < 0).sum()) :]
+        return Rows(
+            self.first[order],
+            self.frame[order],
+            self.core[order],
+            item[entry],
+            self.image[entry],
+            self.own[entry],
+        )
+
+    def part(self, start: int, stop: int) -> Rows:
+        """Give the rows of the things from start to stop."""
+        low, high = np.searchsorted(self.item, [start, stop])
+        return Rows(
+            self.first[start:stop],
+            self.frame[start:stop],
+            self.core[start:stop],
+            self.item[low:high] - start,
+            self.image[low:high],
+            self.own[low:high],
+        )
+
+
+def similarity_rows(xyz: Floats, origin: Floats) -> Floats:
+    """Displacements by an infinitesimal similarity: dX = t + theta x (X - O) + lambda (X - O).
+
+    Parameters
+    ----------
+    xyz : ndarray, shape (n, 3)
+        Positions, metres.
+    origin : ndarray, shape (3,)
+        Origin O.
+
+    Returns
+    -------
+    ndarray, shape (n, 3, 7)
+        Derivatives by shift (metres), rotation (radians) and logarithm of the scale.
+    """
+    arm = xyz - origin
+    rows = np.zeros((len(arm), 3, PARAMETERS))
+    rows[:, :, :3] = np.eye(3)
+    rows[:, :, 3:6] = -cross_matrix(arm)
+    rows[:, :, 6] = arm
+    return rows

@@ -1,0 +1,1 @@
+"""Gross errors in the pairs: residual parallaxes, Grubbs, tau, minimum deletion."""

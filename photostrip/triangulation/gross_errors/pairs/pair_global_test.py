@@ -1,0 +1,135 @@
+"""The global test of oriented pairs: whether the scatter of their y parallaxes belongs to the measurements.
+
+Source: derived; [004a] stops at tests of single residuals. See docs/sources.md.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.statistics import chi2_quantile, normal_quantile
+from photostrip.triangulation.relative_orientation import relative
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from photostrip.triangulation.relative_orientation.relative import Orientation
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+    Flags = NDArray[np.bool_]
+
+CONFIDENCE = 0.999  # of the global test, and of the test of the largest residual of a pair
+NO_REDUNDANCY = 1e-6  # residuals with less are rounding
+
+
+def squares(orientation: Orientation, sigma: Floats) -> Floats:
+    """Sum of squared parallaxes of each pair in units of their variance.
+
+    Parameters
+    ----------
+    orientation : Orientation
+        Oriented pairs.
+    sigma : ndarray, shape (p,)
+        Standard deviation of a y parallax of weight one, mm.
+
+    Returns
+    -------
+    ndarray, shape (p,)
+        Values of the global test.
+    """
+    total: Floats = orientation.pairs.sums(orientation.pairs.weight * orientation.parallax**2) / sigma**2
+    return total
+
+
+def global_limits(count: Numbers) -> Floats:
+    """Critical values of the global test.
+
+    Parameters
+    ----------
+    count : ndarray of int
+        Points of each pair.
+
+    Returns
+    -------
+    ndarray
+        Chi-square with count - 5 degrees of freedom; infinite without redundancy.
+    """
+    return _by_number(
+        count,
+        lambda n: chi2_quantile(CONFIDENCE, n - relative.MINIMUM_POINTS) if n > relative.MINIMUM_POINTS else np.inf,
+    )
+
+
+def standardised(orientation: Orientation, sigma: Floats) -> Floats:
+    """Give parallaxes in units of their standard deviation: residuals of points used, predictions of the others.
+
+    Parameters
+    ----------
+    orientation : Orientation
+        Oriented pairs.
+    sigma : ndarray, shape (p,)
+        Standard deviation of a y parallax of weight one, mm.
+
+    Returns
+    -------
+    ndarray, shape (m,)
+        Values without unit; 0 where a residual has no redundancy.
+    """
+    pairs, used = orientation.pairs, orientation.used
+    size = np.abs(orientation.parallax) / sigma[pairs.pair] * np.sqrt(np.where(used, pairs.weight, 1.0))
+    share = np.where(used, orientation.redundancy, 1.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        value = size / np.sqrt(share)
+    return np.where(np.isfinite(value) & (share > NO_REDUNDANCY), value, 0.0)
+
+
+def failing(orientation: Orientation, sigma: Floats) -> Flags:
+    """Pairs whose residuals do not belong to the scatter.
+
+    Parameters
+    ----------
+    orientation : Orientation
+        Oriented pairs.
+    sigma : ndarray, shape (p,)
+        Standard deviation of a y parallax of weight one, mm.
+
+    Returns
+    -------
+    ndarray of bool, shape (p,)
+        True where the sum of squares or the largest residual exceeds its limit.
+    """
+    count = orientation.points_used
+    largest = np.maximum.reduceat(
+        np.where(orientation.used, standardised(orientation, sigma), 0.0), orientation.pairs.starts
+    )
+    bad: Flags = ~(squares(orientation, sigma) <= global_limits(count)) | (largest > largest_limits(count))
+    return bad & (count > relative.MINIMUM_POINTS)
+
+
+def largest_limits(count: Numbers) -> Floats:
+    """Critical values of the largest standardised residual (Bonferroni).
+
+    Parameters
+    ----------
+    count : ndarray of int
+        Points of each pair.
+
+    Returns
+    -------
+    ndarray
+        Quantiles of the normal distribution.
+    """
+    return _by_number(count, lambda n: normal_quantile(1 - (1 - CONFIDENCE) / (2 * max(n, 1))))
+
+
+def _by_number(count: Numbers, limit: Callable[[int], float]) -> Floats:
+    """Look up a limit for every number of points; each number is asked for once."""
+    table = np.zeros(int(count.max(initial=0)) + 1)
+    for number in np.flatnonzero(np.bincount(np.maximum(count.ravel(), 0))).tolist():
+        table[number] = limit(number)
+    return table[np.maximum(count, 0)]

@@ -1,0 +1,88 @@
+"""Points taken back into their pairs: what the final orientation predicts well was rejected wrongly.
+
+Source: derived, see docs/sources.md.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.triangulation.gross_errors.pairs.pair_global_test import global_limits, squares
+from photostrip.triangulation.relative_orientation import relative
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.triangulation.relative_orientation.relative import Orientation
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+READMIT = 3.0  # standard deviations of the predicted residual
+
+
+def readmit(orientation: Orientation, rows: Numbers, given: Floats, sigma: Floats) -> tuple[Orientation, Numbers]:
+    """Take points back that the final elements predict well, the best of each pair first.
+
+    Parameters
+    ----------
+    orientation : Orientation
+        Pairs oriented without the points.
+    rows : ndarray of int
+        Points taken out.
+    given : ndarray, shape (m,)
+        Weights of all points before any was taken out.
+    sigma : ndarray, shape (p,)
+        Standard deviation of a y parallax of weight one, mm.
+
+    Returns
+    -------
+    Orientation
+        Pairs oriented with the points taken back.
+    ndarray of int
+        Rows taken back.
+    """
+    if not len(rows):
+        return orientation, np.zeros(0, np.intp)
+    todo = np.unique(orientation.pairs.pair[rows])
+    result, place = relative.taken(orientation, todo)
+    given, sigma = given[place], sigma[todo]
+    pairs = result.pairs
+    back: list[int] = []
+    waiting = np.searchsorted(place, np.unique(rows))
+    while len(waiting):
+        number = pairs.pair[waiting]
+        value, growth = _predicted(result, waiting, given, sigma)
+        total = squares(result, sigma)[number] + growth
+        allowed = (value <= READMIT) & (total <= global_limits(result.points_used + 1)[number])
+        allowed &= relative.in_front(result.elements, pairs)[waiting]
+        if not allowed.any():
+            break
+        order = np.lexsort((np.where(allowed, value, np.inf), number))
+        _, first = np.unique(number[order], return_index=True)
+        best = order[first]
+        best = best[allowed[best]]
+        weight = result.pairs.weight.copy()
+        weight[waiting[best]] = given[waiting[best]]
+        back += waiting[best].tolist()
+        result = relative.refine(result, weight, np.unique(number[best]))
+        waiting = np.delete(waiting, best)
+    if not back:
+        return orientation, np.zeros(0, np.intp)
+    return relative.put_back(orientation, todo, place, result), place[np.array(back, np.intp)]
+
+
+def _predicted(orientation: Orientation, rows: Numbers, given: Floats, sigma: Floats) -> tuple[Floats, Floats]:
+    """Predicted residuals in units of their standard deviation, and what they would add to the sum of squares."""
+    pairs = orientation.pairs
+    with np.errstate(all="ignore"):
+        _, jacobian = relative.linearised(orientation.elements, pairs)
+    normal = relative.normal_matrices(jacobian, pairs)
+    cofactors = np.linalg.pinv(np.nan_to_num(normal), hermitian=True)[pairs.pair[rows]]
+    part = jacobian[:, rows]
+    spread = 1 / given[rows] + np.einsum("im,mij,jm->m", part, cofactors, part)
+    value = np.abs(orientation.parallax[rows]) / (sigma[pairs.pair[rows]] * np.sqrt(spread))
+    value = np.where(np.isfinite(value), value, np.inf)
+    return value, value**2

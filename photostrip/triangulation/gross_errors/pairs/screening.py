@@ -1,0 +1,356 @@
+"""Gross errors in relative orientation: the methods by name, the tests of single residuals, the log.
+
+``parallax+grubbs`` tests the residual y parallax against a limit, then by Grubbs' test; ``tau`` tests studentised
+residuals. Every round takes at most one point from a pair, the worst, and orients that pair again: removing several
+at once also throws out good points that a bad neighbour has pulled. All pairs go through a round together. No
+rejection leaves a pair or a standard zone without support.
+
+``deletion``, ``robust`` and ``auto`` are in ``screening_search``.
+
+Source: [004a]; the two-sided form and the order of work are chosen here, see docs/sources.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import InputError
+from photostrip.statistics import grubbs_limit, tau_limit
+from photostrip.triangulation.gross_errors.pairs import pair_global_test, readmission, screening_search
+from photostrip.triangulation.gross_errors.pairs.zones import Support, zones
+from photostrip.triangulation.relative_orientation import relative
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.triangulation.relative_orientation.relative import Orientation, Settings
+
+    Floats = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
+
+METHODS = ("auto", "parallax+grubbs", "tau", "deletion", "robust", "none")
+SEARCHES = {"auto": (True, True), "deletion": (False, True), "robust": (True, False)}  # robust start, sets of points
+GRUBBS_MINIMUM = 7  # below it the test is meaningless: G cannot exceed (n-1)/sqrt(n)
+NEGLIGIBLE = 1e-9  # mm; residuals of error-free data are rounding, not measurements
+LIMIT_FACTOR = 4.0  # a-priori standard deviations of a y parallax
+TAU_REDUNDANCY = 0.01  # a residual with less redundancy says nothing about its point
+MOST_IN_FRONT = 0.5  # share of the points above which a pair stands as it should
+DETECTABLE = 4.13  # shift of a normal variable found in 80 % of cases by a two-sided test at 0.1 %
+
+
+@dataclass(frozen=True, slots=True)
+class Rejection:
+    """One point taken out of a pair.
+
+    Parameters
+    ----------
+    row : int
+        Row in the pairs' table.
+    test : str
+        ``"in front"``, ``"parallax"``, ``"grubbs"``, ``"tau"``, ``"deletion"`` (global test), ``"robust"`` or
+        ``"residual"``.
+    value, limit : float
+        Test value and critical value; mm for a parallax, otherwise without unit.
+    parallax : float
+        Residual y parallax in mm when it was rejected.
+    zone : int
+        Standard zone of the point, 1 to 6; 0 when unknown.
+    size : float
+        Estimated error of the y parallax in mm: what the pair, oriented without the point, leaves of it.
+    readmitted : bool
+        Whether the point was taken back in the end.
+    """
+
+    row: int
+    test: str
+    value: float
+    limit: float
+    parallax: float
+    zone: int = 0
+    size: float = float("nan")
+    readmitted: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Screened:
+    """Oriented pairs after the search for gross errors, and how far errors can be seen in them.
+
+    Parameters
+    ----------
+    orientation : Orientation
+        Pairs oriented without the rejected points.
+    rejections : tuple of Rejection
+        What was rejected, in order; re-admitted points are marked.
+    scatter : screening_search.Scatter
+        Standard deviations of a y parallax of weight one.
+    masked : ndarray of bool, shape (p,)
+        Pairs that fail the global test with nothing left to reject: errors that hide each other are suspected.
+    converged : ndarray of bool, shape (p,)
+        Whether the orientation of each pair converged.
+    """
+
+    orientation: Orientation
+    rejections: tuple[Rejection, ...]
+    scatter: screening_search.Scatter
+    masked: NDArray[np.bool_]
+    converged: NDArray[np.bool_]
+
+    @cached_property
+    def zone(self) -> NDArray[np.intp]:
+        """Standard zone of every point, 1 to 6, shape (m,)."""
+        return zones(self.orientation.elements, self.orientation.pairs)
+
+    @property
+    def counts(self) -> NDArray[np.intp]:
+        """Points that take part, by pair and zone, shape (p, 6)."""
+        return Support.of(self.orientation, self.zone).counts
+
+    @property
+    def detectable(self) -> Floats:
+        """Smallest error of each point's y parallax that a test finds in 80 % of cases, mm, shape (m,).
+
+        Infinite where a point has no redundancy, NaN where it takes no part.
+        """
+        pairs = self.orientation.pairs
+        with np.errstate(divide="ignore", invalid="ignore"):
+            sigma = self.scatter.by_pair[pairs.pair] / np.sqrt(pairs.weight)
+            size: Floats = DETECTABLE * sigma / np.sqrt(np.maximum(self.orientation.redundancy, 0.0))
+        return np.where(self.orientation.used, size, np.nan)
+
+
+def screen(orientation: Orientation, settings: Settings, sigma: float) -> tuple[Orientation, tuple[Rejection, ...]]:
+    """Reject points with gross errors from all pairs and orient those pairs again.
+
+    Parameters
+    ----------
+    orientation : Orientation
+        All pairs, oriented with all points.
+    settings : relative.Settings
+        Method, significance and limit.
+    sigma : float
+        A-priori standard deviation of an image coordinate in mm.
+
+    Returns
+    -------
+    Orientation
+        Pairs oriented without the rejected points.
+    tuple of Rejection
+        What was rejected, in order.
+
+    Raises
+    ------
+    InputError
+        For a method that does not exist.
+    """
+    result = examine(orientation, settings, sigma)
+    return result.orientation, result.rejections
+
+
+def examine(
+    orientation: Orientation, settings: Settings, sigma: float, converged: NDArray[np.bool_] | None = None
+) -> Screened:
+    """Reject points with gross errors, and say what can and what cannot be seen in each pair.
+
+    Parameters
+    ----------
+    orientation : Orientation
+        All pairs, oriented with all points; with ``auto`` and ``robust`` they need not make sense yet.
+    settings : relative.Settings
+        Method, significance and limit.
+    sigma : float
+        A-priori standard deviation of an image coordinate in mm.
+    converged : ndarray of bool, shape (p,), optional
+        Whether the orientation of each pair converged; all by default.
+
+    Returns
+    -------
+    Screened
+        Oriented pairs, log, zones, scatter and pairs with suspected errors.
+
+    Raises
+    ------
+    InputError
+        For a method that does not exist.
+    """
+    if settings.screening not in METHODS:
+        msg = f"screening method {settings.screening!r} is not available; choose one of {', '.join(METHODS)}"
+        raise InputError(msg)
+    start, sets = SEARCHES.get(settings.screening, SEARCHES["auto"])
+    sound = np.ones(orientation.pairs.size, bool) if converged is None else converged
+    rays = relative.rays(orientation.elements, orientation.pairs)
+    doubtful = relative.doubtful(orientation, sound, rays)
+    behind = ~relative.ahead(*rays)
+    with np.errstate(all="ignore"):
+        scatter, found = screening_search.search(orientation, sigma, start=start, sets=sets, doubtful=doubtful)
+    if settings.screening in SEARCHES:
+        result, log = _readmitted(orientation, scatter, found, behind)
+        if doubtful.any():
+            # a pair that was lost at first and now fits its points has converged after all; any other is refused
+            sound = sound | (doubtful & ~pair_global_test.failing(result, scatter.by_pair))
+            result = relative.restored(result, orientation, np.flatnonzero(doubtful & relative.doubtful(result, sound)))
+    else:
+        result, log = _sequential(orientation, settings, sigma, behind)
+    masked = pair_global_test.failing(result, scatter.by_pair)
+    return Screened(result, _completed(log, result), scatter, masked, sound)
+
+
+def _readmitted(
+    orientation: Orientation, scatter: screening_search.Scatter, found: screening_search.Deleted, behind: Flags
+) -> tuple[Orientation, list[Rejection]]:
+    """Take back what the final elements predict well, take out what lies behind a camera, write the log."""
+    weight = orientation.pairs.weight
+    result, _ = readmission.readmit(found.orientation, found.rows, weight, scatter.by_pair)
+    before = np.nan_to_num(orientation.parallax)
+    log = [
+        Rejection(int(row), test, float(value), float(limit), float(before[row]))
+        for row, test, value, limit in zip(found.rows, found.tests, found.values, found.limits, strict=True)
+    ]
+    result, dropped = _drop_behind(result, _behind_now(orientation, result, behind))
+    return result, log + dropped
+
+
+def _sequential(
+    orientation: Orientation, settings: Settings, sigma: float, behind: Flags
+) -> tuple[Orientation, list[Rejection]]:
+    """Test single residuals, one stage after the other."""
+    result, log = _drop_behind(orientation, behind)
+    limit = settings.parallax_limit if settings.parallax_limit is not None else LIMIT_FACTOR * sigma * np.sqrt(2.0)
+    stages = {
+        "none": [],
+        "tau": [("tau", settings.grubbs_alpha)],
+        "parallax+grubbs": [("parallax", limit), ("grubbs", settings.grubbs_alpha)],
+    }
+    for test, bound in stages[settings.screening]:
+        result, found = _stage(result, test, float(bound))
+        log += found
+    return result, log
+
+
+def spared(orientation: Orientation, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Choose the rows that can all go without leaving a pair or a zone without support.
+
+    Parameters
+    ----------
+    orientation : Orientation
+        Oriented pairs.
+    rows : ndarray of bool, shape (m,)
+        Rows that should go.
+
+    Returns
+    -------
+    ndarray of bool, shape (m,)
+        Those that may, one after the other in the order of the table.
+    """
+    result = np.zeros(len(rows), bool)
+    support = Support.of(orientation)
+    counts = support.counts.copy()
+    for row in np.flatnonzero(rows & orientation.used).tolist():
+        pair = orientation.pairs.pair[[row]]
+        if Support(support.zone[[row]], counts).spare(pair)[0]:
+            counts[pair[0], support.zone[row] - 1] -= 1
+            result[row] = True
+    return result
+
+
+def _completed(log: list[Rejection], result: Orientation) -> tuple[Rejection, ...]:
+    """Add to each rejection what only the final orientation can say."""
+    if not log:
+        return ()
+    used = result.used
+    part, rows = relative.taken(result, np.unique(result.pairs.pair[[each.row for each in log]]))
+    number = dict(zip(rows.tolist(), zones(part.elements, part.pairs).tolist(), strict=True))
+    return tuple(
+        replace(r, zone=number[r.row], size=float(result.parallax[r.row]), readmitted=bool(used[r.row])) for r in log
+    )
+
+
+def _behind_now(before: Orientation, after: Orientation, behind: Flags) -> Flags:
+    """Points behind a camera, given those of an earlier orientation."""
+    changed = np.flatnonzero((before.elements != after.elements).any(axis=1))
+    if not len(changed):
+        return behind
+    part, rows = relative.taken(after, changed)
+    result = behind.copy()
+    result[rows] = ~relative.in_front(part.elements, part.pairs)
+    return result
+
+
+def _drop_behind(orientation: Orientation, behind: Flags) -> tuple[Orientation, list[Rejection]]:
+    """Take out the points that come out behind a camera; no measurement of theirs can be right."""
+    pairs, used = orientation.pairs, orientation.used
+    rows = np.flatnonzero(behind & used)
+    if not len(rows):
+        return orientation, []
+    # with most of its points behind, the pair itself is wrong, and relative.require says so
+    most = pairs.sums((~behind & used).astype(float)) > MOST_IN_FRONT * orientation.points_used
+    rows = rows[most[pairs.pair[rows]]]
+    if not len(rows):
+        return orientation, []
+    log = [Rejection(int(row), "in front", np.nan, np.nan, float(orientation.parallax[row])) for row in rows]
+    return _without(orientation, rows), log
+
+
+def _without(orientation: Orientation, rows: NDArray[np.intp]) -> Orientation:
+    weight = orientation.pairs.weight.copy()
+    weight[rows] = 0.0
+    return relative.refine(orientation, weight, np.unique(orientation.pairs.pair[rows]))
+
+
+def _stage(orientation: Orientation, test: str, bound: float) -> tuple[Orientation, list[Rejection]]:
+    """Repeat one test, worst point first, until no pair has anything to reject."""
+    result = orientation
+    log: list[Rejection] = []
+    while True:
+        value, limit = _values(result, test, bound)
+        value[~result.used] = -np.inf
+        peak = np.maximum.reduceat(value, result.pairs.starts)
+        spare = Support.of(result).spare(result.pairs.pair)
+        worst = (value == peak[result.pairs.pair]) & (value > limit) & spare
+        rows = np.flatnonzero(worst)
+        if not len(rows):
+            return result, log
+        _, first = np.unique(result.pairs.pair[rows], return_index=True)  # of equal values the first
+        rows = rows[first]
+        log += [Rejection(int(r), test, float(value[r]), float(limit[r]), float(result.parallax[r])) for r in rows]
+        result = _without(result, rows)
+
+
+def _values(orientation: Orientation, test: str, bound: float) -> tuple[Floats, Floats]:
+    """Test value and limit of every row."""
+    if test == "parallax":
+        return np.abs(orientation.parallax), np.full(len(orientation.parallax), bound)
+    return _grubbs(orientation, bound) if test == "grubbs" else _tau(orientation, bound)
+
+
+def _grubbs(orientation: Orientation, alpha: float) -> tuple[Floats, Floats]:
+    """Deviation from the pair's mean residual in units of its standard deviation."""
+    pairs, used = orientation.pairs, orientation.used
+    count = orientation.points_used
+    mean = pairs.sums(np.where(used, orientation.parallax, 0.0)) / count
+    deviation = np.where(used, orientation.parallax - mean[pairs.pair], 0.0)
+    spread = np.sqrt(pairs.sums(deviation**2) / (count - 1))
+    tested = (count >= GRUBBS_MINIMUM) & (spread > NEGLIGIBLE)
+    limits = np.array([grubbs_limit(int(n), alpha) if ok else np.inf for n, ok in zip(count, tested, strict=True)])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        value = np.abs(deviation) / spread[pairs.pair]
+    return np.where(np.isfinite(value), value, 0.0), limits[pairs.pair]
+
+
+def _tau(orientation: Orientation, alpha: float) -> tuple[Floats, Floats]:
+    """Studentised residual: each in units of its own standard deviation."""
+    pairs = orientation.pairs
+    count = orientation.points_used
+    unknowns = relative.MINIMUM_POINTS
+    tested = (count - unknowns >= 3) & (orientation.sigma0 > NEGLIGIBLE)
+    limits = np.array(
+        [tau_limit(int(n), unknowns, alpha) if ok else np.inf for n, ok in zip(count, tested, strict=True)]
+    )
+    sigma = np.sqrt(2.0) * orientation.sigma0[pairs.pair]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        value = np.abs(orientation.parallax) * np.sqrt(pairs.weight) / (sigma * np.sqrt(orientation.redundancy))
+    value[~(orientation.redundancy > TAU_REDUNDANCY)] = 0.0
+    return np.where(np.isfinite(value), value, 0.0), limits[pairs.pair]

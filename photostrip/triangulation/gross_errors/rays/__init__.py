@@ -1,0 +1,1 @@
+"""Gross errors that only the strip as a whole can show."""

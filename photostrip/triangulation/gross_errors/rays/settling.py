@@ -1,0 +1,207 @@
+"""The strip formed, judged and formed again, until what is left out no longer changes.
+
+Source: derived; see docs/sources.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import GeometryError
+from photostrip.triangulation.gross_errors.pairs.zones import MINIMUM_LEFT
+from photostrip.triangulation.gross_errors.rays import strip_screening
+from photostrip.triangulation.gross_errors.rays.strip_screening import SEVERAL, Layout, Scene, Verdict
+from photostrip.triangulation.relative_orientation import relative
+from photostrip.triangulation.strip_formation import formation, non_neighbours
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.points import PhotoPoints
+    from photostrip.triangulation.gross_errors.pairs.screening import Rejection
+    from photostrip.triangulation.relative_orientation.relative import Orientation
+    from photostrip.triangulation.strip_formation.formation import FormedStrip
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+    Flags = NDArray[np.bool_]
+
+PASSES = 4  # most of the strips settle in the second
+STILL = 5e-4  # rad, and relative: the second order of such a change is 0.04 µm on a photo of 150 mm
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What a strip is formed from, beside its oriented pairs.
+
+    Parameters
+    ----------
+    observations : PhotoPoints
+        Image points.
+    photos : sequence of str
+        Photos of the strip in flight order.
+    weight : ndarray, shape (m,)
+        Weights of the pairs' rows before anything was rejected.
+    sigma : ndarray, shape (p,)
+        Standard deviations of a y parallax of weight one in each pair, mm.
+    stated : float
+        Stated standard deviation of an image coordinate, mm.
+    kept : ndarray of int
+        Rows of the observations that the user keeps.
+    """
+
+    observations: PhotoPoints
+    photos: Sequence[str]
+    weight: Floats
+    sigma: Floats
+    stated: float
+    kept: Numbers
+
+
+def settle(
+    oriented: Orientation, measured: Measured, settings: formation.Settings, *, readmit: bool
+) -> tuple[Orientation, FormedStrip, Verdict]:
+    """Form a strip, leave out what its points contradict, take back what they confirm, and form it again.
+
+    Parameters
+    ----------
+    oriented : Orientation
+        Pairs as their own search for gross errors leaves them.
+    measured : Measured
+        Measurements.
+    settings : formation.Settings
+        Form of the scale transfer.
+    readmit : bool
+        Whether points that a pair rejected may be taken back.
+
+    Returns
+    -------
+    Orientation
+        The pairs with what the strip decided.
+    FormedStrip
+        The strip; points without a ray left are gone.
+    Verdict
+        What was left out.
+
+    Raises
+    ------
+    GeometryError
+        When a joint is broken.
+    """
+    of_pairs = oriented
+    layout = Layout.of(oriented, measured.observations, measured.photos)
+    suspected = np.zeros(0, np.intp)
+    verdict: Verdict | None = None
+    aside = np.zeros(len(oriented.point), bool)
+    moved: Flags | None = None
+    formed = formation.form(oriented, settings, measured.photos, measured.sigma)
+    for _ in range(PASSES):
+        scene = Scene(oriented, formed, measured.observations, layout, measured.sigma, measured.stated)
+        suspected = np.union1d(suspected, strip_screening.suspects(scene)).astype(np.intp)
+        verdict = strip_screening.examine(scene, suspected, measured.kept, verdict, moved)
+        used, outside = _uses(of_pairs, verdict, readmit=readmit)
+        if (used == oriented.used).all() and (outside == aside).all():
+            break
+        before = oriented, formed
+        try:
+            oriented, formed = _formed_again(before, used, (aside, outside), measured, settings)
+        except GeometryError:
+            break  # nothing would join two models: what joined them before stays
+        aside, moved = outside, _moved(before, (oriented, formed))
+    formed, verdict = formation.without(formed, oriented, aside), verdict or Verdict()
+    return oriented, _bridged(formed, oriented, measured, verdict), verdict
+
+
+def _formed_again(
+    before: tuple[Orientation, FormedStrip],
+    used: Flags,
+    asides: tuple[Flags, Flags],
+    measured: Measured,
+    settings: formation.Settings,
+) -> tuple[Orientation, FormedStrip]:
+    """Orient the pairs whose points changed, and form the strip from there."""
+    oriented, formed = before
+    aside, outside = asides
+    pair = oriented.pairs.pair
+    changed = np.unique(pair[used != oriented.used])
+    touched = np.zeros(oriented.pairs.size, bool)
+    touched[changed] = touched[pair[aside != outside]] = True
+    if len(changed):
+        oriented = relative.refine(oriented, np.where(used, measured.weight, 0.0), changed)
+    earlier = formed, touched
+    return oriented, formation.form(oriented, settings, measured.photos, measured.sigma, outside, earlier)
+
+
+def _moved(before: tuple[Orientation, FormedStrip], after: tuple[Orientation, FormedStrip]) -> Flags:
+    """Find the models that have been turned or stretched noticeably."""
+    (old, formed), (new, again) = before, after
+    turned: Flags = np.asarray(np.abs(new.elements - old.elements).max(axis=1) > STILL, bool)
+    stretched = np.abs(again.junctions.factor / formed.junctions.factor - 1) > STILL
+    return np.asarray(turned | np.append(stretched, False) | np.append(False, stretched), bool)
+
+
+def _bridged(formed: FormedStrip, oriented: Orientation, measured: Measured, verdict: Verdict) -> FormedStrip:
+    """Add the points whose good rays come from photos that are no neighbours."""
+    placed = np.zeros(len(measured.observations.point_ids), bool)
+    placed[formed.point] = True
+    gone = verdict.judged[~placed[verdict.judged]]
+    if not len(gone):
+        return formed
+    missing = np.isin(oriented.point, gone)
+    good = np.setdiff1d(oriented.rows[missing], verdict.wrong)
+    return non_neighbours.bridge(formed, measured.observations, measured.photos, oriented.pairs.focal, good)
+
+
+def _uses(of_pairs: Orientation, verdict: Verdict, *, readmit: bool) -> tuple[Flags, Flags]:
+    """Rows of the pairs' table that orient their pair, and those of them that must not place their point.
+
+    Where it cannot be told which of several rays is wrong, those pairs that found nothing wrong keep the point: its
+    y parallaxes are good, its place is not.
+    """
+    if not len(verdict.judged):
+        return of_pairs.used, np.zeros(len(of_pairs.point), bool)
+    flags = np.zeros(int(of_pairs.point.max()) + 1, bool)
+    flags[verdict.judged] = True
+    judged = flags[of_pairs.point]
+    wrong, unclear = np.zeros((2, int(of_pairs.rows.max()) + 1), bool)
+    wrong[verdict.wrong] = True
+    several = np.array([kind == SEVERAL for kind in verdict.kind], bool)
+    unclear[verdict.wrong[several & verdict.across]] = True
+    gone, aside = (np.asarray(each[of_pairs.rows].any(axis=1), bool) for each in (wrong, unclear))
+    used = np.where(judged, np.where(aside, of_pairs.used, ~gone), of_pairs.used)
+    if not readmit:
+        used &= of_pairs.used
+    return _supported(of_pairs, used), aside
+
+
+def _supported(of_pairs: Orientation, used: Flags) -> Flags:
+    """Let pairs that would lose too many points keep those of their own search."""
+    pairs = of_pairs.pairs
+    left = pairs.sums(used.astype(float))
+    had = pairs.sums(of_pairs.used.astype(float))
+    poor = (left < np.minimum(MINIMUM_LEFT, had))[pairs.pair]
+    result: Flags = np.where(poor, of_pairs.used, used)
+    return result
+
+
+def taken_back(rejections: Sequence[Rejection], used: Flags) -> tuple[Rejection, ...]:
+    """Mark the rejections of pairs that the strip took back.
+
+    Parameters
+    ----------
+    rejections : sequence of Rejection
+        Log of the pairs.
+    used : ndarray of bool, shape (m,)
+        Rows of the pairs' table that are used in the end.
+
+    Returns
+    -------
+    tuple of Rejection
+        The same, re-admitted ones marked.
+    """
+    return tuple(replace(each, readmitted=bool(used[each.row])) for each in rejections)

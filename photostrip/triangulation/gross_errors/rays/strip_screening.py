@@ -1,0 +1,438 @@
+"""Wrong rays by the evidence of the whole strip: every point judged by all its rays, on photos that all others orient.
+
+A pair sees y parallaxes only, and an error in a corner zone can make a good point look wrong. A point on three photos
+says more: its y parallaxes in two pairs, and whether both models put it at one place. So wherever a pair or a
+joint had to reject something, windows of the strip are adjusted with all their measurements, those rejected before
+included: first with weights that fall with the misclosure, then with those points that agree. Each point is predicted
+by an adjustment without it. What contradicts the prediction is left out, what agrees is taken back.
+
+What a point's rays say of each other is judged in ``ray_decisions``.
+
+Source: derived; see docs/sources.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.triangulation.gross_errors.rays import window_adjustment, window_points, windows
+from photostrip.triangulation.gross_errors.rays.ray_decisions import GOOD, NONE, PAIR, RAY, RAYS, Decision, decide
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.points import PhotoPoints
+    from photostrip.triangulation.gross_errors.rays.window_adjustment import Solved
+    from photostrip.triangulation.gross_errors.rays.window_points import Group
+    from photostrip.triangulation.gross_errors.rays.windows import Rays
+    from photostrip.triangulation.relative_orientation.relative import Orientation
+    from photostrip.triangulation.strip_formation.formation import FormedStrip
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+    Flags = NDArray[np.bool_]
+
+LONGEST_REACH = 8  # photos; windows do not grow for points that reach over more
+BATCH = 48  # windows solved together
+ABSOLUTE_STEPS, WELSCH_STEPS = 15, 8
+WELSCH = 3.0  # standard deviations
+STILL = 0.3  # standard deviations; the robust start is to find wrong points, not digits
+LEAST_WEIGHT = 1e-9  # keeps a photo in its window
+ROUNDS = 12
+TOLD, BOTH, SEVERAL = "ray", "pair", "rays"
+"""What was found at a point: its wrong ray; two rays that contradict each other; several of which any may be wrong."""
+KINDS = {GOOD: SEVERAL, RAY: TOLD, PAIR: BOTH, RAYS: SEVERAL, NONE: SEVERAL}
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What the strip says about the points it was asked about.
+
+    Parameters
+    ----------
+    judged : ndarray of int, shape (j,)
+        Points that were judged.
+    wrong : ndarray of int, shape (c,)
+        Rows of the observations that must not be used.
+    point : ndarray of int, shape (c,)
+        Their points.
+    kind : tuple of str
+        Why: ``TOLD``, ``BOTH`` or ``SEVERAL``.
+    value, limit : ndarray, shape (c,)
+        Test value of the point with all its rays, as the root of a sum of squares, and its critical value.
+    size : ndarray, shape (c, 2)
+        Estimated errors of the image coordinates, mm; NaN where nothing can be said.
+    across : ndarray of bool, shape (c,)
+        Whether the y parallaxes of the point are good: it may orient pairs, but has no place.
+    """
+
+    judged: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))
+    wrong: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))
+    point: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))
+    kind: tuple[str, ...] = ()
+    value: Floats = field(default_factory=lambda: np.zeros(0))
+    limit: Floats = field(default_factory=lambda: np.zeros(0))
+    size: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+    across: Flags = field(default_factory=lambda: np.zeros(0, bool))
+
+    def of(self, points: Flags) -> Verdict:
+        """Give what was found of some points, a flag for each point of the observations."""
+        here = points[self.point]
+        kind = tuple(each for each, yes in zip(self.kind, here.tolist(), strict=True) if yes)
+        rows = (getattr(self, name)[here] for name in ("value", "limit", "size", "across"))
+        return Verdict(self.judged[points[self.judged]], self.wrong[here], self.point[here], kind, *rows)
+
+    def joined(self, other: Verdict) -> Verdict:
+        """Give both together; they know different points."""
+        order = np.argsort(np.concatenate([self.wrong, other.wrong]), kind="stable")
+        names = ("wrong", "point", "value", "limit", "size", "across")
+        rows = {name: np.concatenate([getattr(self, name), getattr(other, name)])[order] for name in names}
+        kind = self.kind + other.kind
+        return Verdict(np.union1d(self.judged, other.judged), kind=tuple(kind[number] for number in order), **rows)
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Where the image points of a strip are, whatever becomes of them.
+
+    Parameters
+    ----------
+    position : ndarray of int, shape (n,)
+        Place in the strip of the photo of every image point; -1 for photos of other strips.
+    paired : ndarray of bool, shape (n,)
+        Whether an image point stands in a pair.
+    begin, last : ndarray of int, shape (q,)
+        First and last photo of each point in pairs; the last is -1 for points of no pair.
+    """
+
+    position: Numbers
+    paired: Flags
+    begin: Numbers
+    last: Numbers
+
+    @classmethod
+    def of(cls, orientation: Orientation, observations: PhotoPoints, photos: Sequence[str]) -> Layout:
+        """Look up where everything is."""
+        place = {photo: number for number, photo in enumerate(photos)}
+        position = np.array([place.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo]
+        paired = np.zeros(len(position), bool)
+        paired[orientation.rows] = True
+        begin = np.full(len(observations.point_ids), len(photos))
+        last = np.full(len(begin), -1)
+        # the table is ordered by pair: of several the last one written stays
+        begin[orientation.point[::-1]] = orientation.pairs.pair[::-1]
+        last[orientation.point] = orientation.pairs.pair + 1
+        return cls(position, paired, begin, last)
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A formed strip and its measurements.
+
+    Parameters
+    ----------
+    orientation : Orientation
+        Oriented pairs.
+    formed : FormedStrip
+        The strip formed from them.
+    observations : PhotoPoints
+        Image points.
+    layout : Layout
+        Where they are.
+    sigma : ndarray, shape (p,)
+        Standard deviations of a y parallax of weight one in each pair, mm.
+    stated : float
+        Standard deviation of an image coordinate of weight one, mm.
+    """
+
+    orientation: Orientation
+    formed: FormedStrip
+    observations: PhotoPoints
+    layout: Layout
+    sigma: Floats
+    stated: float
+
+    @property
+    def photos(self) -> int:
+        """Number of photos of the strip."""
+        return len(self.formed.centers)
+
+
+def suspects(scene: Scene) -> Numbers:
+    """Points that were rejected in a pair or at a joint, or stand on one of two photos only."""
+    oriented, junctions = scene.orientation, scene.formed.junctions
+    out = oriented.point[~oriented.used]
+    return np.union1d(out, junctions.point[~junctions.used]).astype(np.intp)
+
+
+def collect(scene: Scene, wanted: Flags | None = None) -> Rays:
+    """Collect and linearise the rays of the points that have a place in the strip.
+
+    Parameters
+    ----------
+    scene : Scene
+        The strip.
+    wanted : ndarray of bool, shape (photos,), optional
+        Photos whose rays are wanted; all by default.
+
+    Returns
+    -------
+    Rays
+        Ordered by point and photo; points with one ray are left out.
+    """
+    o, layout = scene.observations, scene.layout
+    inside = layout.paired if wanted is None else layout.paired & np.append(wanted, False)[layout.position]
+    row = np.flatnonzero(inside)
+    row = row[np.lexsort((layout.position[row], o.point[row]))]
+    photo, point = layout.position[row], np.asarray(o.point[row], np.intp)
+    factor = scene.sigma / (np.sqrt(2.0) * scene.stated)
+    by_photo = np.maximum(np.append(factor, factor[-1]), np.append(factor[0], factor))
+    image = o.xy[row], o.sigma[row] * by_photo[photo, None], scene.orientation.pairs.focal
+    rays = _best_start(scene, (row, photo, point), image)
+    sound = np.isfinite(rays.misfit).all(axis=1) & np.isfinite(rays.by_photo).all(axis=(1, 2))
+    several = np.bincount(rays.point[sound], minlength=len(o.point_ids)) > 1
+    return rays.take(np.flatnonzero(sound & several[rays.point]))
+
+
+def _best_start(scene: Scene, place: tuple[Numbers, Numbers, Numbers], image: tuple[Floats, Floats, float]) -> Rays:
+    """Linearise at that of the places of each point, one from each model, with which most of its rays agree."""
+    oriented, formed = scene.orientation, scene.formed
+    photos = formed.centers, formed.rotations
+    new = np.diff(place[2], prepend=-1) > 0
+    number = np.full(len(scene.observations.point_ids), -1)
+    number[place[2][new]] = np.arange(new.sum())
+    known = np.flatnonzero((number[oriented.point] >= 0) & np.isfinite(formed.model_xyz[:, 0]))
+    known = known[np.argsort(oriented.point[known], kind="stable")]  # the table is ordered by pair
+    point, of_ray = number[oriented.point[known]], number[place[2]]
+    slot = np.arange(len(known)) - np.searchsorted(point, point)
+    best = np.full((int(new.sum()), 3), np.nan)
+    cost = np.full(len(best), np.inf)
+    for count in range(int(slot.max(initial=-1)) + 1):
+        here = slot == count
+        candidate = np.full(best.shape, np.nan)
+        candidate[point[here]] = formed.model_xyz[known[here]]
+        rays = windows.linearise(place, image, photos, candidate[of_ray])
+        size = np.minimum(np.nan_to_num(np.abs(rays.misfit).max(axis=1), nan=np.inf), 1e6)
+        total = np.bincount(of_ray, np.sqrt(size), len(best))
+        better = np.isfinite(candidate[:, 0]) & (total < cost)
+        best[better], cost[better] = candidate[better], total[better]
+    return windows.linearise(place, image, photos, best[of_ray])
+
+
+def examine(
+    scene: Scene, points: Numbers, kept: Numbers, earlier: Verdict | None = None, moved: Flags | None = None
+) -> Verdict:
+    """Judge all points near some suspected ones.
+
+    Parameters
+    ----------
+    scene : Scene
+        The strip.
+    points : ndarray of int
+        Points that are suspected.
+    kept : ndarray of int
+        Rows of the observations that the user keeps: their points are not judged.
+    earlier : Verdict, optional
+        What was said of the same strip before its last small change.
+    moved : ndarray of bool, shape (p,), optional
+        Models that this change has turned or stretched by more than the adjustment of a window is linear for; what was
+        said where there is none stands. All by default.
+
+    Returns
+    -------
+    Verdict
+        What must not be used, and which points were judged at all.
+    """
+    if not len(points):
+        return Verdict()
+    begin, last = scene.layout.begin, scene.layout.last
+    seen = last >= 0
+    reach = int(min((last - begin)[seen].max(initial=1), LONGEST_REACH)) + 1
+    first = windows.starts(scene.photos, reach)
+    length = min(windows.size_of(reach)[0], scene.photos)
+    home = np.full(len(begin), -1)
+    home[seen] = windows.homes((begin + last)[seen] / 2, first, reach)
+    at = np.unique(home[points])
+    if earlier is None:
+        return _examined(scene, (first[at], length), (home, at), kept, None)
+    if moved is not None:
+        before = np.concatenate([[0], np.cumsum(moved)])
+        quiet = before[first + length - 1] == before[first]
+        at = at[~(quiet[at] & np.isin(at, home[earlier.judged]))]
+    if not len(at):
+        return earlier
+    fresh = _examined(scene, (first[at], length), (home, at), kept, earlier)
+    return earlier.of(~np.isin(home, at)).joined(fresh)
+
+
+def _examined(
+    scene: Scene, place: tuple[Numbers, int], homes: tuple[Numbers, Numbers], kept: Numbers, earlier: Verdict | None
+) -> Verdict:
+    """Judge the points at home in some windows, given by first photos and length."""
+    first, length = place
+    home, at = homes
+    wanted = np.zeros(scene.photos, bool)
+    wanted[np.minimum(first[:, None] + np.arange(length), len(wanted) - 1)] = True
+    rays = collect(scene, wanted)
+    out = np.zeros(len(scene.observations), bool)
+    if earlier is not None:
+        out[earlier.wrong] = True
+    found: list[Decision] = []
+    for part in range(0, len(at), BATCH):
+        groups = window_points.groups(rays, first[part : part + BATCH], length)
+        start = None if earlier is None else [np.where(out[rays.row[group.ray]], 0.0, 1.0) for group in groups]
+        batch = at[part : part + BATCH]
+        decisions = _adjusted(groups, len(batch), length, start)
+        found += [each.take(home[rays.point[each.group.ray[:, 0]]] == batch[each.group.window]) for each in decisions]
+    return _verdict(scene, rays, found, kept)
+
+
+def _adjusted(groups: list[Group], count: int, length: int, start: list[Floats] | None) -> list[Decision]:
+    """Adjust windows and judge their points, until the points that take part are those that agree.
+
+    Without weights of the rays to start from, which an earlier judgement gives, the start is a robust one.
+    """
+    number = np.sum([np.bincount(group.window, minlength=count) for group in groups], axis=0)
+    if start is None:
+        solved = _robust(groups, count, length)
+        found = [decide(group, window_adjustment.expected(group, solved), number) for group in groups]
+    else:
+        found = _judged(groups, start, number, length)
+        if all((each.weight == weight).all() for each, weight in zip(found, start, strict=True)):
+            return found  # those that were left out before are left out again
+    state = [_State(each, each.weight, *(np.zeros(each.weight.shape, bool) for _ in range(2))) for each in found]
+    for _ in range(ROUNDS):
+        judged = _judged(groups, [each.weight for each in state], number, length)
+        worst = np.zeros(count)
+        for old, new in zip(state, judged, strict=True):
+            np.maximum.at(worst, old.group.window, np.where(old.loses(new), new.value / new.limit, 0.0))
+        fresh = [old.after(new, worst) for old, new in zip(state, judged, strict=True)]
+        settled = all((new.weight == old.weight).all() for new, old in zip(fresh, state, strict=True))
+        state = fresh
+        if settled:
+            break
+    return [each.decided for each in state]
+
+
+def _judged(groups: list[Group], weights: list[Floats], number: Numbers, length: int) -> list[Decision]:
+    """Adjust windows with the rays that count, and judge each point by an adjustment without it."""
+    solved = _least_squares(groups, weights, len(number), length)
+    parts = zip(groups, weights, strict=True)
+    return [decide(group, window_adjustment.without(group, weight, solved), number) for group, weight in parts]
+
+
+@dataclass(frozen=True, eq=False)
+class _State:
+    """Decisions on the points of a group from round to round.
+
+    Wrong points that take part make good ones look wrong: of the points that should go only the worst of a window goes
+    in a round. Two wrong points can each agree with all others and not with each other: what came back once
+    and had to go again stays out.
+    """
+
+    decision: Decision
+    weight: Floats
+    returned: Flags
+    barred: Flags
+
+    @property
+    def group(self) -> Group:
+        return self.decision.group
+
+    @property
+    def decided(self) -> Decision:
+        return replace(self.decision, weight=self.weight)
+
+    def loses(self, fresh: Decision) -> Flags:
+        """Whether points lose a ray that takes part."""
+        return np.asarray((fresh.weight < self.weight).any(axis=1), bool)
+
+    def after(self, fresh: Decision, worst: Floats) -> _State:
+        """Give the state after one more round."""
+        spared = np.asarray(self.loses(fresh) & (fresh.value / fresh.limit < worst[self.group.window]), bool)
+        barred = self.barred | (self.returned & (fresh.weight < self.weight) & ~spared[:, None])
+        weight = np.where(barred, 0.0, np.where(spared[:, None], self.weight, fresh.weight))
+        # what stays as it was against the new decision keeps the reason for which it was
+        old = np.asarray((weight != fresh.weight).any(axis=1) & (self.weight == weight).all(axis=1), bool)
+        merged = replace(
+            fresh,
+            value=np.where(old, self.decision.value, fresh.value),
+            size=np.where(old[:, None, None], self.decision.size, fresh.size),
+            kind=np.where(old, self.decision.kind, fresh.kind),
+        )
+        return _State(merged, weight, self.returned | (weight > self.weight), barred)
+
+
+def _robust(groups: list[Group], count: int, length: int) -> Solved:
+    """Adjust windows with weights of the conditions that fall with their misclosures."""
+    parts = [(group, group.design, group.closing) for group in groups]
+    conditions = window_adjustment.stacked(parts, count, length)
+    left = conditions.left(conditions.estimate(np.ones(conditions.misfit.shape)))
+    for steps, weights in ((ABSOLUTE_STEPS, _absolute), (WELSCH_STEPS, _welsch)):
+        going, part = np.arange(count), conditions
+        for _ in range(steps):
+            now = part.left(part.estimate(weights(left[going])))
+            moving = np.abs(now - left[going]).max(axis=1) >= STILL
+            left[going] = now
+            going, part = going[moving], part.take(moving)
+            if not len(going):
+                break
+    return conditions.solved(_welsch(left))
+
+
+def _absolute(left: Floats) -> Floats:
+    """Weights that minimise absolute misclosures beyond one standard deviation."""
+    return np.asarray(1 / np.maximum(left, 1.0), float)
+
+
+def _welsch(left: Floats) -> Floats:
+    """Weights that forget what lies far away."""
+    return np.asarray(np.exp(-((left / WELSCH) ** 2)) + LEAST_WEIGHT, float)
+
+
+def _least_squares(groups: list[Group], weights: list[Floats], count: int, length: int) -> Solved:
+    """Adjust windows with the rays that count."""
+    parts = []
+    for group, weight in zip(groups, weights, strict=True):
+        whole = np.asarray(weight.all(axis=1), bool)
+        some = np.asarray(~whole & weight.any(axis=1), bool)
+        if whole.any():
+            conditions = group.independent[whole]  # of points that lack a ray too: they change from round to round
+            parts.append((group.take(whole), conditions[:, :, :-1], conditions[:, :, -1]))
+        if some.any():
+            part = group.take(some)
+            parts.append((part, *window_adjustment.projected(part, weight[some])))
+    found = window_adjustment.stacked(parts, count, length)
+    return found.solved(np.ones(found.misfit.shape))
+
+
+def _verdict(scene: Scene, rays: Rays, found: list[Decision], kept: Numbers) -> Verdict:
+    """Put what was found about all points into one list, by rows of the observations."""
+    spared = np.unique(scene.observations.point[kept])
+    judged, columns = [], []
+    for each in found:
+        point = rays.point[each.group.ray[:, 0]]
+        free = ~np.isin(point, spared)
+        judged.append(point[free])
+        place, number = np.nonzero((each.weight == 0) & free[:, None])
+        ray = each.group.ray[place, number]
+        size = each.size[place, number] * rays.sigma[ray]
+        columns.append((rays.row[ray], each.kind[place], each.value[place], each.limit[place], size))
+    rows, kind, value, limit, size = (np.concatenate(each) for each in zip(*columns, strict=True))
+    order = np.argsort(rows, kind="stable")
+    rows = np.asarray(rows[order], np.intp)
+    return Verdict(
+        np.unique(np.concatenate(judged)).astype(np.intp),
+        rows,
+        np.asarray(scene.observations.point[rows], np.intp),
+        tuple(KINDS[int(each)] for each in kind[order]),
+        value[order],
+        limit[order],
+        size[order],
+        kind[order] == RAYS,
+    )

@@ -1,0 +1,230 @@
+"""Points of windows: what the rays of a point demand of their photos, the point itself eliminated.
+
+Points with equally many rays stand together in arrays. What their rays demand does not change from adjustment to
+adjustment and is computed once.
+
+Source: derived; see docs/sources.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.triangulation.gross_errors.rays.windows import FEWEST, PARAMETERS
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.triangulation.gross_errors.rays.windows import Rays
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+    Flags = NDArray[np.bool_]
+
+CONCORDANT = 1e-9  # smallest share of a condition that the others do not hold already
+KEPT = (
+    "basis",
+    "design",
+    "closing",
+    "gram",
+    "independent",
+)  # of a group, what is not computed again for some of its points
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Points with equally many rays in their window.
+
+    Parameters
+    ----------
+    window : ndarray of int, shape (k,)
+        Window of each point, counted within the batch.
+    ray : ndarray of int, shape (k, r)
+        Rays of the point, in flight order.
+    column : ndarray of int, shape (k, r)
+        Place of their photos in the window.
+    by_point : ndarray, shape (k, 2r, 3)
+        Derivatives of all coordinates by the point.
+    by_photo : ndarray, shape (k, 2r, 6r)
+        Derivatives by the photos of the point, one after the other.
+    misfit : ndarray, shape (k, 2r)
+        Measured minus computed.
+    """
+
+    window: Numbers
+    ray: Numbers
+    column: Numbers
+    by_point: Floats
+    by_photo: Floats
+    misfit: Floats
+
+    def take(self, rows: Flags) -> Group:
+        """Give some of the points."""
+        part = Group(
+            self.window[rows],
+            self.ray[rows],
+            self.column[rows],
+            self.by_point[rows],
+            self.by_photo[rows],
+            self.misfit[rows],
+        )
+        part.__dict__.update({name: self.__dict__[name][rows] for name in KEPT if name in self.__dict__})
+        return part
+
+    @property
+    def parameters(self) -> Numbers:
+        """Place of the parameters of its photos among those of the window, shape (k, 6r)."""
+        found: Numbers = (PARAMETERS * self.column[:, :, None] + np.arange(PARAMETERS)).reshape(len(self.window), -1)
+        return found
+
+    @cached_property
+    def basis(self) -> Floats:
+        """Conditions that do not feel the point, out of its coordinates; see ``coplanarities``."""
+        return coplanarities(self)
+
+    @cached_property
+    def design(self) -> Floats:
+        """Derivatives of those conditions by the photos of the point, shape (k, 2r - 3, 6r)."""
+        return np.asarray(self.basis @ self.by_photo, float)
+
+    @cached_property
+    def closing(self) -> Floats:
+        """Their misclosures, shape (k, 2r - 3)."""
+        return np.asarray((self.basis @ self.misfit[:, :, None])[:, :, 0], float)
+
+    @cached_property
+    def gram(self) -> Floats:
+        """Their cofactors, shape (k, 2r - 3, 2r - 3)."""
+        return np.asarray(self.basis @ self.basis.transpose(0, 2, 1), float)
+
+    @cached_property
+    def independent(self) -> Floats:
+        """The same as precise as coordinates and uncorrelated: derivatives, then misclosures, (k, 2r - 3, 6r + 1)."""
+        root = np.linalg.cholesky(self.gram + CONCORDANT * np.eye(self.gram.shape[1]))
+        joined = np.concatenate([self.design, self.closing[:, :, None]], axis=2)
+        return np.asarray(np.linalg.solve(root, joined), float)
+
+
+def groups(rays: Rays, first: Numbers, length: int) -> list[Group]:
+    """Sort the rays of some windows by point, and the points by their number of rays.
+
+    Parameters
+    ----------
+    rays : Rays
+        Rays of the strip, ordered by point and photo.
+    first : ndarray of int, shape (w,)
+        First photo of each window.
+    length : int
+        Photos in a window.
+
+    Returns
+    -------
+    list of Group
+        Points with two rays, with three and so on; points with one ray in a window are left out.
+    """
+    inside = (rays.photo >= first[:, None]) & (rays.photo < first[:, None] + length)
+    window, ray = np.nonzero(inside)
+    key = window * (int(rays.point.max(initial=0)) + 1) + rays.point[ray]
+    begin = np.flatnonzero(np.diff(key, prepend=-1))
+    count = np.diff(np.append(begin, len(key)))
+    found = []
+    for r in np.unique(count[count > 1]).tolist():
+        place = begin[count == r, None] + np.arange(r)
+        of_point, own = ray[place], window[begin[count == r]]
+        k = len(own)
+        design = np.zeros((k, r, 2, r, PARAMETERS))
+        design[:, range(r), :, range(r), :] = rays.by_photo[of_point].transpose(1, 0, 2, 3)
+        found.append(
+            Group(
+                own,
+                of_point,
+                rays.photo[of_point] - first[own, None],
+                rays.by_point[of_point].reshape(k, 2 * r, 3),
+                design.reshape(k, 2 * r, PARAMETERS * r),
+                rays.misfit[of_point].reshape(k, 2 * r),
+            )
+        )
+    return found
+
+
+def projectors(group: Group, weight: Floats) -> Floats:
+    """Matrices that take the point out of its weighted rays.
+
+    Parameters
+    ----------
+    group : Group
+        Points.
+    weight : ndarray, shape (k, r)
+        1 for a ray that counts, 0 for one that does not; a point needs two.
+
+    Returns
+    -------
+    ndarray, shape (k, 2r, 2r)
+        Projections P with P A = 0, A the derivatives by the point; zero for a point with fewer than two rays.
+    """
+    root = np.repeat(weight, 2, axis=1)[:, :, None]
+    design = group.by_point * root
+    normal = design.transpose(0, 2, 1) @ design
+    enough = weight.sum(axis=1) >= FEWEST
+    normal[~enough] = np.eye(3)
+    inside = design @ np.linalg.solve(normal, design.transpose(0, 2, 1))
+    matrix = np.eye(design.shape[1]) * root - inside
+    matrix[~enough] = 0.0
+    return np.asarray(matrix, float)
+
+
+def coplanarities(group: Group) -> Floats:
+    """Conditions of rays of neighbouring photos, then what more the rays of a point demand.
+
+    An error along the base leaves the first r - 1 alone, which are y parallaxes.
+
+    Parameters
+    ----------
+    group : Group
+        Points with r rays.
+
+    Returns
+    -------
+    ndarray, shape (k, 2r - 3, 2r)
+        Rows of unit length: r - 1 coplanarities, then r - 2 rows across them and each other.
+    """
+    k, coordinates = group.misfit.shape
+    r = coordinates // 2
+    result = np.zeros((k, 2 * r - 3, 2 * r))
+    for number in range(r - 1):
+        row = _across(group.by_point[:, 2 * number : 2 * number + 4])
+        result[:, number, 2 * number : 2 * number + 4] = row / np.maximum(
+            np.linalg.norm(row, axis=1, keepdims=True), 1e-300
+        )
+    if r > FEWEST:
+        pairs = result[:, : r - 1]
+        gram = pairs @ pairs.transpose(0, 2, 1) + CONCORDANT * np.eye(r - 1)
+        rest = projectors(group, np.ones((k, r))) - pairs.transpose(0, 2, 1) @ np.linalg.solve(gram, pairs)
+        for number in range(r - 1, 2 * r - 3):
+            result[:, number] = row = _longest(rest)
+            rest = rest - row[:, :, None] * row[:, None, :]
+    return result
+
+
+def _across(slopes: Floats) -> Floats:
+    """Row at right angles to three columns of length four, by minors; shape (k, 4) of (k, 4, 3)."""
+    a, b, c, d = slopes.transpose(1, 2, 0)
+    first, last = _cross(a, b), _cross(c, d)
+    minors = [(b * last).sum(axis=0), -(a * last).sum(axis=0), (d * first).sum(axis=0), -(c * first).sum(axis=0)]
+    return np.stack(minors, axis=1)
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    """Cross products of columns, shape (3, k)."""
+    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+def _longest(projection: Floats) -> Floats:
+    """Give a unit vector inside the range of each projection, its longest column; shape (k, c) of (k, c, c)."""
+    place = np.diagonal(projection, axis1=1, axis2=2).argmax(axis=1)
+    column = projection[np.arange(len(projection)), :, place]
+    return np.asarray(column / np.maximum(np.linalg.norm(column, axis=1, keepdims=True), 1e-300), float)

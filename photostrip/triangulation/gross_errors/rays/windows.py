@@ -1,0 +1,143 @@
+"""Windows of a strip: a few neighbouring photos adjusted together, all rays of their points at once.
+
+What photos far away say about a ray is lost in the strip's deformation; three photos on either side say nearly
+everything. A window is a free network: its photos and points hang together, its place and scale do not matter. The
+adjustment is linear, about a strip that has been formed. Points are eliminated
+(``window_points``); what a point's rays demand of their photos is adjusted
+(``window_adjustment``).
+
+Windows are solved in batches: the arrays of a batch have the window as their first axis.
+
+Source: derived; see docs/sources.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.geometry.rotation import cross_matrix
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+    Flags = NDArray[np.bool_]
+
+PARAMETERS = 6  # of a photo: shift of its centre, rotation
+FEWEST = 2  # rays
+
+
+@dataclass(frozen=True, eq=False)
+class Rays:
+    """Image points of a strip, linearised, in units of their standard deviations.
+
+    Parameters
+    ----------
+    row : ndarray of int, shape (n,)
+        Row in the observations.
+    photo : ndarray of int, shape (n,)
+        Place of the photo in the strip.
+    point : ndarray of int, shape (n,)
+        Number of the point.
+    by_point : ndarray, shape (n, 2, 3)
+        Derivatives of the image coordinates by the point.
+    by_photo : ndarray, shape (n, 2, 6)
+        Derivatives by shift and rotation of the photo.
+    misfit : ndarray, shape (n, 2)
+        Measured minus computed.
+    sigma : ndarray, shape (n, 2)
+        Standard deviations of the image coordinates, mm.
+    """
+
+    row: Numbers
+    photo: Numbers
+    point: Numbers
+    by_point: Floats
+    by_photo: Floats
+    misfit: Floats
+    sigma: Floats
+
+    def take(self, rows: Numbers) -> Rays:
+        """Give some of the rays."""
+        return Rays(
+            self.row[rows],
+            self.photo[rows],
+            self.point[rows],
+            self.by_point[rows],
+            self.by_photo[rows],
+            self.misfit[rows],
+            self.sigma[rows],
+        )
+
+
+def linearise(
+    place: tuple[Numbers, Numbers, Numbers],
+    image: tuple[Floats, Floats, float],
+    photos: tuple[Floats, Floats],
+    xyz: Floats,
+) -> Rays:
+    """Linearise the collinearity equations of rays.
+
+    Parameters
+    ----------
+    place : tuple of ndarray of int, shape (n,)
+        Row, photo and point of each ray.
+    image : tuple
+        Image coordinates (n, 2) in mm, their standard deviations (n, 2) in mm, principal distance in mm.
+    photos : tuple of ndarray
+        Perspective centres (m, 3) and rotations (m, 3, 3), photo to strip.
+    xyz : ndarray, shape (n, 3)
+        Approximate position of the point of each ray, strip coordinates.
+
+    Returns
+    -------
+    Rays
+        The rays; not finite where a point lies behind its camera.
+    """
+    row, photo, point = place
+    xy, sigma, focal = image
+    centers, rotations = photos
+    turn = rotations[photo]
+    u = np.einsum("nji,nj->ni", turn, xyz - centers[photo])
+    with np.errstate(all="ignore"):
+        depth = np.where(u[:, 2] < 0, -u[:, 2], np.nan)
+        computed = focal * u[:, :2] / depth[:, None]
+        slope = np.zeros((len(u), 2, 3))
+        slope[:, 0, 0] = slope[:, 1, 1] = focal / depth
+        slope[:, :, 2] = computed / depth[:, None]
+        slope /= sigma[:, :, None]
+        by_point = np.einsum("nik,njk->nij", slope, turn)
+        by_photo = np.empty((len(u), 2, PARAMETERS))
+        by_photo[:, :, :3] = -by_point
+        by_photo[:, :, 3:] = slope @ cross_matrix(u)
+        misfit = (xy - computed) / sigma
+    return Rays(row, photo, point, by_point, by_photo, misfit, sigma)
+
+
+def size_of(reach: int) -> tuple[int, int]:
+    """Photos in a window and from window to window, for points that reach over so many photos."""
+    return 2 * reach + 4, reach + 1
+
+
+def starts(photos: int, reach: int) -> Numbers:
+    """First photos of the windows that cover a strip."""
+    length, step = size_of(reach)
+    if photos <= length:
+        return np.zeros(1, np.intp)
+    return np.unique(np.minimum(np.arange(0, photos - length + step, step), photos - length)).astype(np.intp)
+
+
+def homes(middle: Floats, first: Numbers, reach: int) -> Numbers:
+    """Window in whose middle each point stands."""
+    length, _ = size_of(reach)
+    centers = first + (length - 1) / 2
+    after = np.clip(np.searchsorted(centers, middle), 1, max(len(centers) - 1, 1))
+    before = after - 1
+    after = np.minimum(after, len(centers) - 1)
+    # of two windows equally near the first
+    nearer = np.abs(middle - centers[before]) <= np.abs(middle - centers[after])
+    return np.asarray(np.where(nearer, before, after), np.intp)

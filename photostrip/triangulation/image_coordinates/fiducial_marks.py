@@ -1,0 +1,304 @@
+"""Measured fiducial marks as arrays, and whether they form the pattern of their camera.
+
+Residuals cannot show everything that goes wrong with marks: four at the corners of a square fit just as well when
+two opposite ones are exchanged. So the pattern is looked at before anything is fitted, with a conformal
+transformation in both hands.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import Fault
+from photostrip.geometry import plane
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.camera import Camera
+    from photostrip.points import PhotoPoints
+
+    Floats = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
+
+WRONG_PATTERN = 0.05  # largest misfit over radius of the marks: film and paper stay far below, wrong numbers far above
+QUARTER = np.pi / 2
+KEY = "fiducial_measurements"
+
+
+@dataclass(frozen=True, eq=False)
+class Marks:
+    """Marks of the photos of one camera; a mark that was not measured has weight zero.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera.
+    photos, names : tuple of str
+        Photos (p) and marks (m).
+    calibrated : ndarray, shape (m, 2)
+        Calibrated coordinates, mm.
+    measured : ndarray, shape (p, m, 2)
+        Measured coordinates.
+    weights : ndarray, shape (p, m)
+        Weights, of mean 1 over the marks of each photo.
+    """
+
+    camera: Camera
+    photos: tuple[str, ...]
+    names: tuple[str, ...]
+    calibrated: Floats
+    measured: Floats
+    weights: Floats
+
+    @property
+    def count(self) -> NDArray[np.intp]:
+        """Number of marks on each photo."""
+        return np.asarray((self.weights > 0).sum(1), np.intp)
+
+    def take(self, rows: Flags) -> Marks:
+        """Give the marks of some photos."""
+        photos = tuple(photo for photo, kept in zip(self.photos, rows, strict=True) if kept)
+        return Marks(self.camera, photos, self.names, self.calibrated, self.measured[rows], self.weights[rows])
+
+    def on_photo(self, row: int) -> tuple[str, ...]:
+        """Give the marks measured on one photo."""
+        return tuple(name for name, weight in zip(self.names, self.weights[row], strict=True) if weight > 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Pattern:
+    """How marks lie against the calibrated ones, by a conformal transformation in one hand.
+
+    Parameters
+    ----------
+    misfit : ndarray, shape (p,)
+        Largest residual over the root mean square distance of the marks from their mean.
+    largest : ndarray, shape (p,)
+        Largest residual, mm.
+    rotation : ndarray, shape (p,)
+        Direction of the measured x axis in the photo system, radians.
+    """
+
+    misfit: Floats
+    largest: Floats
+    rotation: Floats
+
+
+def gather(fiducials: PhotoPoints, camera: Camera, photos: tuple[str, ...]) -> tuple[Marks, list[Fault]]:
+    """Put the marks of the photos of one camera into arrays, and tell what does not go in.
+
+    Parameters
+    ----------
+    fiducials : PhotoPoints
+        Measured marks; ``point_ids`` are their names.
+    camera : Camera
+        Camera with calibrated marks.
+    photos : tuple of str
+        Its photos.
+
+    Returns
+    -------
+    Marks
+        The marks of all these photos, measured or not.
+    list of Fault
+        Marks that the camera does not have, and marks measured twice.
+    """
+    names = tuple(camera.fiducials)
+    row_of = {photo: row for row, photo in enumerate(photos)}
+    column_of = {name: column for column, name in enumerate(names)}
+    rows = np.array([row_of.get(photo, -1) for photo in fiducials.photo_ids], np.intp)[fiducials.photo]
+    columns = np.array([column_of.get(name, -1) for name in fiducials.point_ids], np.intp)[fiducials.point]
+    faults = [
+        fault(
+            "unknown-mark",
+            f"photo {photos[rows[i]]}: camera {camera.name} has no mark {fiducials.point_ids[fiducials.point[i]]}",
+            expected=f"one of {', '.join(names)}",
+        )
+        for i in np.flatnonzero((rows >= 0) & (columns < 0))
+    ]
+    good = (rows >= 0) & (columns >= 0)
+    place = rows[good], columns[good]
+    times = np.zeros((len(photos), len(names)), np.intp)
+    np.add.at(times, place, 1)
+    faults += [
+        fault("mark-twice", f"photo {photos[i]}: mark {names[j]} is measured {times[i, j]} times", fix="keep one row")
+        for i, j in np.argwhere(times > 1)
+    ]
+    measured, weights = np.zeros((*times.shape, 2)), np.zeros(times.shape)
+    measured[place] = fiducials.xy[good]
+    weights[place] = 1 / (fiducials.sigma[good] ** 2).mean(1)
+    weights *= (times.sum(1) / np.where(times.any(1), weights.sum(1), 1.0))[:, None]
+    calibrated = np.array(list(camera.fiducials.values()), float).reshape(-1, 2)
+    return Marks(camera, photos, names, calibrated, measured, weights), faults
+
+
+def enough(marks: Marks, kind: str) -> tuple[Marks, list[Fault]]:
+    """Keep the photos with marks enough.
+
+    Parameters
+    ----------
+    marks : Marks
+        Measured marks.
+    kind : str
+        Transformation to be fitted, or ``"auto"``.
+
+    Returns
+    -------
+    Marks
+        The marks of the photos with enough of them in different places.
+    list of Fault
+        One for each of the other photos.
+    """
+    needed = plane.KINDS["conformal" if kind == "auto" else kind].least_points
+    name = "an interior orientation" if kind == "auto" else f"the {kind} transformation"
+    faults = []
+    for row in np.flatnonzero(marks.count < needed).tolist():
+        found = marks.on_photo(row)
+        text = f"{len(found)} ({', '.join(found)})" if found else "none"
+        message = f"photo {marks.photos[row]}: {name} needs {needed} fiducial marks, measured: {text}"
+        faults.append(
+            fault("too-few-marks", message, fix=f"marks of camera {marks.camera.name}: {', '.join(marks.names)}")
+        )
+    kept = marks.take(marks.count >= needed)
+    apart = plane.strength("conformal", kept.measured, kept.weights) > 0
+    faults += [
+        fault("marks-in-one-place", f"photo {kept.photos[row]}: all fiducial marks have the same coordinates")
+        for row in np.flatnonzero(~apart).tolist()
+    ]
+    return kept.take(apart), faults
+
+
+def right_pattern(marks: Marks) -> tuple[Marks, Flags, list[Fault]]:
+    """Find the hand of the measured system, and the photos whose marks are not where their numbers say.
+
+    The hand is that of most photos of the camera. A photo of the other hand is refused: when only that photo was
+    scanned from the other side its points need no repair, but when two of its marks are exchanged they come out
+    mirrored, and the residuals are equally small in both cases.
+
+    Parameters
+    ----------
+    marks : Marks
+        Measured marks, at least two on each photo.
+
+    Returns
+    -------
+    Marks
+        The marks of the photos in which they lie as calibrated.
+    ndarray of bool, shape (p,)
+        Whether these photos were measured mirrored.
+    list of Fault
+        One for each of the other photos, with the mark that seems wrongly numbered.
+    """
+    if not marks.photos:
+        return marks, np.zeros(0, bool), []
+    direct, turned = (_pattern(marks.measured, marks.weights, marks.calibrated, mirrored=m) for m in (False, True))
+    seen = np.maximum(direct.misfit, turned.misfit) > WRONG_PATTERN  # else the marks fit in both hands
+    hand = seen & (turned.misfit < direct.misfit)
+    fits = np.minimum(direct.misfit, turned.misfit) <= WRONG_PATTERN
+    votes = hand[seen & fits]
+    camera_hand = bool(2 * votes.sum() > len(votes))
+    right = fits & ((hand == camera_hand) | ~seen)
+    pattern = turned if camera_hand else direct
+    quarters = np.round(pattern.rotation[right] / QUARTER).astype(int) % 4
+    usual = int(np.bincount(quarters, minlength=4).argmax()) * QUARTER
+    faults = [
+        _wrong_numbers(marks, row, usual, mirrored=camera_hand, off=pattern.largest[row], alone=bool(fits[row]))
+        for row in np.flatnonzero(~right).tolist()
+    ]
+    kept = marks.take(right)
+    return kept, np.full(len(kept.photos), camera_hand), faults
+
+
+def _pattern(measured: Floats, weights: Floats, calibrated: Floats, *, mirrored: bool) -> Pattern:
+    """Compare measured marks (..., m, 2) with the calibrated ones of their numbers."""
+    flip = np.array([1.0, -1.0 if mirrored else 1.0])
+    fit = plane.conformal_from_points(measured * flip, calibrated, weights)
+    distances = np.linalg.norm(fit.residuals(measured * flip, calibrated), axis=-1)
+    used = weights > 0
+    count = used.sum(-1)
+    target = np.broadcast_to(calibrated, (*weights.shape, 2))
+    center = (used[..., None] * target).sum(-2) / count[..., None]
+    square = (used * ((target - center[..., None, :]) ** 2).sum(-1)).sum(-1) / count
+    rotation = np.arctan2(fit.coefficients[..., 1, 0], fit.coefficients[..., 0, 0])
+    largest = np.where(used, distances, 0.0).max(-1)
+    return Pattern(largest / np.sqrt(square), largest, rotation)
+
+
+def _wrong_numbers(marks: Marks, row: int, usual: float, *, mirrored: bool, off: float, alone: bool) -> Fault:
+    """Say what seems wrong with the marks of one photo."""
+    photo, camera = marks.photos[row], marks.camera.name
+    begin = f"photo {photo}: the fiducial marks "
+    if alone:
+        begin += f"are mirrored against the other photos of camera {camera}"
+    else:
+        begin += f"do not form the pattern of camera {camera}: up to {off:.1f} mm off"
+    change = _renumbering(marks, row, usual, mirrored=mirrored) or _stranger(marks, row, mirrored=mirrored)
+    if change:
+        text, left = change
+        return fault("wrong-mark", f"{begin}; {text} the largest residual is {left:.3f} mm", fix="check the marks")
+    fix = "scan the photo from the same side as the others" if alone else "check numbers and coordinates of the marks"
+    return fault("wrong-mark", begin, fix=fix)
+
+
+def _renumbering(marks: Marks, row: int, usual: float, *, mirrored: bool) -> tuple[str, float] | None:
+    """Find two marks that fit when exchanged, or one that fits with the number of a mark not measured."""
+    present = np.flatnonzero(marks.weights[row] > 0)
+    absent = np.flatnonzero(marks.weights[row] == 0)
+    if len(present) < 3:
+        return None
+    trials, texts = [], []
+    for i, j in combinations(range(len(present)), 2):
+        trial = present.copy()
+        trial[[i, j]] = trial[[j, i]]
+        trials.append(trial)
+        texts.append(f"with {marks.names[present[i]]} and {marks.names[present[j]]} exchanged")
+    for i in range(len(present)):
+        for other in absent:
+            trial = present.copy()
+            trial[i] = other
+            trials.append(trial)
+            texts.append(f"with {marks.names[present[i]]} called {marks.names[other]}")
+    shape = (len(trials), len(present))
+    measured = np.broadcast_to(marks.measured[row, present], (*shape, 2))
+    found = _pattern(measured, np.ones(shape), marks.calibrated[np.array(trials)], mirrored=mirrored)
+    if found.misfit.min() > WRONG_PATTERN:
+        return None
+    # Several exchanges can restore the square, turned by a quarter: the photo most likely lies as the others do.
+    away = np.abs(np.angle(np.exp(1j * (found.rotation - usual))))
+    best = int(np.argmin(np.where(found.misfit <= WRONG_PATTERN, away, np.inf)))
+    return texts[best], float(found.largest[best])
+
+
+def _stranger(marks: Marks, row: int, *, mirrored: bool) -> tuple[str, float] | None:
+    """Find one mark without which the others fit."""
+    present = np.flatnonzero(marks.weights[row] > 0)
+    if len(present) < 4:
+        return None
+    shape = (len(present), len(present))
+    measured = np.broadcast_to(marks.measured[row, present], (*shape, 2))
+    found = _pattern(measured, 1 - np.eye(len(present)), marks.calibrated[present], mirrored=mirrored)
+    best = int(np.argmin(found.misfit))
+    if found.misfit[best] > WRONG_PATTERN:
+        return None
+    return f"without {marks.names[present[best]]}", float(found.largest[best])
+
+
+def fault(code: str, message: str, *, expected: str = "", fix: str = "") -> Fault:
+    """Give a fault of the measured marks.
+
+    Parameters
+    ----------
+    code, message, expected, fix : str
+        As in ``errors.Fault``.
+
+    Returns
+    -------
+    Fault
+        The fault, with the key of the measured marks in the project file.
+    """
+    return Fault(message, code=code, key=KEY, expected=expected, fix=fix)

@@ -1,0 +1,134 @@
+"""Film deformation that the transformation of the fiducial marks leaves: interpolated from their residuals.
+
+A thin plate spline goes through the residuals of the marks: the surface that bends least. It takes the scatter of the
+marks for deformation, too, so it helps only where film is deformed by more than marks are measured well, and where
+there are marks enough to see it, best eight.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+LEAST_MARKS = 4  # three carry the plane that every transformation has already
+FLAT = 0.01  # ratio of the extents of the marks below which they stand on one line
+CONVERGED = 1e-12  # mm
+ITERATIONS = 50
+
+
+@dataclass(frozen=True, eq=False)
+class Deformation:
+    """Residual film deformation of photos.
+
+    Parameters
+    ----------
+    nodes : tuple of ndarray, shape (m, 2)
+        Transformed coordinates of the marks of each photo, mm; none where they do not show a deformation.
+    shifts : tuple of ndarray, shape (m, 2)
+        Corrections there, calibrated minus transformed, mm.
+    """
+
+    nodes: tuple[Floats, ...]
+    shifts: tuple[Floats, ...]
+
+    @classmethod
+    def from_residuals(cls, calibrated: Sequence[Floats], residuals: Sequence[Floats]) -> Deformation:
+        """Take the residuals of the marks for deformation.
+
+        Parameters
+        ----------
+        calibrated : sequence of ndarray, shape (m, 2)
+            Calibrated coordinates of the marks of each photo, mm.
+        residuals : sequence of ndarray, shape (m, 2)
+            Transformed minus calibrated coordinates, mm.
+
+        Returns
+        -------
+        Deformation
+            With nothing for photos of fewer than four marks or with all of them on one line.
+        """
+        seen = [_spread(each) for each in calibrated]
+        none = np.zeros((0, 2))
+        nodes = [c + r if s else none for c, r, s in zip(calibrated, residuals, seen, strict=True)]
+        return cls(tuple(nodes), tuple(-r if s else none for r, s in zip(residuals, seen, strict=True)))
+
+    def unseen(self) -> Numbers:
+        """Give the photos whose marks do not show a deformation."""
+        return np.flatnonzero([len(each) == 0 for each in self.nodes])
+
+    def corrected(self, photo: Numbers, xy: Floats) -> Floats:
+        """Correct transformed coordinates.
+
+        Parameters
+        ----------
+        photo : ndarray of int, shape (n,)
+            Photo of each point.
+        xy : ndarray, shape (n, 2)
+            Coordinates from the transformation, mm.
+
+        Returns
+        -------
+        ndarray, shape (n, 2)
+            Coordinates without the deformation, mm.
+
+        Notes
+        -----
+        Source: Kraus, interpolation of the residuals of fiducial marks; the spline is that of scipy.interpolate.
+        """
+        return self._each(photo, xy, lambda points, shift: points + shift(points))
+
+    def deformed(self, photo: Numbers, xy: Floats) -> Floats:
+        """Give the coordinates that ``corrected`` corrects to these; its inverse.
+
+        Parameters
+        ----------
+        photo : ndarray of int, shape (n,)
+            Photo of each point.
+        xy : ndarray, shape (n, 2)
+            Coordinates without the deformation, mm.
+
+        Returns
+        -------
+        ndarray, shape (n, 2)
+            Deformed coordinates, mm, exact to 1e-9 mm.
+        """
+        return self._each(photo, xy, _undone)
+
+    def _each(self, photo: Numbers, xy: Floats, way: Callable[[Floats, Callable[[Floats], Floats]], Floats]) -> Floats:
+        from scipy.interpolate import RBFInterpolator
+
+        found = np.array(xy, float)
+        order = np.argsort(photo, kind="stable")
+        for rows in np.split(order, np.flatnonzero(np.diff(photo[order])) + 1):
+            if len(rows) and len(nodes := self.nodes[photo[rows[0]]]):
+                shifts = self.shifts[photo[rows[0]]]
+                found[rows] = way(found[rows], RBFInterpolator(nodes, shifts, kernel="thin_plate_spline"))
+        return found
+
+
+def _spread(marks: Floats) -> bool:
+    """Whether marks are enough, and not on one line."""
+    if len(marks) < LEAST_MARKS:
+        return False
+    extent = np.linalg.svd(marks - marks.mean(axis=0), compute_uv=False)
+    return bool(extent[1] > FLAT * extent[0])
+
+
+def _undone(target: Floats, shift: Callable[[Floats], Floats]) -> Floats:
+    """Solve ``X + D(X) = target``; D changes by micrometres over centimetres, so that plain iteration converges."""
+    found = target
+    for _ in range(ITERATIONS):
+        last, found = found, target - shift(found)
+        if (np.abs(found - last) <= CONVERGED).all():
+            break
+    return found

@@ -1,0 +1,264 @@
+"""Gross errors in links: common points that contradict the others, and models of the other hand.
+
+A point is tested as a whole, plan and height of both models together, by the squares that go when it is left out. One
+point of a link goes at a time, the worst first. Where two points explain the same contradiction equally well, none goes
+and both are named: with three points and a centre that happens.
+
+Source: [Baarda 1968]; order and limits derived, see docs/independent-models.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.statistics import chi2_quantile
+from photostrip.triangulation.independent_models import linking
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.triangulation.independent_models.linking import Common, Solved, StripModels
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+    Flags = NDArray[np.bool_]
+
+METHODS = ("auto", "none")
+MEDIAN = 2.366  # of chi-square with three degrees of freedom
+MEDIAN_SPREAD = 1.124  # standard deviation of the ratio of a sample's median to it, times the root of the sample's size
+SURE = 2.6  # standard deviations beyond which the stated precision is contradicted
+EQUALLY_GOOD = 9.2  # difference of two test values below which the odds are less than one in a hundred
+LEFT = 4  # common points, centre included, that a link keeps
+REFLECTED = 0.1  # squares of the best similarity of the other hand over those of the best one
+CONSPICUOUS = 36.0  # mean square in units of the stated variance that makes a reflection worth a look
+POWER = 21.5  # non-centrality of chi-square with three degrees of freedom found in 80 % of cases at a level of 0.001
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How models are joined by similarities.
+
+    Parameters
+    ----------
+    screening : str
+        ``"auto"`` or ``"none"``.
+    alpha : float
+        Probability of rejecting a good point of a link without gross errors.
+    keep, drop : tuple of str
+        Coordinates, ``model/point`` or ``model/photo``, that take part whatever the test says, or not at all.
+    """
+
+    screening: str = "auto"
+    alpha: float = 0.001
+    keep: tuple[str, ...] = ()
+    drop: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Rejection:
+    """A common point that a link does not use.
+
+    Parameters
+    ----------
+    link, row : int
+        Link, and row of ``linking.Common``.
+    value, limit : float
+        Test value and its critical value.
+    error : tuple of float
+        Its difference from what the other points say, mm along the axes of the model before.
+    """
+
+    link: int
+    row: int
+    value: float
+    limit: float
+    error: tuple[float, float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Screened:
+    """Links with their gross errors taken out.
+
+    Parameters
+    ----------
+    shared : Common
+        Common rows.
+    used : ndarray of bool, shape (t,)
+        Rows that took part.
+    solved : Solved
+        The links.
+    value, limit : ndarray, shapes (t,), (j,)
+        Test values of the rows used, and the critical value of each link.
+    rejections : tuple of Rejection
+        What was taken out, worst first.
+    doubtful : tuple of tuple of int
+        Rows of which one is wrong and which one cannot be told.
+    factor : float
+        Variance of the model coordinates over what is stated, with which the tests were made; 1 unless contradicted.
+    reflected : ndarray of bool, shape (j,)
+        Links whose models fit as mirror images.
+    """
+
+    shared: Common
+    used: Flags
+    solved: Solved
+    value: Floats
+    limit: Floats
+    rejections: tuple[Rejection, ...]
+    doubtful: tuple[tuple[int, ...], ...]
+    factor: float
+    reflected: Flags = field(default_factory=lambda: np.zeros(0, bool))
+
+
+def reflected(shared: Common, models: StripModels, used: Flags) -> Flags:
+    """Links whose models fit each other only as mirror images.
+
+    Parameters
+    ----------
+    shared : Common
+        Common rows.
+    models : StripModels
+        The models.
+    used : ndarray of bool, shape (t,)
+        Rows that count.
+
+    Returns
+    -------
+    ndarray of bool, shape (j,)
+        True where the similarity of the other hand leaves a tenth of the squares and the best proper one far too much.
+        Three points, or points in one plane, fit both ways and are False.
+    """
+    share = used.astype(float)
+    found, squares = linking.closed_form(shared, models, share)
+    variance = (models.sigma[shared.before] ** 2).sum(axis=1)
+    variance += found.scale[shared.link] ** 2 * (models.sigma[shared.after] ** 2).sum(axis=1)
+    expected = shared.sums(share * variance)
+    return np.asarray((squares[:, 0] > CONSPICUOUS * expected) & (squares[:, 1] < REFLECTED * squares[:, 0]), bool)
+
+
+def screen(shared: Common, models: StripModels, settings: Settings, kept: Flags) -> Screened:
+    """Solve the links of a strip and take out what contradicts the rest.
+
+    Parameters
+    ----------
+    shared : Common
+        Common rows; every link has three that are not on one line.
+    models : StripModels
+        The models.
+    settings : Settings
+        Level of the test.
+    kept : ndarray of bool, shape (t,)
+        Rows that the user keeps.
+
+    Returns
+    -------
+    Screened
+        Links and what was taken out.
+    """
+    used, log = np.ones(len(shared.link), bool), list[Rejection]()
+    mirrored = reflected(shared, models, used)
+    solved = linking.solve(shared, models, used)
+    value, error, freedom = linking.studentised(shared, solved, used)
+    factor = _scatter(value, freedom, solved)
+    limit = _limits(shared, used, settings.alpha)
+    open_links = np.ones(shared.count, bool)
+    while settings.screening != "none":
+        worst = _worst(shared, models, (used, kept), value / factor, limit, open_links)
+        if not len(worst):
+            break
+        for row in worst.tolist():
+            link = int(shared.link[row])
+            size = (float(error[row, 0]), float(error[row, 1]), float(error[row, 2]))
+            log.append(Rejection(link, row, float(value[row] / factor), float(limit[link]), size))
+        used = used.copy()
+        used[worst] = False
+        solved = linking.solve(shared, models, used)
+        value, error, freedom = linking.studentised(shared, solved, used)
+        factor = _scatter(value, freedom, solved)
+    doubtful = _doubtful(shared, value / factor, limit) if settings.screening != "none" else ()
+    log.sort(key=lambda each: -each.value)
+    return Screened(shared, used, solved, value / factor, limit, tuple(log), doubtful, factor, mirrored)
+
+
+def _scatter(value: Floats, freedom: Numbers, solved: Solved) -> float:
+    """Variance factor by the median test value; 1 unless the stated precision is contradicted."""
+    known = value[freedom == 3]  # every direction of the point is checked
+    independent = solved.redundancy.sum() / 3
+    if len(known) < LEFT or independent < LEFT:
+        return 1.0
+    ratio = float(np.median(known)) / MEDIAN
+    return ratio if ratio > 1 + SURE * MEDIAN_SPREAD / np.sqrt(independent) else 1.0
+
+
+def _limits(shared: Common, used: Flags, alpha: float) -> Floats:
+    """Critical value of each link: the level is shared out among its points."""
+    count = np.maximum(np.bincount(shared.link[used], minlength=shared.count), 1)
+    by_count = {number: chi2_quantile(1 - alpha / number, 3) for number in np.unique(count).tolist()}
+    return np.array([by_count[number] for number in count.tolist()], float).reshape(shared.count)
+
+
+def _worst(
+    shared: Common, models: StripModels, flags: tuple[Flags, Flags], value: Floats, limit: Floats, open_links: Flags
+) -> Numbers:
+    """One row for each link that must go; a link in which it cannot be told, or that would break, is closed."""
+    used, kept = flags
+    size = np.where(used & ~kept & open_links[shared.link] & (value > limit[shared.link]), value, -np.inf)
+    rows = []
+    for link in np.unique(shared.link[np.isfinite(size)]).tolist():
+        here = np.flatnonzero(shared.link == link)
+        row = int(here[np.argmax(size[here])])
+        alone = used.copy()
+        alone[row] = False
+        rivals = here[used[here] & (here != row)]
+        equal = (value[row] - value[rivals] < EQUALLY_GOOD).any()
+        if equal or len(rivals) < LEFT - 1 or linking.extents(shared, models, alone)[link] < linking.THIN:
+            open_links[link] = False
+        else:
+            rows.append(row)
+    return np.array(rows, np.intp)
+
+
+def _doubtful(shared: Common, value: Floats, limit: Floats) -> tuple[tuple[int, ...], ...]:
+    """Rows of each link of which one is wrong, the worst first."""
+    beyond = np.flatnonzero(value > limit[shared.link])
+    found = []
+    for link in np.unique(shared.link[beyond]).tolist():
+        here = np.flatnonzero(shared.link == link)
+        here = here[np.argsort(-np.nan_to_num(value[here], nan=-np.inf), kind="stable")]
+        near = here[value[here[0]] - value[here] < EQUALLY_GOOD]
+        found.append(tuple(near.tolist()))
+    return tuple(found)
+
+
+def detectable(shared: Common, screened: Screened) -> Floats:
+    """Smallest error of each common point that its link finds in 80 % of cases, mm.
+
+    Parameters
+    ----------
+    shared : Common
+        Common rows.
+    screened : Screened
+        The links.
+
+    Returns
+    -------
+    ndarray, shape (t,)
+        In the direction in which the link checks the point least; infinite where it does not, NaN for rows not used.
+    """
+    solved = screened.solved
+    reduced = (
+        solved.weight
+        - solved.weight
+        @ solved.design
+        @ solved.cofactors[shared.link]
+        @ solved.design.transpose(0, 2, 1)
+        @ solved.weight
+    )
+    least = np.linalg.eigvalsh((reduced + reduced.transpose(0, 2, 1)) / 2)[:, 0]
+    size = np.where(
+        least > linking.HELD * np.trace(solved.weight, axis1=1, axis2=2), 1 / np.maximum(least, 1e-300), np.inf
+    )
+    return np.where(screened.used, np.sqrt(POWER * screened.factor * size), np.nan)

@@ -1,0 +1,279 @@
+"""Errors of a strip of independent models by the errors of its model coordinates: covariances, linear in its length.
+
+A link is a least-squares similarity, so its error, a *step*, is a sum over the coordinates of its common points in both
+models. The similarity of a model is the sum of the steps before it; a point is displaced by that of its model and by
+its own coordinates. Steps have coordinates in common only with their neighbours: those of the model between them.
+Everything refers to the frame of the ground after the plain similarity, metres.
+
+Source: derived; see docs/independent-models.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.geometry.rotation import cross_matrix
+from photostrip.triangulation.error_propagation.derivatives import PARAMETERS, similarity_rows
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.geometry.similarity import Similarity
+    from photostrip.triangulation.independent_models.formation import FormedModels
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class ModelErrors:
+    """Everything that covariances of a strip of independent models are made of.
+
+    Parameters
+    ----------
+    origin : ndarray, shape (3,)
+        Common origin of all similarities.
+    covariance : ndarray, shape (n, 3, 3)
+        Covariance of the coordinates of every row, metres^2 along the axes of the ground.
+    before, after : ndarray of int, shape (n,)
+        Entry of `gain` with which a row enters the link behind and the link before its model; -1 for none.
+    gain : ndarray, shape (t, 7, 3)
+        Step of each link by the difference of a common point, the row before minus the row after.
+    link : ndarray of int, shape (t,)
+        Link of each entry.
+    rows : tuple of ndarray of int, shape (t,)
+        Rows before and after of each entry.
+    model : ndarray of int, shape (n,)
+        Model of every row.
+    item : ndarray of int, shape (n,)
+        Node of every row, counted in `FormedModels.node`; -1 for rows that make no mean.
+    share : ndarray, shape (n,)
+        Share of the row in the mean of its node.
+    frame : ndarray, shape (k, 3, 7)
+        Displacement of every node by a similarity.
+    models : int
+        Number of models.
+    """
+
+    origin: Floats
+    covariance: Floats
+    before: Numbers
+    after: Numbers
+    gain: Floats
+    link: Numbers
+    rows: tuple[Numbers, Numbers]
+    model: Numbers
+    item: Numbers
+    share: Floats
+    frame: Floats
+    models: int
+
+
+def differentiate(formed: FormedModels, similarity: Similarity) -> ModelErrors:
+    """Rows of derivatives of a formed strip.
+
+    Parameters
+    ----------
+    formed : FormedModels
+        The strip.
+    similarity : Similarity
+        From the strip to the frame of the ground.
+
+    Returns
+    -------
+    ModelErrors
+        Gains of the links, covariances of the coordinates, rows of the nodes.
+    """
+    models, links = formed.models, formed.links
+    scale = similarity.scale * formed.places.scale
+    turn = scale[:, None, None] * (similarity.rotation @ formed.places.rotation)
+    turned = turn[models.model] * models.sigma[:, None, :]
+    covariance = turned @ turned.transpose(0, 2, 1)
+    nodes = similarity(formed.node_xyz)
+    origin = nodes.mean(axis=0)
+    used = np.flatnonzero(links.used)
+    link, first, second = links.shared.link[used], links.shared.before[used], links.shared.after[used]
+    xyz = similarity(formed.model_xyz)
+    gain = _gains(link, xyz[first], covariance[first] + covariance[second], origin, links.shared.count)
+    before, after = np.full(len(models.model), -1), np.full(len(models.model), -1)
+    before[first], after[second] = np.arange(len(used)), np.arange(len(used))
+    item = np.where(formed.used, np.searchsorted(formed.node, models.node), -1)
+    share = np.where(formed.used, 1 / formed.node_models[np.maximum(item, 0)], 0.0)
+    frame = similarity_rows(nodes, origin)
+    return ModelErrors(
+        origin, covariance, before, after, gain, link, (first, second), models.model, item, share, frame, models.count
+    )
+
+
+def _gains(link: Numbers, xyz: Floats, covariance: Floats, origin: Floats, count: int) -> Floats:
+    """Parameters of each link by the differences of its points: N^-1 D^T P, then moved to the common origin."""
+    number = np.maximum(np.bincount(link, minlength=count), 1)[:, None]
+    center = np.column_stack([np.bincount(link, xyz[:, axis], count) for axis in range(3)]) / number
+    arm = xyz - center[link]
+    size = np.sqrt(np.bincount(link, (arm**2).sum(axis=1), count) / number[:, 0])
+    unit = np.ones((count, PARAMETERS))
+    unit[:, 3:] = 1 / np.maximum(size, 1e-300)[:, None]
+    design = similarity_rows(arm, np.zeros(3)) * unit[link][:, None, :]
+    weighted = design.transpose(0, 2, 1) @ np.linalg.inv(covariance)
+    normal = np.zeros((count, PARAMETERS, PARAMETERS))
+    np.add.at(normal, link, weighted @ design)
+    moved = np.tile(np.eye(PARAMETERS), (count, 1, 1))  # from the link's centre to the common origin
+    offset = center - origin
+    moved[:, :3, 3:6] = cross_matrix(offset)
+    moved[:, :3, 6] = -offset
+    operator = moved @ (unit[:, :, None] * np.linalg.inv(normal))
+    return np.asarray(operator[link] @ weighted, float)
+
+
+# ------------------------------------------------------------------------------------------ sums of displacements
+
+
+def sums(errors: ModelErrors, nodes: Numbers, weights: Floats) -> Floats:
+    """Coefficients of the model coordinates in weighted sums of displacements of nodes.
+
+    Parameters
+    ----------
+    errors : ModelErrors
+        The strip.
+    nodes : ndarray of int, shape (c,)
+        Nodes, counted as ``FormedModels.node``, each at most once.
+    weights : ndarray, shape (t, c, 3)
+        Weight of each coordinate of each node in each sum.
+
+    Returns
+    -------
+    ndarray, shape (t, n, 3)
+        By the coordinates of every row, along the axes of the ground.
+    """
+    place = np.full(len(errors.frame), -1)
+    place[nodes] = np.arange(len(nodes))
+    rows = np.flatnonzero((errors.item >= 0) & (place[errors.item] >= 0))
+    own = errors.share[rows, None] * weights[:, place[errors.item[rows]]]
+    found = np.zeros((len(weights), len(errors.model), 3))
+    found[:, rows] = own
+    by_model = np.zeros((errors.models, len(weights), PARAMETERS))
+    np.add.at(by_model, errors.model[rows], np.einsum("tri,rij->rtj", own, errors.frame[errors.item[rows]]))
+    beyond = np.cumsum(by_model[::-1], axis=0)[::-1][1:]  # of all models after each link
+    by_row = np.einsum("etj,eji->tei", beyond[errors.link], errors.gain)
+    first, second = errors.rows
+    found[:, first] += by_row
+    found[:, second] -= by_row
+    return found
+
+
+def covariance_of_sums(errors: ModelErrors, one: Floats) -> Floats:
+    """Covariances of sums given by ``sums``, metres^2, shape (t, t)."""
+    spread = np.einsum("trj,rij->tri", one, errors.covariance).reshape(len(one), -1)
+    joint = one.reshape(len(one), -1) @ spread.T
+    return np.asarray((joint + joint.T) / 2, float)
+
+
+def with_sums(errors: ModelErrors, coefficients: Floats) -> Floats:
+    """Covariances of the displacements of all nodes with sums of model coordinates.
+
+    Parameters
+    ----------
+    errors : ModelErrors
+        The strip.
+    coefficients : ndarray, shape (t, n, 3)
+        Of the sums, as ``sums`` gives them.
+
+    Returns
+    -------
+    ndarray, shape (k, 3, t)
+        Covariances, metres^2 for sums of metres.
+    """
+    by_row = np.einsum("rij,trj->rit", errors.covariance, coefficients)
+    first, second = errors.rows
+    steps = np.zeros((errors.models, PARAMETERS, len(coefficients)))
+    np.add.at(steps, errors.link + 1, errors.gain @ (by_row[first] - by_row[second]))
+    frames = np.cumsum(steps, axis=0)
+    rows = np.flatnonzero(errors.item >= 0)
+    item, share = errors.item[rows], errors.share[rows]
+    result = np.zeros((len(errors.frame), 3, len(coefficients)))
+    parts = errors.frame[item] @ frames[errors.model[rows]] + by_row[rows]
+    np.add.at(result, item, share[:, None, None] * parts)
+    return result
+
+
+# ----------------------------------------------------------------------------------------------- covariances
+
+
+def covariances(errors: ModelErrors) -> Floats:
+    """Covariances of the nodes of the formed strip relative to its first model, shape (k, 3, 3), metres^2.
+
+    Parameters
+    ----------
+    errors : ModelErrors
+        The strip.
+
+    Returns
+    -------
+    ndarray, shape (k, 3, 3)
+        Covariances.
+
+    Notes
+    -----
+    A node is displaced by ``B (xi + sum of b_j step_j) + sum of its own coordinates`` with xi the similarity of its
+    first model and b_j the share of its models after link j. xi and the steps correlate with their neighbours only.
+    """
+    steps, mixed = _steps(errors)
+    chain = np.zeros((errors.models, PARAMETERS, PARAMETERS))
+    behind = np.zeros((errors.models, PARAMETERS, PARAMETERS))  # of each similarity with the step that follows it
+    behind[1:-1] = mixed
+    added = steps + behind[:-1] + behind[:-1].transpose(0, 2, 1)
+    chain[1:] = np.cumsum(added, axis=0)
+    rows = np.flatnonzero(errors.item >= 0)
+    item, model, share = errors.item[rows], errors.model[rows], errors.share[rows]
+    first = np.full(len(errors.frame), errors.models)
+    np.minimum.at(first, item, model)
+    held = np.zeros((len(errors.frame), int((model - first[item]).max(initial=0)) + 2))
+    np.add.at(held, (item, model - first[item]), share)
+    beyond = np.cumsum(held[:, ::-1], axis=1)[:, ::-1][:, 1:]  # share of the models after each slot's link
+    place = chain[first].copy()
+    for slot in range(beyond.shape[1] - 1):
+        here = np.flatnonzero(beyond[:, slot] > 0)
+        link, part = first[here] + slot, beyond[here, slot, None, None]
+        own = part**2 * steps[link]
+        one = part * behind[link] if slot == 0 else np.zeros_like(own)
+        if slot:
+            one = beyond[here, slot - 1, None, None] * part * mixed[link - 1]
+        place[here] += own + one + one.transpose(0, 2, 1)
+    return _with_own(errors, place, (rows, first, beyond))
+
+
+def _steps(errors: ModelErrors) -> tuple[Floats, Floats]:
+    """Covariances of the steps, shape (j, 7, 7), and of each with the next, shape (j - 1, 7, 7)."""
+    first, second = errors.rows
+    both = errors.covariance[first] + errors.covariance[second]
+    count = errors.models - 1
+    steps = np.zeros((count, PARAMETERS, PARAMETERS))
+    np.add.at(steps, errors.link, errors.gain @ both @ errors.gain.transpose(0, 2, 1))
+    mixed = np.zeros((max(count - 1, 0), PARAMETERS, PARAMETERS))
+    rows = np.flatnonzero((errors.before >= 0) & (errors.after >= 0))  # of a model between two links
+    earlier, later = errors.gain[errors.after[rows]], errors.gain[errors.before[rows]]
+    np.add.at(mixed, errors.model[rows] - 1, -earlier @ errors.covariance[rows] @ later.transpose(0, 2, 1))
+    return steps, mixed
+
+
+def _with_own(errors: ModelErrors, place: Floats, parts: tuple[Numbers, Numbers, Floats]) -> Floats:
+    """Add what the nodes' own coordinates do to what their similarities do."""
+    rows, first, beyond = parts
+    item, model, share = errors.item[rows], errors.model[rows], errors.share[rows]
+    slot = model - first[item]
+    mixed = np.zeros((len(place), PARAMETERS, 3))
+    own = share[:, None, None] * errors.covariance[rows]
+    behind, ahead = errors.after[rows], errors.before[rows]
+    inside = np.flatnonzero(behind >= 0)
+    part = np.where(slot[inside] > 0, beyond[item[inside], np.maximum(slot[inside] - 1, 0)], 1.0)
+    np.add.at(mixed, item[inside], -part[:, None, None] * (errors.gain[behind[inside]] @ own[inside]))
+    inside = np.flatnonzero(ahead >= 0)
+    part = beyond[item[inside], slot[inside]]
+    np.add.at(mixed, item[inside], part[:, None, None] * (errors.gain[ahead[inside]] @ own[inside]))
+    cross = errors.frame @ mixed
+    result = errors.frame @ place @ errors.frame.transpose(0, 2, 1) + cross + cross.transpose(0, 2, 1)
+    np.add.at(result, item, share[:, None, None] * own)
+    return result

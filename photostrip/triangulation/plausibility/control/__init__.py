@@ -1,0 +1,1 @@
+"""Mistakes in the control: readings, heights, lists, single points, place and layout."""

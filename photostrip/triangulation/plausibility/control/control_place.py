@@ -1,0 +1,156 @@
+"""Where on the Earth given coordinates lie, against where their coordinate reference system is made for.
+
+Coordinates with exchanged axes, in feet, or of another system fall hundreds of kilometres away. When they do, the
+readings that would bring them back are tried. A neighbouring zone cannot be seen: the same numbers lie in it as well.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from photostrip.errors import PhotostripError
+from photostrip.triangulation.plausibility.control.control_strip import FOOT
+from photostrip.triangulation.plausibility.finding import found
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from photostrip.geodesy.crs import GroundFrame
+    from photostrip.notes import Finding
+
+    Floats = NDArray[np.float64]
+
+Area = tuple[float, float, float, float]
+MARGIN = (0.6, 0.25)  # of the width and the height of the area: a neighbouring zone is used on purpose at times
+MARGIN_LIMITS = (1.0, 4.0)  # degrees
+ROUND = 360.0  # degrees
+MOST = 0.5  # of the points that may lie outside: single points are slips
+MILLION = 1e6
+
+
+class Place(NamedTuple):
+    """Where a control list lies.
+
+    Parameters
+    ----------
+    findings : list of Finding
+        P401, P402, P403.
+    sure : bool or None
+        Whether its axes are right because the exchanged ones would lie elsewhere (True), wrong (False), or nobody knows
+        (None).
+    inside : bool
+        Whether it lies where its coordinate reference system is made for, as far as that is known.
+    """
+
+    findings: list[Finding]
+    sure: bool | None
+    inside: bool
+
+
+def examine(frame: GroundFrame, area: Area | None, enu: Floats, number: int) -> Place:
+    """Compare the place of a control list with the area of its coordinate reference system.
+
+    Parameters
+    ----------
+    frame : GroundFrame
+        Its frame.
+    area : tuple of float or None
+        West, south, east, north in degrees, when it is known.
+    enu : ndarray, shape (n, 3)
+        Its points east, north, up, in the units of the frame.
+    number : int
+        Its number in the project.
+
+    Returns
+    -------
+    Place
+        What was found.
+    """
+    known = enu[np.isfinite(enu[:, :2]).all(axis=1)]
+    if area is None or not len(known) or frame.kind not in {"projected", "geographic"}:
+        return Place([], None, inside=True)
+    level = np.column_stack([known[:, :2], np.zeros(len(known))])
+    exchanged = level[:, [1, 0, 2]]
+    if _inside(frame, area, level):
+        return Place([], None if _inside(frame, area, exchanged) else True, inside=True)
+    key = f"control[{number}]"
+    where = _where(frame, level, known)
+    evidence: dict[str, float | int | str] = {
+        "area_west_deg": area[0], "area_south_deg": area[1], "area_east_deg": area[2], "area_north_deg": area[3]
+    }  # fmt: skip
+    head = f"{key} {where}, and {frame.title} is made for {area[0]:g} to {area[2]:g} E, {area[1]:g} to {area[3]:g} N"
+    if _inside(frame, area, exchanged):
+        message = f"{head}; with east and north exchanged it would lie there"
+        fix = "put `control.axes` into the order of the columns"
+        return Place([found("P401", message, fix, evidence, key=f"{key}.axes")], sure=False, inside=False)
+    for code, changed, what, fix in _readings(level):
+        if _inside(frame, area, changed):
+            told = found(code, f"{head}; {what}", fix, evidence, key=f"{key}.crs")
+            return Place([told], sure=None, inside=False)
+    fix = "is the crs the right one: zone, datum, false easting and northing?"
+    return Place([found("P402", head, fix, evidence, key=f"{key}.crs")], sure=None, inside=False)
+
+
+def _readings(level: Floats) -> Iterator[tuple[str, Floats, str, str]]:
+    """Give readings of coordinates with their code, what happened, and the cure."""
+    feet = (
+        "name a crs in feet, or convert the table; international feet (0.3048 m) and US survey feet (1200/3937 m) "
+        "differ by 2 ppm, 1.2 m at 600 km"
+    )
+    yield "P403", level * FOOT, "read as feet it would lie there", feet
+    yield "P403", level / FOOT, "read as metres it would lie there: the crs counts in feet", "name a crs in metres"
+    yield "P403", level[:, [1, 0, 2]] * FOOT, "read as feet with exchanged axes it would lie there", feet
+    zone = level.copy()
+    zone[:, 0] -= np.floor(zone[:, 0] / MILLION) * MILLION
+    prefixed = "without the millions of its eastings it would lie there: they are the number of a zone"
+    yield "P402", zone, prefixed, "name the crs of that zone, as of Gauss-Kruger zones"
+    yield (
+        "P402",
+        level * [1.0, -1.0, 1.0],
+        "with northings of the other sign it would lie there",
+        "is the crs southern?",
+    )
+    yield "P402", level * 1000.0, "read as kilometres it would lie there", "give metres"
+    yield "P402", level / 1000.0, "read as millimetres it would lie there", "give metres"
+
+
+def _inside(frame: GroundFrame, area: Area, enu: Floats) -> bool:
+    """Whether most points lie in an area or beside it."""
+    degrees = _degrees(frame, enu)
+    if degrees is None:
+        return False
+    west, south, east, north = area
+    width = (east - west) % ROUND or ROUND
+    beside, above = (
+        float(np.clip(part * size, *MARGIN_LIMITS)) for part, size in zip(MARGIN, (width, north - south), strict=True)
+    )
+    lon = (degrees[:, 0] - west + beside) % ROUND
+    within = (lon <= width + 2.0 * beside) | (width + 2.0 * beside >= ROUND)
+    within &= (degrees[:, 1] >= south - above) & (degrees[:, 1] <= north + above)
+    return bool(within.mean() > MOST)
+
+
+def _degrees(frame: GroundFrame, enu: Floats) -> Floats | None:
+    """Longitude and latitude of points; None where they lie nowhere."""
+    try:
+        cartesian = frame.cartesian_from_ground(enu)
+        degrees = np.degrees(frame.geodetic(cartesian)[:, :2])
+        back = frame.difference(frame.ground_from_cartesian(cartesian), enu)
+    except (PhotostripError, ValueError, ArithmeticError):
+        return None
+    # far from its zone a projection gives places from which no way leads back
+    sound = np.isfinite(degrees).all() and bool((np.abs(back[:, :2]).max(axis=1) < 1.0).mean() > MOST)
+    return degrees if sound else None
+
+
+def _where(frame: GroundFrame, level: Floats, known: Floats) -> str:
+    degrees = _degrees(frame, level)
+    if degrees is None:
+        east, north = (float(np.median(known[:, axis])) for axis in (0, 1))
+        return f"lies nowhere on the Earth (east about {east:.6g}, north about {north:.6g})"
+    lon, lat = (float(np.median(degrees[:, axis])) for axis in (0, 1))
+    return f"lies about {abs(lon):.1f} {'E' if lon >= 0 else 'W'}, {abs(lat):.1f} {'N' if lat >= 0 else 'S'}"

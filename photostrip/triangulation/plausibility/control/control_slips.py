@@ -1,0 +1,223 @@
+"""Single given points that do not go with the others: exchanged ones, slips of the pen in one coordinate."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from photostrip.triangulation.plausibility.control.control_strip import AXES
+from photostrip.triangulation.plausibility.control.digits import slip
+from photostrip.triangulation.plausibility.finding import found
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from photostrip.notes import Finding
+    from photostrip.triangulation.plausibility.control.control_fit import Bent
+    from photostrip.triangulation.plausibility.control.control_strip import Fitted, Given, Seen
+
+    Floats = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
+
+SCALE_CHANGE = 3e-4  # of a large error: the scale of a map is not the same where the point came to lie
+LEAST_RAYS = 2
+CLEARER = 6.0  # times as large as otherwise a slip must be where a wrong image coordinate explains it as well
+NEAR = 3.5  # standard deviations within which the slip must fit where a wrong image coordinate explains it as well
+SOUND = 4.5  # standard deviations within which the other coordinates of a point with a slip of the pen lie
+RIDGE = 1e-9  # of a variance: no computer knows them better
+UNKNOWN = 1e3  # standard deviations in plan: that of a height that is not given
+EARTH_RADIUS = 6.37e6  # metres
+
+
+class Left(NamedTuple):
+    """What is left at given points after a strip was laid on them.
+
+    Parameters
+    ----------
+    plan : Bent
+        In plan.
+    height : Bent or None
+        In height; None where too few heights are given to say.
+    usable : ndarray of bool, shape (n,)
+        Points whose height can be judged.
+    """
+
+    plan: Bent
+    height: Bent | None
+    usable: Flags
+
+    def heights(self) -> tuple[Floats, Floats]:
+        """Give residual and standard deviation of each height, NaN where it cannot be judged, shape (n,), metres."""
+        if self.height is None:
+            unknown = np.full(len(self.usable), np.nan)
+            return unknown, unknown
+        parts = self.height.residual, self.height.spread
+        return np.where(self.usable, parts[0], np.nan), np.where(self.usable, parts[1], np.nan)
+
+
+def examine(given: Given, seen: Seen, fitted: Fitted, judged: Flags, left: Left) -> Iterator[Finding]:
+    """Name points that do not go with the others in plan, and the slip that explains it.
+
+    Parameters
+    ----------
+    given : Given
+        Given points.
+    seen : Seen
+        The same points in the strip.
+    fitted : Fitted
+        The strip on them.
+    judged : ndarray of bool, shape (n,)
+        Points of lists that go with each other.
+    left : Left
+        What is left at them.
+
+    Yields
+    ------
+    Finding
+        P408 and P406.
+    """
+    fit = left.plan
+    odd = judged & given.use[:, 0] & np.isfinite(fit.residual) & fit.odd
+    rows = np.flatnonzero(odd).tolist()
+    exchanged = _exchanged(given, fit, rows)
+    for one, other in exchanged:
+        names = (given.ids[one], given.ids[other])
+        message = f"given points {names[0]} and {names[1]} fit when their coordinates are exchanged"
+        evidence = {
+            "misclosure_as_given_m": float(max(abs(fit.residual[one]), abs(fit.residual[other]))),
+            "misclosure_exchanged_m": _after_exchange(given, fit, one, other),
+        }
+        fix = "were their ids exchanged, in the table or on the photos?"
+        yield found("P408", message, fix, evidence, points=names, strips=(seen.strip,))
+    done = {row for pair in exchanged for row in pair}
+    height, spread = left.heights()
+    for row in rows:
+        far = _curved(fitted, abs(fit.residual[row]))
+        if row in done or abs(height[row]) > SOUND * spread[row] + far:
+            continue  # a wrong measurement along the base moves both
+        difference = np.array([fit.residual[row].real, fit.residual[row].imag, 0.0])
+        if not _one_ray_is_wrong(given, seen, fitted, left, row):
+            yield from _slips(given, seen, row, difference, (float(fit.spread[row]), float(fit.limit[row])), (0, 1))
+
+
+def examine_heights(given: Given, seen: Seen, fitted: Fitted, judged: Flags, left: Left) -> Iterator[Finding]:
+    """Name points that do not go with the others in height only, and the slip that explains it.
+
+    Parameters
+    ----------
+    given, seen, fitted, judged, left
+        As for ``examine``.
+
+    Yields
+    ------
+    Finding
+        P406.
+    """
+    fit, plan = left.height, left.plan
+    if fit is None:
+        return
+    for row in np.flatnonzero(left.usable & judged & fit.odd).tolist():
+        far = _curved(fitted, abs(fit.residual[row]))
+        if abs(plan.residual[row]) > SOUND * plan.spread[row] + far:
+            continue  # a wrong measurement along the base moves both
+        difference = np.array([0.0, 0.0, fit.residual[row]])
+        spread, limit, doubt = float(fit.spread[row]), float(fit.limit[row]), ""
+        if _one_ray_is_wrong(given, seen, fitted, left, row):
+            if seen.rays_of(given.ids[row]).count > LEAST_RAYS:
+                continue
+            # below a photo a wrong height goes with that photo's ray too: two rays cannot tell
+            limit, spread = min(limit, NEAR * spread), CLEARER * spread
+            doubt = "; or a coordinate along the base is wrong on one of its photos"
+        yield from _slips(given, seen, row, difference, (spread, limit), (2,), doubt)
+
+
+def _one_ray_is_wrong(given: Given, seen: Seen, fitted: Fitted, left: Left, row: int) -> bool:
+    """Whether all rays of a point but one go with it as it is given."""
+    rays = seen.rays_of(given.ids[row])
+    if rays.count < LEAST_RAYS:
+        return False
+    plan, (height, spread) = left.plan.residual[row], left.heights()
+    off = np.array([plan.real, plan.imag, height[row]])
+    place = seen.xyz[row] + fitted.strip_from_level @ np.nan_to_num(off)
+    if not rays.shown(place):
+        return False  # off by more than the flying height
+    residual, jacobian = rays.residuals(place)
+    of_plan = float(left.plan.spread[row])
+    of_height = float(spread[row]) if np.isfinite(spread[row]) else UNKNOWN * of_plan
+    # what chance moves all rays of a point by: the strip under it; and each ray by itself
+    common = (jacobian @ fitted.strip_from_level).reshape(-1, 3) * [of_plan, of_plan, of_height]
+    covariance = common @ common.T + np.diag(np.repeat(rays.sigma**2, 2))
+    size = np.sqrt(np.diag(covariance))
+    test, within = residual.ravel() / size, covariance / np.outer(size, size) + RIDGE * np.eye(len(size))
+    limit = float(left.plan.limit[row] / of_plan) ** 2
+    for ray in range(rays.count):
+        others = np.delete(np.arange(2 * rays.count), [2 * ray, 2 * ray + 1])
+        if test[others] @ np.linalg.solve(within[np.ix_(others, others)], test[others]) < limit:
+            return True
+    return False
+
+
+def _curved(fitted: Fitted, off: float) -> float:
+    """How much an error of one coordinate moves the others, metres: the ground is curved."""
+    return off * (off + float(np.ptp(fitted.along[np.isfinite(fitted.along)]))) / EARTH_RADIUS
+
+
+def _exchanged(given: Given, fit: Bent, rows: list[int]) -> list[tuple[int, int]]:
+    pairs = []
+    for place, one in enumerate(rows):
+        for other in rows[place + 1 :]:
+            limit = max(fit.limit[one], fit.limit[other])
+            if given.group[one] == given.group[other] and _after_exchange(given, fit, one, other) < limit:
+                pairs.append((one, other))
+    return pairs
+
+
+def _after_exchange(given: Given, fit: Bent, one: int, other: int) -> float:
+    step = given.plan[other] - given.plan[one]
+    return float(max(abs(fit.residual[one] + step), abs(fit.residual[other] - step)))
+
+
+def _slips(
+    given: Given,
+    seen: Seen,
+    row: int,
+    difference: Floats,
+    spread: tuple[float, float],
+    columns: tuple[int, ...],
+    doubt: str = "",
+) -> Iterator[Finding]:
+    """Name the slip of the pen in the one coordinate that is off.
+
+    `difference` is given minus predicted in the level frame, `spread` its standard deviation and largest value by
+    chance; a slip leaves the point's other coordinates right.
+    """
+    by_axis = given.axes[row] @ difference
+    for axis in columns:
+        others = [each for each in columns if each != axis]
+        off, unit = float(by_axis[axis]), float(given.unit[row, axis])
+        if others and max(abs(by_axis[each]) for each in others) > max(spread[1], 0.02 * abs(off)):
+            continue
+        written = float(given.written[row, axis])
+        if not np.isfinite(written):
+            continue
+        near = spread[1] + SCALE_CHANGE * abs(off)
+        fits = slip(written, written - off / unit, spread[0] / unit, near / unit)
+        if fits is None:
+            continue
+        role = "check" if given.check[row] else "control"
+        message = (
+            f"{role} point {given.ids[row]} is off by {off:+.2f} m in {AXES[axis]}: looks like {fits.text}; "
+            f"{fits.meant:.10g} would fit within {abs(fits.meant - written + off / unit) * unit:.2g} m{doubt}"
+        )
+        evidence = {
+            "given": written,
+            "off_m": off,
+            "would_fit": fits.meant,
+            "standard_deviation_m": spread[0],
+        }
+        fix = f"look {given.ids[row]} up in the records"
+        yield found("P406", message, fix, evidence, points=(given.ids[row],), strips=(seen.strip,))
+        return

@@ -1,0 +1,122 @@
+"""Given points in one level frame in the middle of them, with what their written coordinates mean there."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import PhotostripError
+from photostrip.triangulation.plausibility.control.control_strip import Given
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.geodesy.crs import GroundFrame
+    from photostrip.points import ControlPoints
+
+    Floats = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
+
+USUAL_SIGMA = 0.1  # metres, of coordinates without one
+
+
+def level(control: ControlPoints, frames: Sequence[GroundFrame], *, as_written: bool = False) -> Given | None:
+    """Bring given points into one level frame.
+
+    Parameters
+    ----------
+    control : ControlPoints
+        The points; unused coordinates do not matter.
+    frames : sequence of GroundFrame
+        Ground frames they refer to.
+    as_written : bool
+        Take the numbers as plain coordinates in metres, when their frames cannot be right.
+
+    Returns
+    -------
+    Given or None
+        The points; None when none of them has a plan position.
+    """
+    plan = np.asarray(control.use[:, :2].all(axis=1), bool)
+    height = control.use[:, 2]
+    if not plan.any():
+        return None
+    written = np.where(control.use, control.enu, np.nan)
+    filled = _filled(written, control.frame)
+    by_frame = None if as_written else _decoded(filled, control, frames, plan)
+    if by_frame is None:
+        unit = np.array([[frame.plan_factor, frame.plan_factor, frame.height_factor] for frame in frames])
+        unit = np.where(unit > 0, unit, 1.0)[control.frame]
+        xyz = (filled - np.mean(filled[plan], axis=0)) * unit
+        axes = np.broadcast_to(np.eye(3), (len(control), 3, 3))
+    else:
+        xyz, unit, axes = by_frame
+    known = np.column_stack([plan, plan, height])
+    sigma = np.where(known & (control.sigma > 0), control.sigma, np.nan)
+    usual = [
+        float(np.nanmedian(part)) if np.isfinite(part).any() else USUAL_SIGMA for part in (sigma[:, :2], sigma[:, 2])
+    ]
+    return Given(
+        control.ids,
+        np.where(known, xyz, np.nan),
+        known,
+        control.check,
+        control.frame,
+        written,
+        unit,
+        np.array(axes),
+        (usual[0], usual[1]),
+    )
+
+
+def _filled(written: Floats, lists: NDArray[np.intp]) -> Floats:
+    """Coordinates with the mean of their list, or of all, where they are not given."""
+    filled = written.copy()
+    for number in np.unique(lists).tolist():
+        rows = lists == number
+        for axis in range(3):
+            values = written[rows, axis]
+            if not np.isfinite(values).any():
+                values = written[:, axis]
+            mean = float(np.nanmedian(values)) if np.isfinite(values).any() else 0.0
+            part = filled[rows, axis]
+            filled[rows, axis] = np.where(np.isfinite(part), part, mean)
+    return filled
+
+
+def _decoded(
+    filled: Floats, control: ControlPoints, frames: Sequence[GroundFrame], plan: Flags
+) -> tuple[Floats, Floats, Floats] | None:
+    """Level coordinates, metres in a unit, and directions of the written axes; None where the frames refuse."""
+    cartesian, axes, unit = np.empty_like(filled), np.empty((len(filled), 3, 3)), np.ones_like(filled)
+    try:
+        for number in np.unique(control.frame).tolist():
+            rows, frame = control.frame == number, frames[number]
+            cartesian[rows] = frame.cartesian_from_ground(filled[rows])
+            axes[rows] = frame.axes_at(cartesian[rows])
+            unit[rows] = _metres(frame, filled[rows])
+        middle = np.median(cartesian[plan], axis=0)
+        first = frames[int(control.frame[int(np.argmax(plan))])]
+        turn = first.level_axes_at(middle[None, :])[0]
+    except (PhotostripError, ValueError, ArithmeticError):
+        return None
+    if not np.isfinite(cartesian).all():
+        return None
+    xyz = (cartesian - middle) @ turn.T
+    geocentric = np.array([frames[number].kind == "geocentric" for number in control.frame.tolist()])
+    if geocentric.any():  # their coordinates are no plan and no height
+        unit = np.where(geocentric[:, None], 1.0, unit)
+    return xyz, unit, axes @ turn.T
+
+
+def _metres(frame: GroundFrame, enu: Floats) -> Floats:
+    """Metres on the ground in a unit of each coordinate: a map has a scale of its own."""
+    if frame.kind in {"local", "geocentric"}:
+        return np.broadcast_to([frame.plan_factor, frame.plan_factor, frame.height_factor], enu.shape)
+    step = 1e-5 if frame.kind == "geographic" else 1.0
+    here = frame.cartesian_from_ground(enu)
+    there = [frame.cartesian_from_ground(enu + step * np.eye(3)[axis]) for axis in range(3)]
+    return np.column_stack([np.linalg.norm(each - here, axis=1) / step for each in there])

@@ -1,0 +1,396 @@
+"""What the layout of the photos says about a strip: order, overlap, photos that stand twice, are mirrored or scaled."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.triangulation.plausibility.finding import found
+from photostrip.triangulation.plausibility.photos import mosaic
+from photostrip.triangulation.plausibility.photos.units import reading_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.notes import Finding
+    from photostrip.points import PhotoPoints
+
+    Flags = NDArray[np.bool_]
+    Toward = Callable[[int, int], complex | None]
+    Against = Callable[[Sequence[int]], list[int]]
+    Closer = Callable[[str, str], tuple[complex, complex] | None]
+
+TURNED_BACK = 0.3  # cosine between the directions to both neighbours; -1 in a straight flight
+SURE_COUNT = 3  # common points of a link that may speak against the list
+SURE_MISFIT = 0.35  # of its base
+SAME_PLACE = 0.03  # of the median base: two photos from one place
+NAMED = 8
+LOOKED_AT = 24  # photos that are looked at closer; a list that is wrong at more places needs no closer look
+FEWEST = 3  # photos that have an order
+OTHER_SCALE = 1.25  # ratio to both neighbours that tilts and relief do not make
+
+
+@dataclass(frozen=True)
+class Arranged:
+    """A strip as its photos lie, for the evidence that needs them in order.
+
+    Parameters
+    ----------
+    photos : tuple of str
+        Photos in the order in which they lie, each place once.
+    steps : tuple of complex
+        Centre of the next photo on each of them, in the unit of its coordinates; NaN where it has no link.
+    mirrored : frozenset of str
+        Photos that are mirror images of the others.
+    size : dict of str to float
+        Photos whose coordinates are larger than those of the others, and how many times.
+    changed : bool
+        Whether anything of this differs from what is given.
+    """
+
+    photos: tuple[str, ...]
+    steps: tuple[complex, ...]
+    mirrored: frozenset[str]
+    size: dict[str, float]
+    changed: bool
+
+
+def examine(
+    observations: PhotoPoints, strip: str, photos: Sequence[str], closer: Closer = lambda _one, _other: None
+) -> tuple[list[Finding], Arranged]:
+    """Compare the list of a strip's photos with what their common points say.
+
+    Parameters
+    ----------
+    observations : PhotoPoints
+        Image points of the project, in any unit.
+    strip : str
+        Id of the strip.
+    photos : sequence of str
+        Its photos as listed.
+    closer : callable
+        Gives of two photos the direction of each from the other, tilts taken into account, or None; asked where the
+        layout contradicts the list.
+
+    Returns
+    -------
+    list of Finding
+        P102, P104, P201, P202, P203.
+    Arranged
+        The strip as its photos lie.
+    """
+    links = mosaic.link(observations, photos)
+    layout = mosaic.lay_out(links, len(photos))
+    told = [*_scaled(layout, strip, photos), *_mirrored(layout, strip, photos)]
+    twice = _twice(links)
+    told += [_twin(links, pair, strip, photos) for pair in twice]
+    left = [number for number in range(len(photos)) if number not in {other for _, other in twice}]
+    against = partial(turned_back, links, closer=_by_number(closer, photos))
+    order = _order(links, layout, left, against)
+    moved = _moved(order, left)
+    if moved:
+        told.append(_out_of_order(links, order, moved, strip, photos, against))
+    told += _gaps(links, order, strip, photos)
+    mirrored = frozenset(photos[number] for number in np.flatnonzero(layout.mirrored).tolist())
+    size = {photos[number]: float(layout.size[number]) for number in _other_size(layout)}
+    changed = bool(twice or moved or mirrored or size)
+    return told, Arranged(tuple(photos[number] for number in order), _steps(links, order), mirrored, size, changed)
+
+
+def other_scale(observations: PhotoPoints, strip: str, photos: Sequence[str]) -> Iterator[Finding]:
+    """Look for photos at another scale than both their neighbours, by the images alone: for strips that are not formed.
+
+    Parameters
+    ----------
+    observations : PhotoPoints
+        Image points of the project, in any unit.
+    strip : str
+        Id of the strip.
+    photos : sequence of str
+        Its photos in flight order.
+
+    Yields
+    ------
+    Finding
+        P205.
+    """
+    links = mosaic.link(observations, photos)
+    for number in range(1, len(photos) - 1):
+        rows = [links.index.get((number - 1, number)), links.index.get((number, number + 1))]
+        if rows[0] is None or rows[1] is None:
+            continue
+        before, after = abs(links.turn[rows[0]]), abs(links.turn[rows[1]])
+        ratio = np.array([before, 1.0 / max(after, mosaic.SMALL)])  # of this photo to both
+        if (ratio > OTHER_SCALE).all() or (ratio < 1 / OTHER_SCALE).all():
+            size = float(np.sqrt(ratio.prod()))
+            message = f"things are {size:.2f} times as large on photo {photos[number]} as on both its neighbours"
+            fix = "does it have another principal distance, unit, or flight?"
+            evidence = {"scale_over_neighbours": size}
+            yield found("P205", message, fix, evidence, photos=(photos[number],), strips=(strip,))
+
+
+def _steps(links: mosaic.Links, order: Sequence[int]) -> tuple[complex, ...]:
+    """Way to the next photo on each photo: slope of the line through the centres of all photos linked with it.
+
+    A tilt moves single centres by as much as a base; those of photos farther on say more of it.
+    """
+    rank = np.full(max((*order, int(links.photo.max(initial=0)))) + 1, -1)
+    rank[list(order)] = np.arange(len(order))
+    here, other = (np.concatenate([links.photo[:, k], links.photo[:, 1 - k]]) for k in (0, 1))
+    way, count = np.concatenate(links.bases), np.tile(links.count, 2)
+    lag = rank[other] - rank[here]
+    near = np.abs(lag) == 1  # a link of two points serves where there is no better one
+    use = (rank[here] >= 0) & (rank[other] >= 0) & np.isfinite(way) & (near | (count >= SURE_COUNT))
+    at, lag, way = rank[here[use]], lag[use], way[use]
+    size = len(order)
+    number = np.bincount(at, minlength=size) + 1.0  # with its own centre
+    first, second = np.bincount(at, lag, size), np.bincount(at, lag.astype(float) ** 2, size)
+    total = np.bincount(at, way.real, size) + 1j * np.bincount(at, way.imag, size)
+    mixed = np.bincount(at, lag * way.real, size) + 1j * np.bincount(at, lag * way.imag, size)
+    below = number * second - first**2
+    slope = np.where(below > 0, (number * mixed - first * total) / np.where(below > 0, below, 1.0), np.nan)
+    return tuple(slope.tolist())
+
+
+# ------------------------------------------------------------------------------- photos unlike their neighbours
+
+
+def _other_size(layout: mosaic.Layout) -> list[int]:
+    return [int(number) for number in np.flatnonzero(np.abs(np.log(layout.size)) > np.log(mosaic.JUMP))]
+
+
+def _scaled(layout: mosaic.Layout, strip: str, photos: Sequence[str]) -> Iterator[Finding]:
+    for number in _other_size(layout):
+        size = float(layout.size[number])
+        reading = reading_of(size, (0.5, 2.0))
+        message = f"the coordinates on photo {photos[number]} are {size:.4g} times as large as on its neighbours"
+        if reading.name:
+            message += f": {reading.name}"
+        fix = "bring its rows into the unit of the others"
+        yield found("P102", message, fix, {"times": size}, photos=(photos[number],), strips=(strip,))
+
+
+def _mirrored(layout: mosaic.Layout, strip: str, photos: Sequence[str]) -> Iterator[Finding]:
+    for number in np.flatnonzero(layout.mirrored).tolist():
+        message = (
+            f"photo {photos[number]} fits its neighbours only as a mirror image: a negative read as a positive, its x "
+            "and y exchanged, or its y counted the other way"
+        )
+        fix = "turn the photo over in its rows, or measure it from the right side"
+        yield found("P104", message, fix, {}, photos=(photos[number],), strips=(strip,))
+
+
+def _twice(links: mosaic.Links) -> list[tuple[int, int]]:
+    """Photos taken from one place: the same photo under two names."""
+    base = np.abs(links.bases[1])
+    if not len(base):
+        return []
+    usual = float(np.median(base))
+    like = np.abs(np.log(np.maximum(np.abs(links.turn), mosaic.SMALL))) < np.log(mosaic.JUMP)
+    same = like & (base < SAME_PLACE * usual) & (links.misfit < SAME_PLACE * usual) & (links.count >= SURE_COUNT)
+    return [(int(a), int(b)) for a, b in links.photo[same]]
+
+
+def _twin(links: mosaic.Links, pair: tuple[int, int], strip: str, photos: Sequence[str]) -> Finding:
+    row = links.index[pair]
+    one, other = photos[pair[0]], photos[pair[1]]
+    usual = float(np.median(np.abs(links.bases[1])))
+    message = (
+        f"photos {one} and {other} show their {links.count[row]} common points at the same places, within "
+        f"{100 * float(links.misfit[row]) / usual:.2g} % of a base: the same photo twice"
+    )
+    fix = f"take {other} out of the strip, or give the rows of the photo that was meant"
+    evidence = {
+        "common_points": int(links.count[row]),
+        "base_mm": float(np.abs(links.bases[1][row])),
+        "usual_base_mm": usual,
+        "misfit_mm": float(links.misfit[row]),
+    }
+    return found("P203", message, fix, evidence, photos=(one, other), strips=(strip,))
+
+
+# ------------------------------------------------------------------------------------------------- the order
+
+
+def _sure(links: mosaic.Links) -> Flags:
+    """Links that are good enough to speak against the list."""
+    base = np.abs(links.bases[1])
+    sure: Flags = (links.count >= SURE_COUNT) & (links.misfit < SURE_MISFIT * base)
+    return sure
+
+
+def _by_number(closer: Closer, photos: Sequence[str]) -> Toward:
+    """Give the direction of one photo on another, both by number, as the closer look has it."""
+
+    def toward(of: int, other: int) -> complex | None:
+        seen = closer(photos[min(of, other)], photos[max(of, other)])
+        return None if seen is None else seen[0 if of < other else 1]
+
+    return toward
+
+
+def turned_back(links: mosaic.Links, order: Sequence[int], closer: Toward = lambda _of, _other: None) -> list[int]:
+    """Find photos whose two neighbours lie on the same side.
+
+    Parameters
+    ----------
+    links : Links
+        Links of the strip.
+    order : sequence of int
+        Photos in an order.
+    closer : callable
+        Gives the direction of a photo on another, tilts taken into account, or None where that is not known.
+
+    Returns
+    -------
+    list of int
+        Those photos; none is told where a link is missing or doubtful.
+    """
+    sure = _sure(links)
+    found: list[int] = []
+    looked_at = 0
+    for before, here, after in zip(order, order[1:], order[2:], strict=False):
+        rows = [links.index.get((min(here, other), max(here, other)), -1) for other in (before, after)]
+        if min(rows) < 0 or not sure[rows].all():
+            continue
+        one, two = links.toward(here, before), links.toward(here, after)
+        if not _same_side(one, two):
+            continue
+        looked_at += 1
+        near = [closer(here, other) for other in (before, after)] if looked_at <= LOOKED_AT else [None, None]
+        if near[0] is None or near[1] is None or _same_side(near[0], near[1]):
+            found.append(here)
+    return found
+
+
+def _same_side(one: complex, two: complex) -> bool:
+    return (one * two.conjugate()).real > TURNED_BACK * abs(one) * abs(two)
+
+
+def _unlinked(links: mosaic.Links, order: Sequence[int]) -> int:
+    return sum((min(pair), max(pair)) not in links.index for pair in pairwise(order))
+
+
+def _order(links: mosaic.Links, layout: mosaic.Layout, listed: list[int], contradictions: Against) -> list[int]:
+    """Photos as they lie, where the list is contradicted; else as listed."""
+    against = len(contradictions(listed)) + _unlinked(links, listed)
+    if not against or len(listed) < FEWEST:
+        return listed
+    order: list[int] = []
+    for part in range(int(layout.part.max()) + 1):
+        inside = [number for number in listed if layout.part[number] == part]
+        order += _along(layout, inside)
+    order.sort(key=lambda number: listed.index(_first_of(layout, listed, number)))  # parts as they are listed
+    left = len(contradictions(order)) + _unlinked(links, order)
+    return order if left < against else listed
+
+
+def _first_of(layout: mosaic.Layout, listed: Sequence[int], number: int) -> int:
+    return next(other for other in listed if layout.part[other] == layout.part[number])
+
+
+def _along(layout: mosaic.Layout, inside: list[int]) -> list[int]:
+    """Photos of one part along its longest direction, in the sense in which fewer are out of the list's order."""
+    if len(inside) < FEWEST:
+        return inside
+    center = layout.center[inside]
+    d = center - center.mean()
+    axis = np.sqrt((d**2).sum())  # direction of the largest extent
+    along = (d * np.conj(axis)).real
+    order = [inside[k] for k in np.argsort(along, kind="stable")]
+    return min((order, order[::-1]), key=lambda each: len(_moved(each, inside)))
+
+
+def _moved(order: Sequence[int], listed: Sequence[int]) -> list[int]:
+    """Fewest photos that must be moved in the list: those outside its longest part in order."""
+    if list(order) == list(listed):
+        return []
+    rank = {number: place for place, number in enumerate(order)}
+    ends: list[int] = []
+    chain: list[int] = []
+    before: dict[int, int | None] = {}
+    for number in listed:
+        place = bisect_left([rank[each] for each in ends], rank[number])
+        before[number] = ends[place - 1] if place else None
+        ends[place : place + 1] = [number]
+    last: int | None = ends[-1]
+    while last is not None:
+        chain.append(last)
+        last = before[last]
+    return [number for number in listed if number not in set(chain)]
+
+
+def _out_of_order(
+    links: mosaic.Links,
+    order: Sequence[int],
+    moved: Sequence[int],
+    strip: str,
+    photos: Sequence[str],
+    contradictions: Against,
+) -> Finding:
+    names = [photos[number] for number in order]
+    wrong = [photos[number] for number in moved]
+    exchanged = _exchanged(order, moved, photos)
+    if exchanged:
+        wrong = list(exchanged)
+        message = f"strip {strip}: photos {wrong[0]} and {wrong[1]} are listed in the wrong order"
+    elif len(moved) == 1:
+        place = order.index(moved[0])
+        near = [photos[number] for number in (*order[max(place - 1, 0) : place], *order[place + 1 : place + 2])]
+        where = f"between {near[0]} and {near[1]}" if len(near) > 1 else f"beside {near[0]}"
+        message = f"strip {strip}: photo {wrong[0]} is not where it is listed; its points put it {where}"
+    else:
+        text = ", ".join(wrong[:NAMED]) + (f" and {len(wrong) - NAMED} more" if len(wrong) > NAMED else "")
+        message = f"strip {strip}: photos {text} are not where they are listed"
+    concerned = _window(names, wrong)
+    message += f"; the photos lie in the order {', '.join(concerned)}"
+    listed = [number for number in range(len(photos)) if number in set(order)]
+    evidence = {
+        "photos_moved": len(moved),
+        "turned_back_as_listed": len(contradictions(listed)),
+        "turned_back_as_found": len(contradictions(order)),
+        "neighbours_without_link_as_listed": _unlinked(links, listed),
+    }
+    fix = "list the photos in flight order, or correct the photo ids in the table"
+    return found("P201", message, fix, evidence, photos=tuple(wrong), strips=(strip,))
+
+
+def _exchanged(order: Sequence[int], moved: Sequence[int], photos: Sequence[str]) -> tuple[str, str] | None:
+    """Give the two neighbours whose exchange is all that is wrong."""
+    if len(moved) != 1:
+        return None
+    place = order.index(moved[0])
+    rest = sorted(order)
+    for other in (*order[max(place - 1, 0) : place], *order[place + 1 : place + 2]):
+        here, there = rest.index(moved[0]), rest.index(other)
+        swapped = list(rest)
+        swapped[here], swapped[there] = swapped[there], swapped[here]
+        if swapped in (list(order), list(order)[::-1]):
+            one, two = sorted((moved[0], other))
+            return photos[one], photos[two]
+    return None
+
+
+def _window(names: Sequence[str], wrong: Sequence[str]) -> list[str]:
+    """Give the part of the order that shows where wrong photos belong."""
+    places = [names.index(each) for each in wrong]
+    low, high = max(min(places) - 2, 0), min(max(places) + 3, len(names))
+    return list(names[low:high]) if high - low <= 2 * NAMED else [*names[low : low + 2 * NAMED], "..."]
+
+
+def _gaps(links: mosaic.Links, order: Sequence[int], strip: str, photos: Sequence[str]) -> Iterator[Finding]:
+    """Neighbours, in the order in which the photos lie, without two common points."""
+    for a, b in pairwise(order):
+        if (min(a, b), max(a, b)) in links.index:
+            continue
+        message = f"photos {photos[a]} and {photos[b]} follow each other and have no two points in common"
+        fix = "is a photo between them missing, or does one of them belong to another strip?"
+        evidence = {"common_points_at_most": 1}
+        yield found("P202", message, fix, evidence, photos=(photos[a], photos[b]), strips=(strip,))

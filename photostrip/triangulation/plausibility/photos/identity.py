@@ -1,0 +1,285 @@
+"""Ids of points: one id for two points, two ids for one point."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.triangulation.plausibility.finding import found
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.notes import Finding
+    from photostrip.points import PhotoPoints
+    from photostrip.triangulation.relative_orientation.relative import Orientation
+    from photostrip.triangulation.strip_formation.formation import FormedStrip
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+    Flags = NDArray[np.bool_]
+
+ALONG_BASE = 5.0  # times the y parallax: how large an error of the x parallax may be
+APART = 0.05  # of the distance from camera to ground: no bending of a strip moves a point by it
+SAME_PLACE = 8.0  # standard deviations of an image coordinate, at photo scale, in plan
+SAME_DEPTH = 3.0  # times that in height, times height over base
+CHANCE = 0.01  # points that may stand at one place by chance in the whole strip; else nothing is said
+FAR = 2.0  # bases between two places of one id: tilts move them by less
+SEEN_BY = 2  # photos that must agree
+SMALL = 1e-12
+SAME_IMAGE = 3.5  # standard deviations of the mean difference of image coordinates on common photos
+
+
+def one_id(orientation: Orientation, formed: FormedStrip, names: Sequence[str], strip: Sequence[str], sigma: float,
+           strip_id: str) -> Iterator[Finding]:  # fmt: skip
+    """Find ids that stand for two points: two pairs without a common photo put it at two places.
+
+    What a pair says is believed within what its y parallax lets expect along the base.
+
+    Parameters
+    ----------
+    orientation : Orientation
+        Oriented pairs.
+    formed : FormedStrip
+        The strip formed from them.
+    names : sequence of str
+        Ids of the points by number.
+    strip : sequence of str
+        Photos of the strip in order.
+    sigma : float
+        Standard deviation of an image coordinate, mm.
+    strip_id : str
+        Id of the strip.
+
+    Yields
+    ------
+    Finding
+        P301.
+    """
+    rows = np.flatnonzero(np.isfinite(formed.model_xyz).all(axis=1))
+    pair = orientation.pairs.pair[rows]
+    order = np.lexsort((pair, orientation.point[rows]))
+    rows, pair = rows[order], pair[order]
+    point = orientation.point[rows]
+    apart = np.flatnonzero((point[1:] == point[:-1]) & (pair[1:] > pair[:-1] + 1))
+    distance = np.linalg.norm(formed.model_xyz[rows[apart + 1]] - formed.model_xyz[rows[apart]], axis=1)
+    depth = np.linalg.norm(formed.model_xyz[rows[apart]] - formed.centers[pair[apart]], axis=1)
+    told: set[int] = set()
+    parallax = np.maximum(np.abs(orientation.parallax[rows]), sigma)
+    base = np.linalg.norm(np.diff(formed.centers, axis=0), axis=1)[pair]
+    doubt = ALONG_BASE * parallax / orientation.pairs.focal  # of an x parallax, in units of the distance
+    believed = APART * (pair[apart + 1] - pair[apart]) * depth
+    believed += sum(doubt[each] * depth**2 / base[each] for each in (apart, apart + 1))
+    for k in np.flatnonzero(distance > believed).tolist():
+        number = int(point[apart[k]])
+        if number in told:
+            continue
+        told.add(number)
+        one, two = (tuple(strip[int(pair[apart[k] + more]) :][:2]) for more in (0, 1))
+        share = float(distance[k] / depth[k])
+        message = (
+            f"point {names[number]} stands for two points: photos {' and '.join(one)} put it {100 * share:.0f} % of "
+            f"the flying height away from where photos {' and '.join(two)} put it"
+        )
+        evidence = {
+            "distance_over_flying_height": share,
+            "parallax_mm": float(np.abs(orientation.parallax[rows[apart[k]]])),
+            "other_parallax_mm": float(np.abs(orientation.parallax[rows[apart[k] + 1]])),
+        }
+        fix = f"give one of the two another id on photos {' and '.join(two)}"
+        yield found("P301", message, fix, evidence, points=(names[number],), photos=(*one, *two), strips=(strip_id,))
+
+
+def two_ids(observations: PhotoPoints, formed: FormedStrip, focal: float, strip: Sequence[str], strip_id: str,
+            sigma: float) -> Iterator[Finding]:  # fmt: skip
+    """Find points that stand at one place and are on no photo two different points.
+
+    Parameters
+    ----------
+    observations : PhotoPoints
+        Image points of the project.
+    formed : FormedStrip
+        The strip.
+    focal : float
+        Principal distance, mm.
+    strip : sequence of str
+        Photos of the strip in order.
+    strip_id : str
+        Its id.
+    sigma : float
+        Standard deviation of an image coordinate, mm.
+
+    Yields
+    ------
+    Finding
+        P302.
+    """
+    bases = np.linalg.norm(np.diff(formed.centers, axis=0), axis=1)
+    depth = _depth(formed)
+    reach = SAME_PLACE * sigma / focal * depth
+    tall = SAME_DEPTH * reach * depth / max(float(np.median(bases)), 1e-12)
+    one, two = _near(formed.xyz, reach)
+    apart = len(formed.xyz) ** 2 * reach**2 * np.pi / 2.0 / max(_area(formed.xyz), 1e-12)
+    near = SAME_IMAGE / SAME_PLACE * reach  # two points farther apart are seen as two on their photos
+    expected = len(formed.xyz) ** 2 * near**2 * np.pi / 2.0 / max(_area(formed.xyz), 1e-12)
+    if expected > CHANCE:
+        return
+    for a, b in zip(one.tolist(), two.tolist(), strict=True):
+        if abs(formed.xyz[a, 2] - formed.xyz[b, 2]) > tall:
+            continue
+        numbers = (int(formed.point[a]), int(formed.point[b]))
+        together = _together(observations, numbers, strip)
+        if together is False or (together is None and apart > CHANCE):
+            continue
+        names = tuple(observations.point_ids[number] for number in numbers)
+        gap = float(np.linalg.norm(formed.xyz[a, :2] - formed.xyz[b, :2]) / depth * focal)
+        message = (
+            f"points {names[0]} and {names[1]} stand at one place, {1000 * gap:.0f} µm from each other at photo scale, "
+            "and no photo shows them as two: two ids for one point"
+        )
+        fix = f"give {names[1]} the id {names[0]}"
+        evidence = {"distance_at_photo_scale_mm": gap, "expected_by_chance": float(expected)}
+        yield found("P302", message, fix, evidence, points=names, strips=(strip_id,))
+
+
+def far_apart(
+    observations: PhotoPoints, rows: Numbers, along: Floats, strip: Sequence[str], strip_id: str
+) -> Iterator[Finding]:
+    """Find ids that two groups of photos put at places far from each other along the strip.
+
+    Parameters
+    ----------
+    observations : PhotoPoints
+        Image points of the project.
+    rows : ndarray of int, shape (m,)
+        Those of the strip.
+    along : ndarray, shape (m,)
+        Where the photo of each puts its point along the strip, bases.
+    strip : sequence of str
+        Photos of the strip in order.
+    strip_id : str
+        Its id.
+
+    Yields
+    ------
+    Finding
+        P301.
+    """
+    order = np.lexsort((along, observations.point[rows]))
+    rows, along = rows[order], along[order]
+    point = observations.point[rows]
+    for k in np.flatnonzero((point[1:] == point[:-1]) & (np.diff(along) > FAR)).tolist():
+        here = np.flatnonzero(point == point[k])
+        groups = [rows[here[here <= k]], rows[here[here > k]]]
+        if min(len(each) for each in groups) < SEEN_BY:
+            continue  # a wrong coordinate on one photo
+        names = set(strip)
+        one, two = (
+            tuple(name for name in (observations.photo_ids[n] for n in observations.photo[each]) if name in names)
+            for each in groups
+        )
+        gap = float(along[k + 1] - along[k])
+        name = observations.point_ids[int(point[k])]
+        message = (
+            f"point {name} stands for two points: photos {' and '.join(one)} put it {gap:.1f} bases away from where "
+            f"photos {' and '.join(two)} put it"
+        )
+        fix = f"give one of the two another id on photos {' and '.join(two)}"
+        yield found("P301", message, fix, {"apart_in_bases": gap}, points=(name,), photos=(*one, *two),
+                    strips=(strip_id,))  # fmt: skip
+
+
+def on_top(observations: PhotoPoints, rows: Numbers, strip_id: str) -> Iterator[Finding]:
+    """Find points that stand at one place on every photo that shows both, two photos at least.
+
+    Parameters
+    ----------
+    observations : PhotoPoints
+        Image points, mm.
+    rows : ndarray of int, shape (m,)
+        Those of the strip.
+    strip_id : str
+        Its id.
+
+    Yields
+    ------
+    Finding
+        P302.
+    """
+    if not len(rows):
+        return
+    o = observations
+    reach = SAME_IMAGE * float(np.median(o.sigma[rows])) * np.sqrt(2.0)
+    photos = len(np.unique(o.photo[rows]))
+    area = float(np.prod(np.ptp(o.xy[rows], axis=0)))
+    pairs = len(rows) ** 2 / photos / 2.0  # of points on one photo, each counted on two photos at least
+    if pairs / SEEN_BY * (2.0 * reach) ** 2 / max(area, SMALL) > CHANCE:
+        return
+    rows = rows[np.lexsort((o.xy[rows, 0], o.photo[rows]))]
+    near: dict[tuple[int, int], list[float]] = {}
+    for lag in range(1, len(rows)):
+        step = np.abs(o.xy[rows[lag:]] - o.xy[rows[:-lag]])
+        beside = (o.photo[rows[lag:]] == o.photo[rows[:-lag]]) & (step[:, 0] < reach)
+        if not beside.any():
+            break
+        for k in np.flatnonzero(beside & (step[:, 1] < reach)).tolist():
+            a, b = sorted((int(o.point[rows[k]]), int(o.point[rows[k + lag]])))
+            near.setdefault((a, b), []).append(float(np.hypot(*step[k])))
+    for (a, b), gaps in near.items():
+        both = np.intersect1d(o.photo[rows[o.point[rows] == a]], o.photo[rows[o.point[rows] == b]])
+        if a == b or len(gaps) < max(SEEN_BY, len(both)):
+            continue
+        names = (o.point_ids[a], o.point_ids[b])
+        gap = float(np.mean(gaps))
+        message = (
+            f"points {names[0]} and {names[1]} stand at one place on all {len(both)} photos that show both, "
+            f"{1000 * gap:.0f} µm from each other: two ids for one point"
+        )
+        evidence = {"photos": len(both), "mean_distance_mm": gap}
+        yield found("P302", message, f"give {names[1]} the id {names[0]}", evidence, points=names, strips=(strip_id,))
+
+
+def _depth(formed: FormedStrip) -> float:
+    """Usual distance of the points from the line of the cameras, units of the strip."""
+    axis = formed.rotations[:, :, 2].mean(axis=0)
+    axis /= max(float(np.linalg.norm(axis)), 1e-12)
+    return float(abs(np.median(formed.centers @ axis) - np.median(formed.xyz @ axis)))
+
+
+def _area(xyz: Floats) -> float:
+    low, high = xyz[:, :2].min(axis=0), xyz[:, :2].max(axis=0)
+    return float(np.prod(high - low))
+
+
+def _near(xyz: Floats, reach: float) -> tuple[Numbers, Numbers]:
+    """Pairs of points nearer to each other in plan than a reach: sorted along one axis, each with those behind it."""
+    axis = int(np.ptp(xyz[:, :2], axis=0).argmax())
+    order = np.argsort(xyz[:, axis], kind="stable")
+    along = xyz[order, axis]
+    ones, twos = [], []
+    for lag in range(1, len(order)):
+        close = np.flatnonzero(along[lag:] - along[:-lag] < reach)
+        if not len(close):
+            break
+        hit = close[np.abs(xyz[order[close + lag], 1 - axis] - xyz[order[close], 1 - axis]) < reach]
+        ones.append(order[hit])
+        twos.append(order[hit + lag])
+    if not ones:
+        return np.zeros(0, np.intp), np.zeros(0, np.intp)
+    return np.concatenate(ones), np.concatenate(twos)
+
+
+def _together(observations: PhotoPoints, numbers: tuple[int, int], strip: Sequence[str]) -> bool | None:
+    """Whether two points stand at one place on the photos that show both; None when there is no such photo."""
+    inside = np.array([name in set(strip) for name in observations.photo_ids], bool)[observations.photo]
+    rows = [np.flatnonzero((observations.point == number) & inside) for number in numbers]
+    _, one, two = np.intersect1d(observations.photo[rows[0]], observations.photo[rows[1]], return_indices=True)
+    if not len(one):
+        return None
+    a, b = rows[0][one], rows[1][two]
+    difference = (observations.xy[a] - observations.xy[b]).mean(axis=0)
+    variance = (observations.sigma[a] ** 2 + observations.sigma[b] ** 2).sum(axis=0) / len(a) ** 2
+    return bool((np.abs(difference) <= SAME_IMAGE * np.sqrt(variance)).all())

@@ -1,0 +1,132 @@
+"""Strip polynomials: the deformation that a similarity leaves, taken out axis by axis.
+
+Every axis of the intermediate frame, X along the strip, gets its own polynomial in X and Y. How many terms the control
+can carry is decided by where it stands (``polynomial_terms``), how many it should carry by evidence
+(``polynomial_degree``).
+
+Source: [001] eq. 150-151, the free term of 151 corrected to X - X'.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache, partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.triangulation.polynomial import terms as polynomial_terms
+from photostrip.triangulation.polynomial.degree import GROUPS, Evidence, decide
+from photostrip.triangulation.polynomial.least_squares import AxisFit, Problem, fit_axes
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.triangulation.polynomial.degree import Fits
+
+    Floats = NDArray[np.float64]
+
+__all__ = ["DEGREES", "GROUPS", "AxisFit", "Evidence", "Polynomial", "Problem", "Settings", "fit"]
+
+DEGREES = ("auto", "1", "2", "3")
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Which polynomial takes out the strip deformation.
+
+    Parameters
+    ----------
+    degree : str
+        ``"auto"`` (decided by evidence), ``"1"``, ``"2"`` or ``"3"``.
+    """
+
+    degree: str = "auto"
+
+
+@dataclass(frozen=True, eq=False)
+class Polynomial:
+    """The correction of a strip.
+
+    Parameters
+    ----------
+    degree : int
+        Highest power of X in use; 0: similarity alone.
+    axes : tuple of AxisFit
+        Fits of X, Y, Z.
+    evidence : tuple of Evidence
+        Degrees that were weighed, ascending.
+    stations : tuple of int
+        Different stations along the strip in plan and in height.
+    reach : tuple of float
+        Range of the control along X, metres.
+    asked : str
+        What the settings asked for.
+    """
+
+    degree: int
+    axes: tuple[AxisFit, AxisFit, AxisFit]
+    evidence: tuple[Evidence, ...]
+    stations: tuple[int, int]
+    reach: tuple[float, float]
+    asked: str
+
+    def corrections(self, xyz: Floats) -> Floats:
+        """Correct positions by adding these.
+
+        Parameters
+        ----------
+        xyz : ndarray, shape (n, 3)
+            Strip after the similarity, intermediate frame, metres.
+
+        Returns
+        -------
+        ndarray, shape (n, 3)
+            Corrections in metres.
+
+        Notes
+        -----
+        Source: [001] eq. 150.
+        """
+        return np.column_stack([polynomial_terms.columns(xyz, axis.terms) @ axis.coefficients for axis in self.axes])
+
+    def __call__(self, xyz: Floats) -> Floats:
+        """Corrected positions; see ``corrections``."""
+        return xyz + self.corrections(xyz)
+
+
+def fit(problem: Problem, settings: Settings) -> Polynomial:
+    """Fit the polynomial that the settings ask for, or the one that the evidence supports.
+
+    Parameters
+    ----------
+    problem : Problem
+        Control points after the similarity.
+    settings : Settings
+        Degree, or ``"auto"``.
+
+    Returns
+    -------
+    Polynomial
+        The correction; of degree 0, without terms, when the control carries none or the evidence supports none.
+    """
+    counts = problem.by_axis > 0
+    x = problem.xyz[:, 0]
+    stations = tuple(polynomial_terms.count_stations(x[counts[:, axis]], problem.spacing) for axis in (0, 2))
+    chosen: list[tuple[str, ...]] = []
+    evidence: list[Evidence] = []
+    fits_of: Fits = cache(partial(fit_axes, problem))  # plan and height often weigh the same candidates
+    for group, axes in GROUPS:
+        terms, weighed = decide(problem, (group, axes), settings.degree, fits_of)
+        chosen += [terms] * len(axes)
+        evidence += weighed
+    fits = fits_of(tuple(chosen))
+    inside = x[counts.any(axis=1)]
+    return Polynomial(
+        max(polynomial_terms.degree_of(terms) for terms in chosen),
+        (fits[0], fits[1], fits[2]),
+        tuple(evidence),
+        (stations[0], stations[1]),
+        (float(inside.min()), float(inside.max())),
+        settings.degree,
+    )

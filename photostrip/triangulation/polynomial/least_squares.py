@@ -1,0 +1,209 @@
+"""Least squares of strip polynomials with given terms, axis by axis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.triangulation.polynomial import terms as polynomial_terms
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.triangulation.absolute_orientation import Targets
+
+    Floats = NDArray[np.float64]
+    Terms = tuple[tuple[str, ...], ...]  # of the three axes
+
+PASSES = 4  # plan-only and height-only points take their missing coordinate from the fit itself
+SETTLED = 1e-9  # m: nothing moves any more
+
+
+@dataclass(frozen=True, eq=False)
+class AxisFit:
+    """Polynomial of one axis.
+
+    Parameters
+    ----------
+    terms : tuple of str
+        Names of the terms, keys of ``POWERS``; empty when the axis is not corrected.
+    coefficients, sigmas : ndarray, shape (k,)
+        Coefficients for X and Y in metres and their standard deviations (NaN without redundancy).
+    effects : ndarray, shape (k,)
+        Size of each term in metres at the end of the control's range and the edge of the strip.
+    residuals : ndarray, shape (n,)
+        Corrected minus given in metres; 0 for points that do not count in this axis.
+    basis : ndarray, shape (n, k)
+        Orthonormal basis of the weighted design; its rows say how control coordinates share in the fit.
+    sigma0 : float
+        Standard deviation in metres of a control coordinate of mean weight; NaN without redundancy.
+    redundancy : int
+        Control coordinates minus terms.
+    condition : float
+        Condition number of the scaled design; NaN without terms.
+    """
+
+    terms: tuple[str, ...]
+    coefficients: Floats
+    sigmas: Floats
+    effects: Floats
+    residuals: Floats
+    basis: Floats
+    sigma0: float
+    redundancy: int
+    condition: float
+
+    @property
+    def leverage(self) -> Floats:
+        """Share of each control coordinate in its own fit, 0 to 1."""
+        share: Floats = (self.basis**2).sum(axis=1)
+        return share
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Everything a fit needs: positions, what counts, and the sizes that make columns comparable.
+
+    Parameters
+    ----------
+    xyz : ndarray, shape (n, 3)
+        Control points after the similarity, intermediate frame, metres.
+    targets : Targets
+        What they should be.
+    weight : ndarray, shape (n, 3)
+        Weights along the points' axes (east, north, up), metres^-2; 0 where a coordinate does not count.
+    spacing : float
+        Distance along the strip that makes two stations different, metres (one base).
+    breadth : float
+        Half width of the strip, metres.
+    """
+
+    xyz: Floats
+    targets: Targets
+    weight: Floats
+    spacing: float
+    breadth: float
+
+    @cached_property
+    def sizes(self) -> polynomial_terms.Sizes:
+        """What makes columns comparable."""
+        reach = max(float(np.abs(self.xyz[:, 0]).max()), 1e-6)
+        return polynomial_terms.Sizes(reach, self.breadth, self.spacing)
+
+    @cached_property
+    def misclosures(self) -> Floats:
+        """Strip minus given after the similarity, intermediate frame, metres."""
+        return self.xyz - self.targets.of(self.xyz)
+
+    @cached_property
+    def by_axis(self) -> Floats:
+        """Weights for the axes X, Y, Z: plan weights are those of the two plan coordinates together."""
+        plan = self.weight[:, :2].mean(axis=1)
+        return np.column_stack([plan, plan, self.weight[:, 2]])
+
+
+@dataclass(frozen=True, eq=False)
+class Design:
+    """What the fit of one axis is made of, before there are misclosures.
+
+    Parameters
+    ----------
+    terms : tuple of str
+        Terms; empty when the axis is not corrected.
+    rows : ndarray of bool, shape (n,)
+        Points that count.
+    columns : ndarray, shape (n, k)
+        Scaled columns of all points.
+    scales : ndarray, shape (k,)
+        What they were divided by.
+    root : ndarray, shape (n,)
+        Square roots of the weights over their mean; 0 for points that do not count.
+    basis, triangle : ndarray, shape (n, k) and (k, k)
+        The weighted columns, decomposed.
+    condition : float
+        Condition number of the scaled columns.
+    """
+
+    terms: tuple[str, ...]
+    rows: NDArray[np.bool_]
+    columns: Floats
+    scales: Floats
+    root: Floats
+    basis: Floats
+    triangle: Floats
+    condition: float
+
+    @classmethod
+    def of(cls, problem: Problem, weight: Floats, terms: tuple[str, ...]) -> Design:
+        """Decompose the columns of one axis."""
+        rows, scales = weight > 0, polynomial_terms.scales(terms, problem.sizes)
+        columns = polynomial_terms.columns(problem.xyz, terms) / scales
+        root = np.sqrt(weight / weight[rows].mean()) if rows.any() else np.zeros(len(weight))
+        basis, triangle = np.zeros(columns.shape), np.zeros((0, 0))
+        condition = float("nan")
+        if terms:
+            basis[rows], triangle = np.linalg.qr(columns[rows] * root[rows, None])
+            condition = polynomial_terms.condition(problem.xyz[rows], terms, problem.sizes)
+        return cls(terms, rows, columns, scales, root, basis, triangle, condition)
+
+    def effects(self, misclosure: Floats) -> Floats:
+        """Weighted least squares; the misclosure is strip minus given."""
+        if not self.terms:
+            return np.zeros(0)
+        # eq. 151 with the free term X - X': the polynomial equals given minus strip
+        return np.asarray(np.linalg.solve(self.triangle, self.basis.T @ (-misclosure * self.root)), float)
+
+    def correction(self, misclosure: Floats) -> Floats:
+        """Correct all points, those that do not count too."""
+        result: Floats = self.columns @ self.effects(misclosure)
+        return result
+
+    def fit(self, misclosure: Floats) -> AxisFit:
+        """Fit, with residuals and standard deviations."""
+        estimate = self.effects(misclosure)
+        residuals = np.where(self.rows, misclosure + self.columns @ estimate, 0.0)
+        redundancy = int(self.rows.sum()) - len(self.terms)
+        if not self.terms:
+            nan = float("nan")
+            return AxisFit((), estimate, estimate, estimate, residuals, self.basis, nan, redundancy, nan)
+        squares = float(((residuals * self.root) ** 2).sum())
+        sigma0 = float(np.sqrt(squares / redundancy)) if redundancy > 0 else float("nan")
+        sigmas = sigma0 * np.sqrt((np.linalg.inv(self.triangle) ** 2).sum(axis=1)) / self.scales
+        coefficients = estimate / self.scales
+        return AxisFit(
+            self.terms, coefficients, sigmas, estimate, residuals, self.basis, sigma0, redundancy, self.condition
+        )
+
+
+def fit_axes(problem: Problem, terms: Terms) -> list[AxisFit]:
+    """Fit all three axes; a few passes settle points that give only some of their coordinates.
+
+    Parameters
+    ----------
+    problem : Problem
+        Control points after the similarity.
+    terms : tuple of tuple of str
+        Terms of X, Y, Z.
+
+    Returns
+    -------
+    list of AxisFit
+        Fits of X, Y, Z.
+
+    Notes
+    -----
+    Source: [001] eq. 151.
+    """
+    designs = [Design.of(problem, problem.by_axis[:, axis], terms[axis]) for axis in range(3)]
+    misclosure = problem.misclosures
+    if not problem.targets.control.use.all():
+        for _ in range(PASSES):
+            corrections = [design.correction(misclosure[:, axis]) for axis, design in enumerate(designs)]
+            before = misclosure
+            misclosure = problem.xyz - problem.targets.of(problem.xyz + np.column_stack(corrections))
+            if np.abs(misclosure - before).max() < SETTLED:
+                break
+    return [design.fit(misclosure[:, axis]) for axis, design in enumerate(designs)]

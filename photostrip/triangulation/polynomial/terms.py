@@ -1,0 +1,186 @@
+"""Terms of the strip polynomials, and which of them control points can carry where they stand.
+
+How many terms control can carry is decided by its stations along the strip, not by how many points there are: a cubic
+needs four different ones.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+POWERS = {"1": (0, 0), "X": (1, 0), "Y": (0, 1), "XY": (1, 1), "X^2": (2, 0), "X^3": (3, 0)}
+# Ladder: terms, degree, stations along the strip, points for an exact fit. One more point is asked for unless forced.
+LADDER = (
+    (("1", "X", "Y", "XY", "X^2", "X^3"), 3, 4, 6),
+    (("1", "X", "Y", "XY", "X^2"), 2, 3, 5),
+    (("1", "X", "Y", "X^2"), 2, 3, 4),
+    (("1", "X", "Y"), 1, 2, 3),
+)
+DROP_ORDER = ("XY", "Y", "X^3", "X^2", "X")
+# smallest over largest singular value of the scaled design; below it the control cannot tell the terms apart
+RANK_LIMIT = 0.02
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Sizes that make columns comparable and stations different.
+
+    Parameters
+    ----------
+    reach : float
+        Largest distance of control from the origin along the strip, metres.
+    breadth : float
+        Half width of the strip, metres.
+    spacing : float
+        Distance along the strip that makes two stations different, metres (one base).
+    """
+
+    reach: float
+    breadth: float
+    spacing: float
+
+
+def columns(xyz: Floats, terms: Sequence[str]) -> Floats:
+    """Design columns of the terms, unscaled.
+
+    Parameters
+    ----------
+    xyz : ndarray, shape (n, 3)
+        Positions in the intermediate frame, metres.
+    terms : sequence of str
+        Keys of ``POWERS``.
+
+    Returns
+    -------
+    ndarray, shape (n, k)
+        Powers of X and Y.
+    """
+    x, y = xyz[:, 0], xyz[:, 1]
+    return np.column_stack([x**i * y**j for i, j in (POWERS[t] for t in terms)] or [np.zeros((len(xyz), 0))])
+
+
+def count_stations(x: Floats, spacing: float) -> int:
+    """Count stations along the strip that are at least a spacing apart.
+
+    Parameters
+    ----------
+    x : ndarray, shape (n,)
+        Positions along the strip.
+    spacing : float
+        Smallest distance of two stations.
+
+    Returns
+    -------
+    int
+        The largest number of points of which no two are nearer than the spacing.
+    """
+    return len(np.unique(bands(x, spacing))) if len(x) else 0
+
+
+def bands(x: Floats, spacing: float) -> Numbers:
+    """Group points into bands across the strip, from its beginning.
+
+    Parameters
+    ----------
+    x : ndarray, shape (n,)
+        Positions along the strip.
+    spacing : float
+        A point farther than this from the first of its band opens the next.
+
+    Returns
+    -------
+    ndarray of int, shape (n,)
+        Number of the band of each point.
+    """
+    number = np.zeros(len(x), np.intp)
+    current, first = -1, -np.inf
+    for row in np.argsort(x, kind="stable"):
+        if x[row] - first >= spacing:
+            current, first = current + 1, x[row]
+        number[row] = current
+    return number
+
+
+def choose_terms(xyz: Floats, degree: int, sizes: Sizes, *, forced: bool = False) -> tuple[str, ...]:
+    """Terms that given control points can carry, up to a degree.
+
+    Parameters
+    ----------
+    xyz : ndarray, shape (n, 3)
+        Control points that count in the axis.
+    degree : int
+        Highest power of X asked for.
+    sizes : Sizes
+        Sizes that make the columns comparable.
+    forced : bool
+        Whether a fit without redundancy is allowed.
+
+    Returns
+    -------
+    tuple of str
+        Names of the terms; empty when the control carries none.
+
+    Notes
+    -----
+    Six points are necessary for six terms, not sufficient: [001] after eq. 151 says six, a cubic needs four stations.
+    """
+    stations = count_stations(xyz[:, 0], sizes.spacing)
+    terms = ladder(stations, len(xyz) if forced else len(xyz) - 1, degree)
+    for drop in DROP_ORDER:
+        if not terms or condition(xyz, terms, sizes) < 1 / RANK_LIMIT:
+            break
+        terms = dropped(terms, drop)
+    return terms
+
+
+def ladder(stations: int, points: int, degree: int) -> tuple[str, ...]:
+    """Most terms that so many stations and points carry, up to a degree.
+
+    Parameters
+    ----------
+    stations, points : int
+        Stations along the strip, and control points.
+    degree : int
+        Highest power of X asked for.
+
+    Returns
+    -------
+    tuple of str
+        Terms; none where nothing is carried.
+    """
+    for candidate, power, needed, exact in LADDER:
+        if power <= degree and stations >= needed and points >= exact:
+            return candidate
+    return ()
+
+
+def dropped(terms: tuple[str, ...], drop: str) -> tuple[str, ...]:
+    """Give the terms without one of them."""
+    return tuple(term for term in terms if term != drop)
+
+
+def scales(terms: Sequence[str], sizes: Sizes) -> Floats:
+    """Sizes of the columns at the end of the control and the edge of the strip, shape (k,), metres to their powers."""
+    return np.array([sizes.reach**i * sizes.breadth**j for i, j in (POWERS[t] for t in terms)])
+
+
+def condition(xyz: Floats, terms: Sequence[str], sizes: Sizes) -> float:
+    """Condition number of the scaled columns at positions (n, 3), metres; infinite when they cannot be told apart."""
+    values = np.linalg.svd(columns(xyz, terms) / scales(terms, sizes), compute_uv=False)
+    return float(values[0] / values[-1]) if values[-1] > 0 else float("inf")
+
+
+def degree_of(terms: Sequence[str]) -> int:
+    """Highest power of X among the terms; 0 without terms."""
+    return max((POWERS[t][0] for t in terms), default=0)

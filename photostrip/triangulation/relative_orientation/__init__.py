@@ -1,0 +1,1 @@
+"""Relative orientation of all pairs of a strip: from image coordinates to five elements of each pair."""

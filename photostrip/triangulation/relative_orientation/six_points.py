@@ -1,0 +1,144 @@
+"""Six standard points: relative orientation in closed form to the first order, its precision, the dependent pair.
+
+The points, in the left photo: 1 (0, 0), 2 (b, 0), 3 (0, a), 4 (b, a), 5 (0, -a), 6 (b, -a) with the photo base b.
+Elements are those of ``relative``: alpha1', kappa1', alpha2', omega2', kappa2'.
+
+Source: derived from the linear condition; the weight numbers of the dependent pair are those of [Hallert].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.geometry.rotation import alpha_omega_kappa, from_alpha_omega_kappa
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    Floats = NDArray[np.float64]
+
+SHARES = np.array([2.0, -2.0, -1.0, 1.0, -1.0, 1.0])  # of the six parallaxes in the closing error
+
+
+@dataclass(frozen=True, eq=False)
+class SixPoints:
+    """First-order orientation of six standard points.
+
+    Parameters
+    ----------
+    elements : ndarray, shape (5,)
+        Elements in radians.
+    closing_error : float
+        W, the one check that six points give, mm.
+    sigma : float
+        Standard deviation of a y parallax from the closing error, mm.
+    residuals : ndarray, shape (6,)
+        y parallaxes that remain, mm.
+    """
+
+    elements: Floats
+    closing_error: float
+    sigma: float
+    residuals: Floats
+
+
+def orient_six_points(parallax: ArrayLike, focal: float, width: float, base: float) -> SixPoints:
+    """Elements from the y parallaxes of the six standard points, least squares linearised at zero.
+
+    Parameters
+    ----------
+    parallax : array_like, shape (6,)
+        q = y1 - y2 of points 1 to 6, mm.
+    focal, width, base : float
+        Principal distance f, distance a of the side points from the middle ones, photo base b, mm.
+
+    Returns
+    -------
+    SixPoints
+        Elements, closing error and residuals.
+    """
+    q1, q2, q3, q4, q5, q6 = q = np.asarray(parallax, float)
+    omega2 = focal * (q3 + q4 + q5 + q6 - 2 * q1 - 2 * q2) / (4 * width**2)
+    tilted = omega2 * (focal + 2 * width**2 / (3 * focal))
+    alpha1, alpha2 = (focal * dq / (2 * width * base) for dq in (q6 - q4, q5 - q3))
+    kappa1, kappa2 = ((tilted - total / 3) / base for total in (q2 + q4 + q6, q1 + q3 + q5))
+    closing = float(SHARES @ q)
+    elements = np.array([alpha1, kappa1, alpha2, omega2, kappa2])
+    return SixPoints(elements, closing, abs(closing) / np.sqrt(12.0), SHARES * closing / 12)
+
+
+def cofactors(focal: float, width: float, base: float) -> Floats:
+    """Cofactors of the elements from six standard points.
+
+    Parameters
+    ----------
+    focal, width, base : float
+        f, a and b in mm.
+
+    Returns
+    -------
+    ndarray, shape (5, 5)
+        Cofactors in rad^2 per mm^2; times the variance of a y parallax they are covariances.
+    """
+    f, a, b = focal, width, base
+    alpha, omega = f**2 / (2 * a**2 * b**2), 3 * f**2 / (4 * a**4)
+    kappa = (8 * a**4 + 12 * a**2 * f**2 + 9 * f**4) / (12 * a**4 * b**2)
+    matrix = np.diag([alpha, kappa, alpha, omega, kappa])
+    matrix[[1, 4], [4, 1]] = (a**4 / 3 + a**2 * f**2 + 3 * f**4 / 4) / (a**4 * b**2)
+    matrix[[1, 4, 3, 3], [3, 3, 1, 4]] = f * (2 * a**2 + 3 * f**2) / (4 * a**4 * b)
+    return matrix
+
+
+def dependent_from_base(base: float) -> Floats:
+    """First-order relation of the dependent pair (left photo fixed) to the base-frame elements.
+
+    Parameters
+    ----------
+    base : float
+        Photo base b, mm.
+
+    Returns
+    -------
+    ndarray, shape (5, 5)
+        T with (by, bz, dkappa, dalpha, domega) = T (alpha1', kappa1', alpha2', omega2', kappa2'), lengths in mm. The
+        cofactors follow as T Q T^T for any points. dalpha = alpha2' + bz/b is the decorrelation that [000] uses.
+    """
+    matrix = np.zeros((5, 5))
+    matrix[0, 1] = matrix[1, 0] = -base
+    matrix[2, [1, 4]] = matrix[3, [0, 2]] = -1.0, 1.0
+    matrix[4, 3] = 1.0
+    return matrix
+
+
+def dependent_pair(elements: ArrayLike) -> tuple[Floats, Floats]:
+    """Right photo relative to the left one, from base-frame elements; exact.
+
+    Parameters
+    ----------
+    elements : array_like, shape (..., 5)
+        Elements in radians.
+
+    Returns
+    -------
+    direction : ndarray, shape (..., 3)
+        Unit vector of the base in the left photo's frame; by/bx and bz/bx are ratios of its components.
+    rotation : ndarray, shape (..., 3, 3)
+        Right photo to left photo; its angles are dalpha, domega, dkappa.
+    """
+    al1, ka1, al2, om2, ka2 = np.moveaxis(np.asarray(elements, float), -1, 0)
+    left = from_alpha_omega_kappa(al1, 0.0, ka1)
+    return left[..., 0, :], np.swapaxes(left, -1, -2) @ from_alpha_omega_kappa(al2, om2, ka2)
+
+
+def base_elements(direction: ArrayLike, rotation: ArrayLike) -> Floats:
+    """Base-frame elements, shape (..., 5), radians, of a dependent pair; the inverse of ``dependent_pair``.
+
+    The base `direction`, shape (..., 3), may have any length; it must not be parallel to the left principal ray.
+    """
+    x, y, z = np.moveaxis(np.asarray(direction, float), -1, 0)
+    al1, ka1 = -np.arctan2(z, np.hypot(x, y)), -np.arctan2(y, x)
+    right = from_alpha_omega_kappa(al1, 0.0, ka1) @ np.asarray(rotation, float)
+    return np.stack([al1, ka1, *alpha_omega_kappa(right)], axis=-1)

@@ -1,0 +1,1 @@
+"""Space resection of photos on known points, from start values or in closed form."""
