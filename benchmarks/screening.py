@@ -28,10 +28,7 @@ from photostrip.triangulation.gross_errors.pairs import deletion, screening  # n
 from photostrip.triangulation.gross_errors.rays import settling  # noqa: E402
 from photostrip.triangulation.relative_orientation import relative  # noqa: E402
 from photostrip.triangulation.relative_orientation.relative import Pairs, Settings  # noqa: E402
-from photostrip.triangulation.strip_formation import (
-    formation,  # noqa: E402
-    scale_ratios,  # noqa: E402
-)
+from photostrip.triangulation.strip_formation import formation, scale_ratios  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
