@@ -52,8 +52,6 @@ class Camera:
         Calibrated coordinates of the fiducial marks in mm.
     pixel_size : float, optional
         Size of a pixel in mm, for digital cameras.
-    distortion : Distortion, optional
-        Lens distortion.
     """
 
     name: str

@@ -137,13 +137,6 @@ def t_sf(t: float, dof: float) -> float:
     ----------
     t : float
         Argument, not negative.
-    dof : float
-        Degrees of freedom.
-
-    Returns
-    -------
-    float
-        Probability above t.
     """
     total = dof + t * t
     return 0.5 * beta_cdf(dof / total, dof / 2, 0.5, t * t / total)
@@ -156,13 +149,6 @@ def t_isf(tail: float, dof: float) -> float:
     ----------
     tail : float
         Probability above the quantile, 0 to 1.
-    dof : float
-        Degrees of freedom.
-
-    Returns
-    -------
-    float
-        The quantile.
     """
     if tail > 0.5:  # noqa: PLR2004  the median
         return -t_isf(1 - tail, dof)
@@ -177,15 +163,8 @@ def f_sf(f: float, numerator: float, denominator: float) -> float:
 
     Parameters
     ----------
-    f : float
-        Ratio of two variances.
     numerator, denominator : float
         Their degrees of freedom.
-
-    Returns
-    -------
-    float
-        Probability above f.
     """
     if f <= 0:
         return 1.0
@@ -200,13 +179,6 @@ def chi2_ppf(probability: float, dof: float) -> float:
     ----------
     probability : float
         Probability below the quantile, between 0 and 1.
-    dof : float
-        Degrees of freedom.
-
-    Returns
-    -------
-    float
-        The quantile.
 
     Notes
     -----

@@ -44,10 +44,6 @@ class Fault:
         Position, counted from 1; 0 when unknown.
     key : str
         Path of the key in the project file (``cameras.RC30.format``) or name of the table column.
-    expected : str
-        What was expected instead.
-    fix : str
-        What would put it right.
     """
 
     message: str
@@ -60,7 +56,7 @@ class Fault:
     fix: str = ""
 
     def __str__(self) -> str:
-        """Give the one-line form ``file:line:column: key: what, expected, fix``."""
+        """Return the one-line form ``file:line:column: key: what, expected, fix``."""
         place = self.file
         if self.line:
             place += f":{self.line}"

@@ -27,8 +27,6 @@ class Note:
         ``"warning"`` or ``"note"``.
     strip : str
         Strip concerned; empty for the whole project.
-    photos, points : tuple of str
-        Ids concerned.
     file : str
         File in which the cause stands; empty when there is none.
     line, column : int
@@ -49,12 +47,12 @@ class Note:
     key: str = ""
 
     def __str__(self) -> str:
-        """Give the one-line form ``file:line:column: what``."""
+        """Return the one-line form ``file:line:column: what``."""
         return before(self.file, self.line, self.column) + self.message
 
 
 def before(file: str, line: int, column: int) -> str:
-    """Give the place that stands before a message: ``file:line:column: ``; empty when there is none."""
+    """Return the place that stands before a message: ``file:line:column: ``; empty when there is none."""
     place = file + "".join(f":{number}" for number in (line, column) if file and number)
     return f"{place}: " if place else ""
 
@@ -73,12 +71,8 @@ class Finding:
         ``"error"``: a result made from such data is wrong as a whole; ``"warning"``: some of it may be.
     message : str
         What was found, with ids, numbers and units.
-    fix : str
-        What would put it right.
     evidence : mapping of str to float, int or str
         The numbers behind it; names end with the unit.
-    photos, points, strips : tuple of str
-        Ids concerned.
     key : str
         Path of the key in the project file that would be changed; empty when the mistake is in a table.
     accepted : bool

@@ -29,14 +29,12 @@ class Frame(StrEnum):
 
 
 def frozen(values: ArrayLike, dtype: type = float, shape: tuple[int, ...] | None = None) -> NDArray[Any]:
-    """Give a read-only array, copied only when needed.
+    """Return a read-only array, copied only when needed.
 
     Parameters
     ----------
     values : array_like
         Values of any shape.
-    dtype : type
-        Type of the elements.
     shape : tuple of int, optional
         Shape to bring an empty or flat input into.
 
@@ -82,7 +80,7 @@ class PointTable:
         return {name: row for row, name in enumerate(self.ids)}
 
     def __len__(self) -> int:
-        """Give the number of points."""
+        """Return the number of points."""
         return len(self.ids)
 
     def shared(self, other: PointTable) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -144,7 +142,7 @@ class PhotoPoints:
             object.__setattr__(self, name, frozen(getattr(self, name), shape=(n, 2)))
 
     def __len__(self) -> int:
-        """Give the number of image points."""
+        """Return the number of image points."""
         return len(self.photo)
 
 
@@ -187,21 +185,16 @@ class ControlPoints:
         object.__setattr__(self, "frame", frozen(frame, dtype=np.intp, shape=(n,)))
 
     def __len__(self) -> int:
-        """Give the number of points."""
+        """Return the number of points."""
         return len(self.ids)
 
     def take(self, rows: Sequence[int] | NDArray[np.intp] | NDArray[np.bool_]) -> ControlPoints:
-        """Give the points of some rows.
+        """Return the points of some rows.
 
         Parameters
         ----------
         rows : array of int or bool
             Rows to keep, in their order.
-
-        Returns
-        -------
-        ControlPoints
-            A table of those points.
         """
         numbers = np.arange(len(self))[np.asarray(rows)] if len(self) else np.zeros(0, np.intp)
         ids = tuple(self.ids[i] for i in numbers)
@@ -246,7 +239,7 @@ class ModelPoints:
             object.__setattr__(self, name, frozen(getattr(self, name), shape=(n, 3)))
 
     def __len__(self) -> int:
-        """Give the number of rows."""
+        """Return the number of rows."""
         return len(self.model)
 
     def name(self, node: int) -> str:

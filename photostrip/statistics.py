@@ -14,37 +14,13 @@ from photostrip.distributions import chi2_ppf, f_sf, t_isf, t_sf
 
 @lru_cache(maxsize=4096)
 def t_quantile(probability: float, dof: float) -> float:
-    """Quantile of Student's t.
-
-    Parameters
-    ----------
-    probability : float
-        Probability below the quantile.
-    dof : float
-        Degrees of freedom.
-
-    Returns
-    -------
-    float
-        The quantile.
-    """
+    """Quantile of Student's t."""
     return -t_isf(probability, dof)
 
 
 @lru_cache(maxsize=4096)
 def normal_quantile(probability: float) -> float:
-    """Quantile of the standard normal distribution.
-
-    Parameters
-    ----------
-    probability : float
-        Probability below the quantile.
-
-    Returns
-    -------
-    float
-        The quantile.
-    """
+    """Quantile of the standard normal distribution."""
     return NormalDist().inv_cdf(probability)
 
 
@@ -55,8 +31,6 @@ def t_p_value(t: float, dof: float) -> float:
     ----------
     t : float
         Estimate divided by its standard deviation.
-    dof : float
-        Degrees of freedom.
 
     Returns
     -------
@@ -71,8 +45,6 @@ def f_p_value(f: float, dof_numerator: float, dof_denominator: float) -> float:
 
     Parameters
     ----------
-    f : float
-        Ratio of two variances.
     dof_numerator, dof_denominator : float
         Their degrees of freedom.
 
@@ -86,20 +58,7 @@ def f_p_value(f: float, dof_numerator: float, dof_denominator: float) -> float:
 
 @lru_cache(maxsize=4096)
 def chi2_quantile(probability: float, dof: float) -> float:
-    """Quantile of chi-square.
-
-    Parameters
-    ----------
-    probability : float
-        Probability below the quantile.
-    dof : float
-        Degrees of freedom.
-
-    Returns
-    -------
-    float
-        The quantile.
-    """
+    """Quantile of chi-square."""
     return chi2_ppf(probability, dof)
 
 
@@ -136,8 +95,6 @@ def tau_limit(n: int, unknowns: int, alpha: float) -> float:
 
     Parameters
     ----------
-    n : int
-        Number of observations.
     unknowns : int
         Number of parameters of the adjustment; n - unknowns must be at least 2.
     alpha : float

@@ -58,21 +58,7 @@ def _dask() -> Any:  # noqa: ANN401 (a module without types)
 
 
 class Cluster:
-    """A cluster that is connected.
-
-    Parameters
-    ----------
-    client : dask.distributed.Client
-        The connection.
-    limits : Limits
-        What a project may use.
-    work : str
-        What a worker does with a task, as ``module:function``.
-    begun : callable
-        Is told every task that is sent.
-    say : callable
-        Takes what the user should know meanwhile.
-    """
+    """A cluster that is connected."""
 
     def __init__(
         self,
@@ -112,7 +98,7 @@ class Cluster:
                     future.cancel()
 
     def _ahead(self) -> int:
-        """Give the number of tasks that may be under way: workers come and go."""
+        """Return the number of tasks that may be under way: workers come and go."""
         now = time.monotonic()
         if now - self._counted > COUNTED_EVERY:
             workers = self.client.scheduler_info(n_workers=-1)["workers"].values()
@@ -171,11 +157,6 @@ class Cluster:
 def require_same(theirs: dict[str, str]) -> None:
     """Refuse answers of another program: results would depend on which machine computed them.
 
-    Parameters
-    ----------
-    theirs : dict of str to str
-        What computed an answer.
-
     Raises
     ------
     InputError
@@ -218,21 +199,6 @@ def cluster(
     ----------
     address : str
         ``tcp://HOST:PORT`` of a scheduler, or ``local``.
-    jobs : int
-        Number of processes of a local one.
-    limits : Limits
-        What a project may use.
-    begun : callable
-        Is told every task that is sent.
-    work : str
-        What a worker does with a task, as ``module:function``.
-    say : callable
-        Takes what the user should know meanwhile.
-
-    Yields
-    ------
-    Cluster
-        The cluster.
 
     Raises
     ------

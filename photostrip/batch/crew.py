@@ -39,13 +39,6 @@ class Executor(Protocol):
         ----------
         tasks : iterator of Task or None
             What is to be done, taken as it is needed; None: nothing yet, look again.
-        stopped : callable
-            Whether to stop.
-
-        Yields
-        ------
-        Answer
-            In the order in which they come.
         """
         ...
 
@@ -55,19 +48,7 @@ def ignored(_: Task) -> None:
 
 
 class Crew:
-    """Workers on this machine.
-
-    Parameters
-    ----------
-    jobs : int
-        How many.
-    limits : Limits
-        What a project may use.
-    work : str
-        What a worker does with a task, as ``module:function``.
-    begun : callable
-        Is told every task that begins.
-    """
+    """Workers on this machine."""
 
     def __init__(
         self,

@@ -37,7 +37,7 @@ _TEMPORARY = re.compile(r"\..+\.\d+\.tmp")
 
 @cache
 def program() -> dict[str, str]:
-    """Give what computes: the version, the digest of the program's own files, the versions of the libraries below it.
+    """Return what computes: the version, the digest of the program's own files, the versions of the libraries below it.
 
     Returns
     -------
@@ -54,26 +54,13 @@ def program() -> dict[str, str]:
 
 
 class Folder:
-    """The folder of a batch; make it with ``opened``.
-
-    Parameters
-    ----------
-    path : Path
-        Where it is.
-    overrides : sequence of str
-        Assignments that hold for all projects.
-    """
+    """The folder of a batch; make it with ``opened``."""
 
     def __init__(self, path: Path, overrides: Sequence[str] = ()) -> None:
         self.path, self.overrides = path, list(overrides)
 
     def unchanged(self, chosen: Chosen) -> Document | None:
-        """Give the line of the summary of a result that can be trusted.
-
-        Parameters
-        ----------
-        chosen : Chosen
-            The project.
+        """Return the line of the summary of a result that can be trusted.
 
         Returns
         -------
@@ -96,7 +83,7 @@ class Folder:
         return outcome
 
     def files_of(self, chosen: Chosen) -> list[str]:
-        """Give the files that the result of a project was made from; none when there is no result."""
+        """Return the files that the result of a project was made from; none when there is no result."""
         record = self._record(self.path / chosen.output)
         if record is None or record["project"] != self._name(chosen):
             return []
@@ -105,11 +92,6 @@ class Folder:
 
     def refused(self, chosen: Chosen) -> Fault | None:
         """Say whether a project must not be written where it would go: the result of another one stands there.
-
-        Parameters
-        ----------
-        chosen : Chosen
-            The project.
 
         Returns
         -------
@@ -128,13 +110,6 @@ class Folder:
 
     def write(self, chosen: Chosen, answer: Answer) -> None:
         """Write a result, the record last.
-
-        Parameters
-        ----------
-        chosen : Chosen
-            The project.
-        answer : Answer
-            Its result.
 
         Raises
         ------
@@ -188,8 +163,6 @@ def opened(path: Path, overrides: Sequence[str] = ()) -> Iterator[Folder]:
     ----------
     path : Path
         The folder; made when it is missing.
-    overrides : sequence of str
-        Assignments that hold for all projects.
 
     Yields
     ------

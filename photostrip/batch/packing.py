@@ -30,8 +30,6 @@ class Parcel:
         Content of the project file, of what it extends and of its tables, by path as the user typed it.
     grids : dict of str to bytes
         Content of the grid files beside the project file, by name.
-    folder : str
-        Working folder to which relative paths refer.
     """
 
     files: dict[str, bytes]
@@ -41,18 +39,6 @@ class Parcel:
 
 def pack(path: Path, overrides: Sequence[str] = ()) -> Parcel:
     """Read all files of a project without looking into its tables.
-
-    Parameters
-    ----------
-    path : Path
-        The project file.
-    overrides : sequence of str
-        Assignments that replace values of the file.
-
-    Returns
-    -------
-    Parcel
-        Its files.
 
     Raises
     ------
@@ -87,7 +73,7 @@ def _travels(grid: str) -> bool:
 
 
 def _values(node: Node, key: str) -> Iterator[Node]:
-    """Give every text of the project that stands under a key of this name."""
+    """Return every text of the project that stands under a key of this name."""
     for name, inner in node.entries.items():
         if name == key and inner.text:
             yield inner

@@ -28,17 +28,11 @@ def compute(task: Task, limits: Limits, work: str = WORK) -> tuple[Answer, dict[
 
     Parameters
     ----------
-    task : Task
-        The project, with its files.
     limits : Limits
         What it may use; without a limit of memory, this machine's memory shared among its cores.
-    work : str
-        What a worker does with a task, as ``module:function``.
 
     Returns
     -------
-    answer : Answer
-        What became of it.
     program : dict of str to str
         What computed it, as ``folder.program`` gives it.
     """

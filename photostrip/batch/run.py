@@ -54,18 +54,7 @@ class Stop:
 
 @contextmanager
 def on_signals(stop: Stop) -> Iterator[Stop]:
-    """Let Ctrl-C and SIGTERM end a batch in good order; a second one ends it at once.
-
-    Parameters
-    ----------
-    stop : Stop
-        Learns of the signal.
-
-    Yields
-    ------
-    Stop
-        The same.
-    """
+    """Let Ctrl-C and SIGTERM end a batch in good order; a second one ends it at once."""
     before: dict[int, Any] = {}
 
     def noticed(number: int, _: FrameType | None) -> None:
@@ -90,10 +79,6 @@ class Batch:
     ----------
     outcomes : list of dict
         The line of the summary of each project, in the order in which the user named them.
-    unchanged : int
-        Projects whose result was there already.
-    seconds : float
-        What the others took together.
     """
 
     outcomes: list[Document] = field(default_factory=list)
@@ -111,10 +96,6 @@ class Run:
 
     Parameters
     ----------
-    projects : sequence of Chosen
-        What is to be computed.
-    overrides : sequence of str
-        Assignments that hold for all of them.
     folder : Folder, optional
         Where results go; None: nowhere.
     force : bool
@@ -128,28 +109,13 @@ class Run:
         self.batch = Batch([named(not_run(), chosen, written=folder is not None) for chosen in projects])
 
     def go(self, executor: Executor, watch: Watch, stop: Stop) -> Batch:
-        """Compute what must be computed.
-
-        Parameters
-        ----------
-        executor : Executor
-            Who computes.
-        watch : Watch
-            Is told what happens.
-        stop : Stop
-            Says when to end early.
-
-        Returns
-        -------
-        Batch
-            One line for every project, whatever happened.
-        """
+        """Compute what must be computed."""
         for answer in executor.answers(self._tasks(watch, stop), stop):
             self._take(answer, watch, stop)
         return self.batch
 
     def files_read(self) -> list[str]:
-        """Give every file that the results were made from, and the project files of those without a result."""
+        """Return every file that the results were made from, and the project files of those without a result."""
         files: dict[str, None] = {}
         for chosen in self.projects:
             read = self.folder.files_of(chosen) if self.folder is not None else []
@@ -157,7 +123,7 @@ class Run:
         return list(files)
 
     def _tasks(self, watch: Watch, stop: Callable[[], bool]) -> Iterator[Task | None]:
-        """Give what must be computed, None in between for what need not."""
+        """Return what must be computed, None in between for what need not."""
         for chosen in self.projects:
             if stop():
                 return
@@ -169,7 +135,7 @@ class Run:
                 yield None
 
     def _settled(self, chosen: Chosen) -> Document | None:
-        """Give the line of the summary of a project that need not, or must not, be computed."""
+        """Return the line of the summary of a project that need not, or must not, be computed."""
         if self.folder is None or self.force:
             return None
         outcome = self.folder.unchanged(chosen)
@@ -205,10 +171,6 @@ def named(outcome: Document, chosen: Chosen, *, written: bool) -> Document:
 
     Parameters
     ----------
-    outcome : dict
-        The line.
-    chosen : Chosen
-        The project.
     written : bool
         Whether the batch has a folder to write into.
 

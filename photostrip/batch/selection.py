@@ -28,8 +28,6 @@ class Chosen:
 
     Parameters
     ----------
-    number : int
-        Its place among all.
     project : str
         Path of the project file as the user knows it.
     output : str
@@ -92,7 +90,7 @@ def _listed(arguments: Iterable[str], faults: list[Fault]) -> Iterator[str]:
 
 
 def _projects(argument: str, faults: list[Fault]) -> list[str]:
-    """Give the project files that one argument means."""
+    """Return the project files that one argument means."""
     path = Path(argument)
     if path.is_dir():
         found = _below(path)
@@ -114,7 +112,7 @@ def _project(path: Path) -> list[str]:
 
 
 def _below(folder: Path) -> list[str]:
-    """Give the project of a folder, or those of all folders below it except hidden ones."""
+    """Return the project of a folder, or those of all folders below it except hidden ones."""
     if (folder / PROJECT).is_file():
         return [str(folder / PROJECT)]
     found = []
@@ -127,12 +125,7 @@ def _below(folder: Path) -> list[str]:
 
 
 def output_names(projects: Sequence[str]) -> list[str]:
-    """Give every project the name of its result's folder.
-
-    Parameters
-    ----------
-    projects : sequence of str
-        Paths of different project files.
+    """Return every project the name of its result's folder.
 
     Returns
     -------
@@ -160,7 +153,7 @@ def output_names(projects: Sequence[str]) -> list[str]:
 
 
 def _parts(project: str) -> tuple[str, ...]:
-    """Give the folders above a result and its name."""
+    """Return the folders above a result and its name."""
     path = Path(os.path.abspath(project))  # noqa: PTH100 (links stay: the user named them)
     folders = path.parent.parts[1:]
     if path.stem == "project" and folders:

@@ -44,12 +44,8 @@ class Task:
 
     Parameters
     ----------
-    number : int
-        Its place among the projects of the batch.
     project : str
         Path of the project file as the user knows it.
-    overrides : tuple of str
-        Assignments that replace values of the file.
     parcel : Parcel, optional
         Its files, when it goes to another machine; None: they are read from the disk.
     """
@@ -66,20 +62,12 @@ class Answer:
 
     Parameters
     ----------
-    number : int
-        That of the task.
     outcome : dict
         Its line in the summary, see ``outcome_of`` and ``failure``.
     files : dict of str to str
         Content of its result files by name; none after a failure.
     inputs : dict of str to str or None
         SHA-256 of every file read, by path; None for a file that would have been read if it were there.
-    seconds : float
-        Time it took.
-    megabytes : float
-        Memory of the worker afterwards.
-    trace : str
-        Where an internal error happened.
     """
 
     number: int
@@ -108,12 +96,10 @@ class Limits:
 
 
 def outcome_of(document: Document, findings: list[Document]) -> Document:
-    """Give the line of the summary for a result.
+    """Return the line of the summary for a result.
 
     Parameters
     ----------
-    document : dict
-        The document of the result.
     findings : list of dict
         Its verdict and notes as ``messages.result_findings`` gives them.
 
@@ -143,14 +129,7 @@ def outcome_of(document: Document, findings: list[Document]) -> Document:
 
 
 def failure(status: str, error: InputError | GeometryError | Fault) -> Document:
-    """Give the line of the summary for a project without a result.
-
-    Parameters
-    ----------
-    status : str
-        How it ended.
-    error : InputError, GeometryError or Fault
-        Why.
+    """Return the line of the summary for a project without a result.
 
     Returns
     -------
@@ -172,11 +151,11 @@ def failure(status: str, error: InputError | GeometryError | Fault) -> Document:
 
 
 def not_run() -> Document:
-    """Give the line of the summary for a project that was not reached."""
+    """Return the line of the summary for a project that was not reached."""
     return failure(NOT_RUN, InputError(()))
 
 
 def out_of_memory() -> Document:
-    """Give the line of the summary for a project that needs more memory than it may have."""
+    """Return the line of the summary for a project that needs more memory than it may have."""
     fix = "give more with --memory, with fewer processes (-j) if need be"
     return failure(MEMORY, Fault("needs more memory than a worker may have", "memory", fix=fix))

@@ -26,11 +26,6 @@ if TYPE_CHECKING:
 def evaluate(task: Task) -> Answer:
     """Compute a project.
 
-    Parameters
-    ----------
-    task : Task
-        The project.
-
     Returns
     -------
     Answer
@@ -78,7 +73,7 @@ def _computed(task: Task, source: Source) -> tuple[Document, dict[str, str], dic
 
 
 def _inputs(project: Project, source: Source) -> dict[str, str | None]:
-    """Give the digest of every file that the result depends on."""
+    """Return the digest of every file that the result depends on."""
     inputs: dict[str, str | None] = dict(source.digests)
     for name in project.grids:
         grid = project.grid_folder / name

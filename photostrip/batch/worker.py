@@ -51,8 +51,6 @@ class Worker:
 
     Parameters
     ----------
-    megabytes : float
-        Memory that it may have.
     work : str
         What it does with a task, as ``module:function``.
     """
@@ -110,19 +108,14 @@ class Worker:
         return NO_MEMORY if code and any(words in said for words in NO_MEMORY_WORDS) else code
 
     def fate(self) -> int:
-        """Give the exit code of a worker whose connection broke: it is dead, or about to be."""
+        """Return the exit code of a worker whose connection broke: it is dead, or about to be."""
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(timeout=1.0)
         return self.end()
 
 
 def share_of_memory(workers: int) -> float:
-    """Give an even share of the machine's memory, megabytes.
-
-    Parameters
-    ----------
-    workers : int
-        Number of workers that share it.
+    """Return an even share of the machine's memory, megabytes.
 
     Returns
     -------
@@ -144,10 +137,6 @@ def serve(handle: int, megabytes: float, work: str) -> None:
 
     Parameters
     ----------
-    handle : int
-        File descriptor of the connection.
-    megabytes : float
-        Memory that this process may have.
     work : str
         What to do with a task, as ``module:function``.
     """

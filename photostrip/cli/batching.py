@@ -52,7 +52,7 @@ class Asked:
 
 
 def cores() -> int:
-    """Give the number of cores that this process may use."""
+    """Return the number of cores that this process may use."""
     try:
         return len(os.sched_getaffinity(0))
     except AttributeError:  # not on every system
@@ -60,24 +60,7 @@ def cores() -> int:
 
 
 def run_asked(asked: Asked, form: BatchFormat, width: int | None, *, quiet: bool, verbose: bool) -> int:
-    """Run a batch and print its summary.
-
-    Parameters
-    ----------
-    asked : Asked
-        What the user asked for.
-    form : BatchFormat
-        How the summary is printed.
-    width : int, optional
-        Width of the text in characters.
-    quiet, verbose : bool
-        Whether to say less, or more.
-
-    Returns
-    -------
-    int
-        The exit code.
-    """
+    """Run a batch and print its summary."""
     stop, folder = Stop(), None
     with ExitStack() as stack:
         stack.enter_context(on_signals(stop))
@@ -110,7 +93,7 @@ def run_asked(asked: Asked, form: BatchFormat, width: int | None, *, quiet: bool
 
 @contextmanager
 def executor_of(asked: Asked, number: int, table: BatchTable) -> Iterator[Executor]:
-    """Give the executor that the user asked for."""
+    """Return the executor that the user asked for."""
     jobs = min(asked.jobs or cores(), number)
 
     def begun(task: Task) -> None:
@@ -131,10 +114,6 @@ class Talking:
 
     Parameters
     ----------
-    table : BatchTable
-        The table on a terminal.
-    total : int
-        Number of projects.
     quiet, verbose : bool
         Whether to say nothing, or also where internal errors happened.
     """

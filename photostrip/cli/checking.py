@@ -27,14 +27,6 @@ def print_checked(found: Sequence[Checked], form: Format, width: int | None, *, 
     ----------
     found : sequence of Checked
         Projects in the order in which the user named them.
-    form : Format
-        How.
-    width : int, optional
-        Width of the text in characters.
-    quiet : bool
-        Whether verdicts and findings are enough.
-    verbose : bool
-        Whether long tables are printed whole.
     """
     if form is Format.JSON:
         text = json.dumps(document_of(found), ensure_ascii=not console.speaks_unicode(sys.stdout), indent=1)
@@ -57,7 +49,7 @@ def findings_of(checked: Checked) -> list[dict[str, Any]]:
 
 
 def document_of(found: Sequence[Checked]) -> dict[str, Any]:
-    """Give all that was found as plain values: the content of ``--format json``."""
+    """Return all that was found as plain values: the content of ``--format json``."""
     projects = [
         {
             "project": each.path,

@@ -39,7 +39,7 @@ OWN = ("test", "dev", "peer")  # extras for those who work on photostrip itself
 
 
 def installation() -> dict[str, Any]:
-    """Give what is installed.
+    """Return what is installed.
 
     Returns
     -------
@@ -60,7 +60,7 @@ def installation() -> dict[str, Any]:
 
 
 def _requirements() -> tuple[list[str], dict[str, list[str]]]:
-    """Give the libraries that are needed, and those of each extra, from the installed package itself."""
+    """Return the libraries that are needed, and those of each extra, from the installed package itself."""
     try:
         lines = metadata.requires("photostrip") or []
     except metadata.PackageNotFoundError:  # run from a folder, not installed
@@ -76,7 +76,7 @@ def _requirements() -> tuple[list[str], dict[str, list[str]]]:
 
 
 def _version(name: str) -> str:
-    """Give the version of a library; empty when it is not installed."""
+    """Return the version of a library; empty when it is not installed."""
     try:
         return metadata.version(name)
     except metadata.PackageNotFoundError:
@@ -90,7 +90,7 @@ def _extra(name: str, libraries: list[str]) -> dict[str, Any]:
 
 
 def as_text(found: dict[str, Any]) -> str:
-    """Give what is installed as text, one fact a line."""
+    """Return what is installed as text, one fact a line."""
     lines = [
         f"photostrip  {found['photostrip']}",
         f"python      {found['python']}",

@@ -103,7 +103,7 @@ COMMANDS = {
 
 
 def usage() -> str:
-    """Give the text of ``photostrip --help``."""
+    """Return the text of ``photostrip --help``."""
     width = max(map(len, COMMANDS))
     commands = "\n".join(f"  {name:<{width}}  {entry.help}" for name, entry in COMMANDS.items())
     return f"""\
@@ -235,7 +235,7 @@ def _call(name: str, arguments: list[str]) -> int:
 
 
 def _message(error: BaseException) -> str:
-    """Give the sentence of a usage error."""
+    """Return the sentence of a usage error."""
     text: str = getattr(error, "format_message", error.__str__)()
     return text if text.endswith((".", "?", "!")) else f"{text}."
 

@@ -30,7 +30,7 @@ VARIABLES = (
 
 
 def manual_pages() -> dict[str, str]:
-    """Give all manual pages.
+    """Return all manual pages.
 
     Returns
     -------
@@ -45,7 +45,7 @@ def manual_pages() -> dict[str, str]:
 
 
 def _pages_of(name: str, command: Any) -> dict[str, str]:  # noqa: ANN401 (typer does not export its classes)
-    """Give the pages of a command and of those below it."""
+    """Return the pages of a command and of those below it."""
     below: dict[str, Any] = getattr(command, "commands", {})
     pages = {f"photostrip-{name.replace(' ', '-')}.1": _command_page(name, command)}
     for inner, each in below.items():
@@ -114,7 +114,7 @@ def _synopsis(command: Any) -> str:  # noqa: ANN401
 
 
 def _records(command: Any, kind: str) -> Iterator[tuple[str, str]]:  # noqa: ANN401
-    """Give what ``--help`` says of the arguments, or of the options."""
+    """Return what ``--help`` says of the arguments, or of the options."""
     with command.make_context(command.name, [], resilient_parsing=True) as context:
         for each in command.get_params(context):
             record = each.get_help_record(context)

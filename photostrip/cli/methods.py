@@ -40,20 +40,8 @@ def compare_methods(
 
     Parameters
     ----------
-    project : Path
-        The project file.
-    assignments : sequence of str
-        Values that replace those of the file.
     output : Path or None
         Folder in which each adjustment gets a folder of its own name.
-    form : Format
-        How the comparison is printed.
-    width : int or None
-        Width of the text.
-    talk : Talk
-        What is said on stderr.
-    quiet : bool
-        Whether there is no progress.
 
     Returns
     -------

@@ -43,16 +43,10 @@ def show(document: dict[str, Any], form: Format, width: int | None, *, quiet: bo
 
     Parameters
     ----------
-    document : dict
-        The document of the result.
     form : Format
         How; JSON is the content of result.json, GITHUB the notes as annotations.
     width : int, optional
         Width of the text in characters; default: that of the terminal.
-    quiet : bool
-        Whether the verdict is enough.
-    verbose : bool
-        Whether long tables are printed whole.
     """
     from photostrip.report import chosen_sections, title_of
     from photostrip.report.page import console
@@ -77,19 +71,12 @@ def rendered(
     verbose: bool = False,
     ascii_only: bool = False,
 ) -> str:
-    """Give the report of a result as text, without colours.
+    """Return the report of a result as text, without colours.
 
     Parameters
     ----------
-    document, form, width, quiet, verbose
-        As for ``show``; without a width the text is 100 characters wide.
     ascii_only : bool
         Whether the text may have ASCII letters only; ids in Markdown keep theirs.
-
-    Returns
-    -------
-    str
-        The report.
     """
     from photostrip.report import chosen_sections, title_of
     from photostrip.report.page import layout, text
@@ -110,20 +97,7 @@ def rendered(
 
 
 def traced(result: Result, form: Format) -> str:
-    """Give the trace of a run: every stage and iteration.
-
-    Parameters
-    ----------
-    result : Result
-        What the run found.
-    form : Format
-        Text, Markdown or JSON.
-
-    Returns
-    -------
-    str
-        The trace.
-    """
+    """Return the trace of a run: every stage and iteration."""
     from photostrip.report.commands.trace_sections import trace_sections, trace_title
     from photostrip.report.page import layout, text
     from photostrip.result.trace.trace import trace_of
@@ -142,14 +116,7 @@ def traced(result: Result, form: Format) -> str:
 
 
 def form_of(path: Path, option: str = "--output") -> Format:
-    """Give the format that the ending of a file name asks for.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    option : str
-        The option that names it.
+    """Return the format that the ending of a file name asks for.
 
     Returns
     -------

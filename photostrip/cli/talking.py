@@ -21,15 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass
 class Talk:
-    """Talk on stderr.
-
-    Parameters
-    ----------
-    quiet : bool
-        Whether to say nothing.
-    verbose : bool
-        Whether to name every step and its seconds.
-    """
+    """Talk on stderr."""
 
     quiet: bool = False
     verbose: bool = False
@@ -49,7 +41,7 @@ class Talk:
 
 
 def as_fault(error: OSError) -> InputError:
-    """Give what the system refused (a full disk, a folder that must not be written to) the form of all faults."""
+    """Return what the system refused (a full disk, a folder that must not be written to) the form of all faults."""
     fix = "make room, or choose another place with -o"
     return InputError(Fault(str(error.strerror or error).lower(), "system", str(error.filename or ""), fix=fix))
 

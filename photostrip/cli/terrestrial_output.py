@@ -38,14 +38,8 @@ def hand_out(
 
     Parameters
     ----------
-    document : dict
-        What was computed.
     form : str
         ``"text"``, ``"md"``, ``"json"`` or ``"csv"``.
-    report : callable
-        Makes title and sections of the document.
-    table : callable
-        Makes CSV of the document.
     """
     from photostrip.report.page import console, layout, text
 

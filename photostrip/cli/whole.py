@@ -11,18 +11,7 @@ from photostrip.cli.main import COMMANDS
 
 
 def whole_program(*, completing: bool = False) -> typer.Typer:
-    """Give one program with every command; each is imported.
-
-    Parameters
-    ----------
-    completing : bool
-        Whether it answers shells that complete.
-
-    Returns
-    -------
-    typer.Typer
-        The program.
-    """
+    """Return one program with every command; each is imported."""
     app = typer.Typer(add_completion=completing, rich_markup_mode=None, no_args_is_help=True)
 
     @app.callback()

@@ -41,12 +41,7 @@ SAME_FRAME = {
 
 
 def baseline_of(document: Document) -> Document:
-    """Give what of a result is kept as a baseline.
-
-    Parameters
-    ----------
-    document : dict
-        The document of a result.
+    """Return what of a result is kept as a baseline.
 
     Returns
     -------
@@ -66,10 +61,6 @@ def compare_results(
     ----------
     document, baseline : dict
         The documents of two results; the baseline may be a short one.
-    tolerances : Tolerances, optional
-        What they may differ by.
-    files : tuple of str
-        Their files, to name them.
 
     Returns
     -------
@@ -127,7 +118,7 @@ def _require_comparable(document: Document, baseline: Document, files: tuple[str
 
 
 def _frame(document: Document) -> Document:
-    """Give the frame of a document; an empty one when there is none."""
+    """Return the frame of a document; an empty one when there is none."""
     found = document.get("frame")
     return found if isinstance(found, dict) else {}
 
@@ -151,7 +142,7 @@ def _shown(value: object) -> str:
 
 
 def _compared(document: Document, baseline: Document, tolerances: Tolerances) -> Iterator[Document]:
-    """Give a row for every number that stands in both."""
+    """Return a row for every number that stands in both."""
     before = {(q.block, q.id, q.name): q for q in quantities_of(baseline)}
     for now in quantities_of(document):
         then = before.get((now.block, now.id, now.name))
@@ -271,7 +262,7 @@ def _rotations(document: Document, baseline: Document, tolerances: Tolerances) -
 
 
 def _pairs(now: list[Document], before: list[Document]) -> list[tuple[Document, Document]]:
-    """Give the records that stand in both lists, by id."""
+    """Return the records that stand in both lists, by id."""
     known = {row["id"]: row for row in before}
     return [(row, known[row["id"]]) for row in now if row["id"] in known]
 

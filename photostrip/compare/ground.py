@@ -18,7 +18,7 @@ Document = dict[str, Any]
 
 
 def plan_and_height(frame: Document, now: Floats, before: Floats) -> tuple[Floats, Floats]:
-    """Give the distance of points from where they were, in plan and in height.
+    """Return the distance of points from where they were, in plan and in height.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def plan_and_height(frame: Document, now: Floats, before: Floats) -> tuple[Float
 
 
 def difference_in_plan_and_height(frame: Document, delta: Floats, at: Floats) -> tuple[Floats, Floats]:
-    """Give the parts of differences that are in metres already.
+    """Return the parts of differences that are in metres already.
 
     Parameters
     ----------

@@ -14,12 +14,10 @@ Member = tuple[str, str, str]  # block, id, what it is
 
 
 def members_of(document: Document, kind: str) -> set[Member]:
-    """Give the members of one set of a result.
+    """Return the members of one set of a result.
 
     Parameters
     ----------
-    document : dict
-        The document of a result, or a baseline.
     kind : str
         ``ids``, ``choices``, ``rejected`` or ``findings``.
 
@@ -32,7 +30,7 @@ def members_of(document: Document, kind: str) -> set[Member]:
 
 
 def missing_and_new(now: set[Member], before: set[Member]) -> tuple[list[Document], list[Document]]:
-    """Give what stands in the baseline only, and what in the result only, in order."""
+    """Return what stands in the baseline only, and what in the result only, in order."""
     return [_plain(each) for each in sorted(before - now)], [_plain(each) for each in sorted(now - before)]
 
 
@@ -50,7 +48,7 @@ def _ids(document: Document) -> Iterator[Member]:
 
 
 def _choices(document: Document) -> Iterator[Member]:
-    """Give what is neither a number nor an id, but decides what the numbers are."""
+    """Return what is neither a number nor an id, but decides what the numbers are."""
     yield "status", "", f"status {document['status']}"
     yield "adjustment", "", f"adjustment {document['adjustment']}"
     for block in document.get("polynomials", []):

@@ -21,14 +21,8 @@ class Quantity(NamedTuple):
 
     Parameters
     ----------
-    kind : str
-        Which tolerance holds.
-    block : str
-        Key of the result in which it stands.
     id : str
         Id of the photo, point, model or strip; empty for the whole project.
-    name : str
-        What it is, as in result.json.
     unit : str
         Its unit; empty for ratios and counts.
     value : float or None
@@ -44,12 +38,7 @@ class Quantity(NamedTuple):
 
 
 def quantities_of(document: Document) -> Iterator[Quantity]:
-    """Give all single numbers of a result that are compared; coordinates and rotations are not among them.
-
-    Parameters
-    ----------
-    document : dict
-        The document of a result, or a baseline.
+    """Return all single numbers of a result that are compared; coordinates and rotations are not among them.
 
     Yields
     ------
@@ -80,12 +69,12 @@ def quantities_of(document: Document) -> Iterator[Quantity]:
 
 
 def model_id(model: Document) -> str:
-    """Give the name of a model; photos may stand in several strips."""
+    """Return the name of a model; photos may stand in several strips."""
     return f"{model['left']} – {model['right']}"
 
 
 def _leaves(block: str, name: str, value: object, path: str = "") -> Iterator[Quantity]:
-    """Give every number below a value, by its path; texts are left to others."""
+    """Return every number below a value, by its path; texts are left to others."""
     if isinstance(value, dict):
         for key, each in value.items():
             yield from _leaves(block, name, each, f"{path}.{key}" if path else key)
@@ -115,7 +104,7 @@ def _absolute(block: Document) -> Iterator[Quantity]:
 
 
 def _polynomial(block: Document) -> Iterator[Quantity]:
-    """Give the size of each term at the end of the control's range, in metres, rather than its coefficient."""
+    """Return the size of each term at the end of the control's range, in metres, rather than its coefficient."""
     name = block["strip"]
     for axis, effects in block["effects"].items():
         for term, effect in zip(block["terms"][axis], effects, strict=True):

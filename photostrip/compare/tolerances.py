@@ -24,14 +24,10 @@ class Tolerance:
 
     Parameters
     ----------
-    absolute : float
-        Difference allowed, in the unit of the kind.
     relative : float
         Difference allowed, as a share of the size in the baseline.
     absolute_um : float
         As `absolute`, for statistics in micrometres.
-    ignore : bool
-        Whether quantities of this kind are not compared.
     """
 
     absolute: float = 0.0
@@ -42,15 +38,7 @@ class Tolerance:
 
 @dataclass(frozen=True, slots=True)
 class SetTolerance:
-    """How many elements of a set may be missing or new.
-
-    Parameters
-    ----------
-    missing, new : int
-        Their largest number.
-    ignore : bool
-        Whether the set is not compared.
-    """
+    """How many elements of a set may be missing or new."""
 
     missing: int = 0
     new: int = 0
@@ -74,12 +62,6 @@ class Tolerances:
         Standard deviation of an image coordinate of weight one, micrometres.
     scale : Tolerance
         Scale factors of models, joints and of the strip, ratios.
-    precision : Tolerance
-        Standard deviations of points and photos.
-    statistics : Tolerance
-        Rms values, means, largest values, test values.
-    counts : Tolerance
-        Numbers of points, redundancies.
     ids, choices, rejected, findings : SetTolerance
         Photos, points, models and given points; adjustment, degrees, terms, roles, status and verdicts; measurements
         taken out; notes and points without coordinates.
@@ -99,28 +81,24 @@ class Tolerances:
     findings: SetTolerance = SetTolerance()
 
     def of(self, kind: str) -> Tolerance:
-        """Give the tolerance of a kind of quantity."""
+        """Return the tolerance of a kind of quantity."""
         found: Tolerance = getattr(self, kind)
         return found
 
     def allowed(self, kind: str, unit: str, before: float) -> float:
-        """Give the largest difference that is allowed for a number.
+        """Return the largest difference that is allowed for a number.
 
         Parameters
         ----------
-        kind : str
-            Its kind.
         unit : str
             Its unit. The absolute part of a tolerance holds for numbers in the unit of their kind only: a statistic
             without a unit has the relative part alone.
-        before : float
-            The number in the baseline.
         """
         tolerance = self.of(kind)
         absolute = tolerance.absolute if unit == UNITS[kind] else tolerance.absolute_um if unit == "um" else 0.0
         return max(absolute, tolerance.relative * abs(before))
 
     def of_set(self, kind: str) -> SetTolerance:
-        """Give the tolerance of a kind of set."""
+        """Return the tolerance of a kind of set."""
         found: SetTolerance = getattr(self, kind)
         return found

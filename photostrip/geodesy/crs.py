@@ -303,7 +303,7 @@ def _with_grids(text: str, directory: Path | None) -> str:
 
 
 def grid_names(crs: str) -> tuple[str, ...]:
-    """Give the names of the grid files that a PROJ string asks for.
+    """Return the names of the grid files that a PROJ string asks for.
 
     Parameters
     ----------
@@ -519,14 +519,12 @@ def tie_frames(
 
 
 def area_of_use(spec: FrameSpec, *, directory: Path | None = None) -> tuple[float, float, float, float] | None:
-    """Give the area that a coordinate reference system is made for.
+    """Return the area that a coordinate reference system is made for.
 
     Parameters
     ----------
     spec : FrameSpec
         Frame of a control list.
-    directory : Path, optional
-        As for ``tie_frames``.
 
     Returns
     -------

@@ -79,8 +79,6 @@ class Refusal(Exception):  # noqa: N818 (not an error of its own: it carries one
 
     Parameters
     ----------
-    message, code, expected, fix : str
-        As in ``errors.Fault``.
     key : str
         Key of the control list that is at fault.
     """
@@ -90,7 +88,7 @@ class Refusal(Exception):  # noqa: N818 (not an error of its own: it carries one
         self.message, self.code, self.key, self.expected, self.fix = message, code, key, expected, fix
 
     def at(self, path: str) -> Fault:
-        """Give the fault its place in the project file."""
+        """Return the fault its place in the project file."""
         return Fault(self.message, code=self.code, key=f"{path}.{self.key}", expected=self.expected, fix=self.fix)
 
 
@@ -99,19 +97,10 @@ def contradictions(spec: FrameSpec, kind: Kind, vertical: str, *, three_dimensio
 
     Parameters
     ----------
-    spec : FrameSpec
-        What the user said.
-    kind : str
-        Kind of its CRS.
     vertical : str
         What the heights of the CRS refer to when it says so (a vertical datum, a geoid grid); empty otherwise.
     three_dimensional : bool
         Whether the CRS has ellipsoidal heights of its own.
-
-    Yields
-    ------
-    Refusal
-        Each contradiction.
     """
     yield from _axes(spec, kind)
     yield from _curvature(spec, kind)

@@ -111,8 +111,6 @@ class GroundFrame:
 
     Parameters
     ----------
-    spec : FrameSpec
-        What the user said.
     kind : str
         ``projected``, ``geographic``, ``geocentric`` or ``local``.
     plan_unit, height_unit : str

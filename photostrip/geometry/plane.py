@@ -91,7 +91,7 @@ class PlaneTransform:
         return differences
 
     def jacobian(self, points: ArrayLike) -> Floats:
-        """Give the derivatives of the target by the source coordinates.
+        """Return the derivatives of the target by the source coordinates.
 
         Parameters
         ----------

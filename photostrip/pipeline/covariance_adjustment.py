@@ -92,7 +92,7 @@ class CovarianceAdjustment:
     passes: int
 
     def by_control(self, points: Numbers, coordinates: Numbers) -> Floats:
-        """Give what errors of control coordinates subtract from points.
+        """Return what errors of control coordinates subtract from points.
 
         Parameters
         ----------
@@ -126,8 +126,6 @@ def adjust(
 
     Parameters
     ----------
-    strip : Strip
-        The strip.
     formed : tuple of Orientation, FormedStrip and AbsoluteOrientation
         Oriented pairs, the strip formed from them, and its similarity to the intermediate frame.
     control : tuple of Targets and ndarray of int
@@ -277,11 +275,6 @@ def _solved(
 def photo_rows(errors: strip_errors.StripErrors) -> Rows:
     """Rows of derivatives of the photos in the chain: each moves with the model on its right, the last with its own.
 
-    Parameters
-    ----------
-    errors : StripErrors
-        The formed strip.
-
     Returns
     -------
     Rows
@@ -301,12 +294,10 @@ def photo_rows(errors: strip_errors.StripErrors) -> Rows:
 
 
 def resection(adjusted: CovarianceAdjustment, seen: tuple[Numbers, Floats, Floats], focal: float) -> exterior.Resection:
-    """Give the photos of the adjustment with their image residuals.
+    """Return the photos of the adjustment with their image residuals.
 
     Parameters
     ----------
-    adjusted : CovarianceAdjustment
-        The adjusted strip.
     seen : tuple of ndarray of int, ndarray and ndarray
         Photo of every image point in use, its coordinates (e, 2) in mm and its adjusted point (e, 3).
     focal : float
@@ -337,20 +328,7 @@ def measured(strip: Strip, observations: PhotoPoints) -> Numbers:
 
 
 def proposal(strip: Strip, correction: Polynomial) -> list[Note]:
-    """Propose this adjustment where a polynomial does badly.
-
-    Parameters
-    ----------
-    strip : Strip
-        The strip.
-    correction : Polynomial
-        Its polynomial.
-
-    Returns
-    -------
-    list of Note
-        At most one.
-    """
+    """Propose this adjustment where a polynomial does badly."""
     models = len(strip.photos) - 1
     if models > LONG_STRIP:
         text = (
@@ -374,15 +352,6 @@ def proposal(strip: Strip, correction: Polynomial) -> list[Note]:
 
 def notes(strip: Strip, control: ControlPoints, adjusted: CovarianceAdjustment | None) -> list[Note]:
     """Say what the tests of the adjustment found.
-
-    Parameters
-    ----------
-    strip : Strip
-        The strip.
-    control : ControlPoints
-        Its control.
-    adjusted : CovarianceAdjustment or None
-        The adjustment.
 
     Returns
     -------

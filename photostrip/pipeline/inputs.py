@@ -35,8 +35,6 @@ class Strip:
 
     Parameters
     ----------
-    id : str
-        Id of the strip.
     camera : Camera
         The camera of all its photos.
     photos : tuple of str
@@ -57,8 +55,6 @@ class ModelStrip:
 
     Parameters
     ----------
-    id : str
-        Id of the strip.
     photos : tuple of str
         Photos in flight order.
     models : tuple of str
@@ -160,8 +156,6 @@ class Inputs:
 
     Parameters
     ----------
-    name : str
-        Name of the project.
     strips : tuple of Strip
         Strips in the project's order.
     observations : PhotoPoints
@@ -175,10 +169,6 @@ class Inputs:
         Ground frame of the result; None: that of the first control list.
     fiducials : PhotoPoints or None
         Measured fiducial marks (``point_ids`` are the marks), in mm, y up.
-    positions : CameraPositions or None
-        Measured positions of the cameras.
-    orientations : GivenOrientations or None
-        Given exterior orientations.
     models : MeasuredModels or None
         Measured model coordinates; there are then no `strips` of photos, and `observations` only name the points.
     """
@@ -208,8 +198,6 @@ class Settings:
     ----------
     adjustment : str
         One of ``ADJUSTMENTS``.
-    relative, formation, links, absolute, polynomial, covariance, bundle, interior, refinement
-        Settings of the operations.
     precision : bool
         Whether standard deviations and covariances of points and photos are computed.
     angle_system, angle_unit : str

@@ -27,13 +27,6 @@ if TYPE_CHECKING:
 def require(settings: relative.Settings, observations: PhotoPoints) -> None:
     """Refuse entries that name no measurement, and those that are to be kept and dropped.
 
-    Parameters
-    ----------
-    settings : relative.Settings
-        The lists.
-    observations : PhotoPoints
-        Image points.
-
     Raises
     ------
     InputError
@@ -68,8 +61,6 @@ def rows_of(entries: Sequence[str], observations: PhotoPoints) -> dict[str, int]
     ----------
     entries : sequence of str
         Measurements, photo/point.
-    observations : PhotoPoints
-        Image points.
 
     Returns
     -------
@@ -88,14 +79,12 @@ def rows_of(entries: Sequence[str], observations: PhotoPoints) -> dict[str, int]
 
 
 def rows(entries: Sequence[str], observations: PhotoPoints) -> Numbers:
-    """Give the rows of the measurements of a list.
+    """Return the rows of the measurements of a list.
 
     Parameters
     ----------
     entries : sequence of str
         Measurements, photo/point.
-    observations : PhotoPoints
-        Image points.
 
     Returns
     -------
@@ -112,8 +101,6 @@ def touched(entries: Sequence[str], observations: PhotoPoints, rows: Numbers) ->
     ----------
     entries : sequence of str
         Measurements, photo/point.
-    observations : PhotoPoints
-        Image points.
     rows : ndarray of int, shape (m, 2)
         Rows of the two measurements in the observations.
 
@@ -136,11 +123,6 @@ def without(pairs: Pairs, point: Numbers, rows: Numbers, gone: Flags) -> tuple[P
         As ``relative.collect_pairs`` gives them.
     gone : ndarray of bool, shape (m,)
         Rows to leave out; each pair must keep one.
-
-    Returns
-    -------
-    pairs, point, rows
-        What is left.
     """
     if not gone.any():
         return pairs, point, rows
@@ -158,8 +140,6 @@ def restored(screened: Screened, weight: NDArray[np.float64], kept: Flags) -> Sc
 
     Parameters
     ----------
-    screened : Screened
-        The search.
     weight : ndarray, shape (m,)
         Weights before the search.
     kept : ndarray of bool, shape (m,)
@@ -182,15 +162,6 @@ def restored(screened: Screened, weight: NDArray[np.float64], kept: Flags) -> Sc
 
 def notes(settings: relative.Settings, strip: str, photos: Sequence[str]) -> list[Note]:
     """Say what the user has decided.
-
-    Parameters
-    ----------
-    settings : relative.Settings
-        The lists.
-    strip : str
-        The strip.
-    photos : sequence of str
-        Its photos.
 
     Returns
     -------

@@ -46,24 +46,14 @@ class StripResult:
 
     Parameters
     ----------
-    strip : Strip
-        The strip.
     orientation : relative.Orientation
         Relative orientation of its pairs, after screening.
-    rejections : tuple of screening.Rejection
-        Points taken out of pairs.
-    formed : formation.FormedStrip
-        The formed strip.
     precision : tuple of float
         A-priori standard deviation of a point in plan and height from one model, metres.
-    intermediate : IntermediateFrame
-        Frame of the adjustment.
     control : ControlPoints
         Control that took part.
     control_rows : ndarray of int, shape (n,)
         Its rows in the strip's points.
-    absolute : absolute.AbsoluteOrientation
-        Similarity to the control.
     polynomial : polynomial.Polynomial or None
         Correction of the strip deformation; None with ``adjustment: similarity``.
     xyz : ndarray, shape (q, 3)
@@ -165,7 +155,7 @@ class Ties:
 
     @classmethod
     def none(cls) -> Ties:
-        """Give the ties of an adjustment in which a point has one position."""
+        """Return the ties of an adjustment in which a point has one position."""
         return cls(np.zeros(0, np.intp), np.zeros((0, 2), np.intp), np.zeros((0, 3)))
 
 
@@ -235,8 +225,6 @@ class BlockProblem:
         The arrays; points as numbered in the observations, photos strip by strip.
     origin : ndarray, shape (3,)
         Origin of its frame in the project's Cartesian frame, metres.
-    begin : Selection
-        What takes part at first.
     kept : ndarray of bool, shape (n,)
         Rays that the user keeps.
     rows : ndarray of int, shape (n,)
@@ -262,8 +250,6 @@ class SinglePhoto:
 
     Parameters
     ----------
-    strip : Strip
-        Its strip.
     center, rotation : ndarray, shapes (3,), (3, 3)
         Its orientation in the project's Cartesian frame.
     """
@@ -291,8 +277,6 @@ class Bundle:
         Test of sigma0, with the stated standard deviations.
     components : tuple of variance_components.Component
         Variance components; empty when none were asked for.
-    parameters : tuple of self_calibration.Parameter
-        Calibration parameters.
     correlations : tuple of correlations.Correlation
         Correlations above 0.95: of parameters that photos share with each other and with the photo where it is largest,
         and the largest within photos.
@@ -329,25 +313,13 @@ class Result:
         Ground frames of the control lists.
     output : GroundFrame
         Ground frame of the result.
-    interior : interior.InteriorOrientation or None
-        Interior orientation of the photos.
     refined : corrections.Refined
         Ideal image coordinates and the size of each correction.
-    strips : tuple of StripResult
-        The strips.
-    points : Adjusted
-        All points.
     control_rows : ndarray of int, shape (c,)
         Row in ``points`` of every point of ``inputs.control``; -1 where it has no coordinates.
     control_differences : ndarray, shape (c, 3)
         Adjusted minus given in metres along east, north, up of the point's own ground frame; NaN where it is not
         given, does not count or has no result.
-    ties : Ties
-        Points common to strips.
-    not_determined : dict of str to str
-        Points without coordinates and why.
-    notes : tuple of Note
-        What the surveyor should know.
     precision : Precision or None
         How precise points and photos are; None when it was not computed.
     bundle : Bundle or None

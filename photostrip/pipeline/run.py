@@ -41,15 +41,6 @@ CAMERAS = ("camera_positions", "orientations")  # keys of what may be given of c
 def triangulate(inputs: Inputs, settings: Settings, *, directory: Path | None = None) -> Result:
     """Take a project through the whole strip method.
 
-    Parameters
-    ----------
-    inputs : Inputs
-        What is given.
-    settings : Settings
-        What is to be done.
-    directory : Path, optional
-        Where geoid grids named in a CRS are looked for first.
-
     Returns
     -------
     Result
@@ -170,13 +161,6 @@ def _require_strips(inputs: Inputs) -> None:
 
 def require_whole(inputs: Inputs, frames: Sequence[GroundFrame]) -> None:
     """Refuse geocentric points of which only some coordinates count: X, Y, Z are neither plan nor height.
-
-    Parameters
-    ----------
-    inputs : Inputs
-        What is given.
-    frames : sequence of GroundFrame
-        Frames of the control lists.
 
     Raises
     ------

@@ -52,15 +52,6 @@ def adjust_strip(
         Ideal image coordinates of the whole project.
     control : ControlPoints
         Measured control of the project, no check points.
-    frames : sequence of GroundFrame
-        Ground frames of the control.
-    settings : Settings
-        What is to be done.
-
-    Returns
-    -------
-    StripResult
-        Every stage.
 
     Raises
     ------
@@ -76,16 +67,12 @@ class Formed:
 
     Parameters
     ----------
-    strip : Strip
-        The strip.
     sigma : float
         Median standard deviation of its image coordinates, mm.
     screened : screening.Screened
         The search for gross errors in its pairs.
     oriented : relative.Orientation
         Relative orientation of the pairs, as the strip was formed.
-    formed : formation.FormedStrip
-        The formed strip.
     contradictions : strip_screening.Verdict
         Points whose rays contradict each other from model to model.
     """
@@ -107,8 +94,6 @@ def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> F
         Photos in flight order and their camera.
     observations : PhotoPoints
         Ideal image coordinates of the whole project.
-    settings : Settings
-        What is to be done.
 
     Returns
     -------
@@ -137,18 +122,6 @@ def adjust_formed(
     stage: Formed, observations: PhotoPoints, control: ControlPoints, frames: Sequence[GroundFrame], settings: Settings
 ) -> StripResult:
     """Take a formed strip to the ground.
-
-    Parameters
-    ----------
-    stage : Formed
-        The formed strip.
-    observations, control, frames, settings
-        As for ``adjust_strip``.
-
-    Returns
-    -------
-    StripResult
-        Every stage.
 
     Raises
     ------
@@ -284,17 +257,11 @@ def control_of(
 
     Parameters
     ----------
-    formed : FormedStrip or FormedModels
-        The formed strip.
-    control : ControlPoints
-        Control of the project.
     point_ids : sequence of str
         Ids of the points as they are numbered.
 
     Returns
     -------
-    ControlPoints
-        The control of the strip.
     rows : ndarray of int
         Its rows in the points of the strip.
     """
@@ -322,12 +289,8 @@ def to_ground(
     ----------
     strip : Strip or ModelStrip
         The strip, to name it.
-    formed : FormedStrip or FormedModels
-        The formed strip.
     given : tuple of ControlPoints and ndarray of int
         Its control, and the rows of that in its points.
-    frames : sequence of GroundFrame
-        Ground frames of the control.
     spread_at : callable
         A-priori standard deviations of a point in plan and height, metres, at a scale of the strip.
 
@@ -369,7 +332,7 @@ def to_ground(
 
 
 def middle_frame(control: ControlPoints, frames: Sequence[GroundFrame]) -> IntermediateFrame:
-    """Give the frame at the control's centre of gravity, X to the north.
+    """Return the frame at the control's centre of gravity, X to the north.
 
     Parameters
     ----------

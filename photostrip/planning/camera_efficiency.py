@@ -19,8 +19,6 @@ class Camera(NamedTuple):
 
     Parameters
     ----------
-    name : str
-        Its name.
     focal : float
         Principal distance f, mm.
     sigma : float
@@ -78,18 +76,11 @@ class Comparison(NamedTuple):
 def compare(first: Camera, second: Camera) -> Comparison:
     """Compare two cameras.
 
-    Parameters
-    ----------
-    first, second : Camera
-        The cameras.
-
     Returns
     -------
     Comparison
         Ratios, first to second. Formats and bases may differ; with equal ones the printed and the true ratio of areas
         are the scale ratio and its square.
-
-    Source: [004b] eq. 2, 5, 6.
     """
     base, width = first.base / second.base, first.width / second.width
     coefficient = first.coefficient / second.coefficient
@@ -109,10 +100,6 @@ class PrintedRow(NamedTuple):
         f and m_p, mm.
     coefficient : float
         K, mm².
-    height_ratio : float
-        H / m_h.
-    area : float
-        eta_S.
     """
 
     focal: float
@@ -133,7 +120,7 @@ PRINTED_TABLE = (
 
 
 def source_cameras() -> tuple[Camera, ...]:
-    """Give the four cameras of the source's table.
+    """Return the four cameras of the source's table.
 
     Returns
     -------
@@ -147,11 +134,6 @@ def source_cameras() -> tuple[Camera, ...]:
 
 def by_efficiency(cameras: Sequence[Camera]) -> list[Camera]:
     """Cameras from the best to the worst.
-
-    Parameters
-    ----------
-    cameras : sequence of Camera
-        The cameras.
 
     Returns
     -------

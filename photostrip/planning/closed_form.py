@@ -63,7 +63,7 @@ def coefficients(points: ArrayLike, control: ArrayLike, base: float, depth: floa
 
 
 def _reduced(points: ArrayLike, control: ArrayLike) -> dict[str, Array]:
-    """Give the differences [g] = g of the point less the mean of g over the control."""
+    """Return the differences [g] = g of the point less the mean of g over the control."""
     found = {}
     (x, y), (u, v) = np.asarray(points, float).T, np.asarray(control, float).T
     powers = {

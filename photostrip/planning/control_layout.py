@@ -43,10 +43,6 @@ class Layout:
 
     Parameters
     ----------
-    name : str
-        Its name.
-    kind : str
-        One of `LAYOUTS`.
     bands : int
         Number of bands, spread evenly from the first to the last photo.
     every : int or None
@@ -78,12 +74,10 @@ class Layout:
 
 
 def spots_of(layout: Layout, photos: int, rows: int) -> tuple[Spot, ...]:
-    """Give the control points of a layout.
+    """Return the control points of a layout.
 
     Parameters
     ----------
-    layout : Layout
-        The layout.
     photos, rows : int
         Photos of the strip, and rows of its pass points.
 
@@ -132,15 +126,8 @@ def across(count: int, rows: int) -> list[int]:
 
     Parameters
     ----------
-    count : int
-        Points of the band.
     rows : int
         Rows of pass points.
-
-    Returns
-    -------
-    list of int
-        Rows from 0.
 
     Raises
     ------
@@ -154,5 +141,5 @@ def across(count: int, rows: int) -> list[int]:
 
 
 def numbers_of(strip: IdealStrip, spots: tuple[Spot, ...]) -> list[int]:
-    """Give the numbers of control points among the points of a strip."""
+    """Return the numbers of control points among the points of a strip."""
     return [strip.at(spot.photo - 1, spot.row - 1) for spot in spots]

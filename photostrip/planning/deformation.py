@@ -38,21 +38,10 @@ def relative_differentials(
 
     Parameters
     ----------
-    base, parallax : float
-        dB/B and dp/p.
     image : array_like, shape (2,)
         x and y.
     errors : array_like, shape (3,)
         dx, dy and df.
-    focal : float
-        f.
-
-    Returns
-    -------
-    tuple of float
-        The three relative errors.
-
-    Source: [003] eq. 10.7.
     """
     (x, y), (dx, dy, df) = np.asarray(image, float), np.asarray(errors, float)
     common = base - parallax
@@ -60,7 +49,7 @@ def relative_differentials(
 
 
 def parallax_error(xy: ArrayLike, elements: ArrayLike, focal: float, base: float, measured: ArrayLike = 0.0) -> Array:
-    """Give the quantity c that all errors of a point go through.
+    """Return the quantity c that all errors of a point go through.
 
     Parameters
     ----------
@@ -77,8 +66,6 @@ def parallax_error(xy: ArrayLike, elements: ArrayLike, focal: float, base: float
     -------
     ndarray, shape (n,)
         c in mm. A constant f (dalpha2' - dalpha1') is left out, which is scale and height datum only.
-
-    Source: [003] eq. 10.9, with the sign of kappa that belongs to the angles used here.
     """
     x, y = np.moveaxis(np.asarray(xy, float), -1, 0)
     al1, ka1, al2, om2, ka2 = np.moveaxis(np.asarray(elements, float), -1, 0)
@@ -110,8 +97,6 @@ def ground_errors(
     -------
     ndarray, shape (n, 3)
         Errors along, across and up, ground mm.
-
-    Source: [003] eq. 10.8.
     """
     place, c = np.asarray(xy, float), np.asarray(parallax, float)
     plan = place / base * c[..., None] + np.asarray(image, float)
@@ -141,7 +126,7 @@ PRINTED = {SIDE: Constants(3.5, 2.3), CENTRAL: Constants(2.1, 1.6)}
 
 
 def source_constants() -> dict[str, Constants]:
-    """Give the printed constants before rounding, under the assumptions of the source.
+    """Return the printed constants before rounding, under the assumptions of the source.
 
     Returns
     -------
@@ -188,11 +173,6 @@ def rigorous_factors(xy: ArrayLike, focal: float, width: float, base: float) -> 
 def rigorous_constants(xy: ArrayLike, focal: float, width: float, base: float) -> list[Constants]:
     """Constants for any place in the model.
 
-    Parameters
-    ----------
-    xy, focal, width, base
-        As for ``rigorous_factors``.
-
     Returns
     -------
     list of Constants
@@ -208,7 +188,7 @@ def rigorous_constants(xy: ArrayLike, focal: float, width: float, base: float) -
 
 
 def paraboloid(elements: ArrayLike, scale: float, focal: float, base: float) -> Array:
-    """Give the surface into which errors of the elements bend the heights of a model.
+    """Return the surface into which errors of the elements bend the heights of a model.
 
     Parameters
     ----------
@@ -222,8 +202,6 @@ def paraboloid(elements: ArrayLike, scale: float, focal: float, base: float) -> 
     ndarray, shape (5,)
         E0, A, B, C, D of dZ = E0 + A x + B y + C x y + D x²; dZ in ground mm for x, y in mm. E0, A and B go into the
         absolute orientation; C is twist, D is bending along the base.
-
-    Source: [003] eq. 10.12.
     """
     al1, ka1, al2, om2, ka2 = np.asarray(elements, float)
     m, b = scale, base
@@ -242,8 +220,6 @@ class Paraboloid:
         E0, A, B, C, D, in the unit of the residuals for x, y in their unit.
     sigmas : ndarray, shape (5,)
         Standard deviations: from the residuals with a `redundancy` of three or more, else from the stated ones.
-    redundancy : int
-        Points minus five.
     sigma0 : float
         Standard deviation of unit weight from the residuals; NaN without redundancy.
     """
@@ -260,7 +236,7 @@ class Paraboloid:
             return np.asarray(self.coefficients[3:] / self.sigmas[3:], float)
 
     def critical(self, alpha: float = 0.05) -> float:
-        """Give what |t| exceeds by chance with probability `alpha`; the normal quantile with stated sigmas."""
+        """Return what |t| exceeds by chance with probability `alpha`; the normal quantile with stated sigmas."""
         if self.redundancy < LEAST_REDUNDANCY:
             return normal_quantile(1 - alpha / 2)
         return t_quantile(1 - alpha / 2, self.redundancy)
@@ -323,11 +299,6 @@ def fit_paraboloid(xy: ArrayLike, residuals: ArrayLike, sigmas: ArrayLike) -> Pa
         Heights of the model minus given heights.
     sigmas : array_like, shape (n,)
         Standard deviations of the residuals, in their unit.
-
-    Returns
-    -------
-    Paraboloid
-        Coefficients with their precision.
 
     Raises
     ------

@@ -42,12 +42,6 @@ class StripGeometry:
     ----------
     camera : Camera
         The camera; its lens counts as ideal.
-    photos : int
-        Photos of the strip.
-    end_lap_percent : float
-        Overlap.
-    scale : float
-        Denominator of the photo scale.
     points : Points
         Pass points: rows of them across the flight at each nadir, and further ones in each model.
     image_sigma : float
@@ -98,14 +92,10 @@ class IdealStrip:
 
     Parameters
     ----------
-    geometry : StripGeometry
-        What is flown.
     photos : tuple of str
         Photos in flight order.
     observations : PhotoPoints
         Image coordinates without errors, with their standard deviations.
-    orientation : Orientation
-        Relative orientation of the pairs.
     formed : FormedStrip
         The strip in the frame of its first photo.
     similarity : Similarity
@@ -140,7 +130,7 @@ class IdealStrip:
         return found[np.lexsort((self.row[found], self.station[found]))]
 
     def at(self, station: int, row: int) -> int:
-        """Give the point of a column.
+        """Return the point of a column.
 
         Parameters
         ----------
@@ -148,11 +138,6 @@ class IdealStrip:
             Photo, counted from 0.
         row : int
             Row from left to right, counted from 0.
-
-        Returns
-        -------
-        int
-            Its number among the points.
 
         Raises
         ------
@@ -169,16 +154,6 @@ class IdealStrip:
 
 def ideal_strip(geometry: StripGeometry) -> IdealStrip:
     """Simulate a strip without errors and form it.
-
-    Parameters
-    ----------
-    geometry : StripGeometry
-        What is flown.
-
-    Returns
-    -------
-    IdealStrip
-        The strip.
 
     Raises
     ------

@@ -29,10 +29,6 @@ class AdjustedModel:
 
     Parameters
     ----------
-    control : Control
-        Control.
-    base : float
-        b.
     parameters : ndarray, shape (7,)
         Absolute orientation, in the order of `PARAMETERS`.
     elements : ndarray, shape (4,)
@@ -51,7 +47,7 @@ class AdjustedModel:
     weights: Array
 
     def correction(self, points: ArrayLike) -> Array:
-        """Give what is to be subtracted from model points.
+        """Return what is to be subtracted from model points.
 
         Parameters
         ----------
@@ -108,8 +104,6 @@ def adjust_model(control: Control, misclosures: ArrayLike, base: float, elements
         Control; coordinates that are not given do not count.
     misclosures : array_like, shape (n, 3)
         W: model minus given.
-    base : float
-        b.
     elements : array_like, shape (4, 4)
         A-priori covariance of dkappa, dbz, dalpha2, domega.
 

@@ -58,16 +58,12 @@ class ModelSpec:
         Photo base b, mm.
     width : float
         Distance a of the side points from the flight line, mm.
-    scale : float
-        Denominator of the photo scale.
     image_sigma : float
         Standard deviation of an image coordinate, mm.
     zone_points : int
         Points in each of the six standard zones that orient the pair; 1: the six standard points.
     orientation_points : tuple of tuple of float
         Points that orient the pair, x and y in mm, instead of the standard zones.
-    control : tuple of ControlPoint
-        Control points.
     control_sigma : tuple of float
         Standard deviations of given coordinates along, across and in height, metres.
     grid : tuple of int
@@ -97,12 +93,7 @@ class ModelSpec:
 
 
 def standard_zones(base: float, width: float) -> tuple[Place, ...]:
-    """Give the six standard points.
-
-    Parameters
-    ----------
-    base, width : float
-        b and a.
+    """Return the six standard points.
 
     Returns
     -------
@@ -113,20 +104,7 @@ def standard_zones(base: float, width: float) -> tuple[Place, ...]:
 
 
 def control_layout(name: str, base: float, width: float) -> tuple[ControlPoint, ...]:
-    """Give a named layout of control.
-
-    Parameters
-    ----------
-    name : str
-        One of `LAYOUTS`.
-    base, width : float
-        b and a.
-
-    Returns
-    -------
-    tuple of ControlPoint
-        Points given in full.
-    """
+    """Return a named layout of control."""
     six = standard_zones(base, width)
     places = {"corners": six[2:], "corners+centre": (*six[2:], (base / 2, 0.0)), "six": six}[name]
     return tuple(ControlPoint(place) for place in places)
@@ -138,8 +116,6 @@ class Forecast:
 
     Parameters
     ----------
-    spec : ModelSpec
-        What was asked for.
     places : ndarray, shape (q, 2)
         Points of the grid, mm at photo scale, rows across the flight after each other.
     expected : Expected
@@ -170,7 +146,7 @@ class Forecast:
         return _sigmas(self.adjusted) * self.spec.ground_unit
 
     def shares(self) -> dict[str, Array]:
-        """Give the standard deviations that each source alone would cause.
+        """Return the standard deviations that each source alone would cause.
 
         Returns
         -------
@@ -211,11 +187,6 @@ class SimpleAccuracy:
 
 def plan_model(spec: ModelSpec) -> Forecast:
     """Compute the expected errors of a model.
-
-    Parameters
-    ----------
-    spec : ModelSpec
-        The model.
 
     Returns
     -------
@@ -260,8 +231,6 @@ def simple_accuracy(spec: ModelSpec) -> list[SimpleAccuracy]:
     -------
     list of SimpleAccuracy
         Side points left and right, middle points left and right.
-
-    Source: [003] eq. 10.10, 10.11.
     """
     b, a, f = spec.base, spec.width, spec.focal
     places = {

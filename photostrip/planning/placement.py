@@ -53,8 +53,6 @@ class Placement:
 
     Parameters
     ----------
-    points : int
-        How many.
     into : str
         Name of the layout that they are added to.
     method : str
@@ -75,8 +73,6 @@ class Placed:
 
     Parameters
     ----------
-    placement : Placement
-        What was asked for.
     spots : tuple of Spot
         Where the further points go.
     before, equal, found : tuple of float
@@ -88,8 +84,6 @@ class Placed:
         Part by which the search lowers what equal spacing gives: with a required accuracy the worse of plan and height,
         each relative to what is required, else the root mean square of both worst standard deviations, each relative
         to that of equal spacing. 0 where it does not beat equal spacing.
-    tried : int
-        Layouts looked at.
     """
 
     placement: Placement
@@ -116,14 +110,10 @@ class _Search:
     ----------
     look : callable
         Gives the worst standard deviations of a set of further points, metres.
-    scale : tuple of float
-        What they are divided by.
     required : bool
         Whether the scale is what is required: then the larger of plan and height counts.
     counts : tuple of bool
         Whether plan and height count otherwise: a point in height only can do nothing for the plan.
-    seen : dict
-        What it looked at.
     """
 
     look: Callable[[frozenset[Spot]], tuple[float, float]]
@@ -155,8 +145,6 @@ def best_places(strip: IdealStrip, layout: Layout, placement: Placement, require
 
     Parameters
     ----------
-    strip : IdealStrip
-        The strip.
     layout : Layout
         The control that is there in any case.
     placement : Placement
@@ -220,14 +208,7 @@ def best_places(strip: IdealStrip, layout: Layout, placement: Placement, require
 
 
 def equal_ways(placement: Placement, photos: int, rows: int) -> Iterator[frozenset[Spot]]:
-    """Give the ways of spacing points equally: on alternating edges, in the middle, by pairs, by bands of three.
-
-    Parameters
-    ----------
-    placement : Placement
-        How many.
-    photos, rows : int
-        Of the strip.
+    """Return the ways of spacing points equally: on alternating edges, in the middle, by pairs, by bands of three.
 
     Yields
     ------

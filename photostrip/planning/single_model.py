@@ -122,12 +122,7 @@ def influence(points: ArrayLike, base: float) -> Array:
 
 
 def free_influence(points: ArrayLike, base: float) -> Array:
-    """Give the same for the four elements that are independent with six standard points.
-
-    Parameters
-    ----------
-    points, base
-        As for ``influence``.
+    """Return the same for the four elements that are independent with six standard points.
 
     Returns
     -------
@@ -152,8 +147,6 @@ def free_covariance(dependent: ArrayLike, base: float) -> Array:
     ----------
     dependent : array_like, shape (5, 5)
         Covariance of `ELEMENTS`.
-    base : float
-        b.
 
     Returns
     -------
@@ -181,8 +174,6 @@ def six_point_variances(sigma: float, depth: float, width: float, base: float) -
     -------
     ndarray, shape (4,)
         Variances of dkappa, dbz, dalpha2, domega; the four are not correlated.
-
-    Source: [000], last paragraphs; [Hallert].
     """
     z, a, b = depth, width, base
     shares = [2 / (3 * b**2), z**2 / (2 * a**2), z**2 / (2 * a**2 * b**2), 3 * z**2 / (4 * a**4)]
@@ -248,8 +239,6 @@ def measured_covariance(points: ArrayLike, base: float, focal: float, sigma: flo
     -------
     ndarray, shape (n, 3, 3)
         Covariance of x, y and height in the unit of the model.
-
-    Source: derived; differentials of the intersection as in [000] eq. 2, both rays moving.
     """
     x, y, z = np.moveaxis(np.asarray(points, float), -1, 0)
     one, zero = np.ones_like(x), np.zeros_like(x)
@@ -270,14 +259,12 @@ def measured_covariance(points: ArrayLike, base: float, focal: float, sigma: flo
 
 
 def orientation_operator(points: ArrayLike, control: Control) -> Array:
-    """Give what the absolute orientation gives to points, per misclosure at the control.
+    """Return what the absolute orientation gives to points, per misclosure at the control.
 
     Parameters
     ----------
     points : array_like, shape (q, 3)
         x, y, depth; only x and y matter.
-    control : Control
-        Control.
 
     Returns
     -------
@@ -341,8 +328,6 @@ def orientation_parameters(control: Control, misclosures: ArrayLike) -> Array:
 
     Parameters
     ----------
-    control : Control
-        Control.
     misclosures : array_like, shape (n, 3)
         W: model minus given; coordinates that are not given do not matter.
 
@@ -350,8 +335,6 @@ def orientation_parameters(control: Control, misclosures: ArrayLike) -> Array:
     -------
     ndarray, shape (7,)
         In the order of `PARAMETERS`: shifts at the centre of the control, scale, azimuth, tilts.
-
-    Source: [000] eq. 3-5.
     """
     misclosure = np.asarray(misclosures, float)
     _, plan, size = _plan_control(control.points, control)
@@ -380,8 +363,6 @@ def parameter_rows(points: ArrayLike, control: Control) -> Array:
     -------
     ndarray, shape (q, 3, 7)
         F.
-
-    Source: [000] eq. 3.
     """
     where = np.asarray(points, float)
     x, y = (where[:, :2] - control.points[control.plan, :2].mean(axis=0)).T
@@ -395,23 +376,17 @@ def parameter_rows(points: ArrayLike, control: Control) -> Array:
 
 
 def deformation(points: ArrayLike, control: Control, base: float) -> Array:
-    """Give what the elements do to points of the oriented model: their influence less what the control takes back.
+    """Return what the elements do to points of the oriented model: their influence less what the control takes back.
 
     Parameters
     ----------
     points : array_like, shape (q, 3)
         x, y, depth; relief is allowed.
-    control : Control
-        Control.
-    base : float
-        b.
 
     Returns
     -------
     ndarray, shape (q, 3, 4)
         Coefficients of `FREE`.
-
-    Source: [000] eq. 8, second part.
     """
     there = free_influence(control.points, base)
     found: Array = free_influence(points, base) - np.einsum(
@@ -434,10 +409,6 @@ def expected_errors(
         x, y, depth.
     measured : array_like, shape (q, 3, 3)
         Covariance of their measured model coordinates.
-    control : Control
-        Control.
-    base : float
-        b.
     elements : array_like, shape (4, 4)
         Covariance of `FREE`.
     row : ndarray of int, shape (q,), optional

@@ -31,16 +31,8 @@ class Design:
 
     Parameters
     ----------
-    geometry : StripGeometry
-        The strip.
-    layouts : tuple of Layout
-        Layouts of control to compare.
-    methods : tuple of str
-        Methods of adjustment to compare.
     required : Required
         Accuracy that is needed.
-    placement : Placement or None
-        Points to be placed.
     """
 
     geometry: StripGeometry
@@ -56,16 +48,8 @@ class Outcome:
 
     Parameters
     ----------
-    layout : Layout
-        The layout.
-    spots : tuple of Spot
-        Its control points.
-    method : str
-        The method.
     accuracy : Accuracy or None
         Expected precision; None where the control does not determine the strip.
-    reason : str
-        Why there is none.
     """
 
     layout: Layout
@@ -81,8 +65,6 @@ class Needed:
 
     Parameters
     ----------
-    method : str
-        Method of adjustment.
     bands, points : int or None
         Bands and control points; None: not even a band at every photo does.
     worst : tuple of float
@@ -101,16 +83,8 @@ class Report:
 
     Parameters
     ----------
-    design : Design
-        What was asked for.
-    strip : IdealStrip
-        The strip.
-    outcomes : tuple of Outcome
-        Every layout by every method.
     needed : tuple of Needed
         Bands that the required accuracy needs, by method; empty when none is required.
-    placed : Placed or None
-        The best places.
     """
 
     design: Design
@@ -167,14 +141,12 @@ def _require_places(design: Design) -> None:
 
 
 def methods_of(design: Design, layout: Layout) -> tuple[str, ...]:
-    """Give the methods that a layout is adjusted by: with perspective centres the bundle, which alone uses them.
+    """Return the methods that a layout is adjusted by: with perspective centres the bundle, which alone uses them.
 
     Parameters
     ----------
     design : Design
         Methods that are compared.
-    layout : Layout
-        The layout.
 
     Returns
     -------
@@ -186,15 +158,6 @@ def methods_of(design: Design, layout: Layout) -> tuple[str, ...]:
 
 def outcome(strip: IdealStrip, layout: Layout, method: str) -> Outcome:
     """Adjust one layout by one method.
-
-    Parameters
-    ----------
-    strip : IdealStrip
-        The strip.
-    layout : Layout
-        The control.
-    method : str
-        One of `METHODS`.
 
     Returns
     -------
@@ -209,14 +172,7 @@ def outcome(strip: IdealStrip, layout: Layout, method: str) -> Outcome:
 
 
 def along_the_strip(strip: IdealStrip, expected: Accuracy) -> Floats:
-    """Give the worst standard deviations near each photo.
-
-    Parameters
-    ----------
-    strip : IdealStrip
-        The strip.
-    expected : Accuracy
-        Its precision.
+    """Return the worst standard deviations near each photo.
 
     Returns
     -------
@@ -233,14 +189,8 @@ def bands_needed(strip: IdealStrip, layout: Layout, method: str, required: Requi
 
     Parameters
     ----------
-    strip : IdealStrip
-        The strip.
     layout : Layout
         Points of a band, and their precision.
-    method : str
-        One of `METHODS`.
-    required : Required
-        What is needed.
 
     Returns
     -------

@@ -46,8 +46,6 @@ class Accuracy:
 
     Parameters
     ----------
-    method : str
-        One of `METHODS`.
     used : str
         What the control carries of it: ``degree 2`` where degree 3 was asked for and three bands are given.
     covariance : ndarray, shape (q, 3, 3)
@@ -83,12 +81,10 @@ class Accuracy:
 
 
 def control_of(strip: IdealStrip, spots: tuple[Spot, ...], sigma: tuple[float, float, float]) -> ControlPoints:
-    """Give the control points of a layout.
+    """Return the control points of a layout.
 
     Parameters
     ----------
-    strip : IdealStrip
-        The strip.
     spots : tuple of Spot
         Where they are.
     sigma : tuple of float
@@ -111,14 +107,8 @@ def accuracy(strip: IdealStrip, layout: Layout, spots: tuple[Spot, ...], method:
 
     Parameters
     ----------
-    strip : IdealStrip
-        The strip.
     layout : Layout
         Precision of the control and of measured perspective centres, which only the bundle uses.
-    spots : tuple of Spot
-        The control points.
-    method : str
-        One of `METHODS`.
 
     Returns
     -------
@@ -153,8 +143,6 @@ class _Fit:
     ----------
     numbers : ndarray of int, shape (c,)
         Points that are control.
-    control : ControlPoints
-        The control.
     targets : Targets
         The same from the intermediate frame.
     weight : ndarray, shape (c, 3)
@@ -273,18 +261,12 @@ def _bundle(strip: IdealStrip, layout: Layout, spots: tuple[Spot, ...], control:
 
 
 def bundle_problem(strip: IdealStrip, layout: Layout, numbers: Numbers, control: ControlPoints) -> bundle.Problem:
-    """Give the strip and its control to the bundle adjustment.
+    """Return the strip and its control to the bundle adjustment.
 
     Parameters
     ----------
-    strip : IdealStrip
-        The strip.
-    layout : Layout
-        Precision of measured perspective centres.
     numbers : ndarray of int, shape (c,)
         Points that are control.
-    control : ControlPoints
-        Their coordinates.
 
     Returns
     -------
@@ -309,7 +291,7 @@ def bundle_problem(strip: IdealStrip, layout: Layout, numbers: Numbers, control:
 
 
 def _positions(strip: IdealStrip, sigma: tuple[float, float, float], *, offset: bool) -> bundle.Positions:
-    """Give all perspective centres, with a constant offset that is free or absent."""
+    """Return all perspective centres, with a constant offset that is free or absent."""
     count = len(strip.centers)
     return bundle.Positions(
         np.arange(count),

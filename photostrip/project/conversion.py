@@ -46,8 +46,6 @@ class ImageSystem:
         ``up`` or ``down``.
     origin : str
         ``center``, ``top-left`` or ``first-pixel``.
-    sigma : float or None
-        Standard deviation, in `unit`, of rows without one.
     """
 
     unit: str
@@ -57,28 +55,12 @@ class ImageSystem:
 
 
 def cameras(project: schema.ProjectFile) -> dict[str, camera.Camera]:
-    """Give the cameras of a project.
-
-    Parameters
-    ----------
-    project : ProjectFile
-        The project.
-
-    Returns
-    -------
-    dict of str to Camera
-        By name.
-    """
+    """Return the cameras of a project."""
     return {name: _camera(name, each) for name, each in project.cameras.items()}
 
 
 def certificate_of(given: schema.Camera) -> Certificate | None:
     """Solve the distances between the fiducial marks of a camera.
-
-    Parameters
-    ----------
-    given : Camera
-        The camera as the project describes it.
 
     Returns
     -------
@@ -116,20 +98,7 @@ def _camera(name: str, given: schema.Camera) -> camera.Camera:
 
 
 def strips(project: schema.ProjectFile, known: Mapping[str, camera.Camera]) -> tuple[Strip, ...]:
-    """Give the strips of a project.
-
-    Parameters
-    ----------
-    project : ProjectFile
-        The project.
-    known : mapping of str to Camera
-        Its cameras.
-
-    Returns
-    -------
-    tuple of Strip
-        In the project's order.
-    """
+    """Return the strips of a project."""
     usual = project.processing.bundle.self_calibration
     own = {name: each.self_calibration for name, each in project.cameras.items()}
     return tuple(
@@ -149,10 +118,6 @@ def photo_points(read: Measurements, system: ImageSystem, photos: Mapping[str, c
 
     Parameters
     ----------
-    read : Measurements
-        The table.
-    system : ImageSystem
-        What its numbers mean.
     photos : mapping of str to Camera
         Camera of each photo of the strips; rows of other photos are left out.
 
@@ -204,7 +169,7 @@ def _scaled(values: Floats, scale: Floats) -> Floats:
 
 
 def _renumbered(ids: Sequence[str], codes: NDArray[np.intp]) -> tuple[tuple[str, ...], NDArray[np.intp]]:
-    """Give the ids that are left new numbers, in order of first appearance."""
+    """Return the ids that are left new numbers, in order of first appearance."""
     kept, first, inverse = np.unique(codes, return_index=True, return_inverse=True)
     order = np.argsort(first)
     rank = np.empty(len(kept), np.intp)
@@ -216,18 +181,7 @@ def _renumbered(ids: Sequence[str], codes: NDArray[np.intp]) -> tuple[tuple[str,
 
 
 def frame_spec(control: schema.Control | schema.CameraPositions | schema.Orientations) -> FrameSpec:
-    """Give the frame of a list of ground coordinates.
-
-    Parameters
-    ----------
-    control : Control, CameraPositions or Orientations
-        The list as the project describes it.
-
-    Returns
-    -------
-    FrameSpec
-        Its frame.
-    """
+    """Return the frame of a list of ground coordinates."""
     return FrameSpec(
         str(control.crs),
         control.axes or CARTESIAN_AXES,
@@ -242,12 +196,7 @@ def _semi_axes(given: schema.Ellipsoid | None) -> tuple[float, float] | None:
 
 
 def first_frame(project: schema.ProjectFile) -> FrameSpec:
-    """Give the frame that stands in where the output says nothing.
-
-    Parameters
-    ----------
-    project : ProjectFile
-        The project.
+    """Return the frame that stands in where the output says nothing.
 
     Returns
     -------
@@ -261,12 +210,10 @@ def first_frame(project: schema.ProjectFile) -> FrameSpec:
 
 
 def output_spec(output: schema.Output, first: FrameSpec) -> FrameSpec | None:
-    """Give the frame of the results.
+    """Return the frame of the results.
 
     Parameters
     ----------
-    output : Output
-        What the project says about it.
     first : FrameSpec
         Frame of the first control list, which stands in for what is not said.
 
@@ -292,13 +239,6 @@ def output_spec(output: schema.Output, first: FrameSpec) -> FrameSpec | None:
 
 def control_points(tables: Sequence[ControlTable], lists: Sequence[schema.Control]) -> ControlPoints:
     """Put all control lists into one table, in the internal order of axes.
-
-    Parameters
-    ----------
-    tables : sequence of ControlTable
-        The tables.
-    lists : sequence of Control
-        What the project says about each of them.
 
     Returns
     -------
@@ -332,21 +272,12 @@ def _columns(spec: FrameSpec) -> list[int]:
 def camera_positions(
     read: PositionTable, given: schema.CameraPositions, photos: Mapping[str, camera.Camera]
 ) -> CameraPositions:
-    """Give the measured positions of the cameras, in the internal order of axes.
+    """Return the measured positions of the cameras, in the internal order of axes.
 
     Parameters
     ----------
-    read : PositionTable
-        The table.
-    given : CameraPositions
-        What the project says about it.
     photos : mapping of str to Camera
         Photos of the strips; rows of others are left out.
-
-    Returns
-    -------
-    pipeline.CameraPositions
-        The positions that count.
     """
     rows = np.array([row for row, name in enumerate(read.ids) if name in photos and read.used[row]], np.intp)
     spec = frame_spec(given)
@@ -368,21 +299,12 @@ def camera_positions(
 def given_orientations(
     read: OrientationTable, given: schema.Orientations, photos: Mapping[str, camera.Camera]
 ) -> GivenOrientations:
-    """Give the orientations that are known beforehand, in the internal order of axes and in radians.
+    """Return the orientations that are known beforehand, in the internal order of axes and in radians.
 
     Parameters
     ----------
-    read : OrientationTable
-        The table.
-    given : Orientations
-        What the project says about it.
     photos : mapping of str to Camera
         Photos of the strips; rows of others are left out.
-
-    Returns
-    -------
-    pipeline.GivenOrientations
-        The orientations.
     """
     rows = np.array([row for row, name in enumerate(read.ids) if name in photos], np.intp)
     spec = frame_spec(given)
@@ -408,12 +330,7 @@ def _filled(sigma: Floats, default: Sequence[float] | None) -> Floats:
 
 
 def settings(project: schema.ProjectFile) -> Settings:
-    """Give what is to be done.
-
-    Parameters
-    ----------
-    project : ProjectFile
-        The project.
+    """Return what is to be done.
 
     Returns
     -------

@@ -23,17 +23,6 @@ def placed(
 ) -> Iterator[Finding]:
     """Give findings with the places of what they name.
 
-    Parameters
-    ----------
-    findings : iterable of Finding
-        What was found.
-    tree : Node
-        The project file they were found in.
-    tables : Tables
-        Its tables.
-    strips : sequence of Strip or ModelStrip
-        Its strips.
-
     Yields
     ------
     Finding

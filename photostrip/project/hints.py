@@ -34,10 +34,6 @@ def hints(project: schema.ProjectFile, tables: Tables, root: Node) -> Iterator[N
 
     Parameters
     ----------
-    project : ProjectFile
-        The project.
-    tables : Tables
-        Its tables.
     root : Node
         The project file, which knows where its values stand.
 

@@ -60,12 +60,6 @@ class Project:
 
     Parameters
     ----------
-    inputs : Inputs
-        What is given.
-    settings : Settings
-        What is to be done.
-    path : Path
-        The project file.
     files : tuple of Path
         Every file that was read, the project file first, grid files beside it last.
     resolved : str
@@ -74,13 +68,9 @@ class Project:
         What was passed over or not used, and why.
     tree : Node
         The project file with everything merged into it: it knows where each value stands.
-    tables : Tables
-        Its tables as they were read.
     grids : tuple of str
         Names of the grid files that the ground frames ask for. Those that stand beside the project file are used; for
         the others PROJ looks elsewhere.
-    grid_folder : Path
-        Where they were looked for.
     """
 
     inputs: Inputs
@@ -109,17 +99,12 @@ class Project:
         return tuple(placed(findings, self.tree, self.tables, self.inputs.flights))
 
     def result(self, result: Result) -> Result:
-        """Give a result whose findings say where, with files as seen from the project's folder."""
+        """Return a result whose findings say where, with files as seen from the project's folder."""
         seen = (replace(each, file=_seen_from(each.file, self.directory)) for each in self.placed(result.findings))
         return replace(result, findings=tuple(seen))
 
     def files_read(self, result: Result) -> tuple[Path, ...]:
-        """Give every file that a run read, grids of geoids and datum shifts included.
-
-        Parameters
-        ----------
-        result : Result
-            What the run found.
+        """Return every file that a run read, grids of geoids and datum shifts included.
 
         Returns
         -------
@@ -147,18 +132,6 @@ class Project:
 
 def load_project(path: Path, overrides: Sequence[str] = ()) -> Project:
     """Read a project and all its tables.
-
-    Parameters
-    ----------
-    path : Path
-        The project file.
-    overrides : sequence of str
-        Assignments ``key.path=value`` that replace values of the file.
-
-    Returns
-    -------
-    Project
-        The project.
 
     Raises
     ------
@@ -248,7 +221,7 @@ def _spec(given: schema.Control | schema.CameraPositions | schema.Orientations |
 
 
 def _placed(root: Node, fault: Fault) -> Fault:
-    """Give a fault that only knows its key a place in a file."""
+    """Return a fault that only knows its key a place in a file."""
     return fault_at(root, steps(fault.key), fault.message, fault.code, expected=fault.expected, fix=fault.fix)
 
 
@@ -310,7 +283,7 @@ def _positions(project: schema.ProjectFile, tables: Tables, photos: dict[str, Ca
 
 
 def _orientations(project: schema.ProjectFile, tables: Tables, photos: dict[str, Camera]) -> GivenOrientations | None:
-    """Give the orientations of photos of the strips that are known beforehand."""
+    """Return the orientations of photos of the strips that are known beforehand."""
     if project.orientations is None or tables.orientations is None:
         return None
     return given_orientations(tables.orientations, project.orientations, photos)

@@ -40,8 +40,6 @@ class ModelTables:
     ----------
     points : ModelTable
         Points; rows whose id is that of a photo are perspective centres, when there is no table of those.
-    centers : ModelTable or None
-        Perspective centres.
     """
 
     points: ModelTable
@@ -56,7 +54,7 @@ class ModelTables:
         return np.flatnonzero(flags[self.points.targets])
 
     def centers_of(self, photos: Sequence[str]) -> dict[str, dict[str, int]]:
-        """Give the photos whose centres each model holds, and a row of theirs in the table they stand in."""
+        """Return the photos whose centres each model holds, and a row of theirs in the table they stand in."""
         read = self.points if self.centers is None else self.centers
         rows = self.center_rows(photos) if self.centers is None else np.arange(len(read.table))
         found: dict[str, dict[str, int]] = {name: {} for name in read.model_ids}
@@ -76,14 +74,8 @@ def read_model_points(path: str, root: Node, findings: Findings, *, centers: boo
 
     Parameters
     ----------
-    path : str
-        The table.
     root : Node
         The project, which says what rows without standard deviations get.
-    findings : Findings
-        Where faults go.
-    centers : bool
-        Whether it is the table of perspective centres.
     """
     node = root.find("models", "centers") if centers else root.find("models")
     declared = None if node is None else node.find("columns")
@@ -94,15 +86,6 @@ def read_model_points(path: str, root: Node, findings: Findings, *, centers: boo
 
 def check_models(root: Node, tables: ModelTables, findings: Findings) -> dict[int, tuple[str, ...]]:
     """Find the models of every strip, in flight order, and refuse what does not fit.
-
-    Parameters
-    ----------
-    root : Node
-        The project.
-    tables : ModelTables
-        Its model coordinates.
-    findings : Findings
-        Where faults go.
 
     Returns
     -------
@@ -223,10 +206,6 @@ def measured_models(
 
     Parameters
     ----------
-    tables : ModelTables
-        The tables.
-    given : Models
-        What the project says about them.
     strips : sequence of tuple
         Id, photos and models of each strip in flight order.
 
@@ -283,6 +262,6 @@ def _rows(
 
 
 def named_points(models: MeasuredModels) -> PhotoPoints:
-    """Give a table of image points that holds none and only names the points of the models."""
+    """Return a table of image points that holds none and only names the points of the models."""
     nothing = np.zeros(0, np.intp)
     return PhotoPoints((), models.points.point_ids, nothing, nothing, np.zeros((0, 2)), np.zeros((0, 2)))

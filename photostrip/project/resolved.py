@@ -47,12 +47,8 @@ def completed(project: ProjectFile, root: Node, path: str) -> ProjectFile:
 
     Parameters
     ----------
-    project : ProjectFile
-        The project.
     root : Node
         Its tree, which knows which file names which path.
-    path : str
-        Path of the project file.
 
     Returns
     -------
@@ -129,11 +125,6 @@ def _relative(root: Node, project: str, *owner: str | int) -> Text:
 def text_of(project: ProjectFile) -> str:
     """Write a project as YAML.
 
-    Parameters
-    ----------
-    project : ProjectFile
-        The project.
-
     Returns
     -------
     str
@@ -162,7 +153,7 @@ def _plain(value: Any) -> Any:  # noqa: ANN401 (any value of a project)
 
 
 def _block(mapping: dict[str, Any], indent: str) -> Iterator[str]:
-    """Give the lines of a mapping."""
+    """Return the lines of a mapping."""
     for name, value in mapping.items():
         begin = f"{indent}{_scalar(name)}:"
         if isinstance(value, dict) and value:
@@ -181,7 +172,7 @@ def _block(mapping: dict[str, Any], indent: str) -> Iterator[str]:
 
 
 def _row(begin: str, words: list[str]) -> Iterator[str]:
-    """Give a list of values in brackets, broken into lines where it is long."""
+    """Return a list of values in brackets, broken into lines where it is long."""
     line, indent = f"{begin} [", " " * (len(begin) - len(begin.lstrip()) + 2)
     for number, word in enumerate(words):
         end = "]" if number == len(words) - 1 else ", "

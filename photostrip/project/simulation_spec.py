@@ -250,17 +250,7 @@ class SimulationFile(Section):
 
 @dataclass(frozen=True, eq=False)
 class Specification:
-    """A specification and where its values stand.
-
-    Parameters
-    ----------
-    spec : Spec
-        What is to be simulated.
-    files : tuple of str
-        Every file that was read.
-    root : Node
-        The file as a tree.
-    """
+    """A specification and where its values stand."""
 
     spec: simulate.Spec
     files: tuple[str, ...]
@@ -268,11 +258,6 @@ class Specification:
 
     def simulate(self) -> simulate.Simulation:
         """Simulate what is specified.
-
-        Returns
-        -------
-        Simulation
-            The simulation.
 
         Raises
         ------
@@ -291,18 +276,6 @@ class Specification:
 
 def load_specification(path: Path, overrides: Sequence[str] = ()) -> Specification:
     """Read the specification of a simulation.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    overrides : sequence of str
-        Assignments ``key.path=value`` that replace values of the file.
-
-    Returns
-    -------
-    Specification
-        The specification.
 
     Raises
     ------
@@ -366,18 +339,7 @@ def _semi_axes(given: Ellipsoid | None) -> tuple[float, float] | None:
 
 
 def camera_of(given: SimulatedCamera) -> camera.Camera:
-    """Give the preset with what is said beside it.
-
-    Parameters
-    ----------
-    given : SimulatedCamera
-        The section of a file.
-
-    Returns
-    -------
-    Camera
-        The camera.
-    """
+    """Return the preset with what is said beside it."""
     changed = {name: value for name, value in _fields(given).items() if value is not None and name != "preset"}
     if given.distortion is not None:
         lens = given.distortion

@@ -39,21 +39,7 @@ _ZEROS = re.compile(r"(?m)^([a-z]*)0+")
 
 @dataclass(frozen=True, eq=False)
 class Tables:
-    """What the tables of a project hold; None where one cannot be read.
-
-    Parameters
-    ----------
-    observations, fiducials : Measurements or None
-        Points and fiducial marks measured on photos.
-    control : list of ControlTable or None
-        Control lists in the project's order.
-    positions : PositionTable or None
-        Measured positions of cameras.
-    orientations : OrientationTable or None
-        Given exterior orientations.
-    models : ModelTables or None
-        Model coordinates.
-    """
+    """What the tables of a project hold; None where one cannot be read."""
 
     observations: Measurements | None
     fiducials: Measurements | None
@@ -64,24 +50,7 @@ class Tables:
 
 
 def read_tables(root: Node, project: str, findings: Findings, files: list[str]) -> Tables:
-    """Read every table that the project names, whether or not the rest of the project is right.
-
-    Parameters
-    ----------
-    root : Node
-        The project.
-    project : str
-        Path of the project file.
-    findings : Findings
-        Where faults and notes go.
-    files : list of str
-        Gets the path of every file read.
-
-    Returns
-    -------
-    Tables
-        What could be read.
-    """
+    """Read every table that the project names, whether or not the rest of the project is right."""
     photos = frozenset(photo.id for photo in listed_photos(root))
     observations = fiducials = None
     for path, inner in _named(root, ("observations",), project, findings, files):
@@ -143,7 +112,7 @@ def _orientations(path: str, node: Node, findings: Findings) -> OrientationTable
 def _named(
     root: Node, owner: Path, project: str, findings: Findings, files: list[str]
 ) -> Iterator[tuple[str, Findings]]:
-    """Give the path of a table and findings of its own; faults of the file as a whole are told where it is named."""
+    """Return the path of a table and findings of its own; faults of the file as a whole are told where it is named."""
     key = (*owner, "file")
     node = root.find(*key)
     if node is None or not node.text:
@@ -164,17 +133,7 @@ def _height_column(node: Node) -> int:
 
 
 def check_tables(root: Node, tables: Tables, findings: Findings) -> None:
-    """Check what must fit between the tables and the project file.
-
-    Parameters
-    ----------
-    root : Node
-        The project.
-    tables : Tables
-        Its tables.
-    findings : Findings
-        Where faults go.
-    """
+    """Check what must fit between the tables and the project file."""
     photos = list(listed_photos(root))
     if tables.observations is not None:
         _every_photo(root, photos, tables.observations, "no point", findings)
@@ -264,13 +223,6 @@ def loose(names: Sequence[str]) -> list[str]:
 def alike(names: Sequence[str], candidates: Iterable[str]) -> dict[str, str]:
     """Find names that differ only by slips of the pen.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Ids without a partner.
-    candidates : iterable of str
-        Ids that may be meant.
-
     Returns
     -------
     dict of str to str
@@ -286,13 +238,6 @@ def alike(names: Sequence[str], candidates: Iterable[str]) -> dict[str, str]:
 
 def rays(read: Measurements, photos: set[str]) -> dict[str, int]:
     """Count the photos of strips on which each point is measured.
-
-    Parameters
-    ----------
-    read : Measurements
-        Measured points.
-    photos : set of str
-        Photos of the strips.
 
     Returns
     -------

@@ -76,12 +76,7 @@ FIDUCIALS = "photo,mark,x,y\n"
 
 
 def template_files(name: str) -> dict[str, str]:
-    """Give the files of a new project.
-
-    Parameters
-    ----------
-    name : str
-        Name of the project.
+    """Return the files of a new project.
 
     Returns
     -------
@@ -99,13 +94,6 @@ def template_files(name: str) -> dict[str, str]:
 
 def refuse_existing(folder: Path, names: list[str]) -> None:
     """Refuse to overwrite what a user may have written.
-
-    Parameters
-    ----------
-    folder : Path
-        Where the files are to stand.
-    names : list of str
-        Their names.
 
     Raises
     ------

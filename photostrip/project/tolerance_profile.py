@@ -83,7 +83,7 @@ class Members(Section):
 
 
 def _usual(kind: type[T], usual: Tolerance | SetTolerance) -> T:
-    """Give a section that holds the defaults."""
+    """Return a section that holds the defaults."""
     return kind.model_construct(**{name: getattr(usual, name) for name in kind.model_fields})
 
 
@@ -122,18 +122,6 @@ def tolerance_schema() -> dict[str, Any]:
 
 def load_tolerances(path: Path) -> tuple[Tolerances, tuple[str, ...]]:
     """Read a tolerance profile.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    tolerances : Tolerances
-        The profile, defaults filled in.
-    files : tuple of str
-        Every file that was read.
 
     Raises
     ------

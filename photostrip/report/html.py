@@ -28,11 +28,6 @@ INSTALL = "pip install 'photostrip[report]'"
 def check_html(key: str = "--html") -> None:
     """Make sure that HTML can be written, before anything is computed.
 
-    Parameters
-    ----------
-    key : str
-        The option that asks for it.
-
     Raises
     ------
     InputError
@@ -48,12 +43,10 @@ def check_html(key: str = "--html") -> None:
 
 
 def to_html(document: Document, *, everything: bool = False) -> str:
-    """Give the report of a result as one HTML file.
+    """Return the report of a result as one HTML file.
 
     Parameters
     ----------
-    document : dict
-        The document of a result.
     everything : bool
         Whether all rows of all tables are wanted, not only the worst of long ones.
 
@@ -79,7 +72,7 @@ def to_html(document: Document, *, everything: bool = False) -> str:
 
 
 def _sections(sections: Iterable[Section]) -> Iterator[Document]:
-    """Give the sections as the template takes them; ids are made from their titles."""
+    """Return the sections as the template takes them; ids are made from their titles."""
     taken = {"pictures"}
     for number, section in enumerate(sections):
         name = re.sub(r"[^a-z0-9]+", "-", section.title.lower()).strip("-") or f"section-{number}"

@@ -36,7 +36,7 @@ CURVATURE = "earth curvature"  # told with the other ways to treat it
 
 
 def conventions_of(result: Result) -> Document:
-    """Give the block ``conventions``: units, axes and signs of everything in the result."""
+    """Return the block ``conventions``: units, axes and signs of everything in the result."""
     frame = result.output
     found: Document = {
         "lengths": "metres, unless the key ends in _mm or _um",
@@ -59,7 +59,7 @@ def conventions_of(result: Result) -> Document:
 
 
 def settings_of(result: Result) -> Document:
-    """Give the block ``settings``: what was asked for, with the keys and units of the project file."""
+    """Return the block ``settings``: what was asked for, with the keys and units of the project file."""
     settings = result.settings
     found: Document = {"adjustment": settings.adjustment}
     for field in fields(settings):
@@ -74,7 +74,7 @@ def settings_of(result: Result) -> Document:
 
 
 def cameras_of(result: Result) -> list[Document]:
-    """Give the list ``cameras``, in the order of the strips."""
+    """Return the list ``cameras``, in the order of the strips."""
     cameras = {strip.camera.name: strip.camera for strip in result.inputs.strips}
     return [_camera(camera) for camera in cameras.values()]
 
@@ -92,7 +92,7 @@ def _camera(camera: Camera) -> Document:
 
 
 def corrections_of(result: Result) -> Document:
-    """Give the block ``corrections``: what was done to the measured coordinates, and how large it was."""
+    """Return the block ``corrections``: what was done to the measured coordinates, and how large it was."""
     largest = result.refined.largest_um
     found: Document = {
         effect.replace(" ", "_"): {"applied": effect in largest, "largest_um": rounded(largest.get(effect, 0.0), 2)}

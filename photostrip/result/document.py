@@ -25,8 +25,6 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
 
     Parameters
     ----------
-    result : Result
-        What a run found.
     notes : iterable of Note
         What was noticed before the run, while the project was read; they come first.
 
@@ -91,7 +89,7 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
 
 
 def _finding(finding: Finding) -> Document:
-    """Give a finding; the numbers of its evidence have six digits."""
+    """Return a finding; the numbers of its evidence have six digits."""
     return {
         "code": finding.code,
         "title": finding.title,

@@ -21,8 +21,6 @@ def methods_document(name: str, found: Mapping[str, Document | PhotostripError])
 
     Parameters
     ----------
-    name : str
-        Name of the project.
     found : mapping of str to dict or PhotostripError
         For each adjustment the document of its result, or why there is none.
 

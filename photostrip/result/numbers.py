@@ -33,8 +33,6 @@ def rounded(values: ArrayLike, decimals: int) -> Plain:
     ----------
     values : array_like
         Numbers of any shape.
-    decimals : int
-        Decimals kept.
 
     Returns
     -------
@@ -45,7 +43,7 @@ def rounded(values: ArrayLike, decimals: int) -> Plain:
 
 
 def plain(values: NDArray[np.float64]) -> Plain:
-    """Give an array as plain lists, None where a number is not finite."""
+    """Return an array as plain lists, None where a number is not finite."""
     finite = np.isfinite(values)
     if finite.all():
         return values.tolist()
@@ -67,7 +65,7 @@ def micrometres(millimetres: ArrayLike) -> Plain:
 
 
 def natural(name: str) -> tuple[list[str | tuple[int, str]], str]:
-    """Give the key that puts ``P2`` before ``P10``; equal numbers (``7``, ``07``) by their text."""
+    """Return the key that puts ``P2`` before ``P10``; equal numbers (``7``, ``07``) by their text."""
     parts: list[str | tuple[int, str]] = [*DIGITS.split(name)]
     # numbers by length, then by digits: an id may have more digits than int() takes
     parts[1::2] = [(len(digits), digits) for digits in (part.lstrip("0") for part in DIGITS.findall(name))]
@@ -76,11 +74,6 @@ def natural(name: str) -> tuple[list[str | tuple[int, str]], str]:
 
 def natural_rank(names: Sequence[str]) -> NDArray[np.intp]:
     """Place of each name in natural order.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Names, all different.
 
     Returns
     -------

@@ -36,15 +36,7 @@ TOLERANCES: dict[str, tuple[tuple[str, ...], str]] = {
 
 
 def counts_of(result: Result, measurements: int) -> Document:
-    """Give the block ``counts``.
-
-    Parameters
-    ----------
-    result : Result
-        The result.
-    measurements : int
-        Image points on photos of the strips.
-    """
+    """Return the block ``counts``."""
     roles, control = result.roles, result.inputs.control
     measured = result.control_rows >= 0
     part = measured & ~control.check & control.use.any(axis=1)
@@ -76,12 +68,10 @@ def counts_of(result: Result, measurements: int) -> Document:
 
 
 def summary_of(result: Result, found: Differences) -> Document:
-    """Give the block ``summary``: the accuracy of the whole project.
+    """Return the block ``summary``: the accuracy of the whole project.
 
     Parameters
     ----------
-    result : Result
-        The result.
     found : Differences
         What is left at control and check points; rejected control does not count.
     """
@@ -169,7 +159,7 @@ def _normalised(result: Result, found: Differences, rows: Flags) -> float:
 
 
 def tolerances_of(result: Result, summary: Document) -> list[Document]:
-    """Give the list ``tolerances``: what the project allows and what it got.
+    """Return the list ``tolerances``: what the project allows and what it got.
 
     A tolerance without a value, as that of check points where there are none, counts as failed: what cannot be shown
     to be kept is not kept.

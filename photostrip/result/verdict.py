@@ -99,7 +99,7 @@ def _control(document: Document) -> Iterator[str]:
 
 
 def _without_rejected(row: Document) -> Document:
-    """Give a control point without what was rejected, which has a note of its own."""
+    """Return a control point without what was rejected, which has a note of its own."""
     out = row.get("rejected", "")
     plan = None if "x" in out or "y" in out else row["plan"]
     return row | {"plan": plan, "height": None if "z" in out else row["height"]}

@@ -19,12 +19,7 @@ if TYPE_CHECKING:
 
 
 def truth_of(simulation: Simulation) -> Start:
-    """Give the truth of a simulation in the frame of ``problem_of``.
-
-    Parameters
-    ----------
-    simulation : Simulation
-        Photos with known truth.
+    """Return the truth of a simulation in the frame of ``problem_of``.
 
     Returns
     -------

@@ -50,17 +50,8 @@ def roles(spec: Spec, placed: Placed, rays: Rows) -> Roles:
 
     Parameters
     ----------
-    spec : Spec
-        Layout and numbers.
-    placed : Placed
-        All points.
     rays : ndarray of int, shape (n,)
         On how many photos of its own strip each point lies.
-
-    Returns
-    -------
-    Roles
-        The choice.
 
     Raises
     ------
@@ -162,8 +153,6 @@ def given_coordinates(
     ----------
     spec : Spec
         Standard deviations, and where the second frame begins.
-    chosen : Roles
-        Control and check points.
     points : PointTable
         True Cartesian coordinates of all points, metres.
     offset : ndarray, shape (c, 3)

@@ -24,15 +24,6 @@ STEEPEST = np.radians(75.0)  # a ray flatter than this is not looked for
 def shown(spec: Spec, photos: Photos, placed: Placed) -> tuple[Rows, Rows]:
     """All image points: which photo shows which point.
 
-    Parameters
-    ----------
-    spec : Spec
-        The camera and the flight.
-    photos : Photos
-        Exterior orientations.
-    placed : Placed
-        The points.
-
     Returns
     -------
     photo, point : ndarray of int, shape (n,)

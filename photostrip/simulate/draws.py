@@ -40,10 +40,6 @@ class Draws:
 
     Parameters
     ----------
-    seed : int
-        Seed of the simulation.
-    purpose : Purpose
-        What the numbers are for.
     number : int, optional
         Number of the stream, for purposes that have several.
     """
@@ -91,11 +87,6 @@ class Draws:
 
     def order(self, count: int) -> NDArray[np.intp]:
         """Draw the numbers 0 to count - 1 in random order.
-
-        Parameters
-        ----------
-        count : int
-            How many.
 
         Returns
         -------

@@ -68,13 +68,6 @@ class Sheets:
 def sheets(spec: Spec, count: int) -> Sheets | None:
     """Deform the film of all photos.
 
-    Parameters
-    ----------
-    spec : Spec
-        How much.
-    count : int
-        Number of photos.
-
     Returns
     -------
     Sheets or None

@@ -28,8 +28,6 @@ class Photos:
 
     Parameters
     ----------
-    ids : tuple of str
-        Photo ids.
     strips : tuple of tuple (str, tuple of str)
         Each strip's id and its photos in flight order.
     along, across, height : ndarray, shape (n,)
@@ -59,11 +57,6 @@ def strip_id(number: int) -> str:
     ----------
     number : int
         Number of the strip, from 0.
-
-    Returns
-    -------
-    str
-        Its id.
     """
     head, last = divmod(number, 26)
     return (strip_id(head - 1) if head else "") + chr(ord("A") + last)
@@ -71,11 +64,6 @@ def strip_id(number: int) -> str:
 
 def position_sigma(spec: Spec) -> tuple[float, float, float]:
     """Scatter of the perspective centres.
-
-    Parameters
-    ----------
-    spec : Spec
-        The flight.
 
     Returns
     -------
@@ -90,13 +78,6 @@ def position_sigma(spec: Spec) -> tuple[float, float, float]:
 
 def fly(spec: Spec, space: World) -> Photos:
     """Take the photos.
-
-    Parameters
-    ----------
-    spec : Spec
-        What is flown.
-    space : World
-        The world.
 
     Returns
     -------

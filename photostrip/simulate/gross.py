@@ -28,8 +28,6 @@ class InjectedError:
     ----------
     kind : str
         ``image``, ``control`` or ``swap``.
-    point : str
-        The point.
     photo : str
         The photo; empty for control.
     axis : str
@@ -58,8 +56,6 @@ def spoil_control(
     ----------
     spec : Spec
         Which ones.
-    ids : tuple of str
-        Ids of the control points.
     use : ndarray of bool, shape (n, 3)
         Which of their coordinates are given.
 
@@ -67,8 +63,6 @@ def spoil_control(
     -------
     offset : ndarray, shape (n, 3)
         What is added to the coordinates east, north, up (X, Y, Z), metres.
-    errors : tuple of InjectedError
-        The same as a list.
 
     Raises
     ------
@@ -109,15 +103,6 @@ def spoil_images(spec: Spec, observations: PhotoPoints) -> tuple[PhotoPoints, tu
     ----------
     spec : Spec
         Which ones.
-    observations : PhotoPoints
-        Image points.
-
-    Returns
-    -------
-    observations : PhotoPoints
-        With the errors.
-    errors : tuple of InjectedError
-        What was done.
 
     Raises
     ------
@@ -166,7 +151,7 @@ def _entries(spec: Spec, kinds: set[str]) -> list[tuple[int, GrossError]]:
 
 
 def _take(rows: NDArray[np.intp], number: int, entry: GrossError) -> list[int]:
-    """Give the first rows, as many as are asked for."""
+    """Return the first rows, as many as are asked for."""
     if len(rows) < entry.count:
         raise _too_many(number, entry)
     return [int(row) for row in rows[: entry.count]]

@@ -96,11 +96,6 @@ def world(spec: Spec, ellipsoid: tuple[float, float] | None) -> World:
         Heading and middle of the strips.
     ellipsoid : tuple of float or None
         Semi-axes of the frame's datum, metres; None for a flat world.
-
-    Returns
-    -------
-    World
-        The world.
     """
     heading = np.radians(spec.flight.heading_deg)
     sin, cos = np.sin(heading), np.cos(heading)
@@ -141,7 +136,7 @@ class Surface:
     phase: Array
 
     def __call__(self, along: Array, across: Array) -> Array:
-        """Give the heights at places.
+        """Return the heights at places.
 
         Parameters
         ----------

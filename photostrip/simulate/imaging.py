@@ -27,8 +27,6 @@ def project(photos: Photos, photo: Rows, ray: Array, principal_distance: float) 
 
     Parameters
     ----------
-    photos : Photos
-        Exterior orientations.
     photo : ndarray of int, shape (n,)
         Number of the photo of each row.
     ray : ndarray, shape (n, 3)
@@ -58,8 +56,6 @@ def bent(photos: Photos, photo: Rows, ray: Array, ground_height: float) -> Array
 
     Parameters
     ----------
-    photos : Photos
-        Exterior orientations.
     photo : ndarray of int, shape (n,)
         Number of the photo of each row.
     ray : ndarray, shape (n, 3)
@@ -93,10 +89,6 @@ def sees(spec: Spec, photos: Photos, photo: Rows, xyz: Array) -> NDArray[np.bool
 
     Parameters
     ----------
-    spec : Spec
-        The camera.
-    photos : Photos
-        Exterior orientations.
     photo : ndarray of int, shape (n,)
         Number of the photo of each row.
     xyz : ndarray, shape (n, 3)

@@ -75,12 +75,6 @@ def place(spec: Spec, space: World, terrain: Surface, photos: Photos) -> Placed:
 
     Parameters
     ----------
-    spec : Spec
-        How many and where.
-    space : World
-        The world.
-    terrain : Surface
-        Heights.
     photos : Photos
         Exterior orientations: every point is moved towards the middle until the photos it is meant for show it.
 

@@ -37,8 +37,6 @@ class Scene:
 
     Parameters
     ----------
-    photo_ids : tuple of str
-        Photos.
     points : ndarray, shape (n, 3)
         Points, in the order of the observations' points, metres.
     centers : ndarray, shape (m, 3)
@@ -60,8 +58,6 @@ def plotted(
 
     Parameters
     ----------
-    spec : Spec
-        The specification.
     strips : tuple of tuple (str, tuple of str)
         Id and photos of each strip.
     observations : PhotoPoints

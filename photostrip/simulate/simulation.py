@@ -69,8 +69,6 @@ class Truth:
         Rotations that take image axes to the output frame's east, north, up at the perspective centre.
     image : ndarray, shape (n, 2)
         What would be measured without any error of measurement, in the system and order of the observations, mm.
-    errors : tuple of InjectedError
-        Gross errors.
     """
 
     points: PointTable
@@ -90,12 +88,8 @@ class Simulation:
 
     Parameters
     ----------
-    spec : Spec
-        What was asked for.
     strips : tuple of tuple (str, tuple of str)
         Id and photos, in flight order, of each strip.
-    camera : Camera
-        The camera of all photos.
     observations : PhotoPoints
         Measured image points in mm, y up: in the comparator when there are fiducial measurements, otherwise in the
         camera's image system (its principal point is not subtracted).
@@ -107,8 +101,6 @@ class Simulation:
         Measured fiducial marks, mm.
     gnss : ndarray, shape (m, 3), or None
         Measured perspective centres east, north, up in the first frame, in its units.
-    truth : Truth
-        What is true.
     models : ModelPoints or None
         Measured models, when they stand in place of image coordinates; the observations then only say what is seen.
     """
@@ -127,11 +119,6 @@ class Simulation:
 
 def simulate(spec: Spec) -> Simulation:
     """Simulate strips of photos.
-
-    Parameters
-    ----------
-    spec : Spec
-        What to simulate.
 
     Returns
     -------
@@ -185,11 +172,6 @@ def simulate(spec: Spec) -> Simulation:
 
 def frame_specs(spec: Spec) -> list[FrameSpec]:
     """Frames of the control lists.
-
-    Parameters
-    ----------
-    spec : Spec
-        The specification.
 
     Returns
     -------

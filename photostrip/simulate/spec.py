@@ -73,8 +73,6 @@ class Flight:
 
     Parameters
     ----------
-    photos : int
-        Photos of each strip.
     strips : int
         Parallel strips; each next one lies to the left of the one before.
     end_lap_percent, side_lap_percent : float
@@ -229,8 +227,6 @@ class Film:
         Rms of a smooth deformation that is not affine, micrometres.
     rotation_deg : float
         Scatter of the turn of the film in the comparator.
-    offset_mm : float
-        Scatter of its place.
     """
 
     scale_ppm: float = 150.0
@@ -248,8 +244,6 @@ class GrossError:
     ----------
     kind : str
         ``image``: an image coordinate; ``control``: a given coordinate; ``swap``: two points exchanged on a photo.
-    count : int
-        How many.
     size_um : float
         Size of an error of an image coordinate, micrometres.
     size_m : float
@@ -301,8 +295,6 @@ class Models:
         ``level``: the axes of a model are nearly level, turned about the vertical; ``any``: they lie in any way.
     hand : str
         ``right-handed`` or ``left-handed``.
-    centers : bool
-        Measure the perspective centres.
     """
 
     sigma_um: Triple = (10.0, 10.0, 15.0)
@@ -319,20 +311,12 @@ class Spec:
 
     Parameters
     ----------
-    name : str
-        Name of the project.
     seed : int
         Number that all random numbers come from.
-    camera : Camera
-        The camera of all photos.
-    ground, flight, terrain, points, control, image
-        The parts.
     film : Film or None
         Film deformation; fiducial marks are measured when it is given.
     refraction : bool
         Bend the rays as the standard atmosphere does.
-    gross_errors : tuple of GrossError
-        Gross errors to put in.
     gnss : Gnss or None
         Measured positions of the perspective centres.
     models : Models or None

@@ -28,11 +28,6 @@ LARGEST_ARC = 0.5  # radians of the body that strips may cover
 def faults_of(spec: Spec) -> list[Fault]:
     """Everything in a specification that cannot be simulated.
 
-    Parameters
-    ----------
-    spec : Spec
-        The specification.
-
     Returns
     -------
     list of Fault

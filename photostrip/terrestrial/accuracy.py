@@ -148,14 +148,12 @@ def supported(
 
 
 def of_rounds(sigma: float, rounds: int) -> float:
-    """Give the standard error of the mean of several rounds.
+    """Return the standard error of the mean of several rounds.
 
     Parameters
     ----------
     sigma : float
         Standard error of a direction measured in one round, in both faces; any unit.
-    rounds : int
-        Number of rounds.
 
     Returns
     -------
@@ -166,7 +164,7 @@ def of_rounds(sigma: float, rounds: int) -> float:
 
 
 def rounds_for(sigma: float, wanted: float) -> int:
-    """Give the number of rounds that a theodolite needs.
+    """Return the number of rounds that a theodolite needs.
 
     Parameters
     ----------
@@ -218,14 +216,10 @@ class Example:
 
     Parameters
     ----------
-    camera : str
-        Name of the camera.
     f, x, z, sigma : float
         Principal distance, image coordinates and their standard error, mm.
     horizontal, vertical : float
         m_lambda and m_beta as printed, arcseconds.
-    factor : float
-        1 + x^2/f^2 as printed.
     """
 
     camera: str
@@ -251,8 +245,6 @@ class WorkedExample:
 
     Parameters
     ----------
-    example : Example
-        What is printed.
     horizontal : float
         m_lambda, exact.
     printed_factor : float
@@ -279,11 +271,6 @@ class WorkedExample:
 
 def worked(example: Example) -> WorkedExample:
     """Compute an example of the source again.
-
-    Parameters
-    ----------
-    example : Example
-        What is printed.
 
     Returns
     -------

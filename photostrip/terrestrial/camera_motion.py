@@ -107,11 +107,6 @@ class Turn:
     def predict(self, number: int) -> tuple[Floats, Floats] | None:
         """Fit the turn without one point.
 
-        Parameters
-        ----------
-        number : int
-            The point.
-
         Returns
         -------
         tuple of ndarray or None
@@ -148,7 +143,7 @@ def turned(before: Floats, principal_distance: float, turn: Floats) -> Floats:
 
 
 def turn_gradient(points: Floats, principal_distance: float) -> Floats:
-    """Give the derivatives of coordinates by a small turn of the camera.
+    """Return the derivatives of coordinates by a small turn of the camera.
 
     Parameters
     ----------

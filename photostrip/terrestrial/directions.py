@@ -26,8 +26,6 @@ class Phototheodolite:
 
     Parameters
     ----------
-    name : str
-        Its name.
     principal_distance : float
         Principal distance f in mm.
     principal_point : tuple of float
@@ -111,7 +109,7 @@ def photo_from_directions(directions: ArrayLike, principal_distance: float, rota
 
 
 def partials(xz: ArrayLike, principal_distance: float, rotation: ArrayLike) -> Partials:
-    """Give the derivatives of the directions by what is measured in the photo.
+    """Return the derivatives of the directions by what is measured in the photo.
 
     Parameters
     ----------
@@ -121,11 +119,6 @@ def partials(xz: ArrayLike, principal_distance: float, rotation: ArrayLike) -> P
         Principal distance in mm.
     rotation : array_like, shape (3, 3)
         Photo to ground.
-
-    Returns
-    -------
-    Partials
-        Derivatives of lambda and beta.
 
     Notes
     -----

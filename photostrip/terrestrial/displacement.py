@@ -121,11 +121,6 @@ def limit(significance: float, components: int = SPACE) -> float:
         Probability of calling a point moved that did not move.
     components : int
         Degrees of freedom.
-
-    Returns
-    -------
-    float
-        Quantile of chi-square.
     """
     return chi2_quantile(1 - significance, components)
 

@@ -88,8 +88,6 @@ def monitor(series: Series, pair: StereoPair, settings: Settings | None = None) 
         Measurements; the first epoch is the reference.
     pair : StereoPair
         Stations and orientation of the reference epoch.
-    settings : Settings, optional
-        How displacements are judged.
 
     Returns
     -------
@@ -187,7 +185,7 @@ def _no_turns(series: Series) -> _Turns:
 
 
 def _turns(series: Series, motion: Motion | None, removed: tuple[bool, ...]) -> _Turns:
-    """Give every point the turns of the cameras, to a stable point those without itself."""
+    """Return every point the turns of the cameras, to a stable point those without itself."""
     result = _no_turns(series)
     if motion is None:
         return result
@@ -304,7 +302,7 @@ def _steps(epochs: list[_Epoch], covariance: Floats, ground: Floats, pair: Stere
 
 
 def _parallax_precision(series: Series, epochs: list[_Epoch]) -> tuple[Floats, Floats, Floats]:
-    """Give the changes of vertical parallaxes, and standard deviations of parallaxes and changes."""
+    """Return the changes of vertical parallaxes, and standard deviations of parallaxes and changes."""
     gradients = np.array([each.normal.parallax_by_measured for each in epochs])
     changes = np.array([each.normal.parallax - epochs[0].normal.parallax for each in epochs])
     total = np.einsum("enj,enj->en", gradients**2, series.shared + series.own)

@@ -146,7 +146,7 @@ def vectors_of(directions: ArrayLike) -> Floats:
 
 
 def direction_gradient(vector: ArrayLike) -> Floats:
-    """Give the derivative of the directions of a vector by the vector.
+    """Return the derivative of the directions of a vector by the vector.
 
     Parameters
     ----------

@@ -89,8 +89,6 @@ class CameraState:
 
     Parameters
     ----------
-    epoch : int
-        Number of the epoch.
     side : str
         ``"left"`` or ``"right"``.
     turn : Turn or None
@@ -159,12 +157,6 @@ class Monitoring:
 
     Parameters
     ----------
-    series : Series
-        What was measured.
-    pair : StereoPair
-        The stations.
-    settings : Settings
-        How it was judged.
     positions : tuple of Step
         Coordinates on the ground in each epoch (``values``), with covariance.
     since_first, since_previous : tuple of Step
@@ -181,8 +173,6 @@ class Monitoring:
         Left and right camera of each epoch after the first.
     motions : tuple of Motion or None
         What the stable points say in each epoch after the first; None where there are none.
-    notes : tuple of Note
-        What the surveyor should know.
     """
 
     series: Series

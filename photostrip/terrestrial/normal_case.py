@@ -137,8 +137,6 @@ def to_normal(measured: Floats, variances: Floats, pair: StereoPair, rotations: 
     variances : ndarray, shape (n, 4)
         Variances of the measured coordinates, in any unit: they say which coordinates give way when the rays do not
         meet.
-    pair : StereoPair
-        The stations.
     rotations : ndarray, shape (n, 2, 3, 3)
         Photo to ground, for each point and camera.
 
@@ -195,8 +193,6 @@ def meeting_z(measured: Floats, pair: StereoPair, rotations: Floats) -> Floats:
     ----------
     measured : ndarray, shape (n, 4)
         x, z of the left and x of the right photo in mm; the last column is not used.
-    pair : StereoPair
-        The stations.
     rotations : ndarray, shape (n, 2, 3, 3)
         Photo to ground, for each point and camera.
 

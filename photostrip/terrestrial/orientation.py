@@ -49,8 +49,6 @@ class Sightings:
 
     Parameters
     ----------
-    ids : tuple of str
-        Ids of the points.
     xz : ndarray, shape (n, 2)
         Image coordinates in mm in the system of the principal point.
     directions : ndarray, shape (n, 2)
@@ -99,8 +97,6 @@ class Rejection:
 
     Parameters
     ----------
-    point : int
-        Number of the point.
     test : str
         ``"deletion"`` or ``"stated"``.
     value, limit : float
@@ -141,8 +137,6 @@ class Orientation:
         Points that were used.
     weighted_sum : float
         Weighted sum of squared residuals, chi-square with `dof` degrees of freedom.
-    dof : int
-        Redundancy.
     condition : float
         Condition number of the equations, columns scaled to equal length.
     rejected : tuple of Rejection
@@ -178,7 +172,7 @@ class Orientation:
         return float(np.sqrt(self.weighted_sum / self.dof)) if self.dof else float("nan")
 
     def sigma0_range(self, significance: float) -> tuple[float, float]:
-        """Give the range in which sigma0 should lie when the stated standard deviations are right.
+        """Return the range in which sigma0 should lie when the stated standard deviations are right.
 
         Parameters
         ----------
@@ -216,8 +210,6 @@ def orient(
 
     Parameters
     ----------
-    sightings : Sightings
-        Image coordinates and directions.
     principal_distance : float
         f in mm; the start value when it is free.
     principal_point : tuple of float

@@ -28,11 +28,6 @@ MICROMETRES = 1000.0  # in a millimetre
 def remarks(result: Monitoring) -> Iterator[Note]:
     """Give warnings and remarks on displacements.
 
-    Parameters
-    ----------
-    result : Monitoring
-        Displacements.
-
     Yields
     ------
     Note

@@ -117,7 +117,7 @@ class Targets:
         return self._by_frame(cartesian, lambda frame, points: frame.level_axes_at(points)) @ self.intermediate.axes
 
     def turned(self, xyz: Floats) -> ControlPoints:
-        """Give the control with its standard deviations along ``axes``.
+        """Return the control with its standard deviations along ``axes``.
 
         Parameters
         ----------
@@ -178,12 +178,8 @@ class AbsoluteOrientation:
     sigma0 : float
         Standard deviation of unit weight, without unit (1 when the strip fits within the sigmas of the control and the
         a-priori precision of its points); NaN without redundancy.
-    redundancy : int
-        Control coordinates minus seven.
     condition : float
         Largest over smallest singular value of the design for motions of the strip of the same size.
-    iterations : int
-        Steps of the least-squares iteration.
     """
 
     similarity: Similarity
@@ -226,8 +222,6 @@ def orient(
     ----------
     strip : ndarray, shape (n, 3)
         Strip coordinates of the control points.
-    targets : Targets
-        The control points.
     weight : ndarray, shape (n, 3)
         Weights of their coordinates, metres^-2.
     reach : ndarray, shape (q, 3), optional
@@ -236,11 +230,6 @@ def orient(
     watch : callable, optional
         Told of every step: the similarity before it, and shifts, rotations and scale of the step, metres at the end of
         the strip.
-
-    Returns
-    -------
-    AbsoluteOrientation
-        The similarity and its fit.
 
     Raises
     ------
@@ -406,8 +395,6 @@ def free_motion(direction: Floats, xyz: Floats, control: ControlPoints, half: fl
         Shifts, rotations and scale of the motion, as in the design of the orientation.
     xyz : ndarray, shape (n, 3)
         Control points in the intermediate frame, metres.
-    control : ControlPoints
-        The control points.
     half : float
         Half length of the strip in metres.
 

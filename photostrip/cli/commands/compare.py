@@ -70,7 +70,7 @@ def compare(
 
 
 def _place_of(baseline: Path, *, update: bool) -> Path:
-    """Give the file of a baseline; in a folder it is baseline.json, or else, to be read, result.json."""
+    """Return the file of a baseline; in a folder it is baseline.json, or else, to be read, result.json."""
     if not baseline.is_dir():
         return baseline
     whole = baseline / "result.json"

@@ -40,11 +40,6 @@ def answer(instruction: str) -> int:
     instruction : str
         ``source_bash`` for its script, ``complete_bash`` for what can stand at the cursor, which the shell's script
         describes in variables of its own.
-
-    Returns
-    -------
-    int
-        The exit code.
     """
     from photostrip.cli.whole import whole_program
 
@@ -60,12 +55,7 @@ def answer(instruction: str) -> int:
 
 
 def keys(incomplete: str) -> list[str]:
-    """Give the keys that an assignment of ``--set`` may begin with.
-
-    Parameters
-    ----------
-    incomplete : str
-        What has been typed.
+    """Return the keys that an assignment of ``--set`` may begin with.
 
     Returns
     -------
@@ -79,7 +69,7 @@ def keys(incomplete: str) -> list[str]:
 
 
 def _paths(schema: dict[str, object], part: object, path: str = "") -> list[str]:
-    """Give the paths of all single values below a part of the schema; lists and the names of users are left out."""
+    """Return the paths of all single values below a part of the schema; lists and the names of users are left out."""
     part = _resolved(schema, part)
     properties = part.get("properties")
     if isinstance(properties, dict):

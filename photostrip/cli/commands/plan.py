@@ -80,7 +80,7 @@ def listed(value: str | None) -> str | None:
 
 
 def _flown(*values: str | None) -> Options:
-    """Give the options that every plan of something flown has."""
+    """Return the options that every plan of something flown has."""
     camera, distance, photo_format, overlap, scale, height, sigma = values
     return {
         "camera.preset": ("--camera", camera),
@@ -314,16 +314,10 @@ def deliver(document: Document, form: Form, output: Path | None, drawn: Document
 
     Parameters
     ----------
-    document : dict
-        The plan.
-    form : str
-        How it is printed.
     output : Path, optional
         File to write; its ending says what.
     drawn : dict
         The plan for a picture, on a fine grid.
-    quiet : bool
-        Print nothing where a file is written.
     """
     from photostrip.formats.output.plans import plan_csv
     from photostrip.report.commands.plans import plan_report
@@ -339,7 +333,7 @@ def deliver(document: Document, form: Form, output: Path | None, drawn: Document
 
 
 def _rendered(document: Document, output: Path) -> str:
-    """Give a plan in the form that the ending of a file asks for."""
+    """Return a plan in the form that the ending of a file asks for."""
     from photostrip.formats.output.plans import plan_csv
     from photostrip.formats.output.result_files import to_json
     from photostrip.report.commands.plans import plan_report

@@ -41,10 +41,6 @@ class ControlTable:
 
     Parameters
     ----------
-    table : Table
-        Where they stand.
-    ids : list of str
-        Id of the point of each row.
     xyz, sigma : ndarray, shape (n, 3)
         Coordinates and standard deviations, columns x, y, z; NaN where a cell is empty.
     use : ndarray of bool, shape (n, 3)
@@ -73,12 +69,8 @@ def read_control(
 
     Parameters
     ----------
-    file : str
-        Path of a ``.csv`` or ``.csv.gz`` file.
     up : int
         Which of the columns x, y, z is the height: ``use: xy`` means the two others, ``use: z`` this one.
-    findings : Findings
-        Where faults and notes go.
     default_sigma : bool
         Whether the project file has standard deviations for rows without them.
     columns : mapping of str to str, optional
@@ -141,8 +133,6 @@ def refuse_repeated(tables: Sequence[ControlTable | None], findings: Findings) -
     ----------
     tables : sequence of ControlTable or None
         Control lists of the project; rows with ``use: off`` do not count.
-    findings : Findings
-        Where faults go.
     """
     first: dict[str, tuple[ControlTable, int]] = {}
     for read in tables:

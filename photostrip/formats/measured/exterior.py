@@ -46,10 +46,6 @@ class PositionTable:
 
     Parameters
     ----------
-    table : Table
-        Where they stand.
-    ids : list of str
-        Photo of each row.
     xyz, sigma : ndarray, shape (n, 3)
         Coordinates and standard deviations, columns x, y, z; NaN where a cell is empty.
     use : ndarray of bool, shape (n, 3)
@@ -77,10 +73,6 @@ class OrientationTable:
 
     Parameters
     ----------
-    table : Table
-        Where they stand.
-    ids : list of str
-        Photo of each row.
     xyz, sigma : ndarray, shape (n, 3)
         Perspective centres and their standard deviations, columns x, y, z; NaN where a cell is empty.
     angles, sigma_angles : ndarray, shape (n, 3)
@@ -100,12 +92,8 @@ def read_positions(file: str, up: int, findings: Findings, *, default_sigma: boo
 
     Parameters
     ----------
-    file : str
-        Path of a ``.csv`` or ``.csv.gz`` file.
     up : int
         Which of the columns x, y, z is the height, for ``use: xy`` and ``use: z``.
-    findings : Findings
-        Where faults and notes go.
     default_sigma : bool
         Whether the project file has standard deviations for rows without them.
 
@@ -150,14 +138,10 @@ def read_orientations(
 
     Parameters
     ----------
-    file : str
-        Path of a ``.csv`` or ``.csv.gz`` file.
     names : sequence of str
         Names of the three angles, in the order of their system.
     unit : str
         Their unit, ``deg``, ``gon`` or ``rad``; a column may be called ``kappa`` or ``kappa_deg``.
-    findings : Findings
-        Where faults and notes go.
     needs_sigma : tuple of bool
         Whether rows must have standard deviations of the position and of the angles: they are observations, and
         the project file gives none.

@@ -22,8 +22,6 @@ class Measurements:
 
     Parameters
     ----------
-    table : Table
-        Where they stand.
     photo_ids, target_ids : tuple of str
         Ids of the photos, and of the points or marks, in order of first appearance.
     photo, target : ndarray of int, shape (n,)

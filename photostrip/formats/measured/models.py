@@ -44,12 +44,8 @@ class ModelTable:
 
     Parameters
     ----------
-    table : Table
-        Where they stand.
     target : str
         What is measured: ``point`` or ``photo``, for its perspective centre.
-    model_ids, target_ids : tuple of str
-        Ids in order of first appearance.
     models, targets : ndarray of int, shape (n,)
         Numbers of the model and of the point of each row.
     xyz, sigma : ndarray, shape (n, 3)
@@ -78,12 +74,6 @@ def read_models(
 
     Parameters
     ----------
-    file : str
-        Path of a ``.csv`` or ``.csv.gz`` file.
-    findings : Findings
-        Where faults and notes go.
-    centers : bool
-        Whether the table holds perspective centres, by photo.
     has_sigma : bool
         Whether the project has standard deviations for rows without them.
     columns : mapping of str to str, optional

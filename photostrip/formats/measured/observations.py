@@ -73,10 +73,6 @@ def read_measurements(file: str, findings: Findings, manner: Manner | None = Non
     ----------
     file : str
         Path of a ``.csv`` or ``.csv.gz`` file: points of photos or of pairs, or marks.
-    findings : Findings
-        Where faults and notes go.
-    manner : Manner, optional
-        How it is to be read.
 
     Returns
     -------

@@ -57,8 +57,6 @@ def photos_of_pairs(table: Table, photos: AbstractSet[str], findings: Findings) 
         A table in one of ``LAYOUTS``.
     photos : set of str
         Photos of the strips, by which the name of a pair is divided.
-    findings : Findings
-        Where faults go.
 
     Returns
     -------

@@ -28,12 +28,8 @@ def refuse(read: Measurements, target: str, findings: Findings) -> None:
 
     Parameters
     ----------
-    read : Measurements
-        The table.
     target : str
         What is measured, ``point`` or ``mark``.
-    findings : Findings
-        Where faults go.
     """
     key = _key(read)
     order = np.argsort(key, kind="stable")
@@ -56,8 +52,6 @@ def averaged(read: Measurements, target: str, default: float | None, findings: F
 
     Parameters
     ----------
-    read : Measurements
-        The table.
     target : str
         What is measured, ``point`` or ``mark``.
     default : float or None

@@ -55,15 +55,7 @@ PSEUDO_PARALLAXES = (
 
 @dataclass(frozen=True, eq=False)
 class PointTable:
-    """A table with one row for each point.
-
-    Parameters
-    ----------
-    table : Table
-        Where it stands.
-    ids : tuple of str
-        Points, row by row.
-    """
+    """A table with one row for each point."""
 
     table: Table
     ids: tuple[str, ...]
@@ -75,15 +67,6 @@ class PointTable:
 
 def read_points(file: str, layout: Sequence[Column], findings: Findings) -> PointTable | None:
     """Read a table with one row for each point.
-
-    Parameters
-    ----------
-    file : str
-        Path of a ``.csv`` or ``.csv.gz`` file.
-    layout : sequence of Column
-        One of the layouts of this module.
-    findings : Findings
-        Where faults and notes go.
 
     Returns
     -------
@@ -115,8 +98,6 @@ class EpochTable:
 
     Parameters
     ----------
-    table : Table
-        Where they stand.
     epochs, points : tuple of str
         Ids in order of first appearance; no epoch when the table has no such column.
     epoch, point : ndarray of int, shape (n,)
@@ -143,13 +124,6 @@ class EpochTable:
 def read_coordinates(file: str, findings: Findings) -> EpochTable | None:
     """Read a table of image coordinates ``epoch,photo,point,x,z[,sx,sz]``, photo being left or right.
 
-    Parameters
-    ----------
-    file : str
-        Path of a ``.csv`` or ``.csv.gz`` file.
-    findings : Findings
-        Where faults and notes go.
-
     Returns
     -------
     EpochTable or None
@@ -171,13 +145,6 @@ def read_pseudo_parallaxes(file: str, findings: Findings) -> EpochTable | None:
     The columns are ``point[,epoch],x,z,p[,q],dx,dz,dx_right[,dz_right][,sigma][,sigma_d]``: coordinates on the left
     photo of the reference epoch, parallaxes to the right one, and what changed on both photos until the epoch. x, z, p
     and q may be empty where an earlier row of the point has them.
-
-    Parameters
-    ----------
-    file : str
-        Path of a ``.csv`` or ``.csv.gz`` file.
-    findings : Findings
-        Where faults and notes go.
 
     Returns
     -------
@@ -201,8 +168,6 @@ def reference_values(read: EpochTable, findings: Findings) -> Floats:
 
     Parameters
     ----------
-    read : EpochTable
-        The table.
     findings : Findings
         Where faults go: a point without values, or with different ones in different rows.
 

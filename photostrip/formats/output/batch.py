@@ -22,21 +22,14 @@ COLUMNS = (
 
 
 def summary_json(outcomes: Sequence[Document], exit_code: int, *, ascii_only: bool = False) -> str:
-    """Give the summary as JSON.
+    """Return the summary as JSON.
 
     Parameters
     ----------
     outcomes : sequence of dict
         The line of each project, in the order in which the user named them.
-    exit_code : int
-        How the batch ends.
     ascii_only : bool
         Whether letters beyond ASCII are to be written as escapes.
-
-    Returns
-    -------
-    str
-        JSON, one project a line.
     """
     counts: dict[str, int] = {}
     for each in outcomes:
@@ -54,7 +47,7 @@ def summary_json(outcomes: Sequence[Document], exit_code: int, *, ascii_only: bo
 
 
 def summary_csv(outcomes: Sequence[Document]) -> str:
-    """Give the summary as CSV: a row for each project, the first message in the last column."""
+    """Return the summary as CSV: a row for each project, the first message in the last column."""
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow((*COLUMNS, "message"))
@@ -75,11 +68,6 @@ def record_text(record: Document) -> str:
 
 def parsed_record(data: bytes) -> Document | None:
     """Read the record of a result.
-
-    Parameters
-    ----------
-    data : bytes
-        Content of its file.
 
     Returns
     -------

@@ -25,14 +25,7 @@ PLACED = 6  # decimals of metres that decide which point is the worst: strips ar
 
 
 def strip_document(name: str, report: Report) -> Document:
-    """Give the plan of a strip as a document.
-
-    Parameters
-    ----------
-    name : str
-        Name of the plan.
-    report : Report
-        Everything about the design.
+    """Return the plan of a strip as a document.
 
     Returns
     -------
@@ -151,18 +144,7 @@ def _placed(placed: Placed) -> Document:
 
 
 def along_rows(document: Document) -> list[Document]:
-    """Give the standard deviations along the strip as a table.
-
-    Parameters
-    ----------
-    document : dict
-        The plan of a strip.
-
-    Returns
-    -------
-    list of dict
-        A row for each layout, method and photo.
-    """
+    """Return the standard deviations along the strip as a table."""
     found = [
         {"layout": each["layout"], "method": each["method"], **row}
         for each in document["accuracy"]

@@ -29,14 +29,7 @@ IN_PHOTO = 2  # decimals of mm: places of points
 
 
 def model_document(name: str, camera: str, forecast: Forecast) -> Document:
-    """Give the plan of one model as a document.
-
-    Parameters
-    ----------
-    name, camera : str
-        Names of the plan and of the camera.
-    forecast : Forecast
-        Expected errors.
+    """Return the plan of one model as a document.
 
     Returns
     -------
@@ -150,16 +143,7 @@ def _share(source: str, sigmas: Floats) -> Document:
 
 
 def camera_document(name: str, cameras: Sequence[Camera], reference: Camera) -> Document:
-    """Give a comparison of cameras as a document.
-
-    Parameters
-    ----------
-    name : str
-        Name of the comparison.
-    cameras : sequence of Camera
-        The cameras.
-    reference : Camera
-        The one that they stand beside.
+    """Return a comparison of cameras as a document.
 
     Returns
     -------
@@ -195,7 +179,7 @@ def _camera(camera: Camera, reference: Camera) -> Document:
 
 
 def source_document() -> Document:
-    """Give the table of the source, computed again beside what is printed.
+    """Return the table of the source, computed again beside what is printed.
 
     Returns
     -------
@@ -217,12 +201,7 @@ TABLES = {"model": "points", "cameras": "cameras", "source-table": "cameras"}
 
 
 def plan_csv(document: Document) -> str:
-    """Give the main table of a plan as CSV.
-
-    Parameters
-    ----------
-    document : dict
-        A document of this module.
+    """Return the main table of a plan as CSV.
 
     Returns
     -------

@@ -27,12 +27,10 @@ _encode_ascii = json.JSONEncoder(ensure_ascii=True, allow_nan=False).encode
 
 
 def to_json(document: Document, *, ascii_only: bool = False) -> str:
-    """Give the text of result.json.
+    """Return the text of result.json.
 
     Parameters
     ----------
-    document : dict
-        The document of a result.
     ascii_only : bool
         Whether letters beyond ASCII are to be written as escapes.
 
@@ -60,16 +58,6 @@ def _block(value: Plain, encode: Callable[[Plain], str]) -> str:
 
 def read_result(file: str) -> Document:
     """Read a result.json.
-
-    Parameters
-    ----------
-    file : str
-        Its path.
-
-    Returns
-    -------
-    dict
-        The document.
 
     Raises
     ------
@@ -102,12 +90,10 @@ def read_result(file: str) -> Document:
 
 
 def result_files(document: Document, resolved: str = "") -> dict[str, str]:
-    """Give all files of a result.
+    """Return all files of a result.
 
     Parameters
     ----------
-    document : dict
-        The document of the result.
     resolved : str
         Text of project.resolved.yaml; none is written when it is empty.
 
@@ -143,7 +129,7 @@ def _number(decimals: int) -> Callable[[float | None], str]:
 
 
 def _coordinates(document: Document) -> Callable[[Document], str]:
-    """Give the writer of x, y, z: angles with more decimals than metres."""
+    """Return the writer of x, y, z: angles with more decimals than metres."""
     frame = document["frame"]
     angle = _number(GEOGRAPHIC_DECIMALS if frame["kind"] == "geographic" else GROUND_DECIMALS)
     metre = _number(GROUND_DECIMALS)

@@ -15,11 +15,6 @@ BLOCK = re.compile(r'^"(\w+)": ')
 def line_finder(text: str) -> Callable[[str, str], int]:
     """Index the lines of a result.json as photostrip writes it, each record on a line of its own.
 
-    Parameters
-    ----------
-    text : str
-        The file.
-
     Returns
     -------
     callable
@@ -41,7 +36,7 @@ def line_finder(text: str) -> Callable[[str, str], int]:
 
 
 def _id_of(line: str) -> str | None:
-    """Give the id of the record on a line; None when it is none."""
+    """Return the id of the record on a line; None when it is none."""
     try:
         record: Any = json.loads(line.rstrip(","))
     except json.JSONDecodeError:

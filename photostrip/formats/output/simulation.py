@@ -48,18 +48,7 @@ MM_PER = {"mm": 1.0, "um": 1e-3, "0.1um": 1e-4}
 
 
 def inputs_of(simulation: Simulation) -> Inputs:
-    """Give what a project file and its tables would say of a simulation, without rounding.
-
-    Parameters
-    ----------
-    simulation : Simulation
-        The simulation.
-
-    Returns
-    -------
-    Inputs
-        The same for the pipeline.
-    """
+    """Return what a project file and its tables would say of a simulation, without rounding."""
     if simulation.models is not None:
         return _inputs_of_models(simulation, simulation.models)
     return Inputs(
@@ -73,7 +62,7 @@ def inputs_of(simulation: Simulation) -> Inputs:
 
 
 def _inputs_of_models(simulation: Simulation, points: ModelPoints) -> Inputs:
-    """Give the same of a simulation of models; those of left-handed axes are turned over, as a project says it."""
+    """Return the same of a simulation of models; those of left-handed axes are turned over, as a project says it."""
     if simulation.spec.models is not None and simulation.spec.models.hand == "left-handed":
         points = replace(points, xyz=points.xyz * (1.0, -1.0, 1.0))
     flights, first = [], 0
@@ -93,18 +82,7 @@ def _inputs_of_models(simulation: Simulation, points: ModelPoints) -> Inputs:
 
 
 def settings_of(simulation: Simulation) -> Settings:
-    """Give the settings that the written project has: defaults, and refraction when it was simulated.
-
-    Parameters
-    ----------
-    simulation : Simulation
-        The simulation.
-
-    Returns
-    -------
-    Settings
-        Settings for the pipeline.
-    """
+    """Return the settings that the written project has: defaults, and refraction when it was simulated."""
     return Settings(refinement=corrections.Settings(refraction=simulation.spec.refraction))
 
 
@@ -113,11 +91,6 @@ def settings_of(simulation: Simulation) -> Settings:
 
 def project_files(simulation: Simulation) -> dict[str, str]:
     """Write a simulation as a project.
-
-    Parameters
-    ----------
-    simulation : Simulation
-        The simulation.
 
     Returns
     -------
@@ -142,18 +115,7 @@ def project_files(simulation: Simulation) -> dict[str, str]:
 
 
 def control_file(number: int) -> str:
-    """Name of a control list: ``control.csv``, ``control_2.csv``.
-
-    Parameters
-    ----------
-    number : int
-        Number of its frame, from 0.
-
-    Returns
-    -------
-    str
-        File name.
-    """
+    """Name of a control list: ``control.csv``, ``control_2.csv``."""
     return "control.csv" if number == 0 else f"control_{number + 1}.csv"
 
 
@@ -361,13 +323,6 @@ def _listed(file: str, frame: FrameSpec, sigma: tuple[float, float, float], firs
 def truth_text(simulation: Simulation, output: GroundFrame) -> str:
     """Write the truth.
 
-    Parameters
-    ----------
-    simulation : Simulation
-        The simulation.
-    output : GroundFrame
-        Frame of its first control list.
-
     Returns
     -------
     str
@@ -457,11 +412,6 @@ def _measured_words(simulation: Simulation) -> str:
 
 def summary(simulation: Simulation) -> str:
     """Say in one line what was simulated.
-
-    Parameters
-    ----------
-    simulation : Simulation
-        The simulation.
 
     Returns
     -------

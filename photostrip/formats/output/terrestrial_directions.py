@@ -44,7 +44,7 @@ def head(kind: str, camera: Phototheodolite | None = None) -> Document:
 
 
 def orientation_block(angles: Sequence[float], unit: str) -> Document:
-    """Give the angles of a photo, azimuth from 0 to a full circle."""
+    """Return the angles of a photo, azimuth from 0 to a full circle."""
     alpha, omega, kappa = angles
     values = (positive(alpha), omega, kappa)
     names = dict(zip(ANGLES, rounded(np.array(values) * PER_RADIAN[unit], ANGLE), strict=True))
@@ -73,8 +73,6 @@ def conversion(
 
     Parameters
     ----------
-    camera : Phototheodolite
-        The camera.
     angles : sequence of float
         alpha, omega, kappa in radians.
     rotation : ndarray, shape (3, 3)
@@ -83,13 +81,6 @@ def conversion(
         Ids, and image coordinates in mm as measured or directions in radians.
     options : tuple
         Unit of angles, and standard deviation of an image coordinate in mm, None without standard deviations.
-    to_photo : bool
-        Whether directions are given.
-
-    Returns
-    -------
-    dict
-        The document.
     """
     ids, given = points
     unit, sigma = options
@@ -125,25 +116,16 @@ def required_accuracy(
     *,
     as_printed: bool = False,
 ) -> Document:
-    """Give the accuracy over the photo with which directions must be measured.
+    """Return the accuracy over the photo with which directions must be measured.
 
     Parameters
     ----------
-    camera : Phototheodolite
-        The camera.
     angles : tuple
         alpha, omega, kappa in radians, the rotation from photo to ground, and the unit of angles.
     sigma : float
         Standard error of image coordinates and principal distance in mm.
     grid : tuple of ndarray
         Coordinates x and z of the table in mm, from the principal point.
-    as_printed : bool
-        Whether by the formulas as they are printed.
-
-    Returns
-    -------
-    dict
-        The document.
     """
     x, z = (axis.ravel() for axis in np.meshgrid(*grid))
     xz = np.column_stack([x, z])
@@ -180,12 +162,10 @@ def theodolite_accuracy(
     sigma: float | None,
     grid: tuple[Floats, Floats],
 ) -> Document:
-    """Give the image accuracy over the photo that a theodolite can vouch for.
+    """Return the image accuracy over the photo that a theodolite can vouch for.
 
     Parameters
     ----------
-    camera : Phototheodolite
-        The camera.
     angles : tuple
         alpha, omega, kappa in radians, the rotation from photo to ground, and the unit of angles.
     theodolite : tuple
@@ -195,11 +175,6 @@ def theodolite_accuracy(
         Image accuracy wanted, mm: the rounds it needs are computed.
     grid : tuple of ndarray
         Coordinates x and z of the table in mm, from the principal point.
-
-    Returns
-    -------
-    dict
-        The document.
     """
     x, z = (axis.ravel() for axis in np.meshgrid(*grid))
     xz = np.column_stack([x, z])
@@ -234,13 +209,7 @@ def theodolite_accuracy(
 
 
 def worked_examples() -> Document:
-    """Give the worked examples of the source: as printed, by the printed formulas, and exact.
-
-    Returns
-    -------
-    dict
-        The document.
-    """
+    """Return the worked examples of the source: as printed, by the printed formulas, and exact."""
     document = head("worked-examples")
     document["examples"] = []
     for example in accuracy.EXAMPLES:
@@ -273,26 +242,7 @@ def worked_examples() -> Document:
 def oriented(
     camera: Phototheodolite, sightings: Sightings, found: Orientation, settings: Settings, unit: str
 ) -> Document:
-    """Give a photo oriented by directions.
-
-    Parameters
-    ----------
-    camera : Phototheodolite
-        The camera as given.
-    sightings : Sightings
-        What was measured.
-    found : Orientation
-        The orientation.
-    settings : Settings
-        What was asked for.
-    unit : str
-        Unit of angles.
-
-    Returns
-    -------
-    dict
-        The document.
-    """
+    """Return a photo oriented by directions."""
     document = head("photo-orientation", camera)
     lower, upper = found.sigma0_range(settings.significance)
     document["summary"] = {
@@ -329,7 +279,7 @@ def oriented(
 
 
 def _element(name: str, value: float, sigma: float, unit: str) -> Document:
-    """Give one unknown: angles in the user's unit with seconds, the others in mm with micrometres."""
+    """Return one unknown: angles in the user's unit with seconds, the others in mm with micrometres."""
     if name in ANGLES:
         angle = positive(value) if name == "alpha" else value
         return {
@@ -365,18 +315,7 @@ def _sighted(sightings: Sightings, found: Orientation) -> list[Document]:
 
 
 def camera_list(cameras: dict[str, Phototheodolite]) -> Document:
-    """Give the cameras that can be named.
-
-    Parameters
-    ----------
-    cameras : dict of str to Phototheodolite
-        By name.
-
-    Returns
-    -------
-    dict
-        The document.
-    """
+    """Return the cameras that can be named."""
     document = head("cameras")
     document["cameras"] = []
     for name, each in cameras.items():

@@ -39,20 +39,12 @@ def displacement_document(
     frame: tuple[Sequence[str], Sequence[int], str],
     notes: Iterable[Note] = (),
 ) -> Document:
-    """Give the document of displacements.
+    """Return the document of displacements.
 
     Parameters
     ----------
-    name : str
-        Name of the survey.
-    result : Monitoring
-        Displacements.
-    cameras : tuple of Phototheodolite
-        Of the left and right station.
     frame : tuple
         Names of the ground axes in the user's order, which internal axis each of them is, and the unit of times.
-    notes : iterable of Note
-        What reading the files had to say.
 
     Returns
     -------
@@ -130,7 +122,7 @@ def _rms_um(values: Floats) -> float | None:
 
 
 def _camera(result: Monitoring, state: CameraState) -> Document:
-    """Give the turn of one camera in one epoch."""
+    """Return the turn of one camera in one epoch."""
     row: Document = {"epoch": result.series.epochs[state.epoch], "side": state.side, "determined": False}
     turn = state.turn
     if turn is None:
@@ -152,7 +144,7 @@ def _camera(result: Monitoring, state: CameraState) -> Document:
 
 
 def _point(result: Monitoring, row: int, order: list[int], axes: Sequence[str]) -> Document:
-    """Give all epochs of one point."""
+    """Return all epochs of one point."""
     series = result.series
     epochs = []
     for number, epoch in enumerate(series.epochs):
@@ -187,7 +179,7 @@ def _point(result: Monitoring, row: int, order: list[int], axes: Sequence[str]) 
 
 
 def _step(result: Monitoring, step: Step, row: int, order: list[int], axes: Sequence[str]) -> Document:
-    """Give a displacement, or a rate, with its precision and its test."""
+    """Return a displacement, or a rate, with its precision and its test."""
     covariance = step.covariance[row][np.ix_(order, order)]
     plan = [place for place, axis in enumerate(axes) if axis != "up"]
     plan.sort(key=lambda place: axes[place] in {"north", "ahead"})  # to the right or east first
@@ -216,12 +208,7 @@ def _step(result: Monitoring, step: Step, row: int, order: list[int], axes: Sequ
 
 
 def displacements_csv(document: Document) -> str:
-    """Give the displacements of all points and epochs since the first epoch as CSV.
-
-    Parameters
-    ----------
-    document : dict
-        The document of displacements.
+    """Return the displacements of all points and epochs since the first epoch as CSV.
 
     Returns
     -------
@@ -240,18 +227,7 @@ def displacements_csv(document: Document) -> str:
 
 
 def cameras_csv(document: Document) -> str:
-    """Give the turns of the cameras as CSV.
-
-    Parameters
-    ----------
-    document : dict
-        The document of displacements.
-
-    Returns
-    -------
-    str
-        A row for each camera and later epoch.
-    """
+    """Return the turns of the cameras as CSV."""
     turn = ("right", "up", "counter_clockwise")
     names = (
         "epoch",
@@ -268,17 +244,12 @@ def cameras_csv(document: Document) -> str:
 
 
 def points_csv(document: Document) -> str:
-    """Give the rows ``points`` of a document of directions as CSV.
+    """Return the rows ``points`` of a document of directions as CSV.
 
     Parameters
     ----------
     document : dict
         A document with points, worked examples or cameras that are all alike.
-
-    Returns
-    -------
-    str
-        A row for each.
     """
     rows = next(document[key] for key in ("examples", "cameras", "points") if key in document)
     names = list(rows[0]) if rows else ["id"]
@@ -288,20 +259,7 @@ def points_csv(document: Document) -> str:
 
 
 def to_csv(names: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """Write a table as CSV: empty cells for nothing, 1 and 0 for yes and no.
-
-    Parameters
-    ----------
-    names : sequence of str
-        The header.
-    rows : iterable of sequence
-        Texts, rounded numbers, truth values or None.
-
-    Returns
-    -------
-    str
-        The text.
-    """
+    """Write a table as CSV: empty cells for nothing, 1 and 0 for yes and no."""
     stream = StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(names)
@@ -310,7 +268,7 @@ def to_csv(names: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 
 
 def _cell(value: object) -> object:
-    """Give a number without an exponent, a truth value as 1 or 0."""
+    """Return a number without an exponent, a truth value as 1 or 0."""
     if isinstance(value, bool):
         return int(value)
     return np.format_float_positional(value, trim="0") if isinstance(value, float) else value

@@ -49,18 +49,6 @@ def refuse(file: str, code: str, message: str, *, expected: str = "", fix: str =
 def read_bytes(file: str, limit: int) -> bytes:
     """Read a file that the user named.
 
-    Parameters
-    ----------
-    file : str
-        Its path.
-    limit : int
-        Largest size in bytes.
-
-    Returns
-    -------
-    bytes
-        Its content.
-
     Raises
     ------
     InputError
@@ -147,20 +135,6 @@ def _neighbours(folder: str) -> list[str]:
 
 def decode(file: str, data: bytes) -> tuple[str, bool]:
     """Turn the bytes of a text file into text.
-
-    Parameters
-    ----------
-    file : str
-        Path of the file, for messages.
-    data : bytes
-        Its content.
-
-    Returns
-    -------
-    text : str
-        Its text, without a byte order mark.
-    marked : bool
-        Whether there was a byte order mark.
 
     Raises
     ------

@@ -20,13 +20,7 @@ IDS_NAMED = 8
 
 @dataclass
 class Findings:
-    """Faults of all files of a project, and notes about them.
-
-    Parameters
-    ----------
-    notes : list of Note
-        What the surveyor should know.
-    """
+    """Faults of all files of a project, and notes about them."""
 
     notes: list[Note] = field(default_factory=list)
     _faults: list[Fault] = field(default_factory=list)
@@ -48,7 +42,7 @@ class Findings:
         return self._count[file] >= LARGEST_LIST
 
     def number(self, file: str) -> int:
-        """Give the number of faults of a file so far."""
+        """Return the number of faults of a file so far."""
         return self._count[file]
 
     def count(self, file: str, number: int) -> None:
@@ -60,8 +54,6 @@ class Findings:
 
         Parameters
         ----------
-        other : Findings
-            Faults of one file.
         told : callable
             Gives each fault the place where it is told.
         """
@@ -101,13 +93,6 @@ class Findings:
 def suggestion(name: str, known: Iterable[str]) -> str:
     """Ask whether a similar known name was meant.
 
-    Parameters
-    ----------
-    name : str
-        What the user wrote.
-    known : iterable of str
-        Names that exist.
-
     Returns
     -------
     str
@@ -122,13 +107,6 @@ def suggestion(name: str, known: Iterable[str]) -> str:
 def listed(ids: Iterable[str], limit: int = IDS_NAMED) -> str:
     """Name some ids and count the rest.
 
-    Parameters
-    ----------
-    ids : iterable of str
-        Ids of photos or points.
-    limit : int
-        How many are named.
-
     Returns
     -------
     str
@@ -140,5 +118,5 @@ def listed(ids: Iterable[str], limit: int = IDS_NAMED) -> str:
 
 
 def counted(number: int, one: str, many: str = "") -> str:
-    """Give a number with its noun: ``1 row``, ``2 rows``."""
+    """Return a number with its noun: ``1 row``, ``2 rows``."""
     return f"{number} {one if number == 1 else many or one + 's'}"

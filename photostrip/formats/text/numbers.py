@@ -17,15 +17,7 @@ _MINUS_SIGNS = "−–—"
 
 
 class NotANumber(ValueError):  # noqa: N818 (the name of what it says)
-    """A text that is not a number.
-
-    Parameters
-    ----------
-    message : str
-        What it is instead.
-    fix : str
-        What would make it one.
-    """
+    """A text that is not a number."""
 
     def __init__(self, message: str, fix: str = "") -> None:
         super().__init__(message)
@@ -84,20 +76,13 @@ def _reason(word: str) -> NotANumber:
 
 
 def _ascii(character: str) -> str:
-    """Give the ASCII form of a digit of any script, and of a minus sign."""
+    """Return the ASCII form of a digit of any script, and of a minus sign."""
     digit = unicodedata.decimal(character, None)
     return str(digit) if digit is not None else "-" if character in _MINUS_SIGNS else character
 
 
 def shown(text: str, limit: int = 40) -> str:
-    """Give a text as it can stand in a message: on one line and not too long.
-
-    Parameters
-    ----------
-    text : str
-        What the user wrote.
-    limit : int
-        Most characters shown.
+    """Return a text as it can stand in a message: on one line and not too long.
 
     Returns
     -------

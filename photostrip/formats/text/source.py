@@ -47,7 +47,7 @@ _current: ContextVar[Source | None] = ContextVar("source", default=None)
 
 
 def digest(data: bytes) -> str:
-    """Give the SHA-256 of some bytes as 64 hexadecimal digits."""
+    """Return the SHA-256 of some bytes as 64 hexadecimal digits."""
     import hashlib
 
     return hashlib.sha256(data).hexdigest()
@@ -55,18 +55,7 @@ def digest(data: bytes) -> str:
 
 @contextmanager
 def reading_from(source: Source) -> Iterator[Source]:
-    """Let all readers take their files from a source, and keep its account.
-
-    Parameters
-    ----------
-    source : Source
-        The source.
-
-    Yields
-    ------
-    Source
-        The same.
-    """
+    """Let all readers take their files from a source, and keep its account."""
     token = _current.set(source)
     try:
         yield source
@@ -75,19 +64,12 @@ def reading_from(source: Source) -> Iterator[Source]:
 
 
 def current() -> Source | None:
-    """Give the source that readers take their files from; None: the disk, without an account."""
+    """Return the source that readers take their files from; None: the disk, without an account."""
     return _current.get()
 
 
 def seen_from(file: str, folder: str | Path) -> str:
-    """Give a path relative to a folder, with slashes on every system.
-
-    Parameters
-    ----------
-    file : str
-        A path.
-    folder : str or Path
-        The folder.
+    """Return a path relative to a folder, with slashes on every system.
 
     Returns
     -------

@@ -21,14 +21,10 @@ class TableText:
 
     Parameters
     ----------
-    file : str
-        Path as the user knows it.
     data : bytes
         UTF-8; as a text, one long id in another script would make it four times as large.
     where : dict of str to int
         Number of the field in a row, by column.
-    header : dict of str to str
-        Name in the header, by column.
     """
 
     file: str
@@ -37,7 +33,7 @@ class TableText:
     header: dict[str, str] = field(default_factory=dict)
 
     def stream(self) -> TextIOWrapper:
-        """Give the lines of the table; ends of lines of all systems count."""
+        """Return the lines of the table; ends of lines of all systems count."""
         return TextIOWrapper(BytesIO(self.data), encoding="utf-8", newline="")
 
     @cached_property
@@ -45,17 +41,12 @@ class TableText:
         return self.stream().readlines()
 
     def placed_as(self, column: str, where: str) -> TableText:
-        """Give the text with a column placed where another one stands.
+        """Return the text with a column placed where another one stands.
 
         Parameters
         ----------
         column, where : str
             Name of the column, and of the one in its place.
-
-        Returns
-        -------
-        TableText
-            The same text.
         """
         places, header = dict(self.where), dict(self.header)
         if where in places:
@@ -67,12 +58,8 @@ class TableText:
 
         Parameters
         ----------
-        line : int
-            Line, counted from 1.
         column : str
             Name of the column; empty for the line as a whole.
-        message, code, expected, fix : str
-            As in ``errors.Fault``.
 
         Returns
         -------
@@ -102,18 +89,6 @@ class TableText:
 
 def content(file: str) -> tuple[bytes, bool]:
     """Read and unpack a file, make sure that it is text, and take a byte order mark off.
-
-    Parameters
-    ----------
-    file : str
-        Path of a ``.csv`` or ``.csv.gz`` file.
-
-    Returns
-    -------
-    data : bytes
-        UTF-8.
-    marked : bool
-        Whether there was a byte order mark.
 
     Raises
     ------

@@ -43,20 +43,10 @@ class Column:
 
     Parameters
     ----------
-    name : str
-        Its name in the header.
     number : bool
         Whether its cells are numbers; otherwise they are ids.
-    required : bool
-        Whether the table must have it.
-    filled : bool
-        Whether no cell may be empty.
-    positive : bool
-        Whether its numbers must be larger than 0.
     words : tuple of str
         The only values allowed, the first being that of an empty cell.
-    aliases : tuple of str
-        Other names for it.
     header : str
         The only name for it in this table, in lower case; empty: its name and its aliases.
     """
@@ -82,8 +72,6 @@ class Table:
 
     Parameters
     ----------
-    file : str
-        Path as the user knows it.
     lines : ndarray of int, shape (n,)
         Line of each row, counted from 1.
     numbers : dict of str to ndarray, shape (n,)
@@ -102,67 +90,42 @@ class Table:
     _source: TableText = field(repr=False)
 
     def __len__(self) -> int:
-        """Give the number of rows."""
+        """Return the number of rows."""
         return len(self.lines)
 
     def column(self, name: str) -> Floats:
-        """Give a column of numbers; NaN in every row when the table has no such column."""
+        """Return a column of numbers; NaN in every row when the table has no such column."""
         return self.numbers[name] if name in self.numbers else np.full(len(self), np.nan)
 
     def cells(self, name: str) -> list[str]:
-        """Give a column of ids, or of words, row by row."""
+        """Return a column of ids, or of words, row by row."""
         ids = self.ids[name]
         return [ids[code] for code in self.codes[name]]
 
     def take(self, rows: Numbers) -> Table:
-        """Give the table of some rows.
+        """Return the table of some rows.
 
         Parameters
         ----------
         rows : ndarray of int
             Numbers of the rows to keep, in their order.
-
-        Returns
-        -------
-        Table
-            With the same ids.
         """
         numbers = {name: each[rows] for name, each in self.numbers.items()}
         codes = {name: each[rows] for name, each in self.codes.items()}
         return replace(self, lines=self.lines[rows], numbers=numbers, codes=codes)
 
     def placed_as(self, column: str, where: str) -> Table:
-        """Give the table with the faults of a column that it does not have placed at one that it has.
+        """Return the table with the faults of a column that it does not have placed at one that it has.
 
         Parameters
         ----------
         column, where : str
             Name of the column, and of the one in its place.
-
-        Returns
-        -------
-        Table
-            The same rows.
         """
         return replace(self, _source=self._source.placed_as(column, where))
 
     def fault(self, row: int, column: str, message: str, code: str, *, expected: str = "", fix: str = "") -> Fault:
-        """Make a fault with the place of a cell.
-
-        Parameters
-        ----------
-        row : int
-            Number of the row in the table's arrays.
-        column : str
-            Name of the column.
-        message, code, expected, fix : str
-            As in ``errors.Fault``.
-
-        Returns
-        -------
-        Fault
-            With file, line and column.
-        """
+        """Make a fault with the place of a cell."""
         return self._source.fault(int(self.lines[row]), column, message, code, expected=expected, fix=fix)
 
 
@@ -179,12 +142,6 @@ def read_table(
 
     Parameters
     ----------
-    file : str
-        Path of a ``.csv`` or ``.csv.gz`` file.
-    layout : sequence of Column
-        Columns the format knows.
-    findings : Findings
-        Where faults and notes go.
     others : sequence of sequence of Column
         Other layouts of the same kind of table; that of which the header has most is taken, the first when in doubt.
     columns : mapping of str to str, optional
@@ -211,7 +168,7 @@ def read_table(
 
 
 def _renamed(layout: Sequence[Column], columns: Mapping[str, str]) -> tuple[Column, ...]:
-    """Give a layout the names that the user has for its columns; nothing else is read for those."""
+    """Return a layout the names that the user has for its columns; nothing else is read for those."""
     return tuple(
         replace(column, header=columns[column.name].strip().casefold(), required=True)
         if column.name in columns

@@ -49,8 +49,6 @@ def write_files(folder: Path, files: Mapping[str, str | bytes]) -> None:
     ----------
     folder : Path
         The folder; made when it is missing.
-    files : mapping of str to str or bytes
-        Content by file name.
 
     Raises
     ------
@@ -98,13 +96,6 @@ def _refuse(path: Path, what: str, expected: str) -> None:
 
 def make_rule(target: str | Path, sources: Iterable[str | Path]) -> str:
     """Say to make what a file was made from.
-
-    Parameters
-    ----------
-    target : str or Path
-        The file made.
-    sources : iterable of str or Path
-        Files read for it.
 
     Returns
     -------

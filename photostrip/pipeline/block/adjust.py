@@ -64,16 +64,10 @@ class Block:
     ----------
     strips : tuple of StripResult
         Strips with the orientations and points of the bundle.
-    points : Adjusted
-        All points.
     precision : Precision
         Covariances of points and photos.
     observations : PhotoPoints
         Ideal image coordinates, the calibration found taken into account.
-    bundle : Bundle
-        Everything else.
-    notes : tuple of Note
-        What the surveyor should know.
     """
 
     strips: tuple[StripResult, ...]
@@ -95,14 +89,6 @@ def adjust_block(
 
     Parameters
     ----------
-    inputs : Inputs
-        What is given.
-    settings : Settings
-        What is to be done.
-    observations : PhotoPoints
-        Ideal image coordinates.
-    control : ControlPoints
-        Measured control, no check points.
     frames : tuple
         Frames of the control lists, of the output, of the camera positions and of the orientations.
 
@@ -306,7 +292,7 @@ def _calibrated(observations: PhotoPoints, bundle: Bundle) -> PhotoPoints:
 def _strip(
     strip: StripResult, begin: int, observations: PhotoPoints, used: Numbers, points: Adjusted, bundle: Bundle
 ) -> StripResult:
-    """Give a strip the points and orientations of the bundle, in its own intermediate frame."""
+    """Return a strip the points and orientations of the bundle, in its own intermediate frame."""
     solution, frame = bundle.screened.solution, strip.intermediate
     photos = strip.strip.photos
     numbers = slice(begin, begin + len(photos))
@@ -345,7 +331,7 @@ def _strip(
 
 
 def _strip_notes(start: BlockStart) -> tuple[Note, ...]:
-    """Give the notes of the strips that still mean something."""
+    """Return the notes of the strips that still mean something."""
     return tuple(note for strip in start.strips for note in strip.notes if note.code not in OF_THE_STRIP_METHOD)
 
 

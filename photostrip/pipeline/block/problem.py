@@ -55,18 +55,8 @@ def build(
 
     Parameters
     ----------
-    inputs : Inputs
-        What is given.
-    settings : Settings
-        What is to be done.
-    observations : PhotoPoints
-        Ideal image coordinates.
-    control : ControlPoints
-        Measured control, no check points.
     frames : tuple
         Frames of the control lists, of the camera positions and of the orientations.
-    start : BlockStart
-        Start values.
 
     Returns
     -------
@@ -146,8 +136,6 @@ def given_positions(
         Their frame.
     near : ndarray, shape (n, 3)
         Present positions, Cartesian: they stand in for what does not count.
-    ids : sequence of str
-        Names for messages.
 
     Returns
     -------
@@ -261,19 +249,11 @@ def refilled(
 
     Parameters
     ----------
-    block : BlockProblem
-        The problem.
-    control : ControlPoints
-        Measured control.
-    frames : sequence of GroundFrame
-        Frames of the control lists.
     points : ndarray, shape (q, 3)
         Present positions of all points, in the frame of the problem.
 
     Returns
     -------
-    BlockProblem
-        The same with new targets.
     float
         The largest change of a given coordinate, metres.
     """

@@ -51,10 +51,6 @@ class Known:
 
     Parameters
     ----------
-    control : ControlPoints
-        Measured control, no check points.
-    frames : tuple of GroundFrame
-        Frames of the control lists.
     output : GroundFrame
         Frame of the result.
     centers : dict of str to ndarray
@@ -84,12 +80,6 @@ def known_of(
 
     Parameters
     ----------
-    inputs : Inputs
-        What is given.
-    control : ControlPoints
-        Measured control, no check points.
-    frames : sequence of GroundFrame
-        Frames of the control lists.
     output : GroundFrame
         Frame of the result.
     cameras : tuple of GroundFrame or None
@@ -124,12 +114,6 @@ def start(inputs: Inputs, settings: Settings, observations: PhotoPoints, known: 
 
     Parameters
     ----------
-    inputs : Inputs
-        What is given.
-    settings : Settings
-        What is to be done.
-    observations : PhotoPoints
-        Ideal image coordinates.
     known : Known
         What is known on the ground.
 

@@ -26,15 +26,6 @@ WEAK = 12.0  # standard deviations of a coordinate by which a link moves the far
 def link_notes(strip: ModelStrip, measured: ModelPoints, formed: FormedModels) -> list[Note]:
     """Say which links are weak, or contradict themselves, and what seems to stand in another unit.
 
-    Parameters
-    ----------
-    strip : ModelStrip
-        The strip.
-    measured : ModelPoints
-        Model coordinates of the project.
-    formed : FormedModels
-        The formed strip.
-
     Returns
     -------
     list of Note
@@ -106,11 +97,6 @@ def _unit_notes(strip: ModelStrip, formed: FormedModels) -> list[Note]:
 
 def far_ends(formed: FormedModels) -> Floats:
     """Uncertainty of the far end of the model after each link, in standard deviations of a coordinate.
-
-    Parameters
-    ----------
-    formed : FormedModels
-        The strip.
 
     Returns
     -------

@@ -37,11 +37,6 @@ if TYPE_CHECKING:
 def variance_factor(formed: FormedModels) -> tuple[float, str]:
     """Variance factor of the model coordinates: 1 unless the links contradict what is stated.
 
-    Parameters
-    ----------
-    formed : FormedModels
-        The strip.
-
     Returns
     -------
     factor : float
@@ -66,8 +61,6 @@ def of_linked(
     ----------
     strip : LinkedStrip
         The strip with all its stages.
-    observations : PhotoPoints
-        It names the points.
     frames : sequence of GroundFrame
         Ground frames of the given points.
     given : ControlPoints
@@ -125,16 +118,8 @@ def joint(
 
     Parameters
     ----------
-    formed : FormedModels
-        The formed strip.
-    orientation : absolute_orientation.AbsoluteOrientation
-        Its similarity to the control.
     given : tuple of ControlPoints and ndarray of int
         The control, and its rows in the points of the strip.
-    frames : sequence of GroundFrame
-        Ground frames of the control.
-    intermediate : IntermediateFrame
-        Frame of the adjustment.
     """
     control, rows = given
     if control.use.sum() > control_significance.LARGEST or len(formed.photos) > control_significance.LONGEST:

@@ -33,20 +33,14 @@ class LinkedStrip:
 
     Parameters
     ----------
-    strip : ModelStrip
-        The strip.
     formed : FormedModels
         Its models in one system, and the links between them.
     precision : tuple of float
         A-priori standard deviation of a point of one model in plan and height, metres.
-    intermediate : IntermediateFrame
-        Frame of the adjustment.
     control : ControlPoints
         Control that took part.
     control_rows : ndarray of int, shape (n,)
         Its rows in the strip's points.
-    absolute : absolute.AbsoluteOrientation
-        Similarity to the control.
     polynomial : polynomial.Polynomial or None
         Correction of the strip deformation; None with ``adjustment: similarity``.
     xyz : ndarray, shape (q, 3)

@@ -44,13 +44,6 @@ def adjust_all(
 ) -> tuple[LinkedStrip, ...]:
     """Take all strips of independent models through the method.
 
-    Parameters
-    ----------
-    models : MeasuredModels
-        Strips and model coordinates.
-    control, frames, settings
-        As for ``adjust_models``.
-
     Returns
     -------
     tuple of LinkedStrip
@@ -75,13 +68,6 @@ def adjust_all(
 
 def require_named(settings: link_screening.Settings, measured: ModelPoints) -> None:
     """Refuse entries of ``keep`` and ``drop`` that name nothing, and those in both.
-
-    Parameters
-    ----------
-    settings : link_screening.Settings
-        The lists.
-    measured : ModelPoints
-        Model coordinates.
 
     Raises
     ------
@@ -125,15 +111,6 @@ def adjust_models(
         Model coordinates of the whole project.
     control : ControlPoints
         Measured control of the project, no check points.
-    frames : sequence of GroundFrame
-        Ground frames of the control.
-    settings : Settings
-        What is to be done.
-
-    Returns
-    -------
-    LinkedStrip
-        Every stage.
 
     Raises
     ------
@@ -205,8 +182,6 @@ def form_models(strip: ModelStrip, measured: ModelPoints, settings: Settings) ->
         Photos and models in flight order.
     measured : ModelPoints
         Model coordinates of the whole project.
-    settings : Settings
-        What is to be done.
 
     Returns
     -------
@@ -235,15 +210,6 @@ def form_models(strip: ModelStrip, measured: ModelPoints, settings: Settings) ->
 
 def models_of(strip: ModelStrip, measured: ModelPoints, settings: link_screening.Settings) -> StripModels:
     """Take the models of a strip out of those of the project, without what the user drops.
-
-    Parameters
-    ----------
-    strip : ModelStrip
-        The strip.
-    measured : ModelPoints
-        Model coordinates of the project.
-    settings : link_screening.Settings
-        What is dropped.
 
     Returns
     -------

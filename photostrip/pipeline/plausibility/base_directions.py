@@ -29,7 +29,7 @@ WORST = 0.01  # sigma0 of a pair over the principal distance: beyond it the base
 def closer_look(
     strip: Strip, observations: PhotoPoints, settings: Settings
 ) -> Callable[[str, str], tuple[complex, complex] | None]:
-    """Give what tells in which directions two photos of a strip lie from each other.
+    """Return what tells in which directions two photos of a strip lie from each other.
 
     Parameters
     ----------
@@ -37,8 +37,6 @@ def closer_look(
         The strip; the order of its photos does not matter.
     observations : PhotoPoints
         Image points in the system of the photo, mm.
-    settings : Settings
-        What is to be done.
 
     Returns
     -------

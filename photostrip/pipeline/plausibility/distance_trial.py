@@ -44,12 +44,8 @@ def examine(formed: Formed, observations: PhotoPoints, settings: Settings, read:
 
     Parameters
     ----------
-    formed : Formed
-        The strip.
     observations : PhotoPoints
         Image points in the system of the photo, mm.
-    settings : Settings
-        What was to be done.
     read : callable
         Compares a formed strip with the heights of its control.
 
@@ -80,11 +76,6 @@ def examine(formed: Formed, observations: PhotoPoints, settings: Settings, read:
 
 def without_pairs(strip: Strip, observations: PhotoPoints, settings: Settings, read: Read) -> list[Finding]:
     """Try other principal distances on a strip whose pairs cannot be oriented.
-
-    Parameters
-    ----------
-    strip, observations, settings, read
-        As for ``examine``.
 
     Returns
     -------

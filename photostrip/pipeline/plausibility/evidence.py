@@ -44,10 +44,6 @@ class Formed:
     ----------
     strip : Strip
         The strip with its photos in the order in which they were formed.
-    orientation : relative.Orientation
-        Its pairs.
-    formed : formation.FormedStrip
-        The strip.
     """
 
     strip: Strip
@@ -106,12 +102,8 @@ def form(strip: Strip, observations: PhotoPoints, settings: Settings) -> Formed 
 
     Parameters
     ----------
-    strip : Strip
-        The strip, its photos as they lie.
     observations : PhotoPoints
         Image points in the system of the photo, mm.
-    settings : Settings
-        What was to be done.
 
     Returns
     -------
@@ -138,10 +130,6 @@ def ideal(observations: PhotoPoints, strips: Sequence[Strip], settings: Settings
     ----------
     observations : PhotoPoints
         Image points in the system of the photo, mm.
-    strips : sequence of Strip
-        Strips with their cameras.
-    settings : Settings
-        What was to be done.
 
     Returns
     -------
@@ -161,16 +149,10 @@ def ideal(observations: PhotoPoints, strips: Sequence[Strip], settings: Settings
 def sighted(
     formed: Formed, observations: PhotoPoints, control: ControlPoints, steps: Mapping[str, complex]
 ) -> tuple[Numbers, Seen]:
-    """Give the points of a formed strip whose ground coordinates are given.
+    """Return the points of a formed strip whose ground coordinates are given.
 
     Parameters
     ----------
-    formed : Formed
-        The strip.
-    observations : PhotoPoints
-        Image points.
-    control : ControlPoints
-        Given points.
     steps : mapping of str to complex
         Centre of the next photo on each photo, mm.
 
@@ -202,7 +184,7 @@ def sighted(
 
 
 def _rays(formed: Formed, observations: PhotoPoints, name: str) -> Rays:
-    """Give what the photos of a strip show of a point."""
+    """Return what the photos of a strip show of a point."""
     place = {photo: number for number, photo in enumerate(formed.strip.photos)}
     rows = np.flatnonzero(observations.point == observations.point_ids.index(name))
     here = np.array([place.get(observations.photo_ids[photo], -1) for photo in observations.photo[rows]], np.intp)
@@ -219,13 +201,9 @@ def stretches(rows: Numbers, seen: Seen) -> Iterator[tuple[Numbers, Seen]]:
     ----------
     rows : ndarray of int, shape (n,)
         Rows of given points.
-    seen : Seen
-        The same points in the strip.
 
     Yields
     ------
-    rows : ndarray of int
-        Those of a stretch.
     Seen
         The same points in the strip. A strip of up to 40 photos is one stretch; of a longer one four of 30 photos,
         evenly spread, are given.
@@ -261,16 +239,12 @@ def _base_angle(photos: Sequence[str], steps: Mapping[str, complex]) -> float:
 def sighted_in_mosaic(
     strip: Strip, observations: PhotoPoints, control: ControlPoints, steps: Mapping[str, complex]
 ) -> tuple[Numbers, Seen] | None:
-    """Give the points of a mosaic of some photos whose ground coordinates are given.
+    """Return the points of a mosaic of some photos whose ground coordinates are given.
 
     Parameters
     ----------
-    strip : Strip
-        The strip, its photos as they lie.
     observations : PhotoPoints
         Image points, mm.
-    control : ControlPoints
-        Given points.
     steps : mapping of str to complex
         Centre of the next photo on each photo, mm.
 
@@ -332,12 +306,8 @@ def stations(
 
     Parameters
     ----------
-    strip : Strip
-        The strip, its photos as they lie.
     observations : PhotoPoints
         Image points, mm.
-    control : ControlPoints
-        Given points.
     steps : mapping of str to complex
         Centre of the next photo on each photo, mm.
 
@@ -364,8 +334,6 @@ def places(strip: Strip, observations: PhotoPoints, steps: Mapping[str, complex]
 
     Parameters
     ----------
-    strip : Strip
-        The strip, its photos as they lie.
     observations : PhotoPoints
         Image points, mm.
     steps : mapping of str to complex
@@ -396,12 +364,8 @@ def half_breadth(
 
     Parameters
     ----------
-    strip : Strip
-        The strip.
     observations : PhotoPoints
         Image points, mm.
-    ids : sequence of str
-        Ids of given points.
     plan : ndarray, shape (n, 2)
         Their plan coordinates in metres.
     steps : mapping of str to complex

@@ -49,16 +49,12 @@ class Examined:
 
     Parameters
     ----------
-    findings : tuple of Finding
-        What was found.
     observations : PhotoPoints
         Image points with what was found put right, for further evidence only; mm, y up.
     arranged : tuple of Arranged
         Each strip as its photos lie.
     steps : dict of str to complex
         Centre of the next photo, as the photos lie, on each photo; mm, y up.
-    settings : Settings
-        What is to be done.
     light : bool
         Whether no strip may be formed, as in ``photostrip check``.
     """
@@ -73,13 +69,6 @@ class Examined:
 
 def before(inputs: Inputs, settings: Settings) -> Examined:
     """Examine what is given, as far as that goes without adjusting anything.
-
-    Parameters
-    ----------
-    inputs : Inputs
-        What is given.
-    settings : Settings
-        What is to be done.
 
     Returns
     -------
@@ -135,17 +124,8 @@ def of_inputs(inputs: Inputs, settings: Settings, directory: Path | None = None)
 
     Parameters
     ----------
-    inputs : Inputs
-        What is given.
     settings : Settings
         What is to be done, and what is accepted.
-    directory : Path, optional
-        Where geoid grids named in a CRS are looked for first.
-
-    Returns
-    -------
-    tuple of Finding
-        By code.
     """
     if inputs.models is not None:
         return accepted(_of_models(inputs, inputs.models, settings, directory), settings.accept)
@@ -158,20 +138,7 @@ def of_inputs(inputs: Inputs, settings: Settings, directory: Path | None = None)
 
 
 def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, ...]:
-    """Tell what the data say against themselves, the adjustment being done.
-
-    Parameters
-    ----------
-    result : Result
-        What a run found.
-    directory : Path, optional
-        Where geoid grids named in a CRS are looked for first.
-
-    Returns
-    -------
-    tuple of Finding
-        By code.
-    """
+    """Tell what the data say against themselves, the adjustment being done."""
     inputs, settings = result.inputs, result.settings
     if inputs.models is not None:
         return accepted(_of_models(inputs, inputs.models, settings, directory), settings.accept)
@@ -189,15 +156,6 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
 
 def of_failure(inputs: Inputs, settings: Settings, directory: Path | None = None) -> tuple[Finding, ...]:
     """Tell what the data say against themselves, the adjustment having failed.
-
-    Parameters
-    ----------
-    inputs : Inputs
-        What is given.
-    settings : Settings
-        What was to be done.
-    directory : Path, optional
-        Where geoid grids named in a CRS are looked for first.
 
     Returns
     -------
@@ -226,7 +184,7 @@ def of_failure(inputs: Inputs, settings: Settings, directory: Path | None = None
 
 
 def _as_they_lie(inputs: Inputs, examined: Examined) -> tuple[Strip, ...]:
-    """Give the strips with their photos as they lie, each place once."""
+    """Return the strips with their photos as they lie, each place once."""
     pairs = zip(inputs.strips, examined.arranged, strict=True)
     return tuple(replace(strip, photos=arranged.photos) for strip, arranged in pairs)
 

@@ -52,8 +52,6 @@ class Placed(NamedTuple):
     ----------
     key : str
         Where they stand in the project file.
-    photos : tuple of str
-        Their photos.
     xyz : ndarray, shape (n, 3)
         East, north and height, metres.
     """
@@ -70,19 +68,10 @@ def centers(
 
     Parameters
     ----------
-    inputs : Inputs
-        What is given.
     observations : PhotoPoints
         Image points in the system of the photo, mm.
     strips : sequence of Strip
         The strips, their photos as they lie.
-    directory : Path, optional
-        Where geoid grids named in a CRS are looked for first.
-
-    Yields
-    ------
-    Finding
-        P204 to P207.
     """
     control = inputs.control
     for key, given, whole in _lists(inputs):
@@ -202,17 +191,6 @@ def angles(
     directory: Path | None = None,
 ) -> list[Finding]:
     """Compare given angles with those of strips that are laid on their control, whatever an adjustment made of them.
-
-    Parameters
-    ----------
-    inputs : Inputs
-        What is given.
-    formed : sequence of Formed
-        Strips.
-    observations : PhotoPoints
-        Image points.
-    directory : Path, optional
-        Where geoid grids named in a CRS are looked for first.
 
     Returns
     -------

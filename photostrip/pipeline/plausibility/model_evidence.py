@@ -32,18 +32,12 @@ class Sight:
 
     Parameters
     ----------
-    strip : ModelStrip
-        The strip.
     centers : ndarray, shape (f, 3)
         Perspective centres of the photos that have one, in strip coordinates.
-    photos : tuple of str
-        These photos.
     depth : ndarray, shape (f,)
         Height of each above the points of its models.
     rows : ndarray of int
         Rows of the given points that the strip holds.
-    seen : Seen
-        The same points in the strip.
     place : ndarray
         Place of each of them along the strip in bases, from 0 at the first photo.
     breadth : float
@@ -62,15 +56,6 @@ class Sight:
 
 def sights(models: MeasuredModels, control: ControlPoints, settings: Settings) -> Iterator[Sight]:
     """Form the strips as far as that goes, for evidence alone.
-
-    Parameters
-    ----------
-    models : MeasuredModels
-        Strips and model coordinates.
-    control : ControlPoints
-        Given points.
-    settings : Settings
-        What was to be done.
 
     Yields
     ------

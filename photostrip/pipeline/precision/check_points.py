@@ -39,17 +39,11 @@ def check_points(
 
     Parameters
     ----------
-    strip : StripResult or LinkedStrip
-        The strip.
-    control : ControlPoints
-        All given points.
     observations : PhotoPoints
         Image points of the project, which name its points.
 
     Returns
     -------
-    ControlPoints
-        The check points.
     rows : ndarray of int, shape (c,)
         Their rows in ``strip.formed.point``.
     """
@@ -70,17 +64,10 @@ def by_fit(found: Propagation, given: Given, rows: Numbers, factor: float) -> co
     ----------
     found : Propagation
         Rows and operators of the strip method.
-    given : Given
-        What the check points say.
     rows : ndarray of int, shape (c,)
         Their rows in the points of the strip.
     factor : float
         Variance factor of the image coordinates.
-
-    Returns
-    -------
-    CheckTest
-        The test.
     """
     seen = given.seen
     by_parameters = np.einsum("wi,wit->wt", seen.direction, found.influence[rows][seen.point])
@@ -90,20 +77,7 @@ def by_fit(found: Propagation, given: Given, rows: Numbers, factor: float) -> co
 
 
 def by_covariance(own: CovarianceAdjustment, given: Given) -> covariances.CheckTest:
-    """Test the check points of a strip that was adjusted with its own covariance.
-
-    Parameters
-    ----------
-    own : CovarianceAdjustment
-        The adjustment.
-    given : Given
-        What the check points say.
-
-    Returns
-    -------
-    CheckTest
-        The test.
-    """
+    """Test the check points of a strip that was adjusted with its own covariance."""
     wanted = own.conditions
     taken = prediction.influence(own.errors, wanted, own.local, own.system, given.seen.rows)
     # the similarities of the models are unknowns of this adjustment, not errors
@@ -117,10 +91,6 @@ class Given:
 
     Parameters
     ----------
-    points : int
-        Check points.
-    seen : Misclosures
-        Their coordinates.
     difference : ndarray, shape (w,)
         Adjusted minus given, metres.
     """
@@ -137,19 +107,10 @@ def given_at(
 
     Parameters
     ----------
-    strip : StripResult
-        The strip.
-    errors : StripErrors
-        Its rows.
     checks : tuple of ControlPoints and ndarray of int
         The check points and their rows in the strip.
     frames : sequence of GroundFrame
         Ground frames of the given points.
-
-    Returns
-    -------
-    Given
-        Differences along the ground axes.
     """
     points, rows = checks
     xyz = strip.xyz[rows]

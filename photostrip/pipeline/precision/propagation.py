@@ -31,12 +31,8 @@ class Propagation:
 
     Parameters
     ----------
-    errors : strip_errors.StripErrors
-        The formed strip.
     control : control_errors.Misclosures
         Control coordinates that count.
-    fit : control_errors.Correction
-        Similarity and polynomials.
     influence : ndarray, shape (q, 3, t)
         Points by the parameters of the fit.
     photos : Rows
@@ -65,8 +61,6 @@ def propagation(strip: StripResult, observations: PhotoPoints, frames: Sequence[
         The strip with all its stages.
     observations : PhotoPoints
         Ideal image coordinates of the project.
-    frames : sequence of GroundFrame
-        Ground frames of the control.
 
     Returns
     -------

@@ -151,15 +151,6 @@ def joined(
 ) -> Precision:
     """Precision of all strips together; a point of several strips is their mean.
 
-    Parameters
-    ----------
-    strips : sequence of StripPrecision
-        Precision of each strip.
-    results : sequence of StripResult or LinkedStrip
-        The strips.
-    points : Adjusted
-        Points of all strips.
-
     Returns
     -------
     Precision

@@ -57,14 +57,8 @@ class Checked:
 
     Parameters
     ----------
-    path : str
-        The project file as the user named it.
     faults : tuple of Fault
         What must be put right before the project can be adjusted.
-    findings : tuple of Finding
-        What the data say against themselves.
-    notes : tuple of Note
-        What the surveyor should know.
     document : dict
         What was decoded: counts, rows, frames, control; empty when the files could not be read.
     """
@@ -93,13 +87,6 @@ class Checked:
 
 def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
     """Check a project as far as that goes without adjusting it.
-
-    Parameters
-    ----------
-    path : Path
-        The project file.
-    overrides : sequence of str
-        Assignments ``key.path=value`` that replace values of the file.
 
     Returns
     -------
@@ -143,7 +130,7 @@ def _against_themselves(project: Project) -> tuple[Finding, ...]:
 
 
 def _refused(project: Project, test: Callable[[], None]) -> list[Fault]:
-    """Give what a test of the pipeline refuses, with its place in the project file."""
+    """Return what a test of the pipeline refuses, with its place in the project file."""
     try:
         with project.places():
             test()
@@ -330,7 +317,7 @@ def _decoded(project: Project, frame: GroundFrame, rows: NDArray[np.intp]) -> Do
 
 
 def _control(project: Project) -> Iterator[Document]:
-    """Give the standard deviation of every control coordinate, in the user's order, and where it comes from."""
+    """Return the standard deviation of every control coordinate, in the user's order, and where it comes from."""
     photos = {name: set[str]() for name in project.inputs.observations.point_ids}
     observations = project.inputs.observations
     if project.inputs.models is not None:

@@ -25,18 +25,7 @@ MICROMETRES = 1000.0  # in a millimetre
 
 
 def links_of_models(project: Project) -> Iterator[Fault]:
-    """Refuse neighbouring models that cannot be linked, and models of the other hand.
-
-    Parameters
-    ----------
-    project : Project
-        The project.
-
-    Yields
-    ------
-    Fault
-        One for each strip at most.
-    """
+    """Refuse neighbouring models that cannot be linked, and models of the other hand."""
     from photostrip.pipeline.models.model_strips import form_models  # strips of photos need none of it
 
     models = project.inputs.models
@@ -53,15 +42,7 @@ def links_of_models(project: Project) -> Iterator[Fault]:
 
 
 def source_of(project: Project, path: tuple[str | int, ...]) -> Document | None:
-    """Say where a value of the project stands: in which file, line and key; None when it is not given.
-
-    Parameters
-    ----------
-    project : Project
-        The project.
-    path : tuple
-        Keys and numbers that lead to the value.
-    """
+    """Say where a value of the project stands: in which file, line and key; None when it is not given."""
     if not project.tree.has(*path):
         return None
     place = project.tree.place_of(path)
@@ -69,13 +50,7 @@ def source_of(project: Project, path: tuple[str | int, ...]) -> Document | None:
 
 
 def counts_of_models(models: MeasuredModels) -> Document:
-    """Count models, their points and their perspective centres.
-
-    Parameters
-    ----------
-    models : MeasuredModels
-        The models.
-    """
+    """Count models, their points and their perspective centres."""
     points = models.points.node < len(models.points.point_ids)
     return {
         "models": sum(len(strip.models) for strip in models.strips),
@@ -85,13 +60,7 @@ def counts_of_models(models: MeasuredModels) -> Document:
 
 
 def model_sigma(project: Project) -> Document:
-    """Say which standard deviations the model coordinates get, and how many rows have their own.
-
-    Parameters
-    ----------
-    project : Project
-        The project.
-    """
+    """Say which standard deviations the model coordinates get, and how many rows have their own."""
     tables, models = project.tables.models, project.inputs.models
     tables_read = [] if tables is None else [each for each in (tables.points, tables.centers) if each is not None]
     rows = sum(len(each.table) for each in tables_read)
@@ -107,15 +76,7 @@ def model_sigma(project: Project) -> Document:
 
 
 def points_of_strip(inputs: Inputs, number: int) -> Numbers:
-    """Points that the models of a strip hold, by number.
-
-    Parameters
-    ----------
-    inputs : Inputs
-        What is given.
-    number : int
-        The strip.
-    """
+    """Points that the models of a strip hold, by number."""
     if inputs.models is None:
         return np.zeros(0, np.intp)
     points = inputs.models.points
@@ -125,13 +86,7 @@ def points_of_strip(inputs: Inputs, number: int) -> Numbers:
 
 
 def photos_of_points(models: MeasuredModels) -> dict[str, set[str]]:
-    """Give the photos of the models that hold each point.
-
-    Parameters
-    ----------
-    models : MeasuredModels
-        The models.
-    """
+    """Return the photos of the models that hold each point."""
     shown = {
         name: strip.photos[place : place + 2] for strip in models.strips for place, name in enumerate(strip.models)
     }

@@ -37,11 +37,6 @@ NOT_MEASURED = "not measured on any photo of the strips"
 def observations_used(inputs: Inputs) -> Numbers:
     """Find the strip in which each image point takes part.
 
-    Parameters
-    ----------
-    inputs : Inputs
-        What is given.
-
     Returns
     -------
     ndarray of int, shape (n,)
@@ -78,11 +73,6 @@ def gaps_of(inputs: Inputs) -> list[str]:
 def table_rows(project: Project) -> list[Document]:
     """Count what became of the rows of each table.
 
-    Parameters
-    ----------
-    project : Project
-        The project.
-
     Returns
     -------
     list of dict
@@ -111,13 +101,6 @@ def table_rows(project: Project) -> list[Document]:
 
 def model_rows(tables: Tables, models: MeasuredModels) -> list[Document]:
     """Count what became of the rows of each table of a project of independent models.
-
-    Parameters
-    ----------
-    tables : Tables
-        The tables.
-    models : MeasuredModels
-        The models of the strips.
 
     Returns
     -------

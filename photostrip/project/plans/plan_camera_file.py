@@ -60,19 +60,7 @@ class CameraPlanFile(Section):
 
 @dataclass(frozen=True, eq=False)
 class CameraPlan:
-    """Cameras to compare.
-
-    Parameters
-    ----------
-    name : str
-        Name of the comparison.
-    cameras : tuple of Camera
-        The cameras, in the order of the file.
-    reference : Camera
-        The one that the others stand beside.
-    files : tuple of str
-        Every file that was read.
-    """
+    """Cameras to compare."""
 
     name: str
     cameras: tuple[camera_efficiency.Camera, ...]
@@ -82,18 +70,6 @@ class CameraPlan:
 
 def load_camera_plan(path: Path, assignments: Sequence[str]) -> CameraPlan:
     """Read a list of cameras to compare.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    assignments : sequence of str
-        Assignments ``key.path=value``.
-
-    Returns
-    -------
-    CameraPlan
-        The cameras.
 
     Raises
     ------

@@ -78,19 +78,7 @@ class ModelPlanFile(Flown):
 
 @dataclass(frozen=True, eq=False)
 class ModelPlan:
-    """A plan of one model.
-
-    Parameters
-    ----------
-    name : str
-        Its name.
-    camera : str
-        Name of the camera.
-    spec : ModelSpec
-        What is to be computed.
-    files : tuple of str
-        Every file that was read.
-    """
+    """A plan of one model."""
 
     name: str
     camera: str
@@ -105,13 +93,6 @@ def load_model_plan(path: Path | None, assignments: Sequence[str]) -> ModelPlan:
     ----------
     path : Path, optional
         The file; without one the assignments and defaults are the plan.
-    assignments : sequence of str
-        Assignments ``key.path=value``.
-
-    Returns
-    -------
-    ModelPlan
-        The plan.
 
     Raises
     ------

@@ -80,19 +80,6 @@ def read_plan(kind: type[T], path: Path | None, assignments: Sequence[str]) -> t
     ----------
     kind : type
         Schema of the file; one of its keys is the number of the schema.
-    path : Path, optional
-        The file.
-    assignments : sequence of str
-        Assignments ``key.path=value``.
-
-    Returns
-    -------
-    Section
-        What is given, with all defaults.
-    tuple of str
-        Every file that was read.
-    Node
-        The plan as a tree.
 
     Raises
     ------

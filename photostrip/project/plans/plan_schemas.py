@@ -13,7 +13,7 @@ KINDS: dict[str, type[Section]] = {"model": ModelPlanFile, "strip": StripPlanFil
 
 
 def plan_schema(kind: str) -> dict[str, Any]:
-    """Give the JSON Schema of a plan file.
+    """Return the JSON Schema of a plan file.
 
     Parameters
     ----------

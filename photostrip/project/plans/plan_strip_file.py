@@ -75,7 +75,7 @@ def _layout(value: object) -> object:
 
 
 def layout_option(word: str) -> tuple[str, str]:
-    """Give the key and the value that add a layout to a plan.
+    """Return the key and the value that add a layout to a plan.
 
     Parameters
     ----------
@@ -175,19 +175,7 @@ class StripPlanFile(Flown):
 
 @dataclass(frozen=True, eq=False)
 class StripPlan:
-    """A plan of a strip.
-
-    Parameters
-    ----------
-    name : str
-        Its name.
-    design : Design
-        What is to be designed.
-    files : tuple of str
-        Every file that was read.
-    root : Node
-        The plan as a tree.
-    """
+    """A plan of a strip."""
 
     name: str
     design: Design
@@ -196,11 +184,6 @@ class StripPlan:
 
     def worked_out(self) -> Report:
         """Work out the design.
-
-        Returns
-        -------
-        Report
-            Everything about it.
 
         Raises
         ------
@@ -224,13 +207,6 @@ def load_strip_plan(path: Path | None, assignments: Sequence[str]) -> StripPlan:
     ----------
     path : Path, optional
         The file; without one the assignments and defaults are the plan.
-    assignments : sequence of str
-        Assignments ``key.path=value``.
-
-    Returns
-    -------
-    StripPlan
-        The plan.
 
     Raises
     ------

@@ -43,26 +43,10 @@ class Survey:
 
     Parameters
     ----------
-    name : str
-        Name of the survey.
-    series : Series
-        Measurements.
     pair : StereoPair
         Stations; ground axes are east, north, up, or right, ahead, up in the normal case.
-    settings : Settings
-        How displacements are judged.
-    cameras : tuple of Phototheodolite
-        Of the left and the right station.
     axes : tuple of str
         Names of the ground axes in the order in which the user wants them.
-    order : tuple of int
-        Which internal axis each of them is.
-    time_unit : str
-        Unit of the times of the epochs.
-    files : tuple of str
-        Every file that was read.
-    notes : tuple of Note
-        What was passed over or not used.
     """
 
     name: str
@@ -79,18 +63,6 @@ class Survey:
 
 def load_survey(path: Path, overrides: Sequence[str] = ()) -> Survey:
     """Read a terrestrial project and its table.
-
-    Parameters
-    ----------
-    path : Path
-        The project file.
-    overrides : sequence of str
-        Assignments ``key.path=value`` that replace values of the file.
-
-    Returns
-    -------
-    Survey
-        The survey.
 
     Raises
     ------
@@ -140,23 +112,10 @@ def load_normal_case(
 
     Parameters
     ----------
-    file : str
-        The table.
-    camera : Phototheodolite
-        Camera of both stations.
     base : float
         Base in metres.
     table : Table
         What the numbers of the table mean; its kind may be empty.
-    stable : sequence of str
-        Points that are taken not to move.
-    settings : Settings
-        How displacements are judged.
-
-    Returns
-    -------
-    Survey
-        The survey.
 
     Raises
     ------
@@ -182,7 +141,7 @@ def load_normal_case(
 def _cameras(
     given: TerrestrialFile, root: Node, project: str, findings: Findings, files: list[str]
 ) -> list[Phototheodolite]:
-    """Give the cameras of both stations."""
+    """Return the cameras of both stations."""
     known = own_presets()
     if given.presets is not None:
         node = root.find("presets")
@@ -210,7 +169,7 @@ def _cameras(
 def _camera(
     name: str, given: Camera, known: dict[str, Phototheodolite], root: Node, findings: Findings
 ) -> Phototheodolite | None:
-    """Give a camera: its preset with what is different."""
+    """Return a camera: its preset with what is different."""
     if given.preset is not None and given.preset not in known:
         message = f"there is no preset `{given.preset}`"
         expected, fix = f"one of {', '.join(known)}", suggestion(given.preset, known)
@@ -227,7 +186,7 @@ def _camera(
 
 
 def _pair(given: TerrestrialFile, cameras: Sequence[Phototheodolite]) -> StereoPair:
-    """Give the two stations."""
+    """Return the two stations."""
     focal = (cameras[0].principal_distance, cameras[1].principal_distance)
     if given.axes is None:
         normal = normal_pair(focal[0], given.base or 0.0)
@@ -278,14 +237,14 @@ def _series(
 
 
 def _placed(fault: Fault, root: Node, key: tuple[str, str]) -> Fault:
-    """Give a fault of the project's own lists its place there, one of the table as a whole where it is named."""
+    """Return a fault of the project's own lists its place there, one of the table as a whole where it is named."""
     if not fault.file:
         return fault_at(root, steps(fault.key), fault.message, fault.code, expected=fault.expected, fix=fault.fix)
     return told_where_named(fault, root, key)
 
 
 def _times(given: TerrestrialFile, root: Node, findings: Findings) -> tuple[float, ...] | None:
-    """Give the times of the epochs, when they have any."""
+    """Return the times of the epochs, when they have any."""
     times = [each.time for each in given.epochs or ()]
     if not any(time is not None for time in times):
         return None

@@ -50,10 +50,6 @@ class CameraOptions:
 
     Parameters
     ----------
-    camera : str or None
-        Name of a camera of a list.
-    presets : str or None
-        A list of the user.
     principal_distance : float or None
         f in mm, instead of the list's.
     principal_point, photo_format : str or None
@@ -68,19 +64,7 @@ class CameraOptions:
 
 
 def chosen_camera(options: CameraOptions, *, with_format: bool = False) -> Phototheodolite:
-    """Give the camera that the options name.
-
-    Parameters
-    ----------
-    options : CameraOptions
-        What the user typed.
-    with_format : bool
-        Whether the format of the photo is needed.
-
-    Returns
-    -------
-    Phototheodolite
-        The camera.
+    """Return the camera that the options name.
 
     Raises
     ------
@@ -118,18 +102,6 @@ def chosen_camera(options: CameraOptions, *, with_format: bool = False) -> Photo
 def pair(option: str, text: str) -> tuple[float, float]:
     """Read two numbers with a comma between them.
 
-    Parameters
-    ----------
-    option : str
-        Name of the option.
-    text : str
-        What the user typed.
-
-    Returns
-    -------
-    tuple of float
-        The numbers.
-
     Raises
     ------
     InputError
@@ -145,19 +117,15 @@ def pair(option: str, text: str) -> tuple[float, float]:
 
 
 def looking(alpha: float, omega: float, kappa: float, unit: str) -> tuple[tuple[float, float, float], Floats]:
-    """Give the angles of a camera in radians, and its rotation.
+    """Return the angles of a camera in radians, and its rotation.
 
     Parameters
     ----------
-    alpha, omega, kappa : float
-        Azimuth, elevation and roll.
     unit : str
         ``"deg"`` or ``"gon"``.
 
     Returns
     -------
-    tuple of float
-        Radians.
     ndarray, shape (3, 3)
         Photo to ground.
 
@@ -185,8 +153,6 @@ def image_points(file: str | None, at: Sequence[str], unit: str) -> tuple[tuple[
     ----------
     file : str or None
         Table ``point,x,z``.
-    at : sequence of str
-        Pairs x,z.
     unit : str
         ``"mm"`` or ``"um"``.
 
@@ -196,8 +162,6 @@ def image_points(file: str | None, at: Sequence[str], unit: str) -> tuple[tuple[
         Points; numbers for those from the command line.
     xz : ndarray, shape (n, 2)
         Coordinates in mm.
-    notes : tuple of Note
-        What reading had to say.
 
     Raises
     ------
@@ -217,12 +181,8 @@ def direction_points(
     ----------
     file : str or None
         Table ``point,lambda,beta``.
-    at : sequence of str
-        Pairs lambda,beta.
     unit : str
         ``"deg"`` or ``"gon"``.
-    camera : Phototheodolite
-        The camera.
     rotation : ndarray, shape (3, 3)
         Photo to ground.
 
@@ -232,8 +192,6 @@ def direction_points(
         Points; numbers for those from the command line.
     directions : ndarray, shape (n, 2)
         Radians.
-    notes : tuple of Note
-        What reading had to say.
 
     Raises
     ------
@@ -319,15 +277,11 @@ def read_sightings(file: str, options: SightingOptions) -> tuple[Sightings, tupl
     file : str
         Table ``point,x,z,lambda,beta[,sx,sz][,s_lambda,s_beta]``; standard deviations in the unit of the coordinates
         and in seconds of arc. One of lambda and beta may be empty.
-    options : SightingOptions
-        What its numbers mean.
 
     Returns
     -------
     Sightings
         Points; millimetres and radians.
-    tuple of Note
-        What reading had to say.
 
     Raises
     ------
@@ -367,11 +321,6 @@ def read_sightings(file: str, options: SightingOptions) -> tuple[Sightings, tupl
 
 def free_elements(text: str | None) -> tuple[str, ...]:
     """Read what is to be determined besides the angles.
-
-    Parameters
-    ----------
-    text : str or None
-        Names with commas between them.
 
     Returns
     -------

@@ -61,13 +61,7 @@ class PresetFile(Section):
 
 
 def own_presets() -> dict[str, Phototheodolite]:
-    """Give the cameras that come with the program.
-
-    Returns
-    -------
-    dict of str to Phototheodolite
-        By name.
-    """
+    """Return the cameras that come with the program."""
     text = resources.files("photostrip.terrestrial").joinpath(OWN_LIST).read_text(encoding="utf-8")
     findings = Findings()
     root = parse(text, OWN_LIST, findings)
@@ -77,17 +71,12 @@ def own_presets() -> dict[str, Phototheodolite]:
 
 
 def read_presets(file: str | None) -> dict[str, Phototheodolite]:
-    """Give all cameras that can be named.
+    """Return all cameras that can be named.
 
     Parameters
     ----------
     file : str, optional
         A list of the user; its cameras come after those of the program and replace cameras of the same name.
-
-    Returns
-    -------
-    dict of str to Phototheodolite
-        By name.
 
     Raises
     ------
@@ -113,21 +102,12 @@ def _cameras(root: Node | None, findings: Findings) -> dict[str, Phototheodolite
 
 
 def preset(name: str, known: dict[str, Phototheodolite], where: str) -> Phototheodolite:
-    """Give a camera by name.
+    """Return a camera by name.
 
     Parameters
     ----------
-    name : str
-        What the user wrote.
-    known : dict of str to Phototheodolite
-        Cameras that can be named.
     where : str
         Option or key with the name, for the message.
-
-    Returns
-    -------
-    Phototheodolite
-        The camera.
 
     Raises
     ------

@@ -17,15 +17,7 @@ if TYPE_CHECKING:
 
 
 class Range(NamedTuple):
-    """Limits of a quantity.
-
-    Parameters
-    ----------
-    least, most : float
-        Smallest and largest value.
-    unit : str
-        Their unit.
-    """
+    """Limits of a quantity."""
 
     least: float
     most: float
@@ -58,20 +50,6 @@ SIGNIFICANCE = Range(1e-6, 0.5, "")
 def within(option: str, value: float, limits: Range) -> float:
     """Require that the value of an option lies within limits.
 
-    Parameters
-    ----------
-    option : str
-        Its name.
-    value : float
-        What the user typed.
-    limits : Range
-        Limits.
-
-    Returns
-    -------
-    float
-        The value.
-
     Raises
     ------
     InputError
@@ -83,18 +61,7 @@ def within(option: str, value: float, limits: Range) -> float:
 
 
 def bounded(limits: Range) -> Callable[[float], float]:
-    """Make the check of a key of a project.
-
-    Parameters
-    ----------
-    limits : Range
-        Limits.
-
-    Returns
-    -------
-    callable
-        Gives the value back, or raises.
-    """
+    """Make the check of a key of a project."""
 
     def check(value: float) -> float:
         if not limits.holds(value):
@@ -111,14 +78,6 @@ def refuse_outside(
 
     Parameters
     ----------
-    table : Table
-        The table.
-    columns : sequence of str
-        Its columns.
-    limits : Range
-        Limits.
-    findings : Findings
-        Where faults go.
     scale : float
         How much of the unit of the limits one unit of the table is.
     unit : str

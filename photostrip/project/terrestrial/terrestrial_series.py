@@ -68,10 +68,6 @@ class Wanted:
     ----------
     epochs : tuple of str
         Epochs in order, the first being the reference; empty: as they stand in the table.
-    times : tuple of float or None
-        Their times.
-    stable : tuple of str
-        Points that are taken not to move.
     """
 
     epochs: tuple[str, ...] = ()
@@ -84,16 +80,8 @@ def read_series(file: str, table: Table, centre: Floats, wanted: Wanted, finding
 
     Parameters
     ----------
-    file : str
-        Its path.
-    table : Table
-        What its numbers mean.
     centre : ndarray, shape (2, 2)
         Principal points of the left and right camera in mm, z up.
-    wanted : Wanted
-        Epochs and stable points.
-    findings : Findings
-        Where faults and notes go.
 
     Returns
     -------
@@ -120,7 +108,7 @@ def read_series(file: str, table: Table, centre: Floats, wanted: Wanted, finding
 
 
 def _epochs(read: EpochTable, kind: str, wanted: Wanted, findings: Findings) -> tuple[str, ...]:
-    """Give the epochs in order and refuse those that are not measured."""
+    """Return the epochs in order and refuse those that are not measured."""
     known = read.epochs
     if kind != "coordinates":  # the reference epoch has no rows of its own
         later = read.epochs or (wanted.epochs[1:] if len(wanted.epochs) == FEWEST_EPOCHS else (SECOND,))

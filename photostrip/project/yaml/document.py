@@ -45,17 +45,7 @@ class Place:
 
 @dataclass(slots=True, eq=False)
 class Node:
-    """A value of the file: a text, a list of nodes or a mapping of nodes.
-
-    Parameters
-    ----------
-    value : str or list of Node or dict of str to Node
-        What it is.
-    place : Place
-        Where it begins.
-    keys : dict of str to Place
-        Where the keys of a mapping stand.
-    """
+    """A value of the file: a text, a list of nodes or a mapping of nodes."""
 
     value: str | list[Node] | dict[str, Node]
     place: Place
@@ -77,7 +67,7 @@ class Node:
         return self.value if isinstance(self.value, dict) else {}
 
     def find(self, *path: str | int) -> Node | None:
-        """Give the node at a path of keys and numbers; None when there is none."""
+        """Return the node at a path of keys and numbers; None when there is none."""
         node: Node | None = self
         for step in path:
             if node is None:
@@ -89,7 +79,7 @@ class Node:
         return node
 
     def word(self, *path: str | int) -> str:
-        """Give the text at a path; empty when there is none."""
+        """Return the text at a path; empty when there is none."""
         node = self.find(*path)
         return node.text if node is not None else ""
 
@@ -98,7 +88,7 @@ class Node:
         return self.find(*path) is not None
 
     def place_of(self, path: tuple[str | int, ...]) -> Place:
-        """Give the place of what a path leads to, or of the last thing on the way that exists."""
+        """Return the place of what a path leads to, or of the last thing on the way that exists."""
         node = self
         for step in path:
             inner = node.find(step)
@@ -132,35 +122,13 @@ def key_path(path: tuple[str | int, ...]) -> str:
 def fault_at(
     root: Node, path: tuple[str | int, ...], message: str, code: str, *, expected: str = "", fix: str = ""
 ) -> Fault:
-    """Make a fault with the place of a value of the project.
-
-    Parameters
-    ----------
-    root : Node
-        The project.
-    path : tuple of str or int
-        Keys and numbers that lead to the value.
-    message, code, expected, fix : str
-        As in ``errors.Fault``.
-
-    Returns
-    -------
-    Fault
-        With file, line, column and key.
-    """
+    """Make a fault with the place of a value of the project."""
     place = root.place_of(path)
     return Fault(message, code, place.file, place.line, place.column, key_path(path), expected, fix)
 
 
 def read_document(file: str, findings: Findings) -> Node | None:
     """Read a YAML file.
-
-    Parameters
-    ----------
-    file : str
-        Its path.
-    findings : Findings
-        Where faults and notes go.
 
     Returns
     -------
@@ -191,15 +159,6 @@ def read_document(file: str, findings: Findings) -> Node | None:
 
 def parse(text: str, file: str, findings: Findings) -> Node | None:
     """Turn YAML text into a tree.
-
-    Parameters
-    ----------
-    text : str
-        YAML.
-    file : str
-        Where it stands, for messages.
-    findings : Findings
-        Where faults and notes go.
 
     Returns
     -------
@@ -306,7 +265,7 @@ class _Builder:
             raise _TooMuchError(Fault(message, "yaml", place.file, place.line, place.column, expected="a project"))
 
     def _put(self, node: Node) -> None:
-        """Give a new value its place in the tree."""
+        """Return a new value its place in the tree."""
         self.values += 1
         if self.values > MOST_VALUES:
             message = f"the file has more than {MOST_VALUES} values"
@@ -408,7 +367,7 @@ def _explained(problem: str, line: str, column: int) -> tuple[str, str]:
 
 
 def leaves(node: Node) -> Iterator[Node]:
-    """Give every text of a tree."""
+    """Return every text of a tree."""
     waiting = [node]
     while waiting:
         each = waiting.pop()

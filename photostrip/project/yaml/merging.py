@@ -24,8 +24,6 @@ def path_of(node: Node, project: str) -> str:
 
     Parameters
     ----------
-    node : Node
-        A text that names a file.
     project : str
         Path of the project file; values from the command line are relative to it.
 
@@ -40,15 +38,6 @@ def path_of(node: Node, project: str) -> str:
 
 def read_tree(file: str, findings: Findings, files: list[str]) -> Node | None:
     """Read a project file and what it extends.
-
-    Parameters
-    ----------
-    file : str
-        Path of the project file.
-    findings : Findings
-        Where faults go.
-    files : list of str
-        Gets the path of every file read.
 
     Returns
     -------
@@ -98,22 +87,7 @@ def read_named(path: str, owner: Node, key: tuple[str | int, ...], findings: Fin
 
 
 def told_where_named(fault: Fault, owner: Node, key: tuple[str | int, ...]) -> Fault:
-    """Give a fault of a file as a whole the place where the file is named; others keep their own.
-
-    Parameters
-    ----------
-    fault : Fault
-        A fault found while the file was read.
-    owner : Node
-        The project, or the file that names it.
-    key : tuple of str or int
-        Path of the value that names it.
-
-    Returns
-    -------
-    Fault
-        The fault with a line.
-    """
+    """Return a fault of a file as a whole the place where the file is named; others keep their own."""
     if fault.line:
         return fault
     message = f"{shown(fault.file, 200)} {fault.message}"
@@ -147,17 +121,10 @@ def override(root: Node, assignments: Sequence[str], findings: Findings) -> Node
 
     Parameters
     ----------
-    root : Node
-        The project.
     assignments : sequence of str
         For example ``processing.relative.grubbs_alpha=0.01`` or ``strips[0].camera=RC30``; the value is YAML.
     findings : Findings
         Where faults go; unknown keys are found by the schema later.
-
-    Returns
-    -------
-    Node
-        The project with the values replaced.
     """
     for assignment in assignments:
         name, equals, text = assignment.partition("=")
@@ -192,7 +159,7 @@ def steps(name: str) -> tuple[str | int, ...]:
 
 
 def _moved(node: Node, place: Place) -> Node:
-    """Give a tree from the command line one place, without a line."""
+    """Return a tree from the command line one place, without a line."""
     if isinstance(node.value, list):
         return Node([_moved(each, place) for each in node.value], place)
     if isinstance(node.value, dict):
@@ -202,7 +169,7 @@ def _moved(node: Node, place: Place) -> Node:
 
 
 def _assigned(root: Node, path: tuple[str | int, ...], value: Node, name: str, findings: Findings) -> Node:
-    """Give a copy of the tree in which one value is replaced."""
+    """Return a copy of the tree in which one value is replaced."""
     if not path:
         return value
     step, rest = path[0], path[1:]

@@ -33,18 +33,7 @@ class ListedPhoto:
 
 
 def listed_photos(root: Node) -> Iterator[ListedPhoto]:
-    """Give every photo of every strip.
-
-    Parameters
-    ----------
-    root : Node
-        The project.
-
-    Yields
-    ------
-    ListedPhoto
-        Photos in the order of the file.
-    """
+    """Return every photo of every strip."""
     strips = root.find("strips")
     for i, strip in enumerate(strips.elements if strips is not None else []):
         photos = strip.find("photos")
@@ -54,15 +43,7 @@ def listed_photos(root: Node) -> Iterator[ListedPhoto]:
 
 
 def check_references(root: Node, findings: Findings) -> None:
-    """Check what refers to something else in the project file.
-
-    Parameters
-    ----------
-    root : Node
-        The project.
-    findings : Findings
-        Where faults go.
-    """
+    """Check what refers to something else in the project file."""
     _kind_of_measurements(root, findings)
     _strips(root, findings)
     _photos(root, findings)
@@ -157,18 +138,7 @@ def _photos(root: Node, findings: Findings) -> None:
 
 
 def marks_of(camera: Node) -> Node | None:
-    """Give the fiducial marks of a camera by name: their coordinates, or their places; None when it has none.
-
-    Parameters
-    ----------
-    camera : Node
-        The camera.
-
-    Returns
-    -------
-    Node or None
-        A mapping with a key for each mark.
-    """
+    """Return the fiducial marks of a camera by name: their coordinates, or their places; None when it has none."""
     marks = camera.find("fiducials")
     return camera.find("fiducial_places") if marks is None else marks
 

@@ -219,17 +219,8 @@ def key(description: str, default: Any = ..., *, unit: str = "") -> Any:  # noqa
 
     Parameters
     ----------
-    description : str
-        What it says.
     default : object
         Its default; without one the key is required.
-    unit : str
-        Unit of its value, put behind the description.
-
-    Returns
-    -------
-    pydantic.fields.FieldInfo
-        The field.
     """
     extra: dict[str, Any] | None = {"unit": unit} if unit else None
     return Field(default, description=f"{description} [{unit}]" if unit else description, json_schema_extra=extra)
@@ -744,13 +735,6 @@ def json_schema() -> dict[str, Any]:
 
 def described(kind: type[Section], title: str) -> dict[str, Any]:
     """JSON Schema of a kind of file.
-
-    Parameters
-    ----------
-    kind : type
-        The file as a section.
-    title : str
-        What it is.
 
     Returns
     -------

@@ -32,13 +32,6 @@ EXPECTED = {
 def validate(root: Node, findings: Findings) -> ProjectFile | None:
     """Check the project against the schema.
 
-    Parameters
-    ----------
-    root : Node
-        The project.
-    findings : Findings
-        Where faults go.
-
     Returns
     -------
     ProjectFile or None
@@ -49,15 +42,6 @@ def validate(root: Node, findings: Findings) -> ProjectFile | None:
 
 def checked(kind: type[T], root: Node, findings: Findings) -> T | None:
     """Check a file against its schema.
-
-    Parameters
-    ----------
-    kind : type
-        The schema.
-    root : Node
-        The file.
-    findings : Findings
-        Where faults go.
 
     Returns
     -------
@@ -74,12 +58,10 @@ def checked(kind: type[T], root: Node, findings: Findings) -> T | None:
 
 
 def valid_section(kind: type[T], node: Node | None) -> T | None:
-    """Give one section of a project of which other parts may be at fault.
+    """Return one section of a project of which other parts may be at fault.
 
     Parameters
     ----------
-    kind : type
-        What the section is.
     node : Node or None
         Where it stands; None gives the section of all defaults.
 
@@ -194,11 +176,6 @@ def _described(schema: Model, path: Path) -> str:
 @cache
 def homes(schema: Model) -> dict[str, str]:
     """Where keys belong that stand below another one: name of the key to the path above it.
-
-    Parameters
-    ----------
-    schema : type
-        The schema.
 
     Returns
     -------

@@ -32,21 +32,12 @@ STYLES = {"good": "good", "look": "look", "not run": "look"}
 
 
 def batch_sections(outcomes: Sequence[Document], *, quiet: bool = False, everything: bool = False) -> list[Section]:
-    """Give the summary of a batch.
+    """Return the summary of a batch.
 
     Parameters
     ----------
     outcomes : sequence of dict
         The line of each project, in the order in which the user named them.
-    quiet : bool
-        Whether counts and what is wrong are enough.
-    everything : bool
-        Whether all projects and all messages are shown.
-
-    Returns
-    -------
-    list of Section
-        The projects, what is wrong, the counts.
     """
     sections = [] if quiet else [Section("Projects", (_table(outcomes, everything=everything),))]
     wrong = [each for each in _worst_first(outcomes) if each["exit_code"]]
@@ -60,7 +51,7 @@ def _worst_first(outcomes: Sequence[Document]) -> list[Document]:
 
 
 def _table(outcomes: Sequence[Document], *, everything: bool) -> Table:
-    """Give the table of the projects; of too many, the worst."""
+    """Return the table of the projects; of too many, the worst."""
     shown = list(outcomes) if everything or len(outcomes) <= ROWS else _worst_first(outcomes)[:ROWS]
     missing = len(outcomes) - len(shown)
     note = f"{counted(missing, 'more project')} not shown, none worse: --verbose, or summary.csv" if missing else ""
@@ -81,7 +72,7 @@ def _row(outcome: Document) -> tuple[str, ...]:
 
 
 def _told(wrong: Sequence[Document], *, everything: bool) -> list[Words]:
-    """Give the messages of the projects that are not as they should be."""
+    """Return the messages of the projects that are not as they should be."""
     shown = wrong if everything else wrong[:ROWS]
     found = []
     for each in shown:
@@ -123,7 +114,7 @@ def outcome_line(outcome: Document) -> str:
 
 
 def batch_junit(outcomes: Sequence[Document]) -> str:
-    """Give the summary as JUnit XML.
+    """Return the summary as JUnit XML.
 
     A tolerance that is not kept is a failure; a project without a result is an error.
     """

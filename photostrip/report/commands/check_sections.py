@@ -20,7 +20,7 @@ IDS_SHOWN = 8
 
 
 def check_sections(document: Document, *, everything: bool = False) -> tuple[Section, ...]:
-    """Give the sections for one project that could be read.
+    """Return the sections for one project that could be read.
 
     Parameters
     ----------
@@ -28,11 +28,6 @@ def check_sections(document: Document, *, everything: bool = False) -> tuple[Sec
         What was decoded, see ``checking.check_project``.
     everything : bool
         Whether all control points and all ids are wanted.
-
-    Returns
-    -------
-    tuple of Section
-        Contents, ground frames, standard deviations, rows not used.
     """
     return (
         _contents(document),
@@ -101,7 +96,7 @@ def _frames(frames: Sequence[Document]) -> Section:
 
 
 def _decoded(frame: Document) -> Iterator[tuple[str, str]]:
-    """Give the facts of one frame: a point as given, as decoded, and back."""
+    """Return the facts of one frame: a point as given, as decoded, and back."""
     if "point" not in frame:
         return
     places = 8 if frame["kind"] == "geographic" else 3

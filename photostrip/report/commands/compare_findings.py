@@ -17,12 +17,10 @@ MOST = 50  # annotations of one comparison; a server shows no more
 
 
 def compare_findings(document: Document, line_of: Callable[[str, str], int]) -> list[Document]:
-    """Give what differs as findings, each at the line of the baseline in which the record stands.
+    """Return what differs as findings, each at the line of the baseline in which the record stands.
 
     Parameters
     ----------
-    document : dict
-        The comparison.
     line_of : callable
         Gives the line of a block and an id in the baseline; 0 when it is not there.
 
@@ -77,7 +75,7 @@ def sentence(row: Document) -> str:
 
 
 def compare_cases(document: Document) -> Iterator[Case]:
-    """Give a comparison as test cases: one for each kind of quantity and each set."""
+    """Return a comparison as test cases: one for each kind of quantity and each set."""
     for kind in document["kinds"]:
         name = NAMES[kind["kind"]]
         if kind["ignored"]:

@@ -32,26 +32,19 @@ ONE = {"photos": "photo", "points": "point", "models": "model", "strips": "strip
 
 
 def compare_title(document: Document) -> str:
-    """Give the title of a comparison."""
+    """Return the title of a comparison."""
     return f"Comparison: {document['name']}"
 
 
 def compare_sections(document: Document, *, quiet: bool = False, everything: bool = False) -> tuple[Section, ...]:
-    """Give the sections of a comparison.
+    """Return the sections of a comparison.
 
     Parameters
     ----------
     document : dict
         The comparison, see ``compare.compare_results``.
-    quiet : bool
-        Whether the verdict is enough.
     everything : bool
         Whether all differences are wanted, not only the worst.
-
-    Returns
-    -------
-    tuple of Section
-        The verdict first.
     """
     same = document["status"] == "same"
     verdict = Words(headline(document), "good" if same else "failed")
@@ -117,7 +110,7 @@ def place(row: Document) -> str:
 
 
 def _size(row: Document) -> str:
-    """Give the size of a difference."""
+    """Return the size of a difference."""
     if row["difference"] is None:
         return "new" if row["before"] is None and row["now"] is not None else "gone"
     return short(row["difference"], 3)

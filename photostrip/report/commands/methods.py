@@ -11,7 +11,7 @@ Document = dict[str, Any]
 
 
 def methods_sections(document: Document) -> tuple[Section, ...]:
-    """Give the sections of a comparison of methods.
+    """Return the sections of a comparison of methods.
 
     Parameters
     ----------

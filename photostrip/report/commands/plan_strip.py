@@ -20,11 +20,6 @@ PLACES_SHOWN = 6
 def strip_sections(document: Document) -> tuple[Section, ...]:
     """Make the report of the plan of a strip.
 
-    Parameters
-    ----------
-    document : dict
-        The plan.
-
     Returns
     -------
     tuple of Section

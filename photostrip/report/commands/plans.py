@@ -17,20 +17,7 @@ USES = {"xyz": "in full", "xy": "in plan", "z": "in height"}
 
 
 def plan_report(document: Document) -> tuple[str, tuple[Section, ...]]:
-    """Make the report of a plan.
-
-    Parameters
-    ----------
-    document : dict
-        Document of a plan.
-
-    Returns
-    -------
-    str
-        Title.
-    tuple of Section
-        Sections.
-    """
+    """Make the report of a plan."""
     title, build = BUILDERS[document["kind"]]
     return title, build(document)
 

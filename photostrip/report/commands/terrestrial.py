@@ -25,20 +25,7 @@ TITLES = {
 
 
 def direction_report(document: Document) -> tuple[str, tuple[Section, ...]]:
-    """Give the report of a direction computation.
-
-    Parameters
-    ----------
-    document : dict
-        Its document.
-
-    Returns
-    -------
-    title : str
-        Title of the report.
-    sections : tuple of Section
-        Its sections.
-    """
+    """Return the report of a direction computation."""
     kind = document["kind"]
     return TITLES[kind], BUILDERS[kind](document)
 

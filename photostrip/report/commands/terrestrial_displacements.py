@@ -16,17 +16,10 @@ VERDICTS = {True: "moved", False: "", None: "not tested"}
 
 
 def displacement_report(document: Document) -> tuple[str, tuple[Section, ...]]:
-    """Give the report of displacements.
-
-    Parameters
-    ----------
-    document : dict
-        The document of displacements.
+    """Return the report of displacements.
 
     Returns
     -------
-    title : str
-        Title of the report.
     sections : tuple of Section
         Verdict and set-up, the cameras, displacements of each epoch, rates, notes.
     """

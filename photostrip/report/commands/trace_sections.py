@@ -25,12 +25,12 @@ SOURCE = {
 
 
 def trace_title(document: Document) -> str:
-    """Give the title of a trace."""
+    """Return the title of a trace."""
     return f"Trace: {document['name']}"
 
 
 def trace_sections(document: Document) -> tuple[Section, ...]:
-    """Give the sections of a trace.
+    """Return the sections of a trace.
 
     Parameters
     ----------

@@ -37,12 +37,6 @@ def print_report(
 
     Parameters
     ----------
-    title : str
-        Its title.
-    sections : iterable of Section
-        Its sections.
-    stream : text stream
-        Where to.
     width : int, optional
         Width in characters, brought between 60 and 200; default: that of the terminal, 100 where there is none.
     colour : bool, optional
@@ -73,15 +67,8 @@ def has_colours(stream: TextIO, environment: Mapping[str, str]) -> bool:
 
     Parameters
     ----------
-    stream : text stream
-        Where the report goes.
     environment : mapping of str to str
         ``NO_COLOR``, when it is set and not empty, forbids colours; so does ``TERM=dumb``.
-
-    Returns
-    -------
-    bool
-        True on a terminal that nothing speaks against.
     """
     if environment.get("NO_COLOR") or environment.get("TERM", "") in {"dumb", "unknown"}:
         return False

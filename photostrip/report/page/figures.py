@@ -13,7 +13,7 @@ Number = float | None
 
 
 def fixed(value: Number, decimals: int) -> str:
-    """Give a number with fixed decimals, never -0."""
+    """Return a number with fixed decimals, never -0."""
     return DASH if value is None else f"{value:z.{decimals}f}"
 
 
@@ -33,27 +33,27 @@ def micrometres(value: Number) -> str:
 
 
 def ratio(value: Number) -> str:
-    """Give a ratio without unit."""
+    """Return a ratio without unit."""
     return fixed(value, 2)
 
 
 def short(value: Number, digits: int = 4) -> str:
-    """Give a number with significant digits."""
+    """Return a number with significant digits."""
     return DASH if value is None else f"{value:.{digits}g}"
 
 
 def power(value: Number, digits: int = 4) -> str:
-    """Give a number in scientific form."""
+    """Return a number in scientific form."""
     return DASH if value is None else f"{value:.{digits}e}"
 
 
 def percent(part: float, whole: float) -> str:
-    """Give a share in percent."""
+    """Return a share in percent."""
     return f"{100 * part / whole:.1f} %" if whole else DASH
 
 
 def counted(number: int, one: str, many: str = "") -> str:
-    """Give a number with its noun: ``1 photo``, ``2 photos``."""
+    """Return a number with its noun: ``1 photo``, ``2 photos``."""
     return f"{number} {one if number == 1 else many or one + 's'}"
 
 
@@ -65,5 +65,5 @@ def listed(names: Iterable[str], limit: int) -> str:
 
 
 def unit(name: str) -> str:
-    """Give a unit of the document as it is printed."""
+    """Return a unit of the document as it is printed."""
     return name.replace("um", "µm")

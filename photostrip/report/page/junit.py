@@ -17,12 +17,8 @@ class Case(NamedTuple):
 
     Parameters
     ----------
-    name : str
-        What was tested.
     failure : str
         Why it failed, in one line; empty when it passed.
-    details : str
-        More lines about the failure.
     skipped : str
         Why it was not tested; empty when it was.
     error : str
@@ -37,20 +33,7 @@ class Case(NamedTuple):
 
 
 def to_junit(suite: str, cases: Iterable[Case]) -> str:
-    """Give a suite of test cases as JUnit XML, without times.
-
-    Parameters
-    ----------
-    suite : str
-        Its name.
-    cases : iterable of Case
-        Its cases.
-
-    Returns
-    -------
-    str
-        The file.
-    """
+    """Return a suite of test cases as JUnit XML, without times."""
     given = list(cases)
     failed = sum(bool(case.failure) for case in given)
     skipped = sum(bool(case.skipped) for case in given)

@@ -53,12 +53,8 @@ def lay_out(title: str, sections: Iterable[Section], width: int, *, ascii_only: 
     ----------
     title : str
         Its title; none is printed when it is empty.
-    sections : iterable of Section
-        Its sections.
     width : int
         Width of the page in characters, brought between 60 and 200.
-    ascii_only : bool
-        Whether the page can show ASCII only.
 
     Returns
     -------
@@ -173,8 +169,6 @@ def wrapped(text: str, width: int) -> list[str]:
 
     Parameters
     ----------
-    text : str
-        Words with blanks between them.
     width : int
         Cells of a line; longer words are broken.
 

@@ -23,12 +23,7 @@ ACCEPTED = "accepted: "
 
 
 def finding_of(told: Fault | Note | Finding) -> Document:
-    """Give a fault, a note or a finding as plain values.
-
-    Parameters
-    ----------
-    told : Fault, Note or Finding
-        What was found.
+    """Return a fault, a note or a finding as plain values.
 
     Returns
     -------
@@ -53,7 +48,7 @@ def finding_of(told: Fault | Note | Finding) -> Document:
 
 
 def _of_finding(told: Finding) -> Document:
-    """Give what a finding has beside message and place; an accepted one is no error and needs no cure."""
+    """Return what a finding has beside message and place; an accepted one is no error and needs no cure."""
     return {
         "severity": "note" if told.accepted else told.severity,
         "message": f"{ACCEPTED if told.accepted else ''}{told.message}",
@@ -69,7 +64,7 @@ def _of_finding(told: Finding) -> Document:
 
 
 def findings_of(error: InputError | GeometryError) -> list[Document]:
-    """Give what an error carries as plain values: the failure, then what the data say against themselves."""
+    """Return what an error carries as plain values: the failure, then what the data say against themselves."""
     causes = [finding_of(each) for each in error.findings]
     if isinstance(error, InputError):
         return [finding_of(fault) for fault in error.faults] + causes
@@ -78,12 +73,7 @@ def findings_of(error: InputError | GeometryError) -> list[Document]:
 
 
 def result_findings(document: Document) -> list[Document]:
-    """Give the verdict and the notes of a result as findings.
-
-    Parameters
-    ----------
-    document : dict
-        The document of a result.
+    """Return the verdict and the notes of a result as findings.
 
     Returns
     -------
@@ -110,21 +100,14 @@ def result_findings(document: Document) -> list[Document]:
 
 
 def _told(empty: Document, finding: Document) -> Document:
-    """Give a finding of a result's document in the form of the others."""
+    """Return a finding of a result's document in the form of the others."""
     if not finding["accepted"]:
         return empty | finding
     return empty | finding | {"severity": "note", "message": ACCEPTED + finding["message"], "fix": ""}
 
 
 def as_document(findings: Sequence[Document], exit_code: int) -> Document:
-    """Give the answer of a command that came to no result.
-
-    Parameters
-    ----------
-    findings : sequence of dict
-        What was found.
-    exit_code : int
-        How the command ends.
+    """Return the answer of a command that came to no result.
 
     Returns
     -------
@@ -135,7 +118,7 @@ def as_document(findings: Sequence[Document], exit_code: int) -> Document:
 
 
 def line_of(finding: Document) -> str:
-    """Give a finding on one line: ``error: file:line:column: key: what; expected ...; what would fix it``."""
+    """Return a finding on one line: ``error: file:line:column: key: what; expected ...; what would fix it``."""
     names = ("message", "code", "file", "line", "column", "key", "expected", "fix")
     told = {name: finding[name] for name in names}
     if "evidence" in finding:  # the codes of the gate are for people, too: they can be accepted
@@ -145,11 +128,6 @@ def line_of(finding: Document) -> str:
 
 def annotated(findings: Iterable[Document]) -> str:
     """Give findings as annotations of GitHub Actions.
-
-    Parameters
-    ----------
-    findings : iterable of dict
-        What was found.
 
     Returns
     -------

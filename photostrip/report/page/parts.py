@@ -13,12 +13,8 @@ class Column(NamedTuple):
 
     Parameters
     ----------
-    name : str
-        Its head.
     unit : str
         Unit of its numbers, in the second line of the head.
-    left : bool
-        Whether it holds words, flush left.
     rank : int
         0: always shown; where the page is too narrow, columns of the highest rank are left out first.
     """
@@ -35,12 +31,6 @@ class Table:
 
     Parameters
     ----------
-    columns : tuple of Column
-        Its columns.
-    rows : tuple of tuple of str
-        Its cells.
-    foot : tuple of tuple of str
-        Rows that sum up the others.
     note : str
         A sentence below: what is not shown, and where it is.
     """
@@ -53,13 +43,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Facts:
-    """Labels with a value each.
-
-    Parameters
-    ----------
-    rows : tuple of tuple of str
-        Label and value.
-    """
+    """Labels with a value each."""
 
     rows: tuple[tuple[str, str], ...]
 
@@ -70,8 +54,6 @@ class Words:
 
     Parameters
     ----------
-    text : str
-        Its sentences.
     style : str
         ``"good"``, ``"look"``, ``"failed"`` or empty.
     mark : str
@@ -88,15 +70,7 @@ Part = Table | Facts | Words
 
 @dataclass(frozen=True)
 class Section:
-    """One section of a report.
-
-    Parameters
-    ----------
-    title : str
-        Its heading.
-    parts : tuple of Table, Facts or Words
-        Its content.
-    """
+    """One section of a report."""
 
     title: str
     parts: tuple[Part, ...]

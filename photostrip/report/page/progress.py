@@ -32,8 +32,6 @@ class Progress:
 
     Parameters
     ----------
-    stream : text stream
-        Where to write.
     total : int
         Number of things to do; 0 when it is not known.
     """
@@ -50,7 +48,7 @@ class Progress:
         self.text = text
 
     def line(self, seconds: float, width: int) -> str:
-        """Give the line after some seconds, cut to a width."""
+        """Return the line after some seconds, cut to a width."""
         turn = TURNS[int(seconds / STEP) % len(TURNS)]
         count = f" {self.done} of {self.total}" if self.total else ""
         head, tail = f"{turn}{count} ", f" {seconds:.0f} s"
@@ -100,8 +98,6 @@ def progress(stream: TextIO, total: int = 0, *, quiet: bool = False) -> Iterator
         Where to; nothing is written when it is no terminal.
     total : int
         Number of things to do; 0 when it is not known.
-    quiet : bool
-        Whether nothing is wanted.
 
     Yields
     ------
@@ -129,15 +125,6 @@ class BatchTable:
     """The table of a batch on a terminal: how far it is, what is being computed and for how long.
 
     Where there is no terminal it shows nothing, and what is said goes straight to the stream.
-
-    Parameters
-    ----------
-    stream : text stream
-        Where to.
-    total : int
-        Number of projects.
-    live : bool
-        Whether to show it.
     """
 
     def __init__(self, stream: TextIO, total: int, *, live: bool) -> None:
@@ -187,7 +174,7 @@ class BatchTable:
             self.stream.flush()
 
     def head(self, seconds: float) -> str:
-        """Give the first line after some seconds: how far the batch is, and how long it may still take."""
+        """Return the first line after some seconds: how far the batch is, and how long it may still take."""
         filled = BAR * self.done // max(self.total, 1)
         parts = [f"{'#' * filled}{'.' * (BAR - filled)} {self.done} of {self.total}"]
         parts += [f"{self.failed} failed"] if self.failed else []
@@ -201,7 +188,7 @@ class BatchTable:
         return ", ".join(parts)
 
     def page(self) -> Table:
-        """Give the table as it is now."""
+        """Return the table as it is now."""
         from rich.table import Table
 
         now = time.monotonic()
@@ -219,7 +206,7 @@ class BatchTable:
 
 
 def clock(seconds: float) -> str:
-    """Give a time as ``1:02:03``, without hours when there are none."""
+    """Return a time as ``1:02:03``, without hours when there are none."""
     minutes, rest = divmod(int(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
@@ -233,15 +220,6 @@ def batch_table(stream: TextIO, total: int, *, quiet: bool = False) -> Iterator[
     ----------
     stream : text stream
         Where to; no table is shown when it is no terminal.
-    total : int
-        Number of projects.
-    quiet : bool
-        Whether nothing is wanted.
-
-    Yields
-    ------
-    BatchTable
-        Tell it what is begun and finished.
     """
     table = BatchTable(stream, total, live=not quiet and wanted(stream, os.environ))
     table.start()

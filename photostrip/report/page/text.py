@@ -16,43 +16,13 @@ BEFORE = str.maketrans({sign: f"\\{sign}" for sign in "\\`*_[]<>|#"})
 
 
 def to_text(title: str, sections: Iterable[Section], width: int = USUAL, *, ascii_only: bool = False) -> str:
-    """Give a report as plain text.
-
-    Parameters
-    ----------
-    title : str
-        Its title.
-    sections : iterable of Section
-        Its sections.
-    width : int
-        Width of the page in characters.
-    ascii_only : bool
-        Whether the page can show ASCII only.
-
-    Returns
-    -------
-    str
-        The text, ending with a line feed.
-    """
+    """Return a report as plain text."""
     lines = lay_out(title, sections, width, ascii_only=ascii_only)
     return "".join(f"{line.text}\n" for line in lines)
 
 
 def to_markdown(title: str, sections: Iterable[Section]) -> str:
-    """Give a report as Markdown, all columns of all tables shown.
-
-    Parameters
-    ----------
-    title : str
-        Its title.
-    sections : iterable of Section
-        Its sections.
-
-    Returns
-    -------
-    str
-        The text, ending with a line feed.
-    """
+    """Return a report as Markdown, all columns of all tables shown."""
     blocks = [f"# {_safe(title)}"] if title else []
     for section in sections:
         blocks += [f"## {_safe(section.title)}"] if section.title else []

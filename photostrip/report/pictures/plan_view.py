@@ -15,8 +15,6 @@ class Spot(NamedTuple):
 
     Parameters
     ----------
-    id : str
-        Its id.
     role : str
         ``photo``, ``new``, ``control`` or ``check``.
     along, across : float
@@ -39,17 +37,7 @@ class Spot(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """The plan of a result.
-
-    Parameters
-    ----------
-    spots : list of Spot
-        Points, new ones first.
-    strips : list of list of Spot
-        Photos of each strip in flight order.
-    north : tuple of float
-        Direction of north, along and across.
-    """
+    """The plan of a result."""
 
     spots: list[Spot]
     strips: list[list[Spot]]
@@ -57,12 +45,7 @@ class Plan(NamedTuple):
 
 
 def plan_of(document: Document) -> Plan:
-    """Give the plan of a result, turned so that its first strip runs to the right.
-
-    Parameters
-    ----------
-    document : dict
-        The document of a result.
+    """Return the plan of a result, turned so that its first strip runs to the right.
 
     Returns
     -------
@@ -101,7 +84,7 @@ def plan_of(document: Document) -> Plan:
 
 
 def _ellipse(row: Document, turned: Any) -> tuple[float, float, float] | None:  # noqa: ANN401 (a function)
-    """Give the ellipse of a point, where the result has one."""
+    """Return the ellipse of a point, where the result has one."""
     a, b, azimuth = (row.get(key) for key in ("ellipse_a", "ellipse_b", "ellipse_azimuth_deg"))
     if a is None or b is None or azimuth is None:
         return None
@@ -132,7 +115,7 @@ class _Grid:
         return first, second, third
 
     def _east_north_up(self) -> list[tuple[float, float, float]]:
-        """Give the axes at the middle of the points, up along the normal of the ellipsoid."""
+        """Return the axes at the middle of the points, up along the normal of the ellipsoid."""
         x, y, z = self._named(self._middle)
         a, b = self._ellipsoid
         latitude, longitude = math.atan2(z * a * a, math.hypot(x, y) * b * b), math.atan2(y, x)
@@ -154,7 +137,7 @@ class _Grid:
         return x * self._factor, y * self._factor
 
     def difference(self, row: Document) -> tuple[Pair | None, float | None]:
-        """Give a difference in metres: to the east and north, and in height."""
+        """Return a difference in metres: to the east and north, and in height."""
         values = [row[key] for key in ("dx", "dy", "dz")]
         if self._kind != "geocentric":
             east, north = (values[self._axes.index(name)] for name in ("east", "north"))

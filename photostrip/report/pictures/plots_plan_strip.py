@@ -23,20 +23,7 @@ MARKS = {"xyz": "^", "xy": "s", "z": "o"}
 
 
 def strip_figure(figure: Figure, document: Document) -> Figure:
-    """Draw the plan of a strip.
-
-    Parameters
-    ----------
-    figure : Figure
-        An empty figure.
-    document : dict
-        The plan.
-
-    Returns
-    -------
-    Figure
-        The same.
-    """
+    """Draw the plan of a strip."""
     layouts = document["layouts"]
     figure.set_size_inches(11, 6.0 + 0.45 * len(layouts))
     figure.suptitle(

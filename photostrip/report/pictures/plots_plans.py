@@ -39,11 +39,6 @@ def is_picture(path: Path) -> bool:
 def check_picture(path: Path) -> None:
     """Make sure that a picture can be drawn, before anything is computed.
 
-    Parameters
-    ----------
-    path : Path
-        Where it will be written.
-
     Raises
     ------
     InputError
@@ -67,11 +62,6 @@ def plan_picture(document: Document, ending: str) -> bytes:
         Document of a plan; of a model with errors on a fine grid.
     ending : str
         ``.svg`` or ``.png``.
-
-    Returns
-    -------
-    bytes
-        The file.
     """
     with styled():
         return _file(DRAWINGS[document["kind"]](document), ending.lower())

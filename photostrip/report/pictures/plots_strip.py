@@ -29,11 +29,6 @@ WORDS = {"control": "control point", "check": "check point", "new": "new point",
 def strip_pictures(document: Document) -> list[Picture]:
     """Draw a result.
 
-    Parameters
-    ----------
-    document : dict
-        The document of a result.
-
     Returns
     -------
     list of Picture
@@ -86,7 +81,7 @@ def _plan_picture(document: Document, plan: Plan) -> Picture:
 
 
 def _longest(plan: Plan) -> float:
-    """Give the longest vector or half axis."""
+    """Return the longest vector or half axis."""
     vectors = [math.hypot(*spot.shift) for spot in plan.spots if spot.shift is not None]
     return max([*vectors, *(spot.ellipse[0] for spot in plan.spots if spot.ellipse is not None)], default=0.0)
 
@@ -139,7 +134,7 @@ def _legend(roles: Iterable[str], y: float, x: float = LEFT) -> list[str]:
 
 
 def _bars(scale: float, bar: tuple[float, float], north: tuple[float, float], height: float) -> list[str]:
-    """Give the scale bars of the ground and of the residuals, and the direction of north."""
+    """Return the scale bars of the ground and of the residuals, and the direction of north."""
     ground = svg.nice(90.0 / scale)
     found, x, y = [], LEFT, height - 18.0
     for length, words, kind in (

@@ -33,11 +33,6 @@ MOVED, STILL, STABLE = "#c0392b", "#7f8c8d", "#2471a3"
 def check_plot(file: str) -> None:
     """Make sure that a picture can be drawn and written, before anything is computed.
 
-    Parameters
-    ----------
-    file : str
-        Where it will be written.
-
     Raises
     ------
     InputError
@@ -91,11 +86,6 @@ def accuracy_plot(document: Document, fine: Document) -> str:
         The document of required accuracies, for title and names.
     fine : dict
         The same on a fine grid over the whole photo.
-
-    Returns
-    -------
-    str
-        SVG.
     """
     camera = document["camera"]
     figure = _figure(11, 4.6)
@@ -119,11 +109,6 @@ def theodolite_plot(document: Document, fine: Document) -> str:
         The document of supported accuracies, for title and names.
     fine : dict
         The same on a fine grid over the whole photo.
-
-    Returns
-    -------
-    str
-        SVG.
     """
     camera, given = document["camera"], document["theodolite"]
     figure = _figure(6.5, 4.6)
@@ -148,18 +133,7 @@ def _isolines(axes: Axes, points: list[Document], key: str, title: str) -> None:
 
 @styled()
 def displacement_plot(document: Document) -> str:
-    """Draw the displacements in plan and in elevation, and as time series.
-
-    Parameters
-    ----------
-    document : dict
-        The document of displacements.
-
-    Returns
-    -------
-    str
-        SVG.
-    """
+    """Draw the displacements in plan and in elevation, and as time series."""
     axes_names = document["frame"]["axes"]
     up = axes_names.index("up")
     right, ahead = sorted(

@@ -19,12 +19,6 @@ class Picture(NamedTuple):
 
     Parameters
     ----------
-    name : str
-        Its id in the page.
-    title : str
-        What it is, in a few words.
-    caption : str
-        How to read it.
     svg : str
         The picture; its title and description are those for readers who cannot see it.
     """
@@ -36,15 +30,7 @@ class Picture(NamedTuple):
 
 
 class Axis(NamedTuple):
-    """A scale from numbers to places on the picture.
-
-    Parameters
-    ----------
-    low, high : float
-        Numbers at its ends.
-    start, end : float
-        Their places.
-    """
+    """A scale from numbers to places on the picture."""
 
     low: float
     high: float
@@ -52,7 +38,7 @@ class Axis(NamedTuple):
     end: float
 
     def __call__(self, value: float) -> float:
-        """Give the place of a number."""
+        """Return the place of a number."""
         return self.start + (value - self.low) / (self.high - self.low) * (self.end - self.start)
 
     def ticks(self) -> list[float]:
@@ -64,7 +50,7 @@ class Axis(NamedTuple):
 
 
 def nice(size: float) -> float:
-    """Give the next round number, 1, 2 or 5 times a power of ten, that is not smaller."""
+    """Return the next round number, 1, 2 or 5 times a power of ten, that is not smaller."""
     if size <= 0:
         return 1.0
     power = 10.0 ** math.floor(math.log10(size))
@@ -72,13 +58,13 @@ def nice(size: float) -> float:
 
 
 def number(value: float) -> str:
-    """Give a coordinate of the picture with one decimal, never -0."""
+    """Return a coordinate of the picture with one decimal, never -0."""
     text = f"{value:z.1f}"
     return text.removesuffix(".0")
 
 
 def element(name: str, content: str = "", **attributes: str | float) -> str:
-    """Give one element; underscores in names of attributes stand for hyphens, ``kind`` for ``class``."""
+    """Return one element; underscores in names of attributes stand for hyphens, ``kind`` for ``class``."""
     names = {"kind": "class"}
     words = {key: number(value) if isinstance(value, float) else str(value) for key, value in attributes.items()}
     parts = [f" {names.get(key, key).replace('_', '-')}={quoteattr(value)}" for key, value in words.items()]
@@ -93,18 +79,18 @@ def text(place: Point, words: str, kind: str = "", anchor: str = "start") -> str
 
 
 def line(start: Point, end: Point, kind: str) -> str:
-    """Give a straight line."""
+    """Return a straight line."""
     return element("line", x1=start[0], y1=start[1], x2=end[0], y2=end[1], kind=kind)
 
 
 def path(points: Iterable[Point], kind: str) -> str:
-    """Give a line through points."""
+    """Return a line through points."""
     steps = " ".join(f"{number(x)},{number(y)}" for x, y in points)
     return element("polyline", points=steps, kind=kind)
 
 
 def mark(place: Point, shape: str, kind: str, hint: str, size: float = 5.0) -> str:
-    """Give a mark: a triangle, a square, a diamond or a dot; the hint is what a pointer over it shows."""
+    """Return a mark: a triangle, a square, a diamond or a dot; the hint is what a pointer over it shows."""
     x, y = place
     title = element("title", escape(hint)) if hint else ""
     if shape == "dot":
@@ -123,14 +109,10 @@ def picture(name: str, size: Point, words: tuple[str, str, str], content: Iterab
 
     Parameters
     ----------
-    name : str
-        Its id.
     size : tuple of float
         Width and height of its coordinates; on the page it is as wide as there is room.
     words : tuple of str
         Title, caption, and a description for readers who cannot see it.
-    content : iterable of str
-        Elements.
     """
     title, caption, description = words
     head = element("title", escape(title), id=f"picture-{name}-title") + element(

@@ -18,7 +18,7 @@ NAMED = 6
 
 
 def bundle_sections(document: Document) -> list[Section]:
-    """Give the sections of a bundle adjustment.
+    """Return the sections of a bundle adjustment.
 
     Parameters
     ----------

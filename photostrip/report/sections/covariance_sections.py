@@ -21,8 +21,6 @@ def covariance_section(document: Document, *, everything: bool) -> Section:
     ----------
     document : dict
         The document of a result that has the block ``covariance``.
-    everything : bool
-        Whether all control coordinates are shown.
     """
     blocks = document["covariance"]
     # a result that was written before the choice existed has none

@@ -87,7 +87,7 @@ def _heights(document: Document, settings: Document) -> Iterator[tuple[str, str]
 
 
 def weights_section(document: Document, *, everything: bool) -> Section:
-    """Give the standard deviation of every control coordinate as stated and as it counted in the fit."""
+    """Return the standard deviation of every control coordinate as stated and as it counted in the fit."""
     control = [row for row in document["control"] if row["role"] == "control" and row["measured"]]
     shown = control if everything else control[:WEIGHTS_SHOWN]
     axes = document["frame"]["axes"]
@@ -113,6 +113,6 @@ def weights_section(document: Document, *, everything: bool) -> Section:
 
 
 def _sigmas(row: Document, key: str, up: int) -> list[str]:
-    """Give the standard deviations of the coordinates that count: plan, height or both."""
+    """Return the standard deviations of the coordinates that count: plan, height or both."""
     counts = ["z" in row["use"] if column == up else "x" in row["use"] for column in range(3)]
     return [metres(value) if used else DASH for value, used in zip(row[key], counts, strict=True)]

@@ -17,11 +17,6 @@ def deformation_section(document: Document) -> Section:
     ----------
     document : dict
         The document of a result that has ``deformations``.
-
-    Returns
-    -------
-    Section
-        One row for each such model.
     """
     rows = document["deformations"]
     bent = sum(row["significant"] for row in rows)

@@ -36,19 +36,12 @@ LOOK_SHOWN = 10
 
 
 def sections_of(document: Document, *, everything: bool = False) -> tuple[Section, ...]:
-    """Give the sections of the accuracy report.
+    """Return the sections of the accuracy report.
 
     Parameters
     ----------
-    document : dict
-        The document of a result, as in result.json.
     everything : bool
         Whether all rows of all tables are wanted, not only the worst of long ones.
-
-    Returns
-    -------
-    tuple of Section
-        The verdict first, the notes last.
     """
     several, bundle = len(document["strips"]) > 1, "bundle" in document
     models = model_sections.of_models(document)
@@ -92,17 +85,7 @@ def sections_of(document: Document, *, everything: bool = False) -> tuple[Sectio
 
 
 def chosen_sections(document: Document, *, quiet: bool = False, everything: bool = False) -> tuple[Section, ...]:
-    """Give the sections that are wanted: all of them, or the verdict that stands at the end.
-
-    Parameters
-    ----------
-    document : dict
-        The document of a result.
-    quiet : bool
-        Whether the verdict is enough.
-    everything : bool
-        As for ``sections_of``.
-    """
+    """Return the sections that are wanted: all of them, or the verdict that stands at the end."""
     sections = sections_of(document, everything=everything)
     return sections[-1:] if quiet else sections
 
@@ -114,8 +97,6 @@ def require_complete(document: Document, file: str) -> None:
     ----------
     document : dict
         What stands in the file; a user may have cut or edited it.
-    file : str
-        The file, to name it.
 
     Raises
     ------
@@ -133,7 +114,7 @@ def require_complete(document: Document, file: str) -> None:
 
 
 def title_of(document: Document) -> str:
-    """Give the title of the report."""
+    """Return the title of the report."""
     return f"Accuracy report: {document['name']}"
 
 

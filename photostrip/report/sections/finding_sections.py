@@ -16,17 +16,12 @@ Document = dict[str, Any]
 
 
 def findings_sections(document: Document) -> tuple[Section, ...]:
-    """Give the section of the findings; none when there are none.
+    """Return the section of the findings; none when there are none.
 
     Parameters
     ----------
     document : dict
         The document of a result; those of older versions have no findings.
-
-    Returns
-    -------
-    tuple of Section
-        One, or none.
     """
     findings = document.get("findings", [])
     if not findings:

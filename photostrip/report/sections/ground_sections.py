@@ -243,7 +243,7 @@ def not_determined_section(document: Document, *, everything: bool) -> Section:
 
 
 def notes_section(document: Document, *, everything: bool) -> Section:
-    """Give the notes of the run, said again at the end."""
+    """Return the notes of the run, said again at the end."""
     notes = document["notes"]
     limit = len(notes) if everything else 2 * WORST_SHOWN
     parts: list[Part] = [
@@ -256,5 +256,5 @@ def notes_section(document: Document, *, everything: bool) -> Section:
 
 
 def _told(note: Document) -> str:
-    """Give a note with its place; results of older versions have none."""
+    """Return a note with its place; results of older versions have none."""
     return before(note.get("file", ""), note.get("line", 0), note.get("column", 0)) + str(note["message"])

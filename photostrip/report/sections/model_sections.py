@@ -20,7 +20,7 @@ def of_models(document: Document) -> bool:
 
 
 def scale_word(document: Document) -> str:
-    """Give the scale to which differences on the ground are brought: that of the photos or of the models."""
+    """Return the scale to which differences on the ground are brought: that of the photos or of the models."""
     return "model" if of_models(document) else "photo"
 
 
@@ -130,13 +130,7 @@ def models_section(document: Document, *, everything: bool) -> Section:
 
 
 def project_rows(document: Document) -> list[tuple[str, str]]:
-    """Give what the section on the project says of the links.
-
-    Parameters
-    ----------
-    document : dict
-        The document of a result of independent models.
-    """
+    """Return what the section on the project says of the links."""
     settings = document["settings"]["links"]
     text = str(settings["screening"])
     if text == "auto":
@@ -146,7 +140,7 @@ def project_rows(document: Document) -> list[tuple[str, str]]:
 
 
 def measured(document: Document) -> tuple[tuple[str, str], ...]:
-    """Give the counts of what was measured."""
+    """Return the counts of what was measured."""
     counts = document["counts"]
     points = (
         f"{counts['model_points']} of points, {counts['model_points_used']} used; {counts['model_centers']} of centers"

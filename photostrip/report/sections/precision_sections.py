@@ -26,8 +26,6 @@ def precision_section(document: Document, *, everything: bool) -> Section:
     ----------
     document : dict
         The document of a result that has the block ``precision``.
-    everything : bool
-        Whether every photo is shown.
     """
     block = document["precision"]
     measured = "model" if "links" in document else "image"

@@ -29,14 +29,8 @@ def worst_first(
 
     Parameters
     ----------
-    rows : sequence of dict
-        All rows.
-    badness : callable
-        What makes a row worth showing.
     where : str
         What the rows are and where all of them stand.
-    everything : bool
-        Whether all are wanted.
 
     Returns
     -------
@@ -157,7 +151,7 @@ def junction_section(document: Document, *, everything: bool) -> Section:
 
 
 def _labelled(document: Document, strip: str, label: str) -> str:
-    """Give a label, with the strip where there are several."""
+    """Return a label, with the strip where there are several."""
     return label if len(document["strips"]) == 1 else f"{label}, strip {strip}"
 
 
@@ -249,7 +243,7 @@ def _leverage(document: Document, block: Document) -> str:
 
 
 def _by_strip(blocks: Sequence[Document]) -> Table:
-    """Give one line for each of many strips."""
+    """Return one line for each of many strips."""
     columns = (
         Column("strip", left=True),
         Column("asked"),
@@ -287,7 +281,7 @@ def _choice(document: Document, block: Document) -> str:
 
 
 def _degree(terms: Sequence[str]) -> int:
-    """Give the highest power of X among the terms."""
+    """Return the highest power of X among the terms."""
     return max((int(t[2:]) if t.startswith("X^") else int("X" in t) for t in terms), default=0)
 
 

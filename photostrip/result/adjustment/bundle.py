@@ -42,12 +42,7 @@ RELIABILITY = ("redundancy_x", "redundancy_y", "test_x", "test_y", "detectable_x
 
 
 def bundle_of(result: Result) -> Document:
-    """Give the block ``bundle``.
-
-    Parameters
-    ----------
-    result : Result
-        The result.
+    """Return the block ``bundle``.
 
     Returns
     -------
@@ -195,13 +190,6 @@ def _group(group: reliability.Group, shift: float) -> Document:
 def with_reliability(result: Result, residuals: list[Document]) -> list[Document]:
     """Add to the list ``residuals`` how well each ray is checked by the others.
 
-    Parameters
-    ----------
-    result : Result
-        A result.
-    residuals : list of dict
-        Image residuals photo by photo.
-
     Returns
     -------
     list of dict
@@ -273,7 +261,7 @@ def _row(found: Bundle, group: reliability.Group, at: tuple[int, int], shift: fl
 
 
 def _effect(found: Bundle, kind: str, row: int, external: float) -> Plain:
-    """Give the largest shift of its own point or camera by an error that is just not found, metres."""
+    """Return the largest shift of its own point or camera by an error that is just not found, metres."""
     problem, precision = found.screened.problem, found.screened.precision
     if not np.isfinite(external):
         return None
@@ -300,7 +288,7 @@ def _names(found: Bundle, kind: str, row: int) -> tuple[str | None, str | None]:
 
 
 def _positions(found: Bundle) -> Iterator[Document]:
-    """Give the differences at camera positions, adjusted minus given."""
+    """Return the differences at camera positions, adjusted minus given."""
     problem, solution = found.screened.problem, found.screened.solution
     given = problem.positions
     for row in range(len(given)):
@@ -330,8 +318,6 @@ def with_bundle(result: Result, rejected: list[Document]) -> list[Document]:
 
     Parameters
     ----------
-    result : Result
-        A result.
     rejected : list of dict
         What was taken out while the strips were formed and brought to the ground.
 
@@ -408,17 +394,10 @@ def _rejection(found: Bundle, each: Rejection) -> Document:
 def image_fit(result: Result) -> tuple[float, float, int]:
     """Give sigma0 of the image coordinates, their stated standard deviation and their rms residual, mm, of a bundle.
 
-    Parameters
-    ----------
-    result : Result
-        A result with a bundle adjustment.
-
     Returns
     -------
     sigma0, rms : float
         Standard deviation of an image coordinate found, and rms of the residuals, mm.
-    redundancy : int
-        Redundancy of the adjustment.
     """
     found = result.bundle
     if found is None:

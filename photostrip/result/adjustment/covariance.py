@@ -15,12 +15,7 @@ if TYPE_CHECKING:
 
 
 def covariances_of(result: Result) -> Document:
-    """Give the block ``covariance``: a record for each strip that was adjusted with its own covariance.
-
-    Parameters
-    ----------
-    result : Result
-        The result.
+    """Return the block ``covariance``: a record for each strip that was adjusted with its own covariance.
 
     Returns
     -------

@@ -21,11 +21,6 @@ TERMS = ("twist", "bending")
 def deformations_of(result: Result) -> Document:
     """Give ``{"deformations": [...]}``; empty when no model has height control enough.
 
-    Parameters
-    ----------
-    result : Result
-        What a run found.
-
     Returns
     -------
     dict

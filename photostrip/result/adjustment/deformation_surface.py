@@ -30,16 +30,10 @@ class ModelDeformation:
 
     Parameters
     ----------
-    model : int
-        Number of the model in its strip.
-    points : tuple of str
-        Height control used.
     surface : Paraboloid
         Height residuals in metres as a function of x and y at photo scale, mm.
     base, width : float
         Photo base, and distance of the outermost of the points from the line of flight, mm at photo scale.
-    scale : float
-        Denominator of the photo scale in the model.
     sigma : float
         Mean stated standard deviation of a height residual, metres.
     """
@@ -66,13 +60,6 @@ class ModelDeformation:
 
 def model_deformations(strip: StripResult, frames: Sequence[GroundFrame]) -> tuple[ModelDeformation, ...]:
     """Estimate twist and bending of every model that has the height control for it.
-
-    Parameters
-    ----------
-    strip : StripResult
-        The strip.
-    frames : sequence of GroundFrame
-        Ground frames of the control.
 
     Returns
     -------

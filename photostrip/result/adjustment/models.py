@@ -47,11 +47,6 @@ def _directed(values: Plain, names: Sequence[str] = DIRECTIONS) -> Document:
 def gaps(strip: LinkedStrip) -> Floats:
     """Differences of what neighbouring models have in common, after minus before.
 
-    Parameters
-    ----------
-    strip : LinkedStrip
-        The strip.
-
     Returns
     -------
     ndarray, shape (t, 3)
@@ -77,7 +72,7 @@ def _stated(strip: LinkedStrip) -> float:
 
 
 def strips_of(result: Result) -> list[Document]:
-    """Give the list ``strips``: what each strip is like and how well it holds together."""
+    """Return the list ``strips``: what each strip is like and how well it holds together."""
     return [_strip(strip) for strip in result.linked]
 
 
@@ -115,7 +110,7 @@ def _drift(strip: LinkedStrip) -> float:
 
 
 def counts_of(result: Result) -> Document:
-    """Give what the block ``counts`` says of models beside points and control."""
+    """Return what the block ``counts`` says of models beside points and control."""
     links = [strip.formed.links for strip in result.linked]
     points = [strip.formed.models.node < strip.formed.models.points for strip in result.linked]
     return {
@@ -136,7 +131,7 @@ def counts_of(result: Result) -> Document:
 
 
 def summary_of(result: Result) -> Document:
-    """Give what the block ``summary`` says of models, before what is left at given points."""
+    """Return what the block ``summary`` says of models, before what is left at given points."""
     strips = result.linked
     redundancy = np.array([strip.formed.links.solved.redundancy.sum() for strip in strips])
     share = redundancy / max(int(redundancy.sum()), 1)
@@ -159,7 +154,7 @@ def summary_of(result: Result) -> Document:
 
 
 def models_of(result: Result) -> list[Document]:
-    """Give the list ``models``: what each model holds and how it lies in its strip, in flight order."""
+    """Return the list ``models``: what each model holds and how it lies in its strip, in flight order."""
     return [model for strip in result.linked for model in _models(strip)]
 
 
@@ -194,7 +189,7 @@ def _models(strip: LinkedStrip) -> list[Document]:
 
 
 def links_of(result: Result) -> list[Document]:
-    """Give the list ``links``: how every model fits the one before it, in flight order."""
+    """Return the list ``links``: how every model fits the one before it, in flight order."""
     return [link for strip in result.linked for link in _links(result, strip)]
 
 
@@ -248,7 +243,7 @@ def _name(result: Result, node: int) -> str:
 
 
 def residuals_of(result: Result, rank: Numbers) -> list[Document]:
-    """Give the list ``link_residuals``: differences of what neighbouring models have in common, link by link.
+    """Return the list ``link_residuals``: differences of what neighbouring models have in common, link by link.
 
     After minus before, in micrometres along the axes of the model before; also of points that took no part.
     """
@@ -276,7 +271,7 @@ def residuals_of(result: Result, rank: Numbers) -> list[Document]:
 
 
 def rejected_of(result: Result) -> list[Document]:
-    """Give what was taken out of links and control, as in the list ``rejected``."""
+    """Return what was taken out of links and control, as in the list ``rejected``."""
     found = []
     for strip in result.linked:
         shared, formed, names = strip.formed.links.shared, strip.formed, strip.strip.models
@@ -332,7 +327,7 @@ def _guilty(names: tuple[str, str], used: tuple[bool, bool]) -> str:
 
 
 def photos_of(result: Result) -> list[Document]:
-    """Give the list ``photos``: perspective centres in flight order; rotations of photos are not known from models."""
+    """Return the list ``photos``: perspective centres in flight order; rotations of photos are not known from models."""
     return [photo for number, strip in enumerate(result.linked) for photo in _photos(result, number, strip)]
 
 

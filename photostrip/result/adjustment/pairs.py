@@ -72,7 +72,7 @@ class Parallaxes:
 
 
 def sigma0(squares: Floats, redundancy: Numbers) -> float:
-    """Give the standard deviation of an image coordinate from y parallaxes, in mm; NaN without redundancy.
+    """Return the standard deviation of an image coordinate from y parallaxes, in mm; NaN without redundancy.
 
     A y parallax is the difference of two coordinates: its variance is twice theirs.
     """
@@ -81,7 +81,7 @@ def sigma0(squares: Floats, redundancy: Numbers) -> float:
 
 
 def models_of(result: Result) -> list[Document]:
-    """Give the list ``models``: relative orientation and scale of every pair, in flight order."""
+    """Return the list ``models``: relative orientation and scale of every pair, in flight order."""
     ids = result.refined.observations.point_ids
     return [model for strip in result.strips for model in _models(strip, ids)]
 
@@ -133,7 +133,7 @@ def _detectable(strip: StripResult) -> Floats:
 
 
 def parallaxes_of(result: Result, rank: Numbers) -> list[Document]:
-    """Give the list ``parallaxes``: y parallaxes of all points of every pair, in natural order of the points."""
+    """Return the list ``parallaxes``: y parallaxes of all points of every pair, in natural order of the points."""
     ids = result.refined.observations.point_ids
     found = []
     for strip in result.strips:
@@ -163,7 +163,7 @@ def parallaxes_of(result: Result, rank: Numbers) -> list[Document]:
 
 
 def junctions_of(result: Result) -> list[Document]:
-    """Give the list ``junctions``: the scale transfer at every photo that joins two models."""
+    """Return the list ``junctions``: the scale transfer at every photo that joins two models."""
     ids = result.refined.observations.point_ids
     return [junction for strip in result.strips for junction in _junctions(strip, ids)]
 
@@ -207,11 +207,6 @@ def _junctions(strip: StripResult, ids: Sequence[str]) -> list[Document]:
 def discrepancies(strip: StripResult) -> Floats:
     """Differences of points common to neighbouring models, after minus before.
 
-    Parameters
-    ----------
-    strip : StripResult
-        The strip.
-
     Returns
     -------
     ndarray, shape (t, 3)
@@ -227,7 +222,7 @@ def discrepancies(strip: StripResult) -> Floats:
 
 
 def rejected_of(result: Result) -> list[Document]:
-    """Give the list ``rejected``: what was taken out of pairs, scale transfers, points and control, in flight order.
+    """Return the list ``rejected``: what was taken out of pairs, scale transfers, points and control, in flight order.
 
     Within a pair or a joint they stand in natural order of the points: the order of the tables does not show. A
     measurement that was taken back in the end is in it, marked.
@@ -366,7 +361,7 @@ def _from_rays(strip: StripResult, observations: PhotoPoints) -> list[Document]:
 
 
 def _zones_of(strip: StripResult, rays: int) -> Numbers:
-    """Give the standard zone of each image point in the pair with the next photo or the one before; 0 in none."""
+    """Return the standard zone of each image point in the pair with the next photo or the one before; 0 in none."""
     zone = np.zeros(rays, np.intp)
     for side in (1, 0):
         zone[strip.orientation.rows[:, side]] = strip.screened.zone
@@ -375,11 +370,6 @@ def _zones_of(strip: StripResult, rays: int) -> Numbers:
 
 def rejected_by_strip(strip: StripResult) -> Flags:
     """Tell which of the measurements that the strip found wrong had not been rejected by all their pairs.
-
-    Parameters
-    ----------
-    strip : StripResult
-        The strip.
 
     Returns
     -------
@@ -394,7 +384,7 @@ def rejected_by_strip(strip: StripResult) -> Flags:
 
 
 def from_control(strip: StripResult | LinkedStrip, wrong: ControlRejection) -> Document:
-    """Give an entry of ``rejected``: wrong control."""
+    """Return an entry of ``rejected``: wrong control."""
     sizes = dict(zip(AXES, wrong.size, strict=True))
     reason = "; ".join(f"{axis} by about {sizes[axis]:+.2f} m" for axis in wrong.axes)
     if wrong.exchanged_with:

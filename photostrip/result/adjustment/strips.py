@@ -37,7 +37,7 @@ AXES = ("x", "y", "z")
 
 
 def strips_of(result: Result) -> list[Document]:
-    """Give the list ``strips``: what each strip is like and how well it holds together."""
+    """Return the list ``strips``: what each strip is like and how well it holds together."""
     return [_strip(result, strip) for strip in result.strips]
 
 
@@ -93,7 +93,7 @@ def _scale_change(correction: Polynomial, x: float) -> float:
 
 
 def absolute_of(result: Result) -> list[Document]:
-    """Give the list ``absolute``: the similarity of every strip to its control."""
+    """Return the list ``absolute``: the similarity of every strip to its control."""
     return [_absolute(strip) for strip in result.flights]
 
 
@@ -130,7 +130,7 @@ def _by_axis(values: Sequence[Plain]) -> Document:
 
 
 def polynomials_of(result: Result) -> list[Document]:
-    """Give the list ``polynomials``: the correction of every strip that has one."""
+    """Return the list ``polynomials``: the correction of every strip that has one."""
     return [_polynomial(strip.strip.id, strip.polynomial) for strip in result.flights if strip.polynomial is not None]
 
 

@@ -42,8 +42,6 @@ class Differences:
         The largest difference of a point in units of that standard deviation.
     scale : ndarray, shape (c,)
         Denominator of the photo scale at the point; NaN where it has no coordinates.
-    strips : tuple of tuple of str
-        Strips that hold the point.
     rejected : ndarray of bool, shape (c, 3)
         Coordinates east, north, up of the control that were found wrong and not used.
     """
@@ -72,8 +70,6 @@ def coordinates(frame: GroundFrame, enu: Floats) -> Plain:
 
     Parameters
     ----------
-    frame : GroundFrame
-        Their frame.
     enu : ndarray, shape (n, 3)
         Coordinates in the internal order.
 
@@ -90,7 +86,7 @@ def coordinates(frame: GroundFrame, enu: Floats) -> Plain:
 
 
 def frame_of(result: Result) -> Document:
-    """Give the block ``frame``: what the coordinates of the result refer to."""
+    """Return the block ``frame``: what the coordinates of the result refer to."""
     frame = result.output
     return {
         "crs": frame.spec.crs,
@@ -107,12 +103,10 @@ def frame_of(result: Result) -> Document:
 
 
 def points_of(result: Result, image_rms: Floats, rank: Numbers) -> list[Document]:
-    """Give the list ``points``, in natural order of their ids.
+    """Return the list ``points``, in natural order of their ids.
 
     Parameters
     ----------
-    result : Result
-        The result.
     image_rms : ndarray, shape (n,)
         Root mean square image residual of each point as numbered in the observations, mm.
     rank : ndarray of int, shape (n,)
@@ -149,11 +143,6 @@ def points_of(result: Result, image_rms: Floats, rank: Numbers) -> list[Document
 def differences(result: Result) -> Differences:
     """Differences at control and check points, in the axes of the result and in plan and height.
 
-    Parameters
-    ----------
-    result : Result
-        The result.
-
     Returns
     -------
     Differences
@@ -180,14 +169,7 @@ def differences(result: Result) -> Differences:
 
 
 def of_used(result: Result, found: Differences) -> Differences:
-    """Give the differences without those at control that was rejected: they say nothing about the fit.
-
-    Parameters
-    ----------
-    result : Result
-        The result.
-    found : Differences
-        Differences at every given point.
+    """Return the differences without those at control that was rejected: they say nothing about the fit.
 
     Returns
     -------
@@ -251,7 +233,7 @@ def _expected(result: Result) -> tuple[Floats, Floats, tuple[tuple[str, ...], ..
 def _expected_of_bundle(
     result: Result, covariances: Floats, variance: Floats, members: tuple[NDArray[np.bool_], Numbers]
 ) -> tuple[Floats, Floats, tuple[tuple[str, ...], ...]]:
-    """Give the same for a bundle adjustment, which knows the precision of each point.
+    """Return the same for a bundle adjustment, which knows the precision of each point.
 
     A control coordinate that took part has drawn its point towards itself: what is left is its residual, whose standard
     deviation its redundancy number gives.
@@ -280,7 +262,7 @@ def _expected_of_bundle(
 
 
 def control_of(result: Result, found: Differences) -> list[Document]:
-    """Give the list ``control``: every given point with what is left there, in natural order of the ids."""
+    """Return the list ``control``: every given point with what is left there, in natural order of the ids."""
     control = result.inputs.control
     order = np.argsort(natural_rank(control.ids))
     moved = rounded(found.axes, GROUND)
@@ -319,13 +301,13 @@ def _own_order(result: Result, enu: Floats) -> Plain:
 
 
 def _use(counts: list[bool]) -> str:
-    """Give the word of the project file for which coordinates count."""
+    """Return the word of the project file for which coordinates count."""
     east, north, up = counts
     return f"{'x' if east else ''}{'y' if north else ''}{'z' if up else ''}" or "off"
 
 
 def ties_of(result: Result, rank: Numbers) -> list[Document]:
-    """Give the list ``ties``: points of two strips with their differences, second minus first."""
+    """Return the list ``ties``: points of two strips with their differences, second minus first."""
     ties, ids = result.ties, result.refined.observations.point_ids
     if not len(ties.number):
         return []
@@ -358,13 +340,13 @@ def _level_ties(result: Result) -> Floats:
 
 
 def not_determined_of(result: Result) -> list[Document]:
-    """Give the list ``not_determined``: measured points without coordinates, and why."""
+    """Return the list ``not_determined``: measured points without coordinates, and why."""
     names = list(result.not_determined)
     return [{"id": names[row], "reason": result.not_determined[names[row]]} for row in np.argsort(natural_rank(names))]
 
 
 def misclosures_of(result: Result) -> list[Document]:
-    """Give the list ``misclosures``: strip minus control after the similarity, before any polynomial.
+    """Return the list ``misclosures``: strip minus control after the similarity, before any polynomial.
 
     Beside them, how far each coordinate is checked by all others, and its share in its own polynomial.
     """

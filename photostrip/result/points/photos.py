@@ -49,17 +49,7 @@ class ImageResiduals:
 
     @classmethod
     def of(cls, result: Result, strip: StripResult, rank: Numbers) -> ImageResiduals:
-        """Compute the residuals of a strip under its final orientations.
-
-        Parameters
-        ----------
-        result : Result
-            The result.
-        strip : StripResult
-            One of its strips.
-        rank : ndarray of int
-            Place of every point in natural order.
-        """
+        """Compute the residuals of a strip under its final orientations."""
         observations, photos = result.refined.observations, strip.strip.photos
         place = {photo: number for number, photo in enumerate(photos)}
         position = np.array([place.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo]
@@ -78,7 +68,7 @@ class ImageResiduals:
 
 
 def photos_of(result: Result, residuals: list[ImageResiduals]) -> list[Document]:
-    """Give the list ``photos``: exterior orientations in the frame of the result, in flight order."""
+    """Return the list ``photos``: exterior orientations in the frame of the result, in flight order."""
     return [
         photo
         for number, (strip, image) in enumerate(zip(result.strips, residuals, strict=True))
@@ -132,7 +122,7 @@ def _angles_of_one(rotation: Floats, system: str, unit: str) -> Plain:
 
 
 def residuals_of(result: Result, residuals: list[ImageResiduals]) -> list[Document]:
-    """Give the list ``residuals``: image residuals photo by photo, points in natural order."""
+    """Return the list ``residuals``: image residuals photo by photo, points in natural order."""
     observations = result.refined.observations
     ids = observations.point_ids
     found = []
@@ -158,13 +148,6 @@ def residuals_of(result: Result, residuals: list[ImageResiduals]) -> list[Docume
 def point_rms(result: Result, residuals: list[ImageResiduals]) -> Floats:
     """Root mean square image residual of every point over all its photos, mm; NaN where it took no part.
 
-    Parameters
-    ----------
-    result : Result
-        The result.
-    residuals : list of ImageResiduals
-        Residuals of each strip.
-
     Returns
     -------
     ndarray, shape (n,)
@@ -184,15 +167,7 @@ def point_rms(result: Result, residuals: list[ImageResiduals]) -> Floats:
 
 
 def singles_of(result: Result, rank: Numbers) -> list[ImageResiduals]:
-    """Give the residuals of the photos that are strips of their own, which only a bundle adjustment has.
-
-    Parameters
-    ----------
-    result : Result
-        The result.
-    rank : ndarray of int
-        Place of every point in natural order.
-    """
+    """Return the residuals of the photos that are strips of their own, which only a bundle adjustment has."""
     if result.bundle is None:
         return []
     observations = result.refined.observations
@@ -214,7 +189,7 @@ def singles_of(result: Result, rank: Numbers) -> list[ImageResiduals]:
 
 
 def single_photos_of(result: Result, residuals: list[ImageResiduals]) -> list[Document]:
-    """Give the entries of ``photos`` for photos that are strips of their own."""
+    """Return the entries of ``photos`` for photos that are strips of their own."""
     if result.bundle is None:
         return []
     system, unit = result.settings.angle_system, result.settings.angle_unit
@@ -241,7 +216,7 @@ def single_photos_of(result: Result, residuals: list[ImageResiduals]) -> list[Do
 
 
 def single_residuals_of(result: Result, residuals: list[ImageResiduals]) -> list[Document]:
-    """Give the entries of ``residuals`` for photos that are strips of their own."""
+    """Return the entries of ``residuals`` for photos that are strips of their own."""
     if result.bundle is None:
         return []
     observations = result.refined.observations

@@ -83,12 +83,7 @@ def ellipses(level: Floats) -> tuple[Floats, Floats]:
 
 
 def point_columns(result: Result) -> list[Document]:
-    """Give what is added to each point of ``points``: standard deviations, covariances, error ellipse in plan.
-
-    Parameters
-    ----------
-    result : Result
-        The result.
+    """Return what is added to each point of ``points``: standard deviations, covariances, error ellipse in plan.
 
     Returns
     -------
@@ -116,14 +111,10 @@ def point_columns(result: Result) -> list[Document]:
 
 
 def photo_columns(result: Result, number: int, place: Floats, rotations: Floats) -> list[Document]:
-    """Give what is added to each photo of a strip: standard deviations of centre and angles, and their covariances.
+    """Return what is added to each photo of a strip: standard deviations of centre and angles, and their covariances.
 
     Parameters
     ----------
-    result : Result
-        The result.
-    number : int
-        Number of the strip.
     place : ndarray, shape (m, 3)
         Perspective centres in the Cartesian frame.
     rotations : ndarray, shape (m, 3, 3)
@@ -142,12 +133,10 @@ def photo_columns(result: Result, number: int, place: Floats, rotations: Floats)
 
 
 def columns_of_photos(result: Result, place: Floats, rotations: Floats, given: Floats) -> list[Document]:
-    """Give the same for photos with given covariances.
+    """Return the same for photos with given covariances.
 
     Parameters
     ----------
-    result : Result
-        The result: its frame and its angles count.
     place, rotations : ndarray, shapes (m, 3), (m, 3, 3)
         As for ``photo_columns``.
     given : ndarray, shape (m, 6, 6)
@@ -189,12 +178,7 @@ def _rates(rotations: Floats, system: str) -> Floats:
 
 
 def precision_of(result: Result) -> Document:
-    """Give the block ``precision``: what the covariances rest on, how large they are, how they change along the strips.
-
-    Parameters
-    ----------
-    result : Result
-        The result.
+    """Return the block ``precision``: what the covariances rest on, how large they are, how they change along the strips.
 
     Returns
     -------

@@ -55,10 +55,6 @@ class PairRound:
 
     Parameters
     ----------
-    points : int
-        Points used.
-    steps : tuple of PairStep
-        From the first to the last.
     end : ndarray, shape (5,)
         Elements in the end, radians.
     """
@@ -74,10 +70,6 @@ class SimilarityStep:
 
     Parameters
     ----------
-    similarity : Similarity
-        Strip to intermediate frame before the step.
-    squares : float
-        [w v v] before the step, without unit.
     step : ndarray, shape (7,)
         Three shifts, three rotations and the scale, metres at the end of the strip.
     """
@@ -89,13 +81,6 @@ class SimilarityStep:
 
 def pair_rounds(result: Result, strip: StripResult) -> list[list[PairRound]]:
     """Repeat the relative orientation of every pair: with all its points, then without those that were rejected.
-
-    Parameters
-    ----------
-    result : Result
-        What the run found.
-    strip : StripResult
-        One of its strips.
 
     Returns
     -------
@@ -114,7 +99,7 @@ def pair_rounds(result: Result, strip: StripResult) -> list[list[PairRound]]:
 
 
 def _with_all_points(result: Result, strip: StripResult) -> Pairs:
-    """Give the pairs of a strip as they were before any point was rejected."""
+    """Return the pairs of a strip as they were before any point was rejected."""
     photos, focal = strip.strip.photos, strip.strip.camera.principal_distance
     pairs, point, rows = relative.collect_pairs(result.refined.observations, photos, focal)
     taken = set(map(tuple, strip.orientation.rows.tolist()))
@@ -148,20 +133,7 @@ def _round(start: Floats, pairs: Pairs) -> list[PairRound]:
 
 
 def similarity_steps(result: Result, strip: StripResult | LinkedStrip) -> list[SimilarityStep]:
-    """Repeat the absolute orientation of a strip on the control that was used.
-
-    Parameters
-    ----------
-    result : Result
-        What the run found.
-    strip : StripResult or LinkedStrip
-        One of its strips.
-
-    Returns
-    -------
-    list of SimilarityStep
-        From the first to the last.
-    """
+    """Repeat the absolute orientation of a strip on the control that was used."""
     points = strip.formed.xyz[strip.control_rows]
     targets = absolute_orientation.Targets(strip.control, result.frames, strip.intermediate)
     weight = absolute_orientation.weights(targets.turned(strip.absolute.similarity(points)), strip.precision)

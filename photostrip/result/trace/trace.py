@@ -49,12 +49,7 @@ SYMBOLS = {
 
 
 def trace_of(result: Result) -> Document:
-    """Give every stage of a run, iteration by iteration.
-
-    Parameters
-    ----------
-    result : Result
-        What the run found.
+    """Return every stage of a run, iteration by iteration.
 
     Returns
     -------
@@ -76,7 +71,7 @@ def trace_of(result: Result) -> Document:
 
 
 def _linked(result: Result, strip: LinkedStrip, factor: float) -> Document:
-    """Give a strip of independent models: its links are in the result, the way to the ground is as for photos."""
+    """Return a strip of independent models: its links are in the result, the way to the ground is as for photos."""
     return {
         "strip": strip.strip.id,
         "pairs": [],

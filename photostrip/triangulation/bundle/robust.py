@@ -39,8 +39,6 @@ def adjust(problem: Problem) -> tuple[Solution, Floats]:
 
     Returns
     -------
-    solution : Solution
-        Of the last round.
     weight : ndarray, shape (n,)
         Factor of the weight of each ray, 0 to 1.
 

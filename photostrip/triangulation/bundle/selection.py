@@ -40,7 +40,7 @@ class Selection:
 
     @classmethod
     def everything(cls, problem: Problem) -> Selection:
-        """Give the selection of all observations that are given."""
+        """Return the selection of all observations that are given."""
         given = (np.isfinite(each.sigma) for each in (problem.control, problem.positions, problem.attitudes))
         return cls(np.ones(len(problem.images), bool), *given)
 
@@ -54,13 +54,6 @@ class Selection:
 
 def supported(problem: Problem, selection: Selection) -> Selection:
     """Take out the rays of points that too few rays are left of.
-
-    Parameters
-    ----------
-    problem : Problem
-        The problem with all observations.
-    selection : Selection
-        What is to take part.
 
     Returns
     -------
@@ -80,14 +73,7 @@ def supported(problem: Problem, selection: Selection) -> Selection:
 
 
 def selected(problem: Problem, selection: Selection) -> Problem:
-    """Give the problem with the observations that take part.
-
-    Parameters
-    ----------
-    problem : Problem
-        The problem with all observations.
-    selection : Selection
-        What takes part.
+    """Return the problem with the observations that take part.
 
     Returns
     -------
@@ -110,12 +96,10 @@ def selected(problem: Problem, selection: Selection) -> Problem:
 
 
 def restarted(problem: Problem, solution: Solution) -> Problem:
-    """Give a problem that starts where another one ended.
+    """Return a problem that starts where another one ended.
 
     Parameters
     ----------
-    problem : Problem
-        The problem with all observations.
     solution : Solution
         A solution of it, or of a selection.
 

@@ -42,14 +42,10 @@ class Rejection:
     ----------
     kind : str
         ``image``, ``control``, ``position`` or ``attitude``.
-    row : int
-        Its row in the problem.
     axis : int
         The coordinate beyond the limit: 0, 1 or 2. A ray goes out as a whole.
     test : str
         Name of the test; ``start`` for what the strip method had rejected already and does not fit.
-    value, limit : float
-        Test value and limit.
     size : float
         What error would explain the residual: mm, metres or radians.
     readmitted : bool
@@ -76,14 +72,8 @@ class Screened:
         The problem with the observations that took part.
     selection : Selection
         Which those are.
-    solution : Solution
-        Its solution.
-    precision : Precision
-        Cofactors.
     rejections : tuple of Rejection
         What was taken out, in order; re-admitted ones are marked.
-    rounds : int
-        Adjustments made.
     """
 
     problem: Problem
@@ -99,19 +89,12 @@ def screen(problem: Problem, begin: Selection, settings: Settings, kept: Flags |
 
     Parameters
     ----------
-    problem : Problem
-        All observations.
     begin : Selection
         What takes part at first; the rest is put in at the end where it fits.
     settings : Settings
         Which search, which test, at which level.
     kept : ndarray of bool, shape (n,), optional
         Rays that stay in whatever the tests say.
-
-    Returns
-    -------
-    Screened
-        The cleaned solution.
     """
     keep = np.zeros(len(problem.images), bool) if kept is None else kept
     if settings.screening == "none":
@@ -210,7 +193,7 @@ class _Search:
         return limit, unit
 
     def _worst(self, done: _Adjusted) -> Iterator[Rejection]:
-        """Give the worst observations beyond the limit, no two of which share a point or a photo."""
+        """Return the worst observations beyond the limit, no two of which share a point or a photo."""
         limit, unit = self._limit(done.solution)
         beyond = []
         for group in reliability.groups_of(done.problem, done.solution, done.precision):
@@ -288,7 +271,7 @@ class _Search:
             self.problem = replace(self.problem, start=replace(self.problem.start, points=points))
 
     def log(self, done: _Adjusted, begin: Selection) -> Iterator[Rejection]:
-        """Give every observation that was out at some time."""
+        """Return every observation that was out at some time."""
         limit, unit = self._limit(done.solution)
         outside = np.flatnonzero(~done.selection.images)
         value, size = predicted(self.problem, done.selection, (done.solution, done.precision))
@@ -318,15 +301,6 @@ class _Search:
 
 def predicted(problem: Problem, selection: Selection, found: tuple[Solution, Precision]) -> tuple[Floats, Floats]:
     """Test values of rays that take no part, against what the others give.
-
-    Parameters
-    ----------
-    problem : Problem
-        All observations.
-    selection : Selection
-        What takes part.
-    found : tuple of Solution and Precision
-        Its solution.
 
     Returns
     -------

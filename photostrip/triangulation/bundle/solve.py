@@ -62,13 +62,6 @@ class Settings:
 def solve(problem: Problem, settings: Settings | None = None) -> Solution:
     """Adjust a bundle of rays.
 
-    Parameters
-    ----------
-    problem : Problem
-        Observations and start values.
-    settings : Settings or None
-        How the adjustment is driven.
-
     Returns
     -------
     Solution

@@ -59,8 +59,6 @@ class Factors:
 
         Yields
         ------
-        number : int
-            Row of blocks.
         blocks : tuple of ndarray, shape (b, b)
             Of that row: on the diagonal, the next and the one after; 0 beyond the end.
         """
@@ -82,11 +80,6 @@ def eliminate(diagonal: Floats, beside: Floats) -> Factors:
         Blocks on the diagonal, symmetric.
     beside : ndarray, shape (n, b, b)
         Blocks to the right of them; the last does not count.
-
-    Returns
-    -------
-    Factors
-        The eliminated system.
 
     Raises
     ------

@@ -114,14 +114,8 @@ def conditions(
 
     Parameters
     ----------
-    errors : StripErrors
-        The formed strip.
-    strip : tuple of Orientation and FormedStrip
-        Its pairs and their points.
     control : tuple of Misclosures and ndarray
         Control coordinates that count, and strip minus given in metres.
-    local : Local
-        Unknowns of the models.
     distances : bool
         Whether distances of pass points from the common centres count.
 
@@ -142,12 +136,8 @@ def misclosures_at(wanted: Conditions, formed: FormedStrip, similarity: Similari
 
     Parameters
     ----------
-    wanted : Conditions
-        The conditions.
     formed : FormedStrip
         The strip, with the same joints.
-    similarity : Similarity
-        From there to the ground.
     control : ndarray, shape (w,)
         Strip minus given of the control coordinates, metres.
 

@@ -59,8 +59,6 @@ class Tested:
     ----------
     squares : float
         Weighted sum of squares of all misclosures.
-    redundancy : int
-        Its expectation.
     normalised : ndarray, shape (w,)
         Test value of each control coordinate, standard normal when it is right; NaN where nothing checks it.
     size : ndarray, shape (w,)
@@ -102,21 +100,11 @@ def predict(
 
     Parameters
     ----------
-    errors : StripErrors
-        The formed strip.
-    wanted : Conditions
-        The conditions.
-    local : Local
-        Unknowns of the models.
-    found : System
-        The solved system.
     things : sequence of Rows
         Points, photos.
 
     Returns
     -------
-    predicted : list of Predicted
-        For each of the things.
     cofactors : ndarray, shape (n,)
         Of the correlates of the conditions.
     """
@@ -140,7 +128,7 @@ def predict(
 
 
 def _predicted(errors: StripErrors, job: _Job, order: Numbers) -> Predicted:
-    """Give what was found, in the order in which the things were given."""
+    """Return what was found, in the order in which the things were given."""
     covariance = local_covariances(errors, job.rows, own_with_units(errors, job.rows)) - job.quadratic
     back = np.argsort(order, kind="stable")
     return Predicted(job.error[back], covariance[back])
@@ -168,8 +156,6 @@ class _Job:
     ----------
     rows : Rows
         The things, ordered by their first models.
-    padded : Padded
-        The same model by model.
     frame : ndarray, shape (n, d, 7)
         By the unknowns of the first model.
     shared : tuple of ndarray
@@ -262,14 +248,6 @@ def influence(errors: StripErrors, wanted: Conditions, local: Local, found: Syst
 
     Parameters
     ----------
-    errors : StripErrors
-        The formed strip.
-    wanted : Conditions
-        The conditions.
-    local : Local
-        Unknowns of the models.
-    found : System
-        The solved system.
     rows : Rows
         The things, d = 1, in any order.
 
@@ -296,14 +274,6 @@ def by_conditions(
 
     Parameters
     ----------
-    errors : StripErrors
-        The formed strip.
-    wanted : Conditions
-        The conditions.
-    local : Local
-        Unknowns of the models.
-    found : System
-        The solved system.
     rows : Rows
         n things of d coordinates, in any order.
     chosen : ndarray of int, shape (c,)
@@ -335,19 +305,8 @@ def tested(wanted: Conditions, found: System, cofactors: Floats, count: int) -> 
 
     Parameters
     ----------
-    wanted : Conditions
-        The conditions.
-    found : System
-        The solved system.
     cofactors : ndarray, shape (n,)
         Of the correlates.
-    count : int
-        Number of control coordinates.
-
-    Returns
-    -------
-    Tested
-        Test values.
     """
     correlates = found.solution[found.layout.block, found.layout.position]
     rows = np.flatnonzero(wanted.kind == CONTROL)

@@ -60,8 +60,6 @@ def formed_again(
         Its pairs, as ``oriented_again`` gives them.
     observations : PhotoPoints
         The image points that these were oriented on.
-    photos : sequence of str
-        Photos of the strip in flight order.
 
     Returns
     -------
@@ -78,7 +76,7 @@ def formed_again(
 
 
 def _joined(joined: Junctions, orientation: Orientation, vectors: Floats) -> Junctions:
-    """Give the scale transfer with the same pass points and weights."""
+    """Return the scale transfer with the same pass points and weights."""
     base, _ = orientation.relative
     before = np.linalg.norm(vectors[joined.before] - base[joined.joint], axis=1)
     ratio = before / np.linalg.norm(vectors[joined.after], axis=1)

@@ -29,32 +29,12 @@ if TYPE_CHECKING:
 
 
 def without_frame(rows: Rows) -> Rows:
-    """Leave out the similarity of the first model, which is an unknown of the adjustment and no error.
-
-    Parameters
-    ----------
-    rows : Rows
-        Errors of things.
-
-    Returns
-    -------
-    Rows
-        The same without it.
-    """
+    """Leave out the similarity of the first model, which is an unknown of the adjustment and no error."""
     return replace(rows, frame=np.zeros_like(rows.frame))
 
 
 def image_errors(errors: StripErrors, wanted: Conditions, found: System) -> Floats:
-    """Give the errors of the image coordinates that the adjustment finds.
-
-    Parameters
-    ----------
-    errors : StripErrors
-        The strip.
-    wanted : Conditions
-        The conditions.
-    found : System
-        The solved system.
+    """Return the errors of the image coordinates that the adjustment finds.
 
     Returns
     -------
@@ -66,14 +46,10 @@ def image_errors(errors: StripErrors, wanted: Conditions, found: System) -> Floa
 
 
 def displacements(errors: StripErrors, rows: Rows, images: Floats) -> Floats:
-    """Give what errors of image coordinates do to things, their first models held fast.
+    """Return what errors of image coordinates do to things, their first models held fast.
 
     Parameters
     ----------
-    errors : StripErrors
-        The strip.
-    rows : Rows
-        n things of d coordinates.
     images : ndarray, shape (k, 2)
         Errors, in units of the stated standard deviations.
 
@@ -96,7 +72,7 @@ def displacements(errors: StripErrors, rows: Rows, images: Floats) -> Floats:
 
 
 def largest_turn(found: System, length: float) -> float:
-    """Give the largest turn and change of scale of a model.
+    """Return the largest turn and change of scale of a model.
 
     Parameters
     ----------

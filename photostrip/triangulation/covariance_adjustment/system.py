@@ -51,19 +51,10 @@ def pad(errors: StripErrors, rows: Rows, rank: Numbers, slots: int) -> Padded:
 
     Parameters
     ----------
-    errors : StripErrors
-        The formed strip.
-    rows : Rows
-        n things of d coordinates.
     rank : ndarray of int, shape (n,)
         Place of each among the things of its model.
     slots : int
         Models over which anything reaches.
-
-    Returns
-    -------
-    Padded
-        The rows.
     """
     models, size, have = errors.models, rows.frame.shape[1], rows.core.shape[1]
     places = max(int(rank.max(initial=0)) + 1, 1) * size
@@ -94,8 +85,6 @@ def products(a: Padded, b: Padded, models: Numbers, apart: int) -> Floats:
 
     Parameters
     ----------
-    a, b : Padded
-        Rows.
     models : ndarray of int, shape (m,)
         Models of the first.
     apart : int
@@ -156,8 +145,6 @@ class Layout:
 
     Parameters
     ----------
-    width : int
-        Models in a block.
     blocks, height : int
         Number of blocks, and rows of each.
     rank : ndarray of int, shape (n,)
@@ -215,7 +202,7 @@ class Matrix:
 
     @classmethod
     def zero(cls, layout: Layout) -> Matrix:
-        """Give an empty one."""
+        """Return an empty one."""
         shape = (layout.blocks, layout.height, layout.height)
         return cls(np.zeros(shape), np.zeros(shape))
 
@@ -250,10 +237,6 @@ class System:
     ----------
     layout : Layout
         Where everything stands.
-    padded : Padded
-        The conditions model by model.
-    factors : block_tridiagonal.Factors
-        The eliminated system.
     solution : ndarray, shape (g, b)
         Correlates of the conditions, and unknowns.
     """
@@ -287,17 +270,10 @@ def system(errors: StripErrors, wanted: Conditions, factor: float) -> System:
 
     Parameters
     ----------
-    errors : StripErrors
-        The formed strip.
     wanted : Conditions
         Conditions, model by model.
     factor : float
         Variance factor of the image coordinates.
-
-    Returns
-    -------
-    System
-        The solution.
 
     Notes
     -----

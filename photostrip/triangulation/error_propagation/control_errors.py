@@ -111,8 +111,6 @@ def misclosures(points: Rows, control: ControlPoints, control_rows: Numbers, axe
 
     Parameters
     ----------
-    points : Rows
-        Points of the strip.
     control : ControlPoints
         The control, with standard deviations along `axes`.
     control_rows : ndarray of int, shape (c,)
@@ -150,8 +148,6 @@ def correction(
 
     Parameters
     ----------
-    found : Misclosures
-        The control coordinates.
     weight : ndarray, shape (c, 3)
         Weights of the control coordinates in the fit, as ``absolute_orientation.weights`` gives them.
     xyz : ndarray, shape (c, 3)
@@ -160,11 +156,6 @@ def correction(
         Terms of the polynomials of X, Y, Z; all empty without.
     origin : ndarray, shape (3,)
         Origin of the similarities.
-
-    Returns
-    -------
-    Correction
-        The operator.
     """
     design, share = found.rows.frame[:, 0], np.sqrt(weight[found.point, found.axis])
     size = np.abs(design).max(axis=0)

@@ -40,8 +40,6 @@ class CheckTest:
 
     Parameters
     ----------
-    points : int
-        Check points.
     coordinates : int
         Their coordinates, the expectation of the sum of squares.
     squares : float
@@ -63,8 +61,6 @@ def image_variance(orientation: Orientation, sigma: float) -> tuple[float, str]:
 
     Parameters
     ----------
-    orientation : Orientation
-        Oriented pairs.
     sigma : float
         Stated standard deviation of an image coordinate of weight one, mm.
 
@@ -156,10 +152,6 @@ def fitted(errors: StripErrors, found: Misclosures, operator: Floats, factor: fl
 
     Parameters
     ----------
-    errors : StripErrors
-        The strip.
-    found : Misclosures
-        The control.
     operator : ndarray, shape (t, w)
         Parameters by misclosures.
     factor : float
@@ -186,10 +178,6 @@ def sums_of(errors: StripErrors, rows: Rows, operator: Floats) -> Floats:
 
     Parameters
     ----------
-    errors : StripErrors
-        The strip.
-    rows : Rows
-        Rows with d = 1.
     operator : ndarray, shape (t, n)
         What is summed.
 
@@ -209,10 +197,6 @@ def by_images(errors: StripErrors, rows: Rows, weights: Floats) -> Floats:
 
     Parameters
     ----------
-    errors : StripErrors
-        The strip.
-    rows : Rows
-        Rows with d = 1.
     weights : ndarray, shape (n,)
         Weights of the rows.
 
@@ -285,12 +269,8 @@ def covariances(errors: StripErrors, rows: Rows, fit: Fitted, influence: Floats)
 
     Parameters
     ----------
-    errors : StripErrors
-        The strip.
     rows : Rows
         What is asked for, n things of d coordinates.
-    fit : Fitted
-        Parameters fitted to the control.
     influence : ndarray, shape (n, d, t)
         What each parameter subtracts.
 
@@ -346,8 +326,6 @@ def own_with_units(errors: StripErrors, rows: Rows) -> Floats:
 
     Parameters
     ----------
-    errors : StripErrors
-        The strip.
     rows : Rows
         n things of d coordinates, reaching over s models.
 

@@ -77,7 +77,7 @@ class Rows:
     own: Floats
 
     def taken(self, order: Numbers) -> Rows:
-        """Give the rows of some things, or of all in another order."""
+        """Return the rows of some things, or of all in another order."""
         back = np.full(len(self.first), -1)
         back[order] = np.arange(len(order))
         item = back[self.item]
@@ -92,7 +92,7 @@ class Rows:
         )
 
     def part(self, start: int, stop: int) -> Rows:
-        """Give the rows of the things from start to stop."""
+        """Return the rows of the things from start to stop."""
         low, high = np.searchsorted(self.item, [start, stop])
         return Rows(
             self.first[start:stop],

@@ -35,19 +35,12 @@ def with_bridges(
     ----------
     points : Rows
         Points of the strip; those without a model are empty but for ``frame``.
-    strip : tuple of Orientation and FormedStrip
-        Pairs and strip.
     seen : tuple of Images and ndarray of int
         Image points, and the place of each pair's two points among them.
     photos : tuple of ndarray
         Perspective centres (p + 1, 3) from the common origin in metres, and rotations (p + 1, 3, 3).
     steps : ndarray, shape (p, 7, 6)
         Steps between the models.
-
-    Returns
-    -------
-    Rows
-        All points.
     """
     orientation, formed = strip
     images, place = seen

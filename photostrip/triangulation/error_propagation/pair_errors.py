@@ -65,8 +65,6 @@ def differentiate(orientation: Orientation, rotations: Floats, scale: Floats) ->
 
     Parameters
     ----------
-    orientation : Orientation
-        Oriented pairs.
     rotations : ndarray, shape (p, 3, 3)
         Left photo of each pair to the frame of the ground.
     scale : ndarray, shape (p,)

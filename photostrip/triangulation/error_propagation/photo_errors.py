@@ -55,12 +55,8 @@ def photo_rows(
 
     Parameters
     ----------
-    errors : StripErrors
-        The strip.
     seen : Sightings
         What the photos were oriented on.
-    resection : Resection
-        Their orientation.
     influence : ndarray, shape (q, 3, t)
         What the parameters fitted to the control take away from the points.
 

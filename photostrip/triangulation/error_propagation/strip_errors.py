@@ -53,17 +53,11 @@ class StripErrors:
 
     Parameters
     ----------
-    images : Images
-        Image points.
     steps : ndarray, shape (p, 7, 6)
         Step from the similarity of each model to the next by the model's units; after the last model that of the last
         photo.
     covariances : ndarray, shape (p, 3, 6, 6)
         Covariances of the units of each model with those of itself, the next and the one after.
-    points : Rows
-        Points of the formed strip.
-    pairs : PairErrors
-        Derivatives within the pairs.
     origin : ndarray, shape (3,)
         Common origin of all similarities.
     """
@@ -88,10 +82,6 @@ def strip_errors(
 
     Parameters
     ----------
-    orientation : Orientation
-        Oriented pairs.
-    formed : FormedStrip
-        The strip formed from them.
     similarity : Similarity
         From the strip to the frame of the ground.
     position : ndarray of int, shape (k,)
@@ -130,15 +120,6 @@ def _images(orientation: Orientation, position: Numbers, sigma: Floats) -> tuple
 
 def scale_shares(orientation: Orientation, formed: FormedStrip, derivatives: PairErrors) -> tuple[Floats, Floats]:
     """Share of every pass point in the logarithm of the scale handed on, by its vectors from the common centre.
-
-    Parameters
-    ----------
-    orientation : Orientation
-        Oriented pairs.
-    formed : FormedStrip
-        The strip.
-    derivatives : PairErrors
-        Vectors of the model points.
 
     Returns
     -------
@@ -183,7 +164,7 @@ def _units(
 
 
 def _steps(derivatives: PairErrors, next_centers: Floats) -> Floats:
-    """Give the steps by units: t = dB - theta x (S - O) - mu (S - O), theta, mu; S the centre that joins the models."""
+    """Return the steps by units: t = dB - theta x (S - O) - mu (S - O), theta, mu; S the centre that joins the models."""
     steps = np.zeros((len(next_centers), PARAMETERS, UNITS))
     steps[:, :3, ELEMENTS] = derivatives.base + cross_matrix(next_centers) @ derivatives.turn
     steps[:, :3, SCALE] = -next_centers

@@ -55,8 +55,6 @@ class Settings:
     ----------
     principal_point, distortion : bool
         Reduce to the principal point of the camera; take out its lens distortion.
-    refraction : bool
-        Correct for atmospheric refraction.
     flying_height, ground_height : float or None
         Mean heights of the perspective centers and of the ground above sea level, in metres; None: derived
         from camera and control.
@@ -72,12 +70,7 @@ class Settings:
     earth_radius: float | None = None
 
     def seen_by(self, camera: Camera) -> Camera:
-        """Give a camera without what is not to be corrected.
-
-        Parameters
-        ----------
-        camera : Camera
-            As it is calibrated.
+        """Return a camera without what is not to be corrected.
 
         Returns
         -------
@@ -147,10 +140,6 @@ def refine(
     ----------
     observations : PhotoPoints
         Photo coordinates, mm, in the system in which the principal point of the camera is given.
-    camera_of_photo : mapping of str to Camera
-        Camera of each photo.
-    settings : Settings
-        What is corrected.
     flying_height, ground_height : float, optional
         Heights above sea level in metres that count where the settings have none.
 
@@ -192,16 +181,12 @@ def refine(
 
 
 def undistort(image_xy: ArrayLike, camera: Camera, bending: Bending = NOTHING_BENT) -> Floats:
-    """Give the ideal points of image points of one camera.
+    """Return the ideal points of image points of one camera.
 
     Parameters
     ----------
     image_xy : array_like, shape (n, 2)
         Photo coordinates, mm.
-    camera : Camera
-        The camera.
-    bending : Bending
-        Refraction and Earth curvature.
 
     Returns
     -------
@@ -212,16 +197,12 @@ def undistort(image_xy: ArrayLike, camera: Camera, bending: Bending = NOTHING_BE
 
 
 def distort(ideal_xy: ArrayLike, camera: Camera, bending: Bending = NOTHING_BENT) -> Floats:
-    """Give the image points of ideal points of one camera; the exact inverse of ``undistort``.
+    """Return the image points of ideal points of one camera; the exact inverse of ``undistort``.
 
     Parameters
     ----------
     ideal_xy : array_like, shape (n, 2)
         Ideal coordinates reduced to the principal point, mm.
-    camera : Camera
-        The camera.
-    bending : Bending
-        Refraction and Earth curvature.
 
     Returns
     -------

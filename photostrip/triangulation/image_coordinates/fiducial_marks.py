@@ -36,8 +36,6 @@ class Marks:
 
     Parameters
     ----------
-    camera : Camera
-        The camera.
     photos, names : tuple of str
         Photos (p) and marks (m).
     calibrated : ndarray, shape (m, 2)
@@ -61,12 +59,12 @@ class Marks:
         return np.asarray((self.weights > 0).sum(1), np.intp)
 
     def take(self, rows: Flags) -> Marks:
-        """Give the marks of some photos."""
+        """Return the marks of some photos."""
         photos = tuple(photo for photo, kept in zip(self.photos, rows, strict=True) if kept)
         return Marks(self.camera, photos, self.names, self.calibrated, self.measured[rows], self.weights[rows])
 
     def on_photo(self, row: int) -> tuple[str, ...]:
-        """Give the marks measured on one photo."""
+        """Return the marks measured on one photo."""
         return tuple(name for name, weight in zip(self.names, self.weights[row], strict=True) if weight > 0)
 
 
@@ -96,10 +94,6 @@ def gather(fiducials: PhotoPoints, camera: Camera, photos: tuple[str, ...]) -> t
     ----------
     fiducials : PhotoPoints
         Measured marks; ``point_ids`` are their names.
-    camera : Camera
-        Camera with calibrated marks.
-    photos : tuple of str
-        Its photos.
 
     Returns
     -------
@@ -142,8 +136,6 @@ def enough(marks: Marks, kind: str) -> tuple[Marks, list[Fault]]:
 
     Parameters
     ----------
-    marks : Marks
-        Measured marks.
     kind : str
         Transformation to be fitted, or ``"auto"``.
 
@@ -289,7 +281,7 @@ def _stranger(marks: Marks, row: int, *, mirrored: bool) -> tuple[str, float] | 
 
 
 def fault(code: str, message: str, *, expected: str = "", fix: str = "") -> Fault:
-    """Give a fault of the measured marks.
+    """Return a fault of the measured marks.
 
     Parameters
     ----------

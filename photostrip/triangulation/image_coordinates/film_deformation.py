@@ -63,7 +63,7 @@ class Deformation:
         return cls(tuple(nodes), tuple(-r if s else none for r, s in zip(residuals, seen, strict=True)))
 
     def unseen(self) -> Numbers:
-        """Give the photos whose marks do not show a deformation."""
+        """Return the photos whose marks do not show a deformation."""
         return np.flatnonzero([len(each) == 0 for each in self.nodes])
 
     def corrected(self, photo: Numbers, xy: Floats) -> Floats:
@@ -88,7 +88,7 @@ class Deformation:
         return self._each(photo, xy, lambda points, shift: points + shift(points))
 
     def deformed(self, photo: Numbers, xy: Floats) -> Floats:
-        """Give the coordinates that ``corrected`` corrects to these; its inverse.
+        """Return the coordinates that ``corrected`` corrects to these; its inverse.
 
         Parameters
         ----------

@@ -72,14 +72,8 @@ class InteriorOrientation:
 
     Parameters
     ----------
-    photo_ids : tuple of str
-        Oriented photos.
-    transforms : tuple of str
-        Kind of transformation of each.
     photo_from_measured : PlaneTransform
         The transformations, coefficients of shape (p, 3, 4): measured coordinates to photo coordinates, mm.
-    marks : tuple of tuple of str
-        Marks used on each photo.
     residuals : tuple of ndarray, shape (m, 2)
         Transformed minus calibrated coordinates of these marks in the photo system, mm.
     sigma0 : ndarray, shape (p,)
@@ -135,8 +129,6 @@ def orient(fiducials: PhotoPoints, cameras: Mapping[str, Camera], settings: Sett
         Measured marks; ``point_ids`` are their names. The sigma of a row counts as one weight for both coordinates.
     cameras : mapping of str to Camera
         Camera of each photo of the project. Photos of cameras without fiducial marks are left as they are.
-    settings : Settings
-        Kind of transformation.
 
     Returns
     -------
@@ -186,8 +178,6 @@ def transform(observations: PhotoPoints, interior: InteriorOrientation) -> Photo
     ----------
     observations : PhotoPoints
         Points in the system in which the marks were measured.
-    interior : InteriorOrientation
-        Interior orientation of their photos.
 
     Returns
     -------
@@ -222,14 +212,12 @@ def transform(observations: PhotoPoints, interior: InteriorOrientation) -> Photo
 
 
 def measured(photo_points: PhotoPoints, interior: InteriorOrientation) -> PhotoPoints:
-    """Give the measured coordinates of photo points; the inverse of ``transform``.
+    """Return the measured coordinates of photo points; the inverse of ``transform``.
 
     Parameters
     ----------
     photo_points : PhotoPoints
         Points in the system of the fiducial marks, mm.
-    interior : InteriorOrientation
-        Interior orientation of their photos.
 
     Returns
     -------

@@ -46,8 +46,6 @@ def ideal_from_image(xy: ArrayLike, distortion: Distortion) -> Floats:
     ----------
     xy : array_like, shape (n, 2)
         Image coordinates reduced to the principal point, mm.
-    distortion : Distortion
-        Distortion of the lens.
 
     Returns
     -------
@@ -77,8 +75,6 @@ def image_from_ideal(xy: ArrayLike, distortion: Distortion) -> Floats:
     ----------
     xy : array_like, shape (n, 2)
         Ideal coordinates, mm.
-    distortion : Distortion
-        Distortion of the lens.
 
     Returns
     -------
@@ -104,8 +100,6 @@ def shift(xy: Floats, distortion: Distortion) -> Floats:
     ----------
     xy : ndarray, shape (n, 2)
         Points in which D is defined (image or ideal ones, by the direction), reduced to the principal point, mm.
-    distortion : Distortion
-        Distortion of the lens.
 
     Returns
     -------
@@ -133,8 +127,6 @@ def jacobian(xy: Floats, distortion: Distortion) -> Floats:
     ----------
     xy : ndarray, shape (n, 2)
         Points as in ``shift``.
-    distortion : Distortion
-        Distortion of the lens.
 
     Returns
     -------
@@ -152,12 +144,7 @@ def jacobian(xy: Floats, distortion: Distortion) -> Floats:
 
 
 def reach(distortion: Distortion) -> tuple[float, float]:
-    """Give the radii up to which the distortion is known.
-
-    Parameters
-    ----------
-    distortion : Distortion
-        Distortion of the lens.
+    """Return the radii up to which the distortion is known.
 
     Returns
     -------
@@ -176,8 +163,6 @@ def faults(camera: Camera, farthest: float = 0.0) -> list[Fault]:
 
     Parameters
     ----------
-    camera : Camera
-        The camera.
     farthest : float
         Radius of the farthest image point that will be measured, mm; the format counts in any case.
 

@@ -39,10 +39,6 @@ class FormedModels:
 
     Parameters
     ----------
-    models : StripModels
-        The models.
-    links : Screened
-        The links between them.
     places : Similarities
         From each model to the strip.
     model_xyz : ndarray, shape (n, 3)
@@ -90,7 +86,7 @@ class FormedModels:
         return bool((self.node >= self.models.points).any())
 
     def overturned(self) -> FormedModels:
-        """Give the strip turned by 180 degrees about its X axis."""
+        """Return the strip turned by 180 degrees about its X axis."""
         turn = np.diag([1.0, -1.0, -1.0])
         places = linking.Similarities(self.places.scale, turn @ self.places.rotation, self.places.shift @ turn)
         return replace(self, places=places, model_xyz=self.model_xyz @ turn, node_xyz=self.node_xyz @ turn)
@@ -136,14 +132,8 @@ def require_links(shared: Common, models: StripModels, used: Flags, names: Seque
 
     Parameters
     ----------
-    shared : Common
-        Common rows.
-    models : StripModels
-        The models.
     used : ndarray of bool, shape (t,)
         Rows that count.
-    names : sequence of str
-        Ids of the models.
 
     Raises
     ------
@@ -187,10 +177,6 @@ def form(models: StripModels, links: Screened, photos: Numbers) -> FormedModels:
 
     Parameters
     ----------
-    models : StripModels
-        The models.
-    links : Screened
-        The links between them.
     photos : ndarray of int, shape (f,)
         Node of the centre of each photo, in flight order.
 

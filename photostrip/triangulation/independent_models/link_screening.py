@@ -84,12 +84,8 @@ class Screened:
 
     Parameters
     ----------
-    shared : Common
-        Common rows.
     used : ndarray of bool, shape (t,)
         Rows that took part.
-    solved : Solved
-        The links.
     value, limit : ndarray, shapes (t,), (j,)
         Test values of the rows used, and the critical value of each link.
     rejections : tuple of Rejection
@@ -118,10 +114,6 @@ def reflected(shared: Common, models: StripModels, used: Flags) -> Flags:
 
     Parameters
     ----------
-    shared : Common
-        Common rows.
-    models : StripModels
-        The models.
     used : ndarray of bool, shape (t,)
         Rows that count.
 
@@ -146,10 +138,6 @@ def screen(shared: Common, models: StripModels, settings: Settings, kept: Flags)
     ----------
     shared : Common
         Common rows; every link has three that are not on one line.
-    models : StripModels
-        The models.
-    settings : Settings
-        Level of the test.
     kept : ndarray of bool, shape (t,)
         Rows that the user keeps.
 
@@ -235,13 +223,6 @@ def _doubtful(shared: Common, value: Floats, limit: Floats) -> tuple[tuple[int, 
 
 def detectable(shared: Common, screened: Screened) -> Floats:
     """Smallest error of each common point that its link finds in 80 % of cases, mm.
-
-    Parameters
-    ----------
-    shared : Common
-        Common rows.
-    screened : Screened
-        The links.
 
     Returns
     -------

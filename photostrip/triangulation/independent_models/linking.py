@@ -38,8 +38,6 @@ class StripModels:
 
     Parameters
     ----------
-    count : int
-        Number of models.
     points : int
         Nodes below this number are points, the others perspective centres.
     row : ndarray of int, shape (n,)
@@ -69,8 +67,6 @@ class Common:
         Link of each row, ascending.
     before, after : ndarray of int, shape (t,)
         Rows of ``StripModels`` in the model before and in the one after.
-    count : int
-        Number of links.
     """
 
     link: Numbers
@@ -148,11 +144,6 @@ class Solved:
 def common(models: StripModels) -> Common:
     """Find what neighbouring models have in common.
 
-    Parameters
-    ----------
-    models : StripModels
-        Models of a strip.
-
     Returns
     -------
     Common
@@ -172,10 +163,6 @@ def closed_form(shared: Common, models: StripModels, share: Floats) -> tuple[Sim
 
     Parameters
     ----------
-    shared : Common
-        Common rows.
-    models : StripModels
-        The models.
     share : ndarray, shape (t,)
         Weight of each row, 0 for rows not used.
 
@@ -233,10 +220,6 @@ def extents(shared: Common, models: StripModels, used: Flags) -> Floats:
 
     Parameters
     ----------
-    shared : Common
-        Common rows.
-    models : StripModels
-        The models.
     used : ndarray of bool, shape (t,)
         Rows that count.
 
@@ -259,8 +242,6 @@ def solve(shared: Common, models: StripModels, used: Flags) -> Solved:
     ----------
     shared : Common
         Common rows; every link has at least three in use that are not on one line.
-    models : StripModels
-        The models.
     used : ndarray of bool, shape (t,)
         Rows that count.
 
@@ -320,10 +301,6 @@ def studentised(shared: Common, solved: Solved, used: Flags) -> tuple[Floats, Fl
 
     Parameters
     ----------
-    shared : Common
-        Common rows.
-    solved : Solved
-        The links.
     used : ndarray of bool, shape (t,)
         Rows that took part.
 

@@ -54,8 +54,6 @@ class ModelErrors:
         Share of the row in the mean of its node.
     frame : ndarray, shape (k, 3, 7)
         Displacement of every node by a similarity.
-    models : int
-        Number of models.
     """
 
     origin: Floats
@@ -77,8 +75,6 @@ def differentiate(formed: FormedModels, similarity: Similarity) -> ModelErrors:
 
     Parameters
     ----------
-    formed : FormedModels
-        The strip.
     similarity : Similarity
         From the strip to the frame of the ground.
 
@@ -136,8 +132,6 @@ def sums(errors: ModelErrors, nodes: Numbers, weights: Floats) -> Floats:
 
     Parameters
     ----------
-    errors : ModelErrors
-        The strip.
     nodes : ndarray of int, shape (c,)
         Nodes, counted as ``FormedModels.node``, each at most once.
     weights : ndarray, shape (t, c, 3)
@@ -176,8 +170,6 @@ def with_sums(errors: ModelErrors, coefficients: Floats) -> Floats:
 
     Parameters
     ----------
-    errors : ModelErrors
-        The strip.
     coefficients : ndarray, shape (t, n, 3)
         Of the sums, as ``sums`` gives them.
 
@@ -204,11 +196,6 @@ def with_sums(errors: ModelErrors, coefficients: Floats) -> Floats:
 
 def covariances(errors: ModelErrors) -> Floats:
     """Covariances of the nodes of the formed strip relative to its first model, shape (k, 3, 3), metres^2.
-
-    Parameters
-    ----------
-    errors : ModelErrors
-        The strip.
 
     Returns
     -------

@@ -79,8 +79,6 @@ def found(
     ----------
     code : str
         Its kind, a key of ``KINDS``.
-    message, fix, evidence, photos, points, strips, key
-        As for ``notes.Finding``.
 
     Returns
     -------

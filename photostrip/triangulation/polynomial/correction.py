@@ -60,8 +60,6 @@ class Polynomial:
         Different stations along the strip in plan and in height.
     reach : tuple of float
         Range of the control along X, metres.
-    asked : str
-        What the settings asked for.
     """
 
     degree: int
@@ -100,8 +98,6 @@ def fit(problem: Problem, settings: Settings) -> Polynomial:
 
     Parameters
     ----------
-    problem : Problem
-        Control points after the similarity.
     settings : Settings
         Degree, or ``"auto"``.
 

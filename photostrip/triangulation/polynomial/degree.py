@@ -37,8 +37,6 @@ class Evidence:
     ----------
     group : str
         ``"plan"`` (X and Y) or ``"height"``.
-    degree : int
-        0 for the similarity alone.
     terms : int
         Number of terms in each axis of the group.
     redundancy : int
@@ -92,8 +90,6 @@ def decide(
 
     Parameters
     ----------
-    problem : Problem
-        Control points after the similarity.
     part : tuple
         Name and axes of the part, one of ``GROUPS``.
     asked : str
@@ -103,8 +99,6 @@ def decide(
 
     Returns
     -------
-    terms : tuple of str
-        Terms of the part.
     evidence : list of Evidence
         Every degree that was weighed, ascending.
     """
@@ -152,7 +146,7 @@ def _step_taken(p: float, rich: float, simple: float) -> bool:
 
 
 def _expected(problem: Problem) -> Floats:
-    """Give the standard deviation, by axis in metres, of a misclosure from the control and the point alone."""
+    """Return the standard deviation, by axis in metres, of a misclosure from the control and the point alone."""
     weight = problem.by_axis
     with np.errstate(divide="ignore", invalid="ignore"):
         variance = np.where(weight > 0, 1 / weight, 0.0).sum(axis=0) / (weight > 0).sum(axis=0)

@@ -40,8 +40,6 @@ class AxisFit:
         Orthonormal basis of the weighted design; its rows say how control coordinates share in the fit.
     sigma0 : float
         Standard deviation in metres of a control coordinate of mean weight; NaN without redundancy.
-    redundancy : int
-        Control coordinates minus terms.
     condition : float
         Condition number of the scaled design; NaN without terms.
     """
@@ -71,8 +69,6 @@ class Problem:
     ----------
     xyz : ndarray, shape (n, 3)
         Control points after the similarity, intermediate frame, metres.
-    targets : Targets
-        What they should be.
     weight : ndarray, shape (n, 3)
         Weights along the points' axes (east, north, up), metres^-2; 0 where a coordinate does not count.
     spacing : float
@@ -183,8 +179,6 @@ def fit_axes(problem: Problem, terms: Terms) -> list[AxisFit]:
 
     Parameters
     ----------
-    problem : Problem
-        Control points after the similarity.
     terms : tuple of tuple of str
         Terms of X, Y, Z.
 

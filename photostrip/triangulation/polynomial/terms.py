@@ -77,8 +77,6 @@ def count_stations(x: Floats, spacing: float) -> int:
     ----------
     x : ndarray, shape (n,)
         Positions along the strip.
-    spacing : float
-        Smallest distance of two stations.
 
     Returns
     -------
@@ -166,7 +164,7 @@ def ladder(stations: int, points: int, degree: int) -> tuple[str, ...]:
 
 
 def dropped(terms: tuple[str, ...], drop: str) -> tuple[str, ...]:
-    """Give the terms without one of them."""
+    """Return the terms without one of them."""
     return tuple(term for term in terms if term != drop)
 
 

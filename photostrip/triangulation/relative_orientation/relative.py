@@ -111,8 +111,6 @@ class Pairs:
         -------
         Pairs
             The measurements of those pairs, renumbered from 0.
-        rows : ndarray of int
-            Their rows in this table.
         """
         wanted = np.zeros(self.size, bool)
         wanted[pairs] = True
@@ -147,8 +145,6 @@ def rays(elements: Floats, pairs: Pairs) -> tuple[Floats, Floats]:
     ----------
     elements : ndarray, shape (p, 5)
         Elements of the pairs in radians.
-    pairs : Pairs
-        Measurements.
 
     Returns
     -------
@@ -175,8 +171,6 @@ def parallaxes(elements: Floats, pairs: Pairs) -> Floats:
     ----------
     elements : ndarray, shape (p, 5)
         Elements of the pairs in radians.
-    pairs : Pairs
-        Measurements.
 
     Returns
     -------
@@ -189,14 +183,12 @@ def parallaxes(elements: Floats, pairs: Pairs) -> Floats:
 
 
 def linearised(elements: Floats, pairs: Pairs) -> tuple[Floats, Floats]:
-    """Give the residual y parallaxes and their exact derivatives by the five elements.
+    """Return the residual y parallaxes and their exact derivatives by the five elements.
 
     Parameters
     ----------
     elements : ndarray, shape (p, 5)
         Elements of the pairs in radians.
-    pairs : Pairs
-        Measurements.
 
     Returns
     -------
@@ -248,11 +240,6 @@ def normal_matrices(jacobian: Floats, pairs: Pairs) -> Floats:
 def start_values(pairs: Pairs) -> Floats:
     """Elements to start from: both photos turned so that the mean parallax runs along x.
 
-    Parameters
-    ----------
-    pairs : Pairs
-        Measurements.
-
     Returns
     -------
     ndarray, shape (p, 5)
@@ -273,8 +260,6 @@ def iterate(
     ----------
     elements : ndarray, shape (p, 5)
         Start values in radians.
-    pairs : Pairs
-        Measurements.
     watch : callable, optional
         Told of every step: the numbers of the pairs that take part, their elements before it, their sums of weighted
         squares of the y parallaxes in mm^2, and what is added to the elements.
@@ -328,8 +313,6 @@ def in_front(elements: Floats, pairs: Pairs) -> NDArray[np.bool_]:
     ----------
     elements : ndarray, shape (p, 5)
         Elements of the pairs in radians.
-    pairs : Pairs
-        Measurements.
 
     Returns
     -------
@@ -366,11 +349,6 @@ def solve(pairs: Pairs) -> tuple[Floats, NDArray[np.bool_], Numbers]:
     out behind a camera, or the y parallaxes stay large: with tilts beyond 10 degrees there are false minima with all
     points in front. Of the solutions found, the one with most points in front and then the smallest sum of squares is
     taken.
-
-    Parameters
-    ----------
-    pairs : Pairs
-        Measurements.
 
     Returns
     -------
@@ -493,8 +471,6 @@ def collect_pairs(
     ----------
     observations : PhotoPoints
         Image points, reduced to the principal point.
-    photos : sequence of str
-        Photos of the strip in flight order.
     focal : float
         Principal distance in mm.
 
@@ -585,11 +561,6 @@ def assess(elements: Floats, pairs: Pairs, point: Numbers, rows: Numbers, iterat
         Measurements with the weights in force.
     point, rows, iterations : ndarray
         As in ``Orientation``.
-
-    Returns
-    -------
-    Orientation
-        The oriented pairs.
     """
     with np.errstate(all="ignore"):
         q, jacobian = linearised(elements, pairs)
@@ -615,15 +586,11 @@ def attempt(pairs: Pairs, point: Numbers, rows: Numbers) -> tuple[Orientation, N
 
     Parameters
     ----------
-    pairs : Pairs
-        Measurements.
     point, rows : ndarray
         As ``collect_pairs`` gives them.
 
     Returns
     -------
-    Orientation
-        The pairs.
     converged : ndarray of bool, shape (p,)
         Whether the iteration of each pair converged.
     """
@@ -638,8 +605,6 @@ def doubtful(
 
     Parameters
     ----------
-    result : Orientation
-        The pairs.
     converged : ndarray of bool, shape (p,)
         Whether the iteration of each pair converged.
     known : tuple of ndarray, shape (3, m), optional
@@ -661,11 +626,6 @@ def doubtful(
 
 def mean_parallax(result: Orientation) -> Floats:
     """Mean x parallax of the points of each pair, turned into the base frame, mm.
-
-    Parameters
-    ----------
-    result : Orientation
-        The pairs.
 
     Returns
     -------
@@ -689,8 +649,6 @@ def require(result: Orientation, converged: NDArray[np.bool_], photos: Sequence[
 
     Parameters
     ----------
-    result : Orientation
-        The pairs.
     converged : ndarray of bool, shape (p,)
         Whether the iteration of each pair converged.
     photos : sequence of str
@@ -710,17 +668,10 @@ def orient(pairs: Pairs, point: Numbers, rows: Numbers, photos: Sequence[str]) -
 
     Parameters
     ----------
-    pairs : Pairs
-        Measurements.
     point, rows : ndarray
         As ``collect_pairs`` gives them.
     photos : sequence of str
         Photos of the strip, to name a pair that is refused.
-
-    Returns
-    -------
-    Orientation
-        The oriented pairs.
 
     Raises
     ------
@@ -737,8 +688,6 @@ def refine(orientation: Orientation, weight: Floats, todo: Numbers) -> Orientati
 
     Parameters
     ----------
-    orientation : Orientation
-        The oriented pairs.
     weight : ndarray, shape (m,)
         New weights of all rows.
     todo : ndarray of int
@@ -765,8 +714,6 @@ def taken(orientation: Orientation, todo: Numbers) -> tuple[Orientation, Numbers
 
     Parameters
     ----------
-    orientation : Orientation
-        All pairs.
     todo : ndarray of int
         Pairs to take, ascending.
 
@@ -788,12 +735,8 @@ def put_back(orientation: Orientation, todo: Numbers, rows: Numbers, part: Orien
 
     Parameters
     ----------
-    orientation : Orientation
-        All pairs.
     todo, rows : ndarray of int
         The pairs that were taken, ascending, and their rows.
-    part : Orientation
-        What became of them.
 
     Returns
     -------
@@ -815,11 +758,6 @@ def restored(orientation: Orientation, earlier: Orientation, todo: Numbers) -> O
         The same pairs now and before.
     todo : ndarray of int
         Pairs to restore, ascending.
-
-    Returns
-    -------
-    Orientation
-        All pairs.
     """
     if not len(todo):
         return orientation

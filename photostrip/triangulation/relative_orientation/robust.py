@@ -40,8 +40,6 @@ def median_by_pair(values: Floats, pairs: Pairs, use: NDArray[np.bool_]) -> Floa
     ----------
     values : ndarray, shape (m,)
         Values by row.
-    pairs : Pairs
-        The pairs.
     use : ndarray of bool, shape (m,)
         Rows that count.
 
@@ -60,11 +58,6 @@ def median_by_pair(values: Floats, pairs: Pairs, use: NDArray[np.bool_]) -> Floa
 
 def start_values(pairs: Pairs) -> Floats:
     """Elements to start from that single wrong points do not turn: the median parallax runs along x.
-
-    Parameters
-    ----------
-    pairs : Pairs
-        Measurements.
 
     Returns
     -------

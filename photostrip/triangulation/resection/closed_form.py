@@ -52,8 +52,6 @@ class OrientedPhoto:
         Measured minus computed image coordinates, mm.
     sigma0 : float
         Standard deviation of unit weight; NaN without redundancy.
-    redundancy : int
-        Image coordinates minus six.
     """
 
     center: Floats
@@ -274,8 +272,6 @@ def intersect_points(
         Photo and point of each row.
     photos : tuple of ndarray
         Centres (m, 3), rotations (m, 3, 3) and principal distances (m,) in mm.
-    count : int
-        Number of points q.
 
     Returns
     -------

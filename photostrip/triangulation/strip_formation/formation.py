@@ -114,8 +114,6 @@ class FormedStrip:
         Strip coordinates, mean over the models that hold the point.
     models : ndarray of int, shape (q,)
         Number of those models.
-    junctions : Junctions
-        Scale transfer.
     bridging : ndarray of int, shape (b,)
         Rows of the observations that place points without a model: of photos that are not neighbours.
     home : ndarray of int, shape (q,)
@@ -174,11 +172,6 @@ def hand_on(rotations: Floats) -> Floats:
 
 def model_points(orientation: Orientation) -> tuple[Floats, Floats, Flags]:
     """Points of every model in the frame of its left photo, base length 1.
-
-    Parameters
-    ----------
-    orientation : Orientation
-        Oriented pairs.
 
     Returns
     -------
@@ -250,14 +243,10 @@ def transfer_scale(
 
     Parameters
     ----------
-    orientation : Orientation
-        Oriented pairs.
     vectors : ndarray, shape (m, 3)
         Model points as ``model_points`` gives them.
     sound : ndarray of bool, shape (m,)
         Which of them exist.
-    settings : Settings
-        Form of the transfer.
     photos : sequence of str
         Photos of the strip, to name a broken joint.
     sigma : ndarray, shape (p,), optional
@@ -364,10 +353,6 @@ def form(
     ----------
     orientation : Orientation
         Oriented pairs in flight order.
-    settings : Settings
-        Form of the scale transfer.
-    photos : sequence of str
-        Photos of the strip in flight order.
     sigma : ndarray, shape (p,), optional
         Standard deviation of a y parallax of weight one in each pair, mm; by default from the pairs' own residuals.
     aside : ndarray of bool, shape (m,), optional
@@ -404,8 +389,6 @@ def placed(orientation: Orientation, vectors: Floats, gap: Floats, junctions: Ju
         Oriented pairs in flight order.
     vectors, gap : ndarray
         Model points as ``model_points`` gives them.
-    junctions : Junctions
-        Scale transfer.
     use : ndarray of bool, shape (m,)
         Rows of the pairs' table whose points count.
 
@@ -439,14 +422,10 @@ def placed(orientation: Orientation, vectors: Floats, gap: Floats, junctions: Ju
 
 
 def without(formed: FormedStrip, orientation: Orientation, left_out: Flags) -> FormedStrip:
-    """Give a formed strip whose points are the means over fewer models.
+    """Return a formed strip whose points are the means over fewer models.
 
     Parameters
     ----------
-    formed : FormedStrip
-        The strip.
-    orientation : Orientation
-        Oriented pairs.
     left_out : ndarray of bool, shape (m,)
         Rows of the pairs' table that no longer count.
 

@@ -30,16 +30,10 @@ SMALLEST_ANGLE = 1e-4  # sine of the angle between the rays
 def bridge(
     formed: FormedStrip, observations: PhotoPoints, photos: Sequence[str], focal: float, rows: Numbers
 ) -> FormedStrip:
-    """Give a strip that also holds the points which some rays place without a model.
+    """Return a strip that also holds the points which some rays place without a model.
 
     Parameters
     ----------
-    formed : FormedStrip
-        The strip.
-    observations : PhotoPoints
-        Image points.
-    photos : sequence of str
-        Photos of the strip in flight order.
     focal : float
         Principal distance, mm.
     rows : ndarray of int

@@ -45,8 +45,6 @@ def spreads(
 
     Parameters
     ----------
-    orientation : Orientation
-        Oriented pairs.
     vectors : ndarray, shape (m, 3)
         Model points, base length 1.
     rows : sequence of ndarray of int, shape (t,)
@@ -172,8 +170,6 @@ def screen(
         Relative standard deviations as ``spreads`` gives them.
     joint : ndarray of int, shape (t,)
         Joint of each ratio, ascending.
-    joints : int
-        Number of joints.
 
     Returns
     -------

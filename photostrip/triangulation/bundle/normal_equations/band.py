@@ -79,7 +79,7 @@ class Band:
         return found
 
     def inverse(self) -> Band:
-        """Give the elements of the inverse within the band.
+        """Return the elements of the inverse within the band.
 
         Returns
         -------

@@ -30,11 +30,6 @@ DEFECT = 7
 def is_free(problem: Problem) -> bool:
     """Whether nothing that is given says where the network is.
 
-    Parameters
-    ----------
-    problem : Problem
-        The problem.
-
     Returns
     -------
     bool
@@ -49,10 +44,6 @@ def anchor(model: Model, state: State, own: Floats) -> Floats:
 
     Parameters
     ----------
-    model : Model
-        The problem.
-    state : State
-        Where.
     own : ndarray, shape (m, 6, 6)
         Blocks of the photos in the order of the band: the conditions are made as strong as the rays.
 
@@ -97,10 +88,6 @@ def photo_generators(model: Model, state: State, origin: Floats) -> Floats:
 
     Parameters
     ----------
-    model : Model
-        The problem.
-    state : State
-        Where.
     origin : ndarray, shape (3,)
         Origin, metres.
 
@@ -123,12 +110,8 @@ def centred(model: Model, state: State, move: Move) -> Move:
 
     Parameters
     ----------
-    model : Model
-        The problem.
     state : State
         Where the step starts.
-    move : Move
-        The step.
 
     Returns
     -------
@@ -150,13 +133,6 @@ def centred(model: Model, state: State, move: Move) -> Move:
 
 def inner(model: Model, state: State) -> tuple[Floats, Floats]:
     """Origin and inverse normal matrix of the similarity of the points.
-
-    Parameters
-    ----------
-    model : Model
-        The problem.
-    state : State
-        Where.
 
     Returns
     -------

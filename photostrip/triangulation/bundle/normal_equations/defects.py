@@ -42,11 +42,6 @@ MOVES = ("shift along its x", "shift along its y", "shift along its z", "roll ab
 def refuse_repeated(problem: Problem) -> None:
     """Refuse rays that stand twice.
 
-    Parameters
-    ----------
-    problem : Problem
-        The problem.
-
     Raises
     ------
     InputError
@@ -73,8 +68,6 @@ def refuse_weak_points(model: Model, reduced: Reduced) -> None:
 
     Parameters
     ----------
-    model : Model
-        The problem.
     reduced : Reduced
         Its normal equations, without damping.
 
@@ -109,8 +102,6 @@ def listed(noun: str, names: list[str]) -> str:
     ----------
     noun : str
         What they are, in the singular.
-    names : list of str
-        Their names.
 
     Returns
     -------
@@ -151,13 +142,6 @@ class Held:
 
 def refuse_loose(model: Model, state: State) -> None:
     """Refuse parts of the network that what is given does not hold in place.
-
-    Parameters
-    ----------
-    model : Model
-        The problem.
-    state : State
-        Start of the adjustment.
 
     Raises
     ------
@@ -303,10 +287,6 @@ def refuse_singular(model: Model, reduced: Reduced, extra: Floats | None) -> NoR
 
     Parameters
     ----------
-    model : Model
-        The problem.
-    reduced : Reduced
-        The normal equations.
     extra : ndarray, shape (m, 6, 6), or None
         What was added to them as a datum.
 
@@ -346,8 +326,6 @@ def refuse_common(model: Model, before: Floats, left: Floats) -> None:
 
     Parameters
     ----------
-    model : Model
-        The problem.
     before : ndarray, shape (p, p)
         Normal matrix of the common parameters with all others known.
     left : ndarray, shape (p, p)

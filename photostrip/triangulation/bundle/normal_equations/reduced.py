@@ -56,17 +56,8 @@ def reduce(model: Model, state: State, damping: float = 0.0) -> Reduced:
 
     Parameters
     ----------
-    model : Model
-        The problem.
-    state : State
-        Where.
     damping : float
         Part of its diagonal by which the normal matrix of each point is made larger.
-
-    Returns
-    -------
-    Reduced
-        The normal equations.
     """
     structure, p, more = model.structure, len(state.common), len(model.calibrated)
     blocks = np.zeros((len(structure.rows), PHOTO, PHOTO))
@@ -161,10 +152,6 @@ def factored(model: Model, reduced: Reduced, add: Floats | None = None) -> Facto
 
     Parameters
     ----------
-    model : Model
-        The problem.
-    reduced : Reduced
-        Its normal equations.
     add : ndarray, shape (m, 6, 6), or None
         What is added to the photos' own blocks.
 

@@ -72,7 +72,7 @@ class Sparse:
         return found
 
     def inverse(self) -> Sparse:
-        """Give the elements of the inverse at the pairs."""
+        """Return the elements of the inverse at the pairs."""
         found = np.empty_like(self.blocks)
         order = np.argsort(self.columns, kind="stable")
         edges = np.searchsorted(self.columns[order], np.arange(0, self.photos + TOGETHER, TOGETHER))
@@ -86,7 +86,7 @@ class Sparse:
         return Sparse(self.photos, self.rows, self.columns, found)
 
     def _pair(self, row: Numbers, column: Numbers) -> tuple[Numbers, NDArray[np.bool_]]:
-        """Give the number of the pair of elements (row >= column), and whether there is one."""
+        """Return the number of the pair of elements (row >= column), and whether there is one."""
         keys = self.rows * self.photos + self.columns
         wanted = row // PHOTO * self.photos + column // PHOTO
         pair = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)

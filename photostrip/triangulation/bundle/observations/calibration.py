@@ -44,11 +44,6 @@ class Calibrated:
 def parameters(cameras: Cameras) -> Calibrated:
     """List the parameters to be calibrated.
 
-    Parameters
-    ----------
-    cameras : Cameras
-        The cameras.
-
     Returns
     -------
     Calibrated
@@ -96,8 +91,6 @@ def partials(wanted: Calibrated, xy: Floats, ratio: Floats, camera: Numbers) -> 
 
     Parameters
     ----------
-    wanted : Calibrated
-        The parameters.
     xy : ndarray, shape (2, ...)
         Measured ideal image coordinates, mm.
     ratio : ndarray, shape (2, ...)

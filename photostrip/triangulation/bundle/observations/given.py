@@ -57,8 +57,6 @@ def drift_columns(positions: Positions, first: int) -> tuple[Numbers, Numbers]:
 
     Parameters
     ----------
-    positions : Positions
-        The positions.
     first : int
         Number of common parameters before them.
 
@@ -80,8 +78,6 @@ def positions_at(positions: Positions, centers: Floats, rotations: Floats, commo
 
     Parameters
     ----------
-    positions : Positions
-        What is given.
     centers : ndarray, shape (m, 3)
         Perspective centres, metres.
     rotations : ndarray, shape (m, 3, 3)
@@ -90,11 +86,6 @@ def positions_at(positions: Positions, centers: Floats, rotations: Floats, commo
         Common parameters.
     calibrated : int
         How many of them are calibration parameters, which stand first.
-
-    Returns
-    -------
-    Linear
-        The linearised observations.
     """
     turn = positions.axes @ rotations[positions.photo]
     arm = np.einsum("gij,gj->gi", turn, positions.lever)
@@ -116,17 +107,10 @@ def attitudes_at(attitudes: Attitudes, rotations: Floats, common: int) -> Linear
 
     Parameters
     ----------
-    attitudes : Attitudes
-        What is given.
     rotations : ndarray, shape (m, 3, 3)
         Rotations, photo to Cartesian frame.
     common : int
         Number of common parameters, on which attitudes do not depend.
-
-    Returns
-    -------
-    Linear
-        The linearised observations.
     """
     turn = to_vector(np.swapaxes(attitudes.rotations, 1, 2) @ rotations[attitudes.photo])
     by_photo = np.zeros((len(attitudes), 3, PHOTO))
@@ -141,7 +125,7 @@ def attitudes_at(attitudes: Attitudes, rotations: Floats, common: int) -> Linear
 
 
 def _vector_by_turn(vector: Floats) -> Floats:
-    """Give the derivative of a rotation vector by a further small rotation about the turned axes, shape (n, 3, 3)."""
+    """Return the derivative of a rotation vector by a further small rotation about the turned axes, shape (n, 3, 3)."""
     angle = np.linalg.norm(vector, axis=1)
     safe = np.where(angle < SMALL, 1.0, angle)
     factor = np.where(angle < SMALL, 1.0 / 12.0, 1.0 / safe**2 - (1.0 + np.cos(safe)) / (2.0 * safe * np.sin(safe)))

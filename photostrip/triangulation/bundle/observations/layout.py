@@ -103,10 +103,6 @@ def sort_rays(images: Images, points: int, rank: Numbers) -> Sorted:
 
     Parameters
     ----------
-    images : Images
-        The rays.
-    points : int
-        Number of points q.
     rank : ndarray of int, shape (m,)
         Place of each photo in the band.
 
@@ -125,17 +121,10 @@ def arrange(images: Images, rays: Sorted, photos: int) -> tuple[Batch, ...]:
 
     Parameters
     ----------
-    images : Images
-        The rays.
     rays : Sorted
         The same, sorted.
     photos : int
         Number of photos m.
-
-    Returns
-    -------
-    tuple of Batch
-        All rays of all points.
     """
     first = np.cumsum(rays.counts) - rays.counts
     batches: list[Batch] = []

@@ -60,17 +60,10 @@ def view(batch: Batch, xyz: Floats, photos: Floats) -> Rays:
 
     Parameters
     ----------
-    batch : Batch
-        The rays.
     xyz : ndarray, shape (3, S)
         Points of the slots.
     photos : ndarray, shape (13, m)
         Of each photo: nine elements of the transposed rotation by rows, perspective centre, principal distance.
-
-    Returns
-    -------
-    Rays
-        The rays.
     """
     k, slots = batch.photo.shape
     of_ray = photos.take(batch.photo, axis=1, mode="clip")
@@ -93,11 +86,6 @@ def view(batch: Batch, xyz: Floats, photos: Floats) -> Rays:
 def by_point(rays: Rays) -> Floats:
     """Give partials of the computed image coordinates by the points.
 
-    Parameters
-    ----------
-    rays : Rays
-        Rays of a batch.
-
     Returns
     -------
     ndarray, shape (3, 2, k, S)
@@ -114,8 +102,6 @@ def by_photo(rays: Rays, more: int) -> Floats:
 
     Parameters
     ----------
-    rays : Rays
-        Rays of a batch.
     more : int
         Rows for common parameters, left to be filled, between the photo's and the misfit.
 
@@ -178,11 +164,6 @@ def eliminate(batch: Batch, xyz: Floats, rays: Rays, common: Floats | None, damp
         Partials by common parameters, in units of sigma.
     damping : float
         Part of its diagonal by which each normal matrix is made larger.
-
-    Returns
-    -------
-    Eliminated
-        What is left of them.
     """
     white = by_point(rays)
     normal, right = point_normals(batch, xyz, white, rays.misfit)
@@ -315,8 +296,6 @@ def squares(batch: Batch, partials: Floats, rows: Floats) -> tuple[Floats, Float
 
     Parameters
     ----------
-    batch : Batch
-        The groups.
     partials : ndarray, shape (6 + more + 1, 2, k, S)
         Of ``by_photo``.
     rows : ndarray, shape (6 k + more + 1, 3, S)

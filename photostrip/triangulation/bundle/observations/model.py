@@ -51,12 +51,6 @@ class Model:
 
     Parameters
     ----------
-    problem : Problem
-        The problem.
-    structure : Structure
-        Its structure.
-    calibrated : Calibrated
-        Its calibration parameters.
     prior : ndarray, shape (p,)
         A-priori sigmas of all common parameters.
     """
@@ -116,11 +110,6 @@ class Move:
 
 def model_of(problem: Problem) -> Model:
     """Prepare a problem.
-
-    Parameters
-    ----------
-    problem : Problem
-        The problem.
 
     Returns
     -------

@@ -204,18 +204,8 @@ class Problem:
 
     Parameters
     ----------
-    images : Images
-        Measured rays.
-    cameras : Cameras
-        Cameras of the photos.
     start : Start
         Start values; they say how many photos (m) and points (q) there are.
-    control : Control
-        Given coordinates of points.
-    positions : Positions
-        Given camera positions.
-    attitudes : Attitudes
-        Given attitudes.
     photo_ids, point_ids, camera_ids, group_ids : tuple of str
         Names for messages; empty: the numbers.
     """

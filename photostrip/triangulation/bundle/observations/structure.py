@@ -63,10 +63,6 @@ class Structure:
         Pairs of photos that share points (places in the band, row >= column), every photo with itself among them.
     own : ndarray of int, shape (m,)
         Which of the pairs is each photo with itself.
-    width : int
-        Largest distance of a pair.
-    batches : tuple of Batch
-        The rays.
     pairs, singles : tuple of Gather
         For each batch: of its blocks to the pairs (by pair within the set of photos, then group), and of its rays to
         photos (by ray, then group).
@@ -85,11 +81,6 @@ class Structure:
 
 def build(problem: Problem) -> Structure:
     """Find the structure of a problem.
-
-    Parameters
-    ----------
-    problem : Problem
-        The problem.
 
     Returns
     -------
@@ -127,11 +118,6 @@ def build(problem: Problem) -> Structure:
 @cache
 def triangle(rays: int) -> tuple[Numbers, Numbers]:
     """Pairs of a set of photos, the later one first: positions within the set.
-
-    Parameters
-    ----------
-    rays : int
-        Size of the set.
 
     Returns
     -------
@@ -184,7 +170,7 @@ def _pairs(rays: Sorted, photos: int) -> tuple[Numbers, Numbers]:
 
 
 def _narrower(rows: Numbers, columns: Numbers, photos: int) -> Numbers | None:
-    """Give the rank of the photos in the reverse Cuthill-McKee order, or None when that is not narrower."""
+    """Return the rank of the photos in the reverse Cuthill-McKee order, or None when that is not narrower."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import reverse_cuthill_mckee
 
@@ -200,7 +186,7 @@ def _narrower(rows: Numbers, columns: Numbers, photos: int) -> Numbers | None:
 
 
 def _with_control(batch: Batch, normal: Floats, right: Floats, where: Numbers) -> Batch:
-    """Give a batch the control of its points."""
+    """Return a batch the control of its points."""
     if not len(normal):
         return batch
     slots = batch.real[where[batch.point[batch.real]] >= 0]
@@ -215,13 +201,6 @@ def _with_control(batch: Batch, normal: Floats, right: Floats, where: Numbers) -
 
 def control_normals(control: Control, points: int) -> tuple[Floats, Floats, Numbers]:
     """Sum the control of each point.
-
-    Parameters
-    ----------
-    control : Control
-        The rows.
-    points : int
-        Number of points q.
 
     Returns
     -------
@@ -249,8 +228,6 @@ def blocks_of(added: Floats, taken: Floats, rays: int) -> tuple[Floats, Floats, 
     ----------
     added, taken : ndarray
         Of ``linearise.squares``.
-    rays : int
-        Number of rays k.
 
     Returns
     -------

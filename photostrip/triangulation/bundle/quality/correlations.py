@@ -38,8 +38,6 @@ class Correlation:
     ----------
     first, second : str
         Names: ``camera RC30: c``, ``photo 1003: shift along x``.
-    value : float
-        Their correlation.
     """
 
     first: str
@@ -49,15 +47,6 @@ class Correlation:
 
 def correlations(solution: Solution, precision: Precision, limit: float = LIMIT) -> tuple[Correlation, ...]:
     """List correlations above a limit: between common parameters, between these and photos, and within photos.
-
-    Parameters
-    ----------
-    solution : Solution
-        The adjusted problem.
-    precision : Precision
-        Its cofactors.
-    limit : float
-        Least absolute value.
 
     Returns
     -------

@@ -61,8 +61,6 @@ class Inverse:
         ----------
         sets : ndarray of int, shape (g, k)
             Photos of each set, places in the band.
-        more : int
-            How many common parameters.
 
         Returns
         -------
@@ -93,17 +91,7 @@ class Inverse:
 
 
 def precision(solution: Solution) -> Precision:
-    """Give the cofactors of all parameters and residuals.
-
-    Parameters
-    ----------
-    solution : Solution
-        An adjusted problem.
-
-    Returns
-    -------
-    Precision
-        The cofactors.
+    """Return the cofactors of all parameters and residuals.
 
     Raises
     ------

@@ -100,16 +100,7 @@ class Group:
 
 
 def groups_of(problem: Problem, solution: Solution, precision: Precision) -> tuple[Group, ...]:
-    """Give all observations with their redundancy numbers.
-
-    Parameters
-    ----------
-    problem : Problem
-        What was given.
-    solution : Solution
-        Its solution.
-    precision : Precision
-        Cofactors.
+    """Return all observations with their redundancy numbers.
 
     Returns
     -------
@@ -139,8 +130,6 @@ def noncentrality(alpha: float, power: float) -> float:
     ----------
     alpha : float
         Probability of rejecting a good observation.
-    power : float
-        Probability of finding the error.
 
     Returns
     -------
@@ -191,8 +180,6 @@ class Sigma0Test:
     ----------
     sigma0 : float
         Standard deviation of unit weight found.
-    redundancy : int
-        Redundancy.
     lower, upper : float
         Limits of sigma0 between which it lies with the probability 1 - ``SIGMA0_LEVEL``; NaN without redundancy.
     """
@@ -210,11 +197,6 @@ class Sigma0Test:
 
 def sigma0_test(solution: Solution) -> Sigma0Test:
     """Test sigma0 against 1.
-
-    Parameters
-    ----------
-    solution : Solution
-        A solution.
 
     Returns
     -------

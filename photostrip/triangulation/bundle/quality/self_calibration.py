@@ -84,8 +84,6 @@ def sigmas(asked: Sequence[Sequence[str]], prior: dict[str, float]) -> Floats | 
 
     Parameters
     ----------
-    asked : sequence of sequence of str
-        Parameters wanted of each camera.
     prior : dict of str to float
         Their a-priori standard deviations; free without one.
 
@@ -103,7 +101,7 @@ def sigmas(asked: Sequence[Sequence[str]], prior: dict[str, float]) -> Floats | 
 
 
 def millimetre(xy: Floats) -> Floats:
-    """Give the values of the parameters that move a point at the edge of the measured part of a photo by 1 mm.
+    """Return the values of the parameters that move a point at the edge of the measured part of a photo by 1 mm.
 
     Parameters
     ----------
@@ -142,12 +140,10 @@ def columns(xy: Floats) -> Floats:
 
 
 def values_of(problem: Problem, common: Floats) -> Floats:
-    """Give the calibration parameters camera by camera.
+    """Return the calibration parameters camera by camera.
 
     Parameters
     ----------
-    problem : Problem
-        The problem.
     common : ndarray, shape (p,)
         Common parameters of its solution.
 
@@ -164,12 +160,10 @@ def values_of(problem: Problem, common: Floats) -> Floats:
 
 
 def image_shift(problem: Problem, common: Floats, xy: Floats, photo: Numbers) -> Floats:
-    """Give the correction that makes ideal image coordinates of the given principal distance.
+    """Return the correction that makes ideal image coordinates of the given principal distance.
 
     Parameters
     ----------
-    problem : Problem
-        The problem.
     common : ndarray, shape (p,)
         Common parameters of its solution.
     xy : ndarray, shape (n, 2)
@@ -192,16 +186,7 @@ def image_shift(problem: Problem, common: Floats, xy: Floats, photo: Numbers) ->
 
 
 def parameters_of(problem: Problem, solution: Solution, precision: Precision) -> tuple[Parameter, ...]:
-    """Give every calibration parameter with its precision and significance.
-
-    Parameters
-    ----------
-    problem : Problem
-        The problem.
-    solution : Solution
-        Its solution.
-    precision : Precision
-        Cofactors.
+    """Return every calibration parameter with its precision and significance.
 
     Returns
     -------

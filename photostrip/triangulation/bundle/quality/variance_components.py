@@ -38,10 +38,6 @@ class Component:
     name : str
         ``image``, ``control plan``, ``control height``, ``control``, ``positions plan``, ``positions height`` or
         ``attitudes``.
-    observations : int
-        Coordinates in it.
-    redundancy : float
-        Its share of the redundancy.
     factor : float
         What its stated standard deviations are to be multiplied with; 1 when it was not estimated.
     sigma : float
@@ -65,8 +61,6 @@ def labels(kind: str, rows: int, level: Sequence[bool]) -> list[tuple[str, slice
     ----------
     kind : str
         A kind of ``reliability``.
-    rows : int
-        Number of its rows.
     level : sequence of bool
         Whether the axes of a row are plan and height; others, as of geocentric coordinates, stay one group.
 
@@ -90,12 +84,6 @@ def components(
 
     Parameters
     ----------
-    problem : Problem
-        The problem.
-    solution : Solution
-        Its solution.
-    precision : Precision
-        Cofactors.
     level : mapping of str to sequence of bool
         For ``control`` and ``position``: whether the axes of each row are plan and height.
 
@@ -131,15 +119,6 @@ def _component(name: str, group: reliability.Group, given: NDArray[np.bool_]) ->
 def scaled(problem: Problem, found: Sequence[Component], level: Mapping[str, Sequence[bool]]) -> Problem:
     """Multiply the standard deviations of a problem with the factors of their groups.
 
-    Parameters
-    ----------
-    problem : Problem
-        The problem.
-    found : sequence of Component
-        The factors.
-    level : mapping of str to sequence of bool
-        As for ``components``.
-
     Returns
     -------
     Problem
@@ -170,8 +149,6 @@ def combined(before: Sequence[Component], step: Sequence[Component]) -> tuple[Co
     ----------
     before : sequence of Component
         Factors so far; empty at the first step.
-    step : sequence of Component
-        Factors of the step.
 
     Returns
     -------
@@ -183,11 +160,5 @@ def combined(before: Sequence[Component], step: Sequence[Component]) -> tuple[Co
 
 
 def settled(step: Sequence[Component]) -> bool:
-    """Whether a step changes nothing worth another adjustment.
-
-    Parameters
-    ----------
-    step : sequence of Component
-        Factors of the step.
-    """
+    """Whether a step changes nothing worth another adjustment."""
     return all(abs(each.factor - 1.0) < CONVERGED for each in step)

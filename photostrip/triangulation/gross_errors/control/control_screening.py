@@ -63,8 +63,6 @@ class ControlRejection:
 
     Parameters
     ----------
-    id : str
-        The point.
     axes : tuple of str
         Which coordinates look wrong: ``"east"``, ``"north"``, ``"up"`` (of the point's ground frame).
     value, limit : float
@@ -97,10 +95,6 @@ class Setting:
     ----------
     strip : ndarray, shape (n, 3)
         Strip coordinates of the control points.
-    frames : sequence of GroundFrame
-        Ground frames of the control.
-    intermediate : IntermediateFrame
-        Frame of the adjustment.
     precision : tuple of float
         A-priori standard deviation of a strip point in plan and height, metres.
     spacing, breadth : float
@@ -126,7 +120,7 @@ class Setting:
         return correction.Problem(orientation.similarity(self.strip), targets, weight, self.spacing, self.breadth)
 
     def placed(self, kept: ControlPoints) -> Floats:
-        """Give all control points after a similarity on what is kept, intermediate frame, metres."""
+        """Return all control points after a similarity on what is kept, intermediate frame, metres."""
         targets = Targets(kept, self.frames, self.intermediate)
         return absolute_orientation.orient(self.strip, targets, kept.use.astype(float)).similarity(self.strip)
 
@@ -148,8 +142,6 @@ def screen(control: ControlPoints, setting: Setting) -> tuple[ControlPoints, tup
     ----------
     control : ControlPoints
         Control of a strip, no check points.
-    setting : Setting
-        The strip.
 
     Returns
     -------
@@ -229,13 +221,6 @@ def _richest(problem: correction.Problem) -> correction.Polynomial | None:
 def judged(problem: correction.Problem, fit: correction.Polynomial) -> tuple[Floats, Floats, Floats, Floats]:
     """Judge every control coordinate by what the others predict.
 
-    Parameters
-    ----------
-    problem : correction.Problem
-        Control after the similarity.
-    fit : correction.Polynomial
-        Polynomial of the control.
-
     Returns
     -------
     value, limit : ndarray, shape (n, 3)
@@ -290,7 +275,7 @@ def _snooped(control: ControlPoints, start: ControlPoints, setting: Setting) -> 
 
 
 def _fit(kept: ControlPoints, setting: Setting) -> float:
-    """Give the standard deviation of unit weight of control by the covariance of the strip."""
+    """Return the standard deviation of unit weight of control by the covariance of the strip."""
     return control_significance.judge(_joint(setting), setting.misclosures(kept), kept.use, ALPHA).sigma0
 
 

@@ -90,11 +90,6 @@ def judge(joint: Joint, misclosures: Floats, used: Flags, alpha: float) -> Judge
         Coordinates that take part; the others are judged by them.
     alpha : float
         Level of rejecting anything in a strip without wrong control.
-
-    Returns
-    -------
-    Judged
-        Test values.
     """
     w = misclosures[joint.point, joint.axis]
     inside = np.flatnonzero(used[joint.point, joint.axis])

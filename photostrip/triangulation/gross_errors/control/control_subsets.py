@@ -45,12 +45,8 @@ def far(strip: Floats, targets: Targets, weight: Floats, start: Similarity) -> t
     ----------
     strip : ndarray, shape (n, 3)
         Strip coordinates of the control points.
-    targets : Targets
-        The control points.
     weight : ndarray, shape (n, 3)
         Weights of their coordinates, metres^-2; nothing is far that is within twelve of these standard deviations.
-    start : Similarity
-        A similarity to begin with.
 
     Returns
     -------

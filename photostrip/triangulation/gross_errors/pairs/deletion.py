@@ -46,7 +46,7 @@ def subsets(n: int, k: int) -> Numbers:
 
 
 def gains(residuals: Floats, matrix: Floats, sets: Numbers) -> Floats:
-    """Give what the sum of squares loses when sets of points are taken out.
+    """Return what the sum of squares loses when sets of points are taken out.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def gains(residuals: Floats, matrix: Floats, sets: Numbers) -> Floats:
 
 
 def _form(v: list[Floats], m: dict[tuple[int, int], Floats]) -> tuple[Floats, Floats]:
-    """Give the determinant of M_KK and v^T adj(M_KK) v, by Cramer's rule."""
+    """Return the determinant of M_KK and v^T adj(M_KK) v, by Cramer's rule."""
     if len(v) == 1:
         return m[0, 0], v[0] ** 2
     if len(v) == 2:

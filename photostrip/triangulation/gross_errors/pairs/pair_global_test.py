@@ -32,8 +32,6 @@ def squares(orientation: Orientation, sigma: Floats) -> Floats:
 
     Parameters
     ----------
-    orientation : Orientation
-        Oriented pairs.
     sigma : ndarray, shape (p,)
         Standard deviation of a y parallax of weight one, mm.
 
@@ -48,11 +46,6 @@ def squares(orientation: Orientation, sigma: Floats) -> Floats:
 
 def global_limits(count: Numbers) -> Floats:
     """Critical values of the global test.
-
-    Parameters
-    ----------
-    count : ndarray of int
-        Points of each pair.
 
     Returns
     -------
@@ -70,8 +63,6 @@ def standardised(orientation: Orientation, sigma: Floats) -> Floats:
 
     Parameters
     ----------
-    orientation : Orientation
-        Oriented pairs.
     sigma : ndarray, shape (p,)
         Standard deviation of a y parallax of weight one, mm.
 
@@ -93,8 +84,6 @@ def failing(orientation: Orientation, sigma: Floats) -> Flags:
 
     Parameters
     ----------
-    orientation : Orientation
-        Oriented pairs.
     sigma : ndarray, shape (p,)
         Standard deviation of a y parallax of weight one, mm.
 
@@ -112,18 +101,7 @@ def failing(orientation: Orientation, sigma: Floats) -> Flags:
 
 
 def largest_limits(count: Numbers) -> Floats:
-    """Critical values of the largest standardised residual (Bonferroni).
-
-    Parameters
-    ----------
-    count : ndarray of int
-        Points of each pair.
-
-    Returns
-    -------
-    ndarray
-        Quantiles of the normal distribution.
-    """
+    """Critical values of the largest standardised residual (Bonferroni)."""
     return _by_number(count, lambda n: normal_quantile(1 - (1 - CONFIDENCE) / (2 * max(n, 1))))
 
 

@@ -28,10 +28,6 @@ def readmit(orientation: Orientation, rows: Numbers, given: Floats, sigma: Float
 
     Parameters
     ----------
-    orientation : Orientation
-        Pairs oriented without the points.
-    rows : ndarray of int
-        Points taken out.
     given : ndarray, shape (m,)
         Weights of all points before any was taken out.
     sigma : ndarray, shape (p,)
@@ -41,8 +37,6 @@ def readmit(orientation: Orientation, rows: Numbers, given: Floats, sigma: Float
     -------
     Orientation
         Pairs oriented with the points taken back.
-    ndarray of int
-        Rows taken back.
     """
     if not len(rows):
         return orientation, np.zeros(0, np.intp)

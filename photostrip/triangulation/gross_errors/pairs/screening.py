@@ -48,8 +48,6 @@ class Rejection:
 
     Parameters
     ----------
-    row : int
-        Row in the pairs' table.
     test : str
         ``"in front"``, ``"parallax"``, ``"grubbs"``, ``"tau"``, ``"deletion"`` (global test), ``"robust"`` or
         ``"residual"``.
@@ -235,8 +233,6 @@ def spared(orientation: Orientation, rows: NDArray[np.bool_]) -> NDArray[np.bool
 
     Parameters
     ----------
-    orientation : Orientation
-        Oriented pairs.
     rows : ndarray of bool, shape (m,)
         Rows that should go.
 

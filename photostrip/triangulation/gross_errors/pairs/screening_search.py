@@ -72,14 +72,8 @@ class Deleted:
 
     Parameters
     ----------
-    orientation : Orientation
-        Pairs oriented without those points.
     rows : ndarray of int
         Rows taken out, in order, re-admitted ones included.
-    tests : tuple of str
-        Test of each.
-    values, limits : ndarray
-        Its value and limit.
     """
 
     orientation: Orientation
@@ -99,8 +93,6 @@ def robust_start(orientation: Orientation, todo: Numbers, sigma: Floats) -> tupl
 
     Parameters
     ----------
-    orientation : Orientation
-        The pairs.
     todo : ndarray of int
         Pairs to orient, ascending.
     sigma : ndarray, shape (p,)
@@ -150,8 +142,6 @@ def search(
 
     Parameters
     ----------
-    orientation : Orientation
-        All pairs with all points.
     sigma : float
         Stated standard deviation of an image coordinate, mm.
     start : bool
@@ -247,7 +237,7 @@ def _cleaned(seen: Orientation, todo: Numbers, scale: Floats) -> Orientation:
 
 
 def _left(given: Orientation, found: Deleted, cleaned: Orientation, sigma: Floats) -> _Sizes:
-    """Give what a search leaves of the pairs that failed.
+    """Return what a search leaves of the pairs that failed.
 
     Pairs from which too many points went, or that still fail, do not speak by what the search chose to leave but by
     what a robust start leaves.

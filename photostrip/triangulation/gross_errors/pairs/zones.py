@@ -88,11 +88,6 @@ class Support:
             The pairs with the weights in force.
         zone : ndarray of int, shape (m,), optional
             Zones of the rows, when they are known already.
-
-        Returns
-        -------
-        Support
-            Zones and counts.
         """
         number = zones(orientation.elements, orientation.pairs) if zone is None else zone
         pairs, used = orientation.pairs, orientation.used

@@ -40,8 +40,6 @@ class Decision:
 
     Parameters
     ----------
-    group : Group
-        The points.
     weight : ndarray, shape (k, r)
         1 for a ray that may be used, 0 for one that may not.
     value, limit : ndarray, shape (k,)
@@ -103,17 +101,10 @@ def decide(group: Group, expected: tuple[Floats, Floats], number: Numbers) -> De
 
     Parameters
     ----------
-    group : Group
-        Points with r rays.
     expected : tuple of ndarray, shapes (k, 2r - 3), (k, 2r - 3, 2r - 3)
         What those photos leave of the conditions of each point, and its variances.
     number : ndarray of int, shape (w,)
         Points of each window, among which one in a hundred windows may lose a good one.
-
-    Returns
-    -------
-    Decision
-        What may be used.
     """
     k, r = group.ray.shape
     gap, variance = expected

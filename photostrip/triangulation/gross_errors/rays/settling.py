@@ -41,10 +41,6 @@ class Measured:
 
     Parameters
     ----------
-    observations : PhotoPoints
-        Image points.
-    photos : sequence of str
-        Photos of the strip in flight order.
     weight : ndarray, shape (m,)
         Weights of the pairs' rows before anything was rejected.
     sigma : ndarray, shape (p,)
@@ -72,10 +68,6 @@ def settle(
     ----------
     oriented : Orientation
         Pairs as their own search for gross errors leaves them.
-    measured : Measured
-        Measurements.
-    settings : formation.Settings
-        Form of the scale transfer.
     readmit : bool
         Whether points that a pair rejected may be taken back.
 
@@ -85,8 +77,6 @@ def settle(
         The pairs with what the strip decided.
     FormedStrip
         The strip; points without a ray left are gone.
-    Verdict
-        What was left out.
 
     Raises
     ------
@@ -194,8 +184,6 @@ def taken_back(rejections: Sequence[Rejection], used: Flags) -> tuple[Rejection,
 
     Parameters
     ----------
-    rejections : sequence of Rejection
-        Log of the pairs.
     used : ndarray of bool, shape (m,)
         Rows of the pairs' table that are used in the end.
 

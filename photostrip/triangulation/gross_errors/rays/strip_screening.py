@@ -81,7 +81,7 @@ class Verdict:
     across: Flags = field(default_factory=lambda: np.zeros(0, bool))
 
     def of(self, points: Flags) -> Verdict:
-        """Give what was found of some points, a flag for each point of the observations."""
+        """Return what was found of some points, a flag for each point of the observations."""
         here = points[self.point]
         kind = tuple(each for each, yes in zip(self.kind, here.tolist(), strict=True) if yes)
         rows = (getattr(self, name)[here] for name in ("value", "limit", "size", "across"))
@@ -136,12 +136,6 @@ class Scene:
 
     Parameters
     ----------
-    orientation : Orientation
-        Oriented pairs.
-    formed : FormedStrip
-        The strip formed from them.
-    observations : PhotoPoints
-        Image points.
     layout : Layout
         Where they are.
     sigma : ndarray, shape (p,)
@@ -175,8 +169,6 @@ def collect(scene: Scene, wanted: Flags | None = None) -> Rays:
 
     Parameters
     ----------
-    scene : Scene
-        The strip.
     wanted : ndarray of bool, shape (photos,), optional
         Photos whose rays are wanted; all by default.
 
@@ -231,8 +223,6 @@ def examine(
 
     Parameters
     ----------
-    scene : Scene
-        The strip.
     points : ndarray of int
         Points that are suspected.
     kept : ndarray of int
@@ -353,7 +343,7 @@ class _State:
         return np.asarray((fresh.weight < self.weight).any(axis=1), bool)
 
     def after(self, fresh: Decision, worst: Floats) -> _State:
-        """Give the state after one more round."""
+        """Return the state after one more round."""
         spared = np.asarray(self.loses(fresh) & (fresh.value / fresh.limit < worst[self.group.window]), bool)
         barred = self.barred | (self.returned & (fresh.weight < self.weight) & ~spared[:, None])
         weight = np.where(barred, 0.0, np.where(spared[:, None], self.weight, fresh.weight))

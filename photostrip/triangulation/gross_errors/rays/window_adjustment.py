@@ -113,11 +113,6 @@ def stacked(parts: list[tuple[Group, Floats, Floats]], count: int, length: int) 
         Groups with the derivatives (k, c, 6r) of their conditions by the photos, and the misclosures (k, c).
     count, length : int
         Number of windows and photos in each.
-
-    Returns
-    -------
-    Conditions
-        All conditions by window.
     """
     window = np.concatenate([np.zeros(0, np.intp), *(np.repeat(g.window, closing.shape[1]) for g, _, closing in parts)])
     order = np.argsort(window, kind="stable")
@@ -140,8 +135,6 @@ def projected(group: Group, weight: Floats) -> tuple[Floats, Floats]:
 
     Parameters
     ----------
-    group : Group
-        Points.
     weight : ndarray, shape (k, r)
         1 for a ray that counts, 0 for one that does not.
 
@@ -155,14 +148,7 @@ def projected(group: Group, weight: Floats) -> tuple[Floats, Floats]:
 
 
 def expected(group: Group, solved: Solved) -> tuple[Floats, Floats]:
-    """Give what an adjustment that is taken not to know the points leaves of their conditions.
-
-    Parameters
-    ----------
-    group : Group
-        Points.
-    solved : Solved
-        The adjustment.
+    """Return what an adjustment that is taken not to know the points leaves of their conditions.
 
     Returns
     -------
@@ -181,16 +167,12 @@ def _predicted(group: Group, solved: Solved) -> tuple[Floats, Floats]:
 
 
 def without(group: Group, weight: Floats, solved: Solved) -> tuple[Floats, Floats]:
-    """Give what an adjustment of all other points leaves of the conditions of each point.
+    """Return what an adjustment of all other points leaves of the conditions of each point.
 
     Parameters
     ----------
-    group : Group
-        Points.
     weight : ndarray, shape (k, r)
         Rays that took part, 1 or 0.
-    solved : Solved
-        The adjustment of all.
 
     Returns
     -------

@@ -118,8 +118,6 @@ def groups(rays: Rays, first: Numbers, length: int) -> list[Group]:
         Rays of the strip, ordered by point and photo.
     first : ndarray of int, shape (w,)
         First photo of each window.
-    length : int
-        Photos in a window.
 
     Returns
     -------
@@ -156,8 +154,6 @@ def projectors(group: Group, weight: Floats) -> Floats:
 
     Parameters
     ----------
-    group : Group
-        Points.
     weight : ndarray, shape (k, r)
         1 for a ray that counts, 0 for one that does not; a point needs two.
 
@@ -181,11 +177,6 @@ def coplanarities(group: Group) -> Floats:
     """Conditions of rays of neighbouring photos, then what more the rays of a point demand.
 
     An error along the base leaves the first r - 1 alone, which are y parallaxes.
-
-    Parameters
-    ----------
-    group : Group
-        Points with r rays.
 
     Returns
     -------
@@ -224,7 +215,7 @@ def _cross(a: Floats, b: Floats) -> Floats:
 
 
 def _longest(projection: Floats) -> Floats:
-    """Give a unit vector inside the range of each projection, its longest column; shape (k, c) of (k, c, c)."""
+    """Return a unit vector inside the range of each projection, its longest column; shape (k, c) of (k, c, c)."""
     place = np.diagonal(projection, axis1=1, axis2=2).argmax(axis=1)
     column = projection[np.arange(len(projection)), :, place]
     return np.asarray(column / np.maximum(np.linalg.norm(column, axis=1, keepdims=True), 1e-300), float)

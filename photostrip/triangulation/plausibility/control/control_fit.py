@@ -199,8 +199,6 @@ class Bent:
         Points that took part and go with the others.
     coefficient, sigma : ndarray, shape (c,)
         Coefficients of the columns and their standard deviations.
-    freedom : int
-        Redundancy.
     sigma0 : float
         Standard deviation of a given coordinate, metres; not below what makes sense, infinite without redundancy.
     """

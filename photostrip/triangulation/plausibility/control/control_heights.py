@@ -81,10 +81,6 @@ def compare(given: Given, fitted: Fitted, judged: Flags) -> Heights | None:
 
     Parameters
     ----------
-    given : Given
-        Given points.
-    fitted : Fitted
-        The strip on them.
     judged : ndarray of bool, shape (n,)
         Points of lists that go with each other.
 
@@ -132,13 +128,6 @@ class Stretched(NamedTuple):
 def stretched(given: Given, seen: Seen) -> Stretched | None:
     """Estimate by how much the heights of a strip are stretched, for a trial with another principal distance.
 
-    Parameters
-    ----------
-    given : Given
-        Given points.
-    seen : Seen
-        The same points in the strip.
-
     Returns
     -------
     Stretched or None
@@ -173,10 +162,6 @@ def examine(given: Given, seen: Seen, heights: Heights, fit: Bent, floor: float)
 
     Parameters
     ----------
-    given : Given
-        Given points.
-    seen : Seen
-        The same points in the strip.
     heights : Heights
         Their heights against those of the strip.
     fit : Bent

@@ -35,10 +35,6 @@ def examine(given: Given, seen: Seen, level: Level, took_part: Flags) -> tuple[l
 
     Parameters
     ----------
-    given : Given
-        Given points.
-    seen : Seen
-        The same points in the strip.
     level : Level
         The strip, level and laid on them.
     took_part : ndarray of bool, shape (n,)

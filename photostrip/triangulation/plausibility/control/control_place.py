@@ -62,13 +62,6 @@ def examine(frame: GroundFrame, area: Area | None, enu: Floats, number: int) -> 
         West, south, east, north in degrees, when it is known.
     enu : ndarray, shape (n, 3)
         Its points east, north, up, in the units of the frame.
-    number : int
-        Its number in the project.
-
-    Returns
-    -------
-    Place
-        What was found.
     """
     known = enu[np.isfinite(enu[:, :2]).all(axis=1)]
     if area is None or not len(known) or frame.kind not in {"projected", "geographic"}:

@@ -51,10 +51,6 @@ def examine(
 
     Parameters
     ----------
-    given : Given
-        Given points.
-    seen : Seen
-        The same points in the strip.
     axes_are_right : bool or None
         Whether the place on the Earth shows the axes of the control to be right (True) or wrong (False).
     exchanged : callable

@@ -37,8 +37,6 @@ class Left(NamedTuple):
 
     Parameters
     ----------
-    plan : Bent
-        In plan.
     height : Bent or None
         In height; None where too few heights are given to say.
     usable : ndarray of bool, shape (n,)
@@ -63,21 +61,8 @@ def examine(given: Given, seen: Seen, fitted: Fitted, judged: Flags, left: Left)
 
     Parameters
     ----------
-    given : Given
-        Given points.
-    seen : Seen
-        The same points in the strip.
-    fitted : Fitted
-        The strip on them.
     judged : ndarray of bool, shape (n,)
         Points of lists that go with each other.
-    left : Left
-        What is left at them.
-
-    Yields
-    ------
-    Finding
-        P408 and P406.
     """
     fit = left.plan
     odd = judged & given.use[:, 0] & np.isfinite(fit.residual) & fit.odd
@@ -104,18 +89,7 @@ def examine(given: Given, seen: Seen, fitted: Fitted, judged: Flags, left: Left)
 
 
 def examine_heights(given: Given, seen: Seen, fitted: Fitted, judged: Flags, left: Left) -> Iterator[Finding]:
-    """Name points that do not go with the others in height only, and the slip that explains it.
-
-    Parameters
-    ----------
-    given, seen, fitted, judged, left
-        As for ``examine``.
-
-    Yields
-    ------
-    Finding
-        P406.
-    """
+    """Name points that do not go with the others in height only, and the slip that explains it."""
     fit, plan = left.height, left.plan
     if fit is None:
         return

@@ -36,8 +36,6 @@ class Given:
 
     Parameters
     ----------
-    ids : tuple of str
-        Their ids.
     level : ndarray, shape (n, 3)
         East, north, up in metres in a level frame in the middle of the control; NaN where not given.
     use : ndarray of bool, shape (n, 3)
@@ -151,8 +149,6 @@ class Seen:
 
     Parameters
     ----------
-    strip : str
-        Id of the strip.
     xyz : ndarray, shape (n, 3)
         Strip coordinates; the third may be NaN, when only a mosaic is known.
     axes : ndarray, shape (p, 3)
@@ -186,16 +182,12 @@ class Fitted:
 
     Parameters
     ----------
-    laid : Laid
-        Its similarity in plan.
     along, across : ndarray, shape (n,)
         Places of the points along and across the strip, metres.
     height : ndarray, shape (n,)
         Heights in the strip, metres.
     floor : tuple of float
         A-priori standard deviations in plan and height, metres.
-    plan : Bent
-        What is left in plan.
     strip_from_level : ndarray, shape (3, 3)
         Steps in the strip from steps in the level frame, metres.
     """
@@ -261,8 +253,6 @@ def levelled(given: Given, level: Level, floor: float, took_part: Flags) -> Leve
 
     Parameters
     ----------
-    given : Given
-        Given points.
     level : Level
         The strip, set upright by its cameras.
     floor : float
@@ -302,8 +292,6 @@ def straightened(given: Given, level: Level, floor: tuple[float, float], took_pa
 
     Parameters
     ----------
-    given : Given
-        Given points.
     level : Level
         The strip, level and laid on them.
     floor : tuple of float
@@ -311,11 +299,6 @@ def straightened(given: Given, level: Level, floor: tuple[float, float], took_pa
         ground.
     took_part : ndarray of bool, shape (n,)
         Points that may say how the strip bends.
-
-    Returns
-    -------
-    Fitted
-        The strip on its control.
     """
     w, z, laid, turn, depth = level
     scale = abs(laid.turn)
@@ -362,8 +345,6 @@ def simplest(
     -------
     columns : ndarray, shape (n, c)
         Those taken.
-    Bent
-        Their fit.
     """
     number = least
     while True:

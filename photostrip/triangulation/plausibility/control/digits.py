@@ -60,7 +60,7 @@ def slip(given: float, predicted: float, scatter: float, tolerance: float) -> Sl
 
 
 def _slips(given: float, scatter: float) -> Iterator[Slip]:
-    """Give every coordinate that one slip of the pen turns into the one given."""
+    """Return every coordinate that one slip of the pen turns into the one given."""
     text = f"{abs(given):.{MOST_DECIMALS}f}"
     sign = -1.0 if given < 0 else 1.0
     yield Slip(-given, "the sign is wrong")

@@ -40,10 +40,6 @@ def examine(
         Half the breadth of the strip, metres.
     photos : sequence of str
         Photos of the strip in order.
-    strip : str
-        Id of the strip.
-    ids : sequence of str
-        Ids of the control points.
 
     Yields
     ------

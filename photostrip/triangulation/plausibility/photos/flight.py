@@ -43,15 +43,6 @@ def examine(centers: Floats, depth: Floats, up: Floats, photos: Sequence[str], s
         Height of each above the points it shows, in that unit.
     up : ndarray, shape (3,)
         Direction from the ground to the cameras.
-    photos : sequence of str
-        Their photos.
-    strip : str
-        Id of the strip.
-
-    Yields
-    ------
-    Finding
-        P204 to P207.
     """
     names = (strip,)
     below = np.flatnonzero(depth <= 0)
@@ -99,7 +90,7 @@ def _heights(height: Floats, flying: float, photos: Sequence[str], names: tuple[
 
 
 def _worth_a_look(conspicuous: Flags) -> list[int]:
-    """Give what stands near something conspicuous; everything of a short flight."""
+    """Return what stands near something conspicuous; everything of a short flight."""
     if len(conspicuous) <= SHORT_FLIGHT:
         return list(range(len(conspicuous)))
     around = np.convolve(conspicuous, np.ones(2 * WINDOW + 1), "same")

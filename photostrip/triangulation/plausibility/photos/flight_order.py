@@ -71,10 +71,6 @@ def examine(
     ----------
     observations : PhotoPoints
         Image points of the project, in any unit.
-    strip : str
-        Id of the strip.
-    photos : sequence of str
-        Its photos as listed.
     closer : callable
         Gives of two photos the direction of each from the other, tilts taken into account, or None; asked where the
         layout contradicts the list.
@@ -111,15 +107,8 @@ def other_scale(observations: PhotoPoints, strip: str, photos: Sequence[str]) ->
     ----------
     observations : PhotoPoints
         Image points of the project, in any unit.
-    strip : str
-        Id of the strip.
     photos : sequence of str
         Its photos in flight order.
-
-    Yields
-    ------
-    Finding
-        P205.
     """
     links = mosaic.link(observations, photos)
     for number in range(1, len(photos) - 1):
@@ -227,7 +216,7 @@ def _sure(links: mosaic.Links) -> Flags:
 
 
 def _by_number(closer: Closer, photos: Sequence[str]) -> Toward:
-    """Give the direction of one photo on another, both by number, as the closer look has it."""
+    """Return the direction of one photo on another, both by number, as the closer look has it."""
 
     def toward(of: int, other: int) -> complex | None:
         seen = closer(photos[min(of, other)], photos[max(of, other)])
@@ -241,8 +230,6 @@ def turned_back(links: mosaic.Links, order: Sequence[int], closer: Toward = lamb
 
     Parameters
     ----------
-    links : Links
-        Links of the strip.
     order : sequence of int
         Photos in an order.
     closer : callable
@@ -363,7 +350,7 @@ def _out_of_order(
 
 
 def _exchanged(order: Sequence[int], moved: Sequence[int], photos: Sequence[str]) -> tuple[str, str] | None:
-    """Give the two neighbours whose exchange is all that is wrong."""
+    """Return the two neighbours whose exchange is all that is wrong."""
     if len(moved) != 1:
         return None
     place = order.index(moved[0])
@@ -379,7 +366,7 @@ def _exchanged(order: Sequence[int], moved: Sequence[int], photos: Sequence[str]
 
 
 def _window(names: Sequence[str], wrong: Sequence[str]) -> list[str]:
-    """Give the part of the order that shows where wrong photos belong."""
+    """Return the part of the order that shows where wrong photos belong."""
     places = [names.index(each) for each in wrong]
     low, high = max(min(places) - 2, 0), min(max(places) + 3, len(names))
     return list(names[low:high]) if high - low <= 2 * NAMED else [*names[low : low + 2 * NAMED], "..."]

@@ -41,23 +41,12 @@ def one_id(orientation: Orientation, formed: FormedStrip, names: Sequence[str], 
 
     Parameters
     ----------
-    orientation : Orientation
-        Oriented pairs.
-    formed : FormedStrip
-        The strip formed from them.
     names : sequence of str
         Ids of the points by number.
     strip : sequence of str
         Photos of the strip in order.
     sigma : float
         Standard deviation of an image coordinate, mm.
-    strip_id : str
-        Id of the strip.
-
-    Yields
-    ------
-    Finding
-        P301.
     """
     rows = np.flatnonzero(np.isfinite(formed.model_xyz).all(axis=1))
     pair = orientation.pairs.pair[rows]
@@ -99,23 +88,12 @@ def two_ids(observations: PhotoPoints, formed: FormedStrip, focal: float, strip:
 
     Parameters
     ----------
-    observations : PhotoPoints
-        Image points of the project.
-    formed : FormedStrip
-        The strip.
     focal : float
         Principal distance, mm.
     strip : sequence of str
         Photos of the strip in order.
-    strip_id : str
-        Its id.
     sigma : float
         Standard deviation of an image coordinate, mm.
-
-    Yields
-    ------
-    Finding
-        P302.
     """
     bases = np.linalg.norm(np.diff(formed.centers, axis=0), axis=1)
     depth = _depth(formed)
@@ -152,21 +130,12 @@ def far_apart(
 
     Parameters
     ----------
-    observations : PhotoPoints
-        Image points of the project.
     rows : ndarray of int, shape (m,)
         Those of the strip.
     along : ndarray, shape (m,)
         Where the photo of each puts its point along the strip, bases.
     strip : sequence of str
         Photos of the strip in order.
-    strip_id : str
-        Its id.
-
-    Yields
-    ------
-    Finding
-        P301.
     """
     order = np.lexsort((along, observations.point[rows]))
     rows, along = rows[order], along[order]
@@ -201,13 +170,6 @@ def on_top(observations: PhotoPoints, rows: Numbers, strip_id: str) -> Iterator[
         Image points, mm.
     rows : ndarray of int, shape (m,)
         Those of the strip.
-    strip_id : str
-        Its id.
-
-    Yields
-    ------
-    Finding
-        P302.
     """
     if not len(rows):
         return

@@ -67,7 +67,7 @@ class Links:
     mirrored: Flags
 
     def __len__(self) -> int:
-        """Give the number of links."""
+        """Return the number of links."""
         return len(self.count)
 
     @cached_property
@@ -212,20 +212,7 @@ class Layout:
 
 
 def lay_out(links: Links, photos: int) -> Layout:
-    """Bring the photos of a strip into one plane, along the links with most points.
-
-    Parameters
-    ----------
-    links : Links
-        Links of the strip.
-    photos : int
-        Number of its photos.
-
-    Returns
-    -------
-    Layout
-        Places of all photos.
-    """
+    """Bring the photos of a strip into one plane, along the links with most points."""
     around: list[list[tuple[int, int]]] = [[] for _ in range(photos)]
     for row, (a, b) in enumerate(links.photo.tolist()):
         around[a].append((row, b))

@@ -44,8 +44,6 @@ def examine(angles: Floats, system: str, rotations: Floats, photos: Sequence[str
         Their system as stated, one of ``geometry.rotation.SYSTEMS``.
     rotations : ndarray, shape (n, 3, 3)
         Rotations found, image axes to east, north, up.
-    photos : sequence of str
-        The photos.
 
     Yields
     ------

@@ -65,8 +65,6 @@ def reading_of(ratio: float, likely: tuple[float, float], pixel_size: float | No
 
     Parameters
     ----------
-    ratio : float
-        Size found over size expected.
     likely : tuple of float
         Range in which the ratio should lie.
     pixel_size : float, optional
@@ -100,8 +98,6 @@ def reaches(observations: PhotoPoints, cameras: Mapping[str, Camera]) -> dict[st
     ----------
     observations : PhotoPoints
         Image points, mm.
-    cameras : mapping of str to Camera
-        Camera of each photo.
 
     Returns
     -------
@@ -128,13 +124,9 @@ def examine(observations: PhotoPoints, cameras: Mapping[str, Camera]) -> tuple[l
     ----------
     observations : PhotoPoints
         Image points in the system of the photo, mm.
-    cameras : mapping of str to Camera
-        Camera of each photo.
 
     Returns
     -------
-    list of Finding
-        P101 and P105.
     dict of str to float
         Factor by camera that would bring its image coordinates to a likely size; 1 where nothing is wrong.
     """
@@ -164,8 +156,6 @@ def of_marks(scales: Floats, photos: Sequence[str]) -> list[Finding]:
     ----------
     scales : ndarray, shape (p,)
         Calibrated over measured distances of the marks of each photo.
-    photos : sequence of str
-        The photos.
 
     Returns
     -------
