@@ -327,7 +327,7 @@ def _guilty(names: tuple[str, str], used: tuple[bool, bool]) -> str:
 
 
 def photos_of(result: Result) -> list[Document]:
-    """Return the list ``photos``: perspective centres in flight order; rotations of photos are not known from models."""
+    """List ``photos``: perspective centres in flight order; rotations of photos are not known from models."""
     return [photo for number, strip in enumerate(result.linked) for photo in _photos(result, number, strip)]
 
 

@@ -178,7 +178,7 @@ def _rates(rotations: Floats, system: str) -> Floats:
 
 
 def precision_of(result: Result) -> Document:
-    """Return the block ``precision``: what the covariances rest on, how large they are, how they change along the strips.
+    """Make the block ``precision``: what the covariances rest on, how large they are, how they change along the strips.
 
     Returns
     -------
