@@ -164,7 +164,7 @@ def _units(
 
 
 def _steps(derivatives: PairErrors, next_centers: Floats) -> Floats:
-    """Derive the steps by units: t = dB - theta x (S - O) - mu (S - O), theta, mu; S the centre that joins the models."""
+    """Derive steps by units: t = dB - theta x (S - O) - mu (S - O), theta, mu; S the centre that joins the models."""
     steps = np.zeros((len(next_centers), PARAMETERS, UNITS))
     steps[:, :3, ELEMENTS] = derivatives.base + cross_matrix(next_centers) @ derivatives.turn
     steps[:, :3, SCALE] = -next_centers
