@@ -7,57 +7,29 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Distortion:
-    """Lens distortion as the project states it.
+    """Lens distortion as the project states it."""
 
-    Parameters
-    ----------
-    model : str
-        ``"brown"`` or ``"radial-table"``.
-    direction : str
-        ``"image_to_ideal"``: ideal = image + D(image); ``"ideal_to_image"``: image = ideal + D(ideal).
-    k : tuple of float
-        Radial coefficients k1, k2, k3 in mm^-2, mm^-4, mm^-6 (Brown).
-    p : tuple of float
-        Decentering coefficients p1, p2 in mm^-1 (Brown).
-    b : tuple of float
-        Affinity b1 and shear b2 of the image, dimensionless (Brown): D_x gets b1 X + b2 Y.
-    radius, distortion : tuple of float
-        Radial table in mm: distances from the principal point and distortion there.
-    """
-
-    model: str
-    direction: str
-    k: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    p: tuple[float, float] = (0.0, 0.0)
+    model: str  # ``"brown"`` or ``"radial-table"``
+    direction: str  # ``"image_to_ideal"``: ideal = image + D(image); ``"ideal_to_image"``: image = ideal + D(ideal)
+    k: tuple[float, float, float] = (0.0, 0.0, 0.0)  # radial coefficients k1, k2, k3 in mm^-2, mm^-4, mm^-6 (Brown)
+    p: tuple[float, float] = (0.0, 0.0)  # decentering coefficients p1, p2 in mm^-1 (Brown)
+    # affinity b1 and shear b2 of the image, dimensionless (Brown): D_x gets b1 X + b2 Y
     b: tuple[float, float] = (0.0, 0.0)
+    # radius, distortion: radial table in mm: distances from the principal point and distortion there
     radius: tuple[float, ...] = ()
     distortion: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
 class Camera:
-    """Interior orientation of one camera.
+    """Interior orientation of one camera."""
 
-    Parameters
-    ----------
-    name : str
-        Name of the camera in the project.
-    principal_distance : float
-        Principal distance f in mm, positive.
-    principal_point : tuple of float
-        x0, y0 in mm in the system of the image coordinates (of the fiducial marks for film).
-    format : tuple of float, optional
-        Width and height of the photo in mm.
-    fiducials : dict of str to tuple of float
-        Calibrated coordinates of the fiducial marks in mm.
-    pixel_size : float, optional
-        Size of a pixel in mm, for digital cameras.
-    """
-
-    name: str
-    principal_distance: float
+    name: str  # name of the camera in the project
+    principal_distance: float  # principal distance f in mm, positive
+    # x0, y0 in mm in the system of the image coordinates (of the fiducial marks for film)
     principal_point: tuple[float, float] = (0.0, 0.0)
-    format: tuple[float, float] | None = None
+    format: tuple[float, float] | None = None  # width and height of the photo in mm
+    # calibrated coordinates of the fiducial marks in mm
     fiducials: dict[str, tuple[float, float]] = field(default_factory=dict)
-    pixel_size: float | None = None
+    pixel_size: float | None = None  # size of a pixel in mm, for digital cameras
     distortion: Distortion | None = None

@@ -30,28 +30,15 @@ EXIT_INTERNAL = 70
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One thing that is wrong with an input, and where.
+    """One thing that is wrong with an input, and where."""
 
-    Parameters
-    ----------
-    message : str
-        What is wrong, in the surveyor's words, with ids of photos and points.
-    code : str
-        Stable short name of the kind of fault, for example ``"unknown-key"``.
-    file : str
-        File as the user named it; empty when the fault is not in a file.
-    line, column : int
-        Position, counted from 1; 0 when unknown.
-    key : str
-        Path of the key in the project file (``cameras.RC30.format``) or name of the table column.
-    """
-
-    message: str
-    code: str = "input"
-    file: str = ""
+    message: str  # what is wrong, in the surveyor's words, with ids of photos and points
+    code: str = "input"  # stable short name of the kind of fault, for example ``"unknown-key"``
+    file: str = ""  # file as the user named it; empty when the fault is not in a file
+    # line, column: position, counted from 1; 0 when unknown
     line: int = 0
     column: int = 0
-    key: str = ""
+    key: str = ""  # path of the key in the project file (``cameras.RC30.format``) or name of the table column
     expected: str = ""
     fix: str = ""
 

@@ -15,36 +15,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """One thing the surveyor should know.
+    """One thing the surveyor should know."""
 
-    Parameters
-    ----------
-    code : str
-        Stable short name of the kind of note.
-    message : str
-        The whole sentence, with ids, numbers and units.
-    severity : str
-        ``"warning"`` or ``"note"``.
-    strip : str
-        Strip concerned; empty for the whole project.
-    file : str
-        File in which the cause stands; empty when there is none.
-    line, column : int
-        Where it stands, counted from 1; 0 when unknown.
-    key : str
-        Path of the key in the project file, or name of the table column.
-    """
-
-    code: str
-    message: str
-    severity: str = "warning"
-    strip: str = ""
+    code: str  # stable short name of the kind of note
+    message: str  # the whole sentence, with ids, numbers and units
+    severity: str = "warning"  # ``"warning"`` or ``"note"``
+    strip: str = ""  # strip concerned; empty for the whole project
     photos: tuple[str, ...] = ()
     points: tuple[str, ...] = ()
-    file: str = ""
+    file: str = ""  # file in which the cause stands; empty when there is none
+    # line, column: where it stands, counted from 1; 0 when unknown
     line: int = 0
     column: int = 0
-    key: str = ""
+    key: str = ""  # path of the key in the project file, or name of the table column
 
     def __str__(self) -> str:
         """Return the one-line form ``file:line:column: what``."""
@@ -59,42 +42,22 @@ def before(file: str, line: int, column: int) -> str:
 
 @dataclass(frozen=True)
 class Finding:
-    """One mistake that the data seem to have; see ``plausibility``.
+    """One mistake that the data seem to have; see ``plausibility``."""
 
-    Parameters
-    ----------
-    code : str
-        Its kind, for example ``"P101"``.
-    title : str
-        What kind of mistake that is, in a few words.
-    severity : str
-        ``"error"``: a result made from such data is wrong as a whole; ``"warning"``: some of it may be.
-    message : str
-        What was found, with ids, numbers and units.
-    evidence : mapping of str to float, int or str
-        The numbers behind it; names end with the unit.
-    key : str
-        Path of the key in the project file that would be changed; empty when the mistake is in a table.
-    accepted : bool
-        Whether the user has accepted it.
-    file : str
-        File in which it would be put right; empty when it is not known.
-    line, column : int
-        Where in it, counted from 1; 0 when unknown.
-    """
-
-    code: str
-    title: str
-    severity: str
-    message: str
+    code: str  # its kind, for example ``"P101"``
+    title: str  # what kind of mistake that is, in a few words
+    severity: str  # ``"error"``: a result made from such data is wrong as a whole; ``"warning"``: some of it may be
+    message: str  # what was found, with ids, numbers and units
     fix: str
+    # the numbers behind it; names end with the unit
     evidence: Mapping[str, float | int | str] = field(default_factory=dict)
     photos: tuple[str, ...] = ()
     points: tuple[str, ...] = ()
     strips: tuple[str, ...] = ()
-    key: str = ""
-    accepted: bool = False
-    file: str = ""
+    key: str = ""  # path of the key in the project file that would be changed; empty when the mistake is in a table
+    accepted: bool = False  # whether the user has accepted it
+    file: str = ""  # file in which it would be put right; empty when it is not known
+    # line, column: where in it, counted from 1; 0 when unknown
     line: int = 0
     column: int = 0
 

@@ -54,21 +54,11 @@ def frozen(values: ArrayLike, dtype: type = float, shape: tuple[int, ...] | None
 
 @dataclass(frozen=True, eq=False)
 class PointTable:
-    """Coordinates of points in one named frame.
+    """Coordinates of points in one named frame."""
 
-    Parameters
-    ----------
-    ids : tuple of str
-        Point ids, unique.
-    xyz : ndarray, shape (n, 3)
-        Coordinates in the unit of the frame.
-    frame : Frame
-        The frame in which they exist.
-    """
-
-    ids: tuple[str, ...]
-    xyz: NDArray[np.float64]
-    frame: Frame
+    ids: tuple[str, ...]  # point ids, unique
+    xyz: NDArray[np.float64]  # (n, 3): coordinates in the unit of the frame
+    frame: Frame  # the frame in which they exist
 
     def __post_init__(self) -> None:
         """Freeze the array."""
@@ -112,26 +102,16 @@ class PointTable:
 
 @dataclass(frozen=True, eq=False)
 class PhotoPoints:
-    """Points measured on photos, one row for each image point.
+    """Points measured on photos, one row for each image point."""
 
-    Parameters
-    ----------
-    photo_ids, point_ids : tuple of str
-        Ids in order of first appearance; rows refer to them by number.
-    photo, point : ndarray of int, shape (n,)
-        Numbers of the photo and of the point of each row.
-    xy : ndarray, shape (n, 2)
-        Image coordinates in mm; x to the right, y up.
-    sigma : ndarray, shape (n, 2)
-        Their standard deviations in mm.
-    """
-
+    # photo_ids, point_ids: ids in order of first appearance; rows refer to them by number
     photo_ids: tuple[str, ...]
     point_ids: tuple[str, ...]
+    # photo, point: (n,): numbers of the photo and of the point of each row
     photo: NDArray[np.intp]
     point: NDArray[np.intp]
-    xy: NDArray[np.float64]
-    sigma: NDArray[np.float64]
+    xy: NDArray[np.float64]  # (n, 2): image coordinates in mm; x to the right, y up
+    sigma: NDArray[np.float64]  # (n, 2): their standard deviations in mm
 
     def __post_init__(self) -> None:
         """Freeze the columns."""
@@ -148,30 +128,16 @@ class PhotoPoints:
 
 @dataclass(frozen=True, eq=False)
 class ControlPoints:
-    """Given ground coordinates: what they are, which of them count, how good they are.
+    """Given ground coordinates: what they are, which of them count, how good they are."""
 
-    Parameters
-    ----------
-    ids : tuple of str
-        Point ids, unique.
-    enu : ndarray, shape (n, 3)
-        Given coordinates in the units of each point's own ground frame, in the internal order east,
-        north, up (geocentric: X, Y, Z). A coordinate that is not given is NaN.
-    use : ndarray of bool, shape (n, 3)
-        Which coordinates count, in the same order.
-    check : ndarray of bool, shape (n,)
-        True for check points, which never influence a result.
-    sigma : ndarray, shape (n, 3)
-        Standard deviations in metres, in the same order.
-    frame : ndarray of int, shape (n,)
-        Number of each point's ground frame in the project's list of frames.
-    """
-
-    ids: tuple[str, ...]
+    ids: tuple[str, ...]  # point ids, unique
+    # (n, 3): given coordinates in the units of each point's own ground frame, in the internal order east, north, up
+    # (geocentric: X, Y, Z). A coordinate that is not given is NaN
     enu: NDArray[np.float64]
-    use: NDArray[np.bool_]
-    check: NDArray[np.bool_]
-    sigma: NDArray[np.float64]
+    use: NDArray[np.bool_]  # (n, 3): which coordinates count, in the same order
+    check: NDArray[np.bool_]  # (n,): true for check points, which never influence a result
+    sigma: NDArray[np.float64]  # (n, 3): standard deviations in metres, in the same order
+    # (n,): number of each point's ground frame in the project's list of frames
     frame: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp))
 
     def __post_init__(self) -> None:
@@ -209,26 +175,18 @@ class ModelPoints:
 
     Points and centres have one numbering: number ``k`` below ``len(point_ids)`` is a point, above it the perspective
     centre of photo ``photo_ids[k - len(point_ids)]``.
-
-    Parameters
-    ----------
-    model_ids, point_ids, photo_ids : tuple of str
-        Ids; rows refer to them by number.
-    model, node : ndarray of int, shape (n,)
-        Number of the model, and of the point or centre, of each row.
-    xyz : ndarray, shape (n, 3)
-        Model coordinates in mm, right-handed; every model has a scale, a rotation and an origin of its own.
-    sigma : ndarray, shape (n, 3)
-        Their standard deviations in mm.
     """
 
+    # model_ids, point_ids, photo_ids: ids; rows refer to them by number
     model_ids: tuple[str, ...]
     point_ids: tuple[str, ...]
     photo_ids: tuple[str, ...]
+    # model, node: (n,): number of the model, and of the point or centre, of each row
     model: NDArray[np.intp]
     node: NDArray[np.intp]
+    # (n, 3): model coordinates in mm, right-handed; every model has a scale, a rotation and an origin of its own
     xyz: NDArray[np.float64]
-    sigma: NDArray[np.float64]
+    sigma: NDArray[np.float64]  # (n, 3): their standard deviations in mm
 
     def __post_init__(self) -> None:
         """Freeze the columns."""

@@ -22,18 +22,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Parcel:
-    """The files of a project.
+    """The files of a project."""
 
-    Parameters
-    ----------
-    files : dict of str to bytes
-        Content of the project file, of what it extends and of its tables, by path as the user typed it.
-    grids : dict of str to bytes
-        Content of the grid files beside the project file, by name.
-    """
-
+    # content of the project file, of what it extends and of its tables, by path as the user typed it
     files: dict[str, bytes]
-    grids: dict[str, bytes]
+    grids: dict[str, bytes]  # content of the grid files beside the project file, by name
     folder: str
 
 

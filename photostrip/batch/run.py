@@ -34,18 +34,10 @@ class Watch(Protocol):
 
 @dataclass
 class Stop:
-    """Why a batch is to end early.
+    """Why a batch is to end early."""
 
-    Parameters
-    ----------
-    signal : int
-        Number of the signal that asked for it; 0: none did.
-    refusals : int
-        Results in a row that could not be written.
-    """
-
-    signal: int = 0
-    refusals: int = 0
+    signal: int = 0  # number of the signal that asked for it; 0: none did
+    refusals: int = 0  # results in a row that could not be written
 
     def __call__(self) -> bool:
         """Whether to stop."""
@@ -73,14 +65,9 @@ def on_signals(stop: Stop) -> Iterator[Stop]:
 
 @dataclass
 class Batch:
-    """What became of a batch.
+    """What became of a batch."""
 
-    Parameters
-    ----------
-    outcomes : list of dict
-        The line of the summary of each project, in the order in which the user named them.
-    """
-
+    # the line of the summary of each project, in the order in which the user named them
     outcomes: list[Document] = field(default_factory=list)
     unchanged: int = 0
     seconds: float = 0.0

@@ -24,19 +24,11 @@ LARGEST_LIST = 100 * MEGABYTE
 
 @dataclass(frozen=True, slots=True)
 class Chosen:
-    """A project of the batch.
-
-    Parameters
-    ----------
-    project : str
-        Path of the project file as the user knows it.
-    output : str
-        Folder of its result below that of the batch, with slashes.
-    """
+    """A project of the batch."""
 
     number: int
-    project: str
-    output: str
+    project: str  # path of the project file as the user knows it
+    output: str  # folder of its result below that of the batch, with slashes
 
 
 def choose(arguments: Sequence[str]) -> list[Chosen]:

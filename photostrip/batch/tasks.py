@@ -40,39 +40,22 @@ EXIT_CODES = {
 
 @dataclass(frozen=True)
 class Task:
-    """One project to be computed.
-
-    Parameters
-    ----------
-    project : str
-        Path of the project file as the user knows it.
-    parcel : Parcel, optional
-        Its files, when it goes to another machine; None: they are read from the disk.
-    """
+    """One project to be computed."""
 
     number: int
-    project: str
+    project: str  # path of the project file as the user knows it
     overrides: tuple[str, ...] = ()
-    parcel: Parcel | None = None
+    parcel: Parcel | None = None  # its files, when it goes to another machine; None: they are read from the disk
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What became of a project.
-
-    Parameters
-    ----------
-    outcome : dict
-        Its line in the summary, see ``outcome_of`` and ``failure``.
-    files : dict of str to str
-        Content of its result files by name; none after a failure.
-    inputs : dict of str to str or None
-        SHA-256 of every file read, by path; None for a file that would have been read if it were there.
-    """
+    """What became of a project."""
 
     number: int
-    outcome: Document
-    files: dict[str, str] = field(default_factory=dict)
+    outcome: Document  # its line in the summary, see ``outcome_of`` and ``failure``
+    files: dict[str, str] = field(default_factory=dict)  # content of its result files by name; none after a failure
+    # SHA-256 of every file read, by path; None for a file that would have been read if it were there
     inputs: dict[str, str | None] = field(default_factory=dict)
     seconds: float = 0.0
     megabytes: float = 0.0
@@ -81,18 +64,10 @@ class Answer:
 
 @dataclass(frozen=True)
 class Limits:
-    """What one project may use.
+    """What one project may use."""
 
-    Parameters
-    ----------
-    seconds : float, optional
-        Time; None: any.
-    megabytes : float, optional
-        Memory of the worker that computes it; None: an even share of the machine's memory.
-    """
-
-    seconds: float | None = None
-    megabytes: float | None = None
+    seconds: float | None = None  # time; None: any
+    megabytes: float | None = None  # memory of the worker that computes it; None: an even share of the machine's memory
 
 
 def outcome_of(document: Document, findings: list[Document]) -> Document:

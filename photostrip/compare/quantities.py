@@ -17,24 +17,14 @@ ELEMENTS = ("alpha1", "kappa1", "alpha2", "omega2", "kappa2")
 
 
 class Quantity(NamedTuple):
-    """One number of a result.
-
-    Parameters
-    ----------
-    id : str
-        Id of the photo, point, model or strip; empty for the whole project.
-    unit : str
-        Its unit; empty for ratios and counts.
-    value : float or None
-        The number; None where the result has none.
-    """
+    """One number of a result."""
 
     kind: str
     block: str
-    id: str
+    id: str  # id of the photo, point, model or strip; empty for the whole project
     name: str
-    unit: str
-    value: Number
+    unit: str  # its unit; empty for ratios and counts
+    value: Number  # the number; None where the result has none
 
 
 def quantities_of(document: Document) -> Iterator[Quantity]:

@@ -20,19 +20,11 @@ SETS = ("ids", "choices", "rejected", "findings")
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """Tolerance of one kind of quantity; the larger of its two parts counts.
-
-    Parameters
-    ----------
-    relative : float
-        Difference allowed, as a share of the size in the baseline.
-    absolute_um : float
-        As `absolute`, for statistics in micrometres.
-    """
+    """Tolerance of one kind of quantity; the larger of its two parts counts."""
 
     absolute: float = 0.0
-    relative: float = 0.0
-    absolute_um: float = 0.0
+    relative: float = 0.0  # difference allowed, as a share of the size in the baseline
+    absolute_um: float = 0.0  # as `absolute`, for statistics in micrometres
     ignore: bool = False
 
 
@@ -51,30 +43,20 @@ class Tolerances:
 
     The defaults let pass what another processor or another version of the numerical libraries changes, and hardly
     anything else: two units of the last digit that result.json shows.
-
-    Parameters
-    ----------
-    plan, height : Tolerance
-        Ground points, perspective centres and differences at control, metres.
-    rotation : Tolerance
-        Angle between two rotations, and elements of relative orientation, degrees.
-    sigma0 : Tolerance
-        Standard deviation of an image coordinate of weight one, micrometres.
-    scale : Tolerance
-        Scale factors of models, joints and of the strip, ratios.
-    ids, choices, rejected, findings : SetTolerance
-        Photos, points, models and given points; adjustment, degrees, terms, roles, status and verdicts; measurements
-        taken out; notes and points without coordinates.
     """
 
+    # plan, height: ground points, perspective centres and differences at control, metres
     plan: Tolerance = Tolerance(absolute=0.0002)
     height: Tolerance = Tolerance(absolute=0.0002)
+    # angle between two rotations, and elements of relative orientation, degrees
     rotation: Tolerance = Tolerance(absolute=2e-6)
-    sigma0: Tolerance = Tolerance(absolute=0.02)
-    scale: Tolerance = Tolerance(relative=1e-8)
+    sigma0: Tolerance = Tolerance(absolute=0.02)  # standard deviation of an image coordinate of weight one, micrometres
+    scale: Tolerance = Tolerance(relative=1e-8)  # scale factors of models, joints and of the strip, ratios
     precision: Tolerance = Tolerance(absolute=0.0002, relative=0.001)
     statistics: Tolerance = Tolerance(absolute=0.0002, relative=0.001, absolute_um=0.11)
     counts: Tolerance = Tolerance()
+    # ids, choices, rejected, findings: photos, points, models and given points; adjustment, degrees, terms, roles,
+    # status and verdicts; measurements taken out; notes and points without coordinates
     ids: SetTolerance = SetTolerance()
     choices: SetTolerance = SetTolerance()
     rejected: SetTolerance = SetTolerance()

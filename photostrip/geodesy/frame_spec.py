@@ -29,30 +29,17 @@ _LONGEST_NAME = 60
 
 @dataclass(frozen=True)
 class FrameSpec:
-    """What the project file says about the frame of one control list, or of the output.
+    """What the project file says about the frame of one control list, or of the output."""
 
-    Parameters
-    ----------
-    crs : str
-        Authority code, PROJ string, WKT, ``geocentric`` or ``local``.
-    axes : tuple of str
-        The user's order of columns: a permutation of (east, north, up); for geocentric frames also of (x, y, z).
-    height : str
-        ``ellipsoidal`` or ``orthometric``.
-    geoid_undulation : float or None
-        Constant undulation N of the geoid above the ellipsoid of `crs`, metres: h = H + N. Only with orthometric
-        heights.
-    ellipsoid : tuple of float or None
-        Semi-axes (a, b), metres, for ``geocentric`` on another body or ellipsoid; None: WGS 84.
-    curvature_radius : float or None
-        Radius R of the curvature correction (eq. 153), metres. Only for ``local``; None: no correction.
-    """
-
-    crs: str
+    crs: str  # authority code, PROJ string, WKT, ``geocentric`` or ``local``
+    # the user's order of columns: a permutation of (east, north, up); for geocentric frames also of (x, y, z)
     axes: tuple[str, str, str]
-    height: str = "ellipsoidal"
+    height: str = "ellipsoidal"  # ``ellipsoidal`` or ``orthometric``
+    # constant undulation N of the geoid above the ellipsoid of `crs`, metres: h = H + N. Only with orthometric heights
     geoid_undulation: float | None = None
+    # semi-axes (a, b), metres, for ``geocentric`` on another body or ellipsoid; None: WGS 84
     ellipsoid: Ellipsoid | None = None
+    # radius R of the curvature correction (eq. 153), metres. Only for ``local``; None: no correction
     curvature_radius: float | None = None
 
     def __post_init__(self) -> None:

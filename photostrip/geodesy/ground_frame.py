@@ -108,29 +108,19 @@ class GroundFrame:
 
     Made by ``tie_frames``. All arrays of ground coordinates are in the internal order east, north, up
     (longitude, latitude, height; X, Y, Z) and in the CRS's own units.
-
-    Parameters
-    ----------
-    kind : str
-        ``projected``, ``geographic``, ``geocentric`` or ``local``.
-    plan_unit, height_unit : str
-        Names of the units (``metre``, ``US survey foot``, ``degree``).
-    plan_factor, height_factor : float
-        Metres per unit (radians per unit for the plan of a geographic frame).
-    ellipsoid : tuple of float or None
-        Semi-axes (a, b) of the frame's own datum, metres; None for a local frame.
-    origin : tuple of float or None
-        Point of tangency (east, north) of the curvature correction of a local frame, metres.
     """
 
     spec: FrameSpec
-    kind: Kind
+    kind: Kind  # ``projected``, ``geographic``, ``geocentric`` or ``local``
     title: str
+    # plan_unit, height_unit: names of the units (``metre``, ``US survey foot``, ``degree``)
     plan_unit: str
     height_unit: str
+    # plan_factor, height_factor: metres per unit (radians per unit for the plan of a geographic frame)
     plan_factor: float
     height_factor: float
-    ellipsoid: Ellipsoid | None
+    ellipsoid: Ellipsoid | None  # semi-axes (a, b) of the frame's own datum, metres; None for a local frame
+    # point of tangency (east, north) of the curvature correction of a local frame, metres
     origin: tuple[float, float] | None = None
     _angle: float = 1.0  # radians per unit of what the projection gives
     _plane: Operation | None = None  # grid -> longitude, latitude of the same datum

@@ -202,23 +202,14 @@ def strip_azimuth(first: ArrayLike, last: ArrayLike) -> float:
 class IntermediateFrame:
     """The Cartesian frame Pi in which a strip is adjusted.
 
-    Parameters
-    ----------
-    origin : ndarray, shape (3,)
-        Origin, in the project's Cartesian frame, metres.
-    axes : ndarray, shape (3, 3)
-        M: columns are the axes X, Y, Z in the project's Cartesian frame.
-    azimuth : float
-        Azimuth A0 of the X axis, clockwise from north, radians.
-
     Notes
     -----
     Source: [001] eq. 142-144, 152. Way there and way back use the same origin and axes by construction.
     """
 
-    origin: NDArray[np.float64]
-    axes: NDArray[np.float64]
-    azimuth: float = 0.0
+    origin: NDArray[np.float64]  # (3,): origin, in the project's Cartesian frame, metres
+    axes: NDArray[np.float64]  # (3, 3): M: columns are the axes X, Y, Z in the project's Cartesian frame
+    azimuth: float = 0.0  # azimuth A0 of the X axis, clockwise from north, radians
 
     def __post_init__(self) -> None:
         """Keep private read-only copies of the arrays."""

@@ -36,15 +36,9 @@ LINEAR = [0, 1, 3]  # columns of x, y and 1
 
 @dataclass(frozen=True, eq=False)
 class PlaneTransform:
-    """Transformation of the plane: ``top = coefficients @ (x, y, x y, 1)``, target = the first two over the third.
+    """Transformation of the plane: ``top = coefficients @ (x, y, x y, 1)``, target = the first two over the third."""
 
-    Parameters
-    ----------
-    coefficients : ndarray, shape (..., 3, 4)
-        Rows: target x, target y, denominator.
-    """
-
-    coefficients: Floats
+    coefficients: Floats  # (..., 3, 4): rows: target x, target y, denominator
 
     def __post_init__(self) -> None:
         """Freeze the array."""
@@ -118,15 +112,9 @@ class PlaneTransform:
 
 @dataclass(frozen=True, eq=False)
 class PlaneInverse:
-    """Inverse of a transformation with a bilinear term, by Newton's iteration from its affine part.
+    """Inverse of a transformation with a bilinear term, by Newton's iteration from its affine part."""
 
-    Parameters
-    ----------
-    inverse : PlaneTransform
-        The transformation that it is the inverse of.
-    """
-
-    inverse: PlaneTransform
+    inverse: PlaneTransform  # the transformation that it is the inverse of
 
     def __call__(self, points: ArrayLike) -> Floats:
         """Transform points back.

@@ -17,21 +17,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Similarity:
-    """Similarity ``target = scale * rotation @ source + shift``.
+    """Similarity ``target = scale * rotation @ source + shift``."""
 
-    Parameters
-    ----------
-    scale : float
-        Scale, positive.
-    rotation : ndarray, shape (3, 3)
-        Rotation, determinant +1.
-    shift : ndarray, shape (3,)
-        Shift in the unit of the target.
-    """
-
-    scale: float
-    rotation: Floats
-    shift: Floats
+    scale: float  # scale, positive
+    rotation: Floats  # (3, 3): rotation, determinant +1
+    shift: Floats  # (3,): shift in the unit of the target
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""

@@ -45,51 +45,24 @@ ENOUGH = 0.1  # of the angle that an image coordinate's standard deviation spans
 
 @dataclass(frozen=True, eq=False)
 class CovarianceAdjustment:
-    """What the adjustment of a strip with its own covariance found, intermediate frame.
+    """What the adjustment of a strip with its own covariance found, intermediate frame."""
 
-    Parameters
-    ----------
-    xyz : ndarray, shape (q, 3)
-        Adjusted points of the strip, metres.
-    centers : ndarray, shape (m, 3)
-        Perspective centres, metres.
-    rotations : ndarray, shape (m, 3, 3)
-        Photo to intermediate frame.
-    points : ndarray, shape (q, 3, 3)
-        Covariances of the points, metres^2.
-    photos : ndarray, shape (m, 6, 6)
-        Covariances of centre and small rotation of the photos.
-    control : control_errors.Misclosures
-        Control coordinates that counted.
-    tested : prediction.Tested
-        Test of the whole, and of each of these coordinates.
-    factor : float
-        Variance factor of the image coordinates.
-    basis : str
-        Where it comes from.
-    sigma : float
-        Standard deviation of an image coordinate of weight one, mm.
-    errors, conditions, local, system
-        Rows of the strip, conditions, unknowns and the solved system.
-    passes : int
-        How often the strip was formed.
-    """
-
-    xyz: Floats
-    centers: Floats
-    rotations: Floats
-    points: Floats
-    photos: Floats
-    control: control_errors.Misclosures
-    tested: prediction.Tested
-    factor: float
-    basis: str
-    sigma: float
+    xyz: Floats  # (q, 3): adjusted points of the strip, metres
+    centers: Floats  # (m, 3): perspective centres, metres
+    rotations: Floats  # (m, 3, 3): photo to intermediate frame
+    points: Floats  # (q, 3, 3): covariances of the points, metres^2
+    photos: Floats  # (m, 6, 6): covariances of centre and small rotation of the photos
+    control: control_errors.Misclosures  # control coordinates that counted
+    tested: prediction.Tested  # test of the whole, and of each of these coordinates
+    factor: float  # variance factor of the image coordinates
+    basis: str  # where it comes from
+    sigma: float  # standard deviation of an image coordinate of weight one, mm
+    # errors, conditions, local, system: rows of the strip, conditions, unknowns and the solved system
     errors: strip_errors.StripErrors
     conditions: strip_conditions.Conditions
     local: strip_conditions.Local
     system: strip_system.System
-    passes: int
+    passes: int  # how often the strip was formed
 
     def by_control(self, points: Numbers, coordinates: Numbers) -> Floats:
         """Return what errors of control coordinates subtract from points.

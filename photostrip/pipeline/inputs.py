@@ -31,157 +31,79 @@ ADJUSTMENTS = ("similarity", "polynomial", "covariance", "bundle")
 
 @dataclass(frozen=True)
 class Strip:
-    """Photos of one flight line.
-
-    Parameters
-    ----------
-    camera : Camera
-        The camera of all its photos.
-    photos : tuple of str
-        Photos in flight order; a single one only in a bundle adjustment.
-    calibrate : tuple of str
-        Parameters of its camera that a bundle adjustment estimates, of ``bundle.settings.CALIBRATION``.
-    """
+    """Photos of one flight line."""
 
     id: str
-    camera: Camera
-    photos: tuple[str, ...]
+    camera: Camera  # the camera of all its photos
+    photos: tuple[str, ...]  # photos in flight order; a single one only in a bundle adjustment
+    # parameters of its camera that a bundle adjustment estimates, of ``bundle.settings.CALIBRATION``
     calibrate: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class ModelStrip:
-    """Independent models of one flight line.
-
-    Parameters
-    ----------
-    photos : tuple of str
-        Photos in flight order.
-    models : tuple of str
-        Models in flight order; model i shows photos i and i + 1.
-    """
+    """Independent models of one flight line."""
 
     id: str
-    photos: tuple[str, ...]
-    models: tuple[str, ...]
+    photos: tuple[str, ...]  # photos in flight order
+    models: tuple[str, ...]  # models in flight order; model i shows photos i and i + 1
 
 
 @dataclass(frozen=True, eq=False)
 class MeasuredModels:
-    """Model coordinates in place of image coordinates.
+    """Model coordinates in place of image coordinates."""
 
-    Parameters
-    ----------
-    strips : tuple of ModelStrip
-        Strips in the project's order.
-    points : ModelPoints
-        Points and perspective centres as measured, in mm, right-handed.
-    """
-
-    strips: tuple[ModelStrip, ...]
-    points: ModelPoints
+    strips: tuple[ModelStrip, ...]  # strips in the project's order
+    points: ModelPoints  # points and perspective centres as measured, in mm, right-handed
 
 
 @dataclass(frozen=True, eq=False)
 class CameraPositions:
-    """Measured positions of cameras (GNSS).
+    """Measured positions of cameras (GNSS)."""
 
-    Parameters
-    ----------
-    photos : tuple of str
-        Photos, unique.
-    frame : FrameSpec
-        Ground frame of the positions.
-    enu : ndarray, shape (n, 3)
-        Coordinates in the units of the frame, internal order; NaN where one is not given.
-    use : ndarray of bool, shape (n, 3)
-        Which coordinates count.
-    sigma : ndarray, shape (n, 3)
-        Standard deviations in metres.
-    time : ndarray, shape (n,)
-        Time of exposure; NaN without one.
-    lever_arm : tuple of float
-        Antenna from the perspective centre along the image axes (x right, y up, z towards the viewer), metres.
-    correction : str
-        What the positions of one strip share beside the truth: ``"none"``, ``"offset"`` or ``"drift"``.
-    """
-
-    photos: tuple[str, ...]
-    frame: FrameSpec
-    enu: Floats
-    use: Flags
-    sigma: Floats
-    time: Floats
+    photos: tuple[str, ...]  # photos, unique
+    frame: FrameSpec  # ground frame of the positions
+    enu: Floats  # (n, 3): coordinates in the units of the frame, internal order; NaN where one is not given
+    use: Flags  # (n, 3): which coordinates count
+    sigma: Floats  # (n, 3): standard deviations in metres
+    time: Floats  # (n,): time of exposure; NaN without one
+    # antenna from the perspective centre along the image axes (x right, y up, z towards the viewer), metres
     lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    # what the positions of one strip share beside the truth: ``"none"``, ``"offset"`` or ``"drift"``
     correction: str = "none"
 
 
 @dataclass(frozen=True, eq=False)
 class GivenOrientations:
-    """Given exterior orientations.
+    """Given exterior orientations."""
 
-    Parameters
-    ----------
-    photos : tuple of str
-        Photos, unique.
-    frame : FrameSpec
-        Ground frame of the centres; the rotations refer to its axes at each centre.
-    enu : ndarray, shape (n, 3)
-        Perspective centres in the units of the frame, internal order.
-    angles : ndarray, shape (n, 3)
-        Angles of ``system``, radians.
-    system : str
-        One of ``geometry.rotation.SYSTEMS``.
-    sigma : ndarray, shape (n, 3)
-        Standard deviations of the centres, metres.
-    sigma_angles : ndarray, shape (n, 3)
-        Standard deviations of the angles, radians.
-    observed : bool
-        Whether they are observations; otherwise a start without influence, and the standard deviations are NaN.
-    """
-
-    photos: tuple[str, ...]
-    frame: FrameSpec
-    enu: Floats
-    angles: Floats
-    system: str
-    sigma: Floats
-    sigma_angles: Floats
+    photos: tuple[str, ...]  # photos, unique
+    frame: FrameSpec  # ground frame of the centres; the rotations refer to its axes at each centre
+    enu: Floats  # (n, 3): perspective centres in the units of the frame, internal order
+    angles: Floats  # (n, 3): angles of ``system``, radians
+    system: str  # one of ``geometry.rotation.SYSTEMS``
+    sigma: Floats  # (n, 3): standard deviations of the centres, metres
+    sigma_angles: Floats  # (n, 3): standard deviations of the angles, radians
+    # whether they are observations; otherwise a start without influence, and the standard deviations are NaN
     observed: bool
 
 
 @dataclass(frozen=True, eq=False)
 class Inputs:
-    """Everything that is given: what a project file and its tables say, without how they say it.
-
-    Parameters
-    ----------
-    strips : tuple of Strip
-        Strips in the project's order.
-    observations : PhotoPoints
-        Image points as measured, in mm, x to the right, y up; in the system of the fiducial
-        measurements when there are any, otherwise in that of the photo.
-    control : ControlPoints
-        Control and check points; ``frame`` counts in ``frames``.
-    frames : tuple of FrameSpec
-        Ground frame of each control list.
-    output : FrameSpec or None
-        Ground frame of the result; None: that of the first control list.
-    fiducials : PhotoPoints or None
-        Measured fiducial marks (``point_ids`` are the marks), in mm, y up.
-    models : MeasuredModels or None
-        Measured model coordinates; there are then no `strips` of photos, and `observations` only name the points.
-    """
+    """Everything that is given: what a project file and its tables say, without how they say it."""
 
     name: str
-    strips: tuple[Strip, ...]
+    strips: tuple[Strip, ...]  # strips in the project's order
+    # image points as measured, in mm, x to the right, y up; in the system of the fiducial measurements when there are
+    # any, otherwise in that of the photo
     observations: PhotoPoints
-    control: ControlPoints
-    frames: tuple[FrameSpec, ...]
-    output: FrameSpec | None = None
-    fiducials: PhotoPoints | None = None
+    control: ControlPoints  # control and check points; ``frame`` counts in ``frames``
+    frames: tuple[FrameSpec, ...]  # ground frame of each control list
+    output: FrameSpec | None = None  # ground frame of the result; None: that of the first control list
+    fiducials: PhotoPoints | None = None  # measured fiducial marks (``point_ids`` are the marks), in mm, y up
     positions: CameraPositions | None = None
     orientations: GivenOrientations | None = None
+    # measured model coordinates; there are then no `strips` of photos, and `observations` only name the points
     models: MeasuredModels | None = None
 
     @property
@@ -192,23 +114,9 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Settings:
-    """What is to be done; every part stands beside the operation it steers.
+    """What is to be done; every part stands beside the operation it steers."""
 
-    Parameters
-    ----------
-    adjustment : str
-        One of ``ADJUSTMENTS``.
-    precision : bool
-        Whether standard deviations and covariances of points and photos are computed.
-    angle_system, angle_unit : str
-        System (``geometry.rotation.SYSTEMS``) and unit (``"deg"``, ``"gon"``, ``"rad"``) of exported angles.
-    tolerances : dict of str to float
-        Largest allowed values of the summary, metres, by name (``check_rms_xy``, ``check_rms_z``, ...).
-    accept : tuple of str
-        Findings that the user has looked at and accepted: codes, or ``code/id`` for one photo, point or strip.
-    """
-
-    adjustment: str = "polynomial"
+    adjustment: str = "polynomial"  # one of ``ADJUSTMENTS``
     relative: relative.Settings = field(default_factory=relative.Settings)
     formation: formation.Settings = field(default_factory=formation.Settings)
     links: link_screening.Settings = field(default_factory=link_screening.Settings)
@@ -218,8 +126,12 @@ class Settings:
     bundle: bundle.Settings = field(default_factory=bundle.Settings)
     interior: interior.Settings = field(default_factory=interior.Settings)
     refinement: refinement.Settings = field(default_factory=refinement.Settings)
-    precision: bool = True
+    precision: bool = True  # whether standard deviations and covariances of points and photos are computed
+    # angle_system, angle_unit: system (``geometry.rotation.SYSTEMS``) and unit (``"deg"``, ``"gon"``, ``"rad"``) of
+    # exported angles
     angle_system: str = "alpha-omega-kappa"
     angle_unit: str = "deg"
+    # largest allowed values of the summary, metres, by name (``check_rms_xy``, ``check_rms_z``, ...)
     tolerances: dict[str, float] = field(default_factory=dict)
+    # findings that the user has looked at and accepted: codes, or ``code/id`` for one photo, point or strip
     accept: tuple[str, ...] = ()

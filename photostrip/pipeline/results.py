@@ -42,64 +42,33 @@ NEW, CONTROL, CHECK = "new", "control", "check"
 
 @dataclass(frozen=True, eq=False)
 class StripResult:
-    """Every stage of one strip, in order.
-
-    Parameters
-    ----------
-    orientation : relative.Orientation
-        Relative orientation of its pairs, after screening.
-    precision : tuple of float
-        A-priori standard deviation of a point in plan and height from one model, metres.
-    control : ControlPoints
-        Control that took part.
-    control_rows : ndarray of int, shape (n,)
-        Its rows in the strip's points.
-    polynomial : polynomial.Polynomial or None
-        Correction of the strip deformation; None with ``adjustment: similarity``.
-    xyz : ndarray, shape (q, 3)
-        Adjusted points, intermediate frame, metres; points of ``formed.point``.
-    cartesian : ndarray, shape (q, 3)
-        The same in the project's Cartesian frame.
-    resection : exterior.Resection
-        Photos oriented on the adjusted points, intermediate frame.
-    rows : ndarray of int, shape (m,)
-        Image points that took part in the resections, rows of the observations.
-    depth : float
-        Mean distance of the points from the cameras along the viewing direction, metres.
-    notes : tuple of Note
-        What this strip's numbers say beside themselves.
-    screened : screening.Screened
-        The search for gross errors: log, zones, detectable errors; it holds ``orientation`` and ``rejections`` too.
-    contradictions : strip_screening.Verdict
-        Measurements that the strip as a whole does not confirm.
-    wrong_control : tuple of control_screening.ControlRejection
-        Control coordinates that were not used; ``control`` says so in its ``use``.
-    covariance : CovarianceAdjustment or None
-        The adjustment with the strip's own covariance; None with other adjustments.
-    judged_control : control_significance.Judged or None
-        What the covariance of the strip says of each coordinate of ``control``; None without.
-    """
+    """Every stage of one strip, in order."""
 
     strip: Strip
-    orientation: relative.Orientation
+    orientation: relative.Orientation  # relative orientation of its pairs, after screening
     rejections: tuple[screening.Rejection, ...]
     formed: formation.FormedStrip
-    precision: tuple[float, float]
+    precision: tuple[float, float]  # a-priori standard deviation of a point in plan and height from one model, metres
     intermediate: IntermediateFrame
-    control: ControlPoints
-    control_rows: Numbers
+    control: ControlPoints  # control that took part
+    control_rows: Numbers  # (n,): its rows in the strip's points
     absolute: absolute.AbsoluteOrientation
+    # correction of the strip deformation; None with ``adjustment: similarity``
     polynomial: polynomial.Polynomial | None
-    xyz: Floats
-    cartesian: Floats
-    resection: exterior.Resection
-    rows: Numbers
-    depth: float
-    notes: tuple[Note, ...]
+    xyz: Floats  # (q, 3): adjusted points, intermediate frame, metres; points of ``formed.point``
+    cartesian: Floats  # (q, 3): the same in the project's Cartesian frame
+    resection: exterior.Resection  # photos oriented on the adjusted points, intermediate frame
+    rows: Numbers  # (m,): image points that took part in the resections, rows of the observations
+    depth: float  # mean distance of the points from the cameras along the viewing direction, metres
+    notes: tuple[Note, ...]  # what this strip's numbers say beside themselves
+    # the search for gross errors: log, zones, detectable errors; it holds ``orientation`` and ``rejections`` too
     screened: screening.Screened
-    contradictions: strip_screening.Verdict
+    contradictions: strip_screening.Verdict  # measurements that the strip as a whole does not confirm
+    # control coordinates that were not used; ``control`` says so in its ``use``
     wrong_control: tuple[control_screening.ControlRejection, ...]
+    # the adjustment with the strip's own covariance; None with other adjustments
     covariance: CovarianceAdjustment | None = None
+    # what the covariance of the strip says of each coordinate of ``control``; None without
     judged_control: control_significance.Judged | None = None
 
     @property
@@ -115,43 +84,21 @@ class StripResult:
 
 @dataclass(frozen=True, eq=False)
 class Adjusted:
-    """Points of all strips together.
+    """Points of all strips together."""
 
-    Parameters
-    ----------
-    number : ndarray of int, shape (n,)
-        Points, as numbered in the observations, ascending.
-    cartesian : ndarray, shape (n, 3)
-        Coordinates in the project's Cartesian frame, metres; mean over the strips.
-    ground : ndarray, shape (n, 3)
-        Coordinates in the output frame, internal order east, north, up.
-    rays : ndarray of int, shape (n,)
-        Photos on which the point was measured and used.
-    """
-
-    number: Numbers
-    cartesian: Floats
-    ground: Floats
-    rays: Numbers
+    number: Numbers  # (n,): points, as numbered in the observations, ascending
+    cartesian: Floats  # (n, 3): coordinates in the project's Cartesian frame, metres; mean over the strips
+    ground: Floats  # (n, 3): coordinates in the output frame, internal order east, north, up
+    rays: Numbers  # (n,): photos on which the point was measured and used
 
 
 @dataclass(frozen=True, eq=False)
 class Ties:
-    """Points common to two strips.
+    """Points common to two strips."""
 
-    Parameters
-    ----------
-    number : ndarray of int, shape (t,)
-        Points, as numbered in the observations.
-    strips : ndarray of int, shape (t, 2)
-        The two strips.
-    difference : ndarray, shape (t, 3)
-        Second minus first strip along east, north and up of the output frame, metres.
-    """
-
-    number: Numbers
-    strips: Numbers
-    difference: Floats
+    number: Numbers  # (t,): points, as numbered in the observations
+    strips: Numbers  # (t, 2): the two strips
+    difference: Floats  # (t, 3): second minus first strip along east, north and up of the output frame, metres
 
     @classmethod
     def none(cls) -> Ties:
@@ -165,188 +112,101 @@ class Precision:
 
     Every way of adjusting fills the same columns. All covariances refer to the axes of the project's Cartesian frame,
     as ``Adjusted.cartesian`` does; they are turned into the axes of the output where they are written.
-
-    Parameters
-    ----------
-    points : ndarray, shape (n, 3, 3)
-        Covariances of the points of ``Adjusted.number``, metres^2; NaN where one is not known.
-    photos : tuple of ndarray, shape (m, 6, 6)
-        One array for each strip, photos in flight order: perspective centre in metres, then the small rotation in
-        radians that turns the photo about the axes of the frame, ``R_true = exp([theta]) R``; NaN where not known.
-    sigma : tuple of float
-        Standard deviation of an image coordinate of weight one behind the covariances, mm, for each strip.
-    basis : tuple of str
-        For each strip: ``"a-priori"`` when that is the stated one, ``"a-posteriori"`` when it was found by the
-        adjustment.
-    checks : tuple of CheckTest or None
-        For each strip the test of its check points together; None without any, empty when no strip was tested.
     """
 
-    points: Floats
+    points: Floats  # (n, 3, 3): covariances of the points of ``Adjusted.number``, metres^2; NaN where one is not known
+    # (m, 6, 6): one array for each strip, photos in flight order: perspective centre in metres, then the small rotation
+    # in radians that turns the photo about the axes of the frame, ``R_true = exp([theta]) R``; NaN where not known
     photos: tuple[Floats, ...]
+    # standard deviation of an image coordinate of weight one behind the covariances, mm, for each strip
     sigma: tuple[float, ...]
+    # for each strip: ``"a-priori"`` when that is the stated one, ``"a-posteriori"`` when it was found by the adjustment
     basis: tuple[str, ...]
+    # for each strip the test of its check points together; None without any, empty when no strip was tested
     checks: tuple[CheckTest | None, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class BlockStart:
-    """Start values of the bundle adjustment.
+    """Start values of the bundle adjustment."""
 
-    Parameters
-    ----------
-    strips : tuple of StripResult
-        Strips of two photos or more, every stage of the strip method.
-    photos : tuple of str
-        All photos, strip by strip.
-    centers, rotations : ndarray, shapes (m, 3), (m, 3, 3)
-        Their orientations, Cartesian frame.
-    points : ndarray, shape (q, 3)
-        All points of the observations; NaN where one has no coordinates.
-    free : bool
-        Whether nothing ties the block to the ground: its frame and scale are those of the first strip.
-    """
-
-    strips: tuple[StripResult, ...]
-    photos: tuple[str, ...]
+    strips: tuple[StripResult, ...]  # strips of two photos or more, every stage of the strip method
+    photos: tuple[str, ...]  # all photos, strip by strip
+    # centers, rotations: (m, 3), (m, 3, 3): their orientations, Cartesian frame
     centers: Floats
     rotations: Floats
-    points: Floats
-    free: bool
+    points: Floats  # (q, 3): all points of the observations; NaN where one has no coordinates
+    free: bool  # whether nothing ties the block to the ground: its frame and scale are those of the first strip
 
 
 @dataclass(frozen=True, eq=False)
 class BlockProblem:
-    """A bundle adjustment with what its rows stand for.
+    """A bundle adjustment with what its rows stand for."""
 
-    Parameters
-    ----------
-    problem : Problem
-        The arrays; points as numbered in the observations, photos strip by strip.
-    origin : ndarray, shape (3,)
-        Origin of its frame in the project's Cartesian frame, metres.
-    kept : ndarray of bool, shape (n,)
-        Rays that the user keeps.
-    rows : ndarray of int, shape (n,)
-        Row in the observations of each ray.
-    control : ndarray of int, shape (c,)
-        Row in the measured control of each row of ``problem.control``.
-    level : dict of str to tuple of bool
-        For ``control`` and ``position``: whether the axes of each row are plan and height.
-    """
-
-    problem: Problem
-    origin: Floats
+    problem: Problem  # the arrays; points as numbered in the observations, photos strip by strip
+    origin: Floats  # (3,): origin of its frame in the project's Cartesian frame, metres
     begin: Selection
-    kept: Flags
-    rows: Numbers
-    control: Numbers
+    kept: Flags  # (n,): rays that the user keeps
+    rows: Numbers  # (n,): row in the observations of each ray
+    control: Numbers  # (c,): row in the measured control of each row of ``problem.control``
+    # for ``control`` and ``position``: whether the axes of each row are plan and height
     level: dict[str, tuple[bool, ...]]
 
 
 @dataclass(frozen=True, eq=False)
 class SinglePhoto:
-    """A photo that is a strip of its own.
-
-    Parameters
-    ----------
-    center, rotation : ndarray, shapes (3,), (3, 3)
-        Its orientation in the project's Cartesian frame.
-    """
+    """A photo that is a strip of its own."""
 
     strip: Strip
+    # center, rotation: (3,), (3, 3): its orientation in the project's Cartesian frame
     center: Floats
     rotation: Floats
 
 
 @dataclass(frozen=True, eq=False)
 class Bundle:
-    """What the bundle adjustment found beside points and orientations.
+    """What the bundle adjustment found beside points and orientations."""
 
-    Parameters
-    ----------
-    start : BlockStart
-        Where it started: the strips as the strip method leaves them.
-    block : BlockProblem
-        All observations, with the standard deviations of the last adjustment.
-    screened : Screened
-        The solution and how it was cleaned.
-    groups : tuple of reliability.Group
-        Observations that took part with their redundancy numbers.
-    sigma0 : reliability.Sigma0Test
-        Test of sigma0, with the stated standard deviations.
-    components : tuple of variance_components.Component
-        Variance components; empty when none were asked for.
-    correlations : tuple of correlations.Correlation
-        Correlations above 0.95: of parameters that photos share with each other and with the photo where it is largest,
-        and the largest within photos.
-    singles : tuple of SinglePhoto
-        Photos that are strips of their own.
-    photo_covariances : ndarray, shape (m, 6, 6)
-        Covariances of all photos, strip by strip, as in ``results.Precision``.
-    unit : float
-        Standard deviation of unit weight behind the covariances: sigma0, or 1 with Baarda's test.
-    """
-
-    start: BlockStart
-    block: BlockProblem
-    screened: Screened
-    groups: tuple[reliability.Group, ...]
-    sigma0: reliability.Sigma0Test
-    components: tuple[variance_components.Component, ...]
+    start: BlockStart  # where it started: the strips as the strip method leaves them
+    block: BlockProblem  # all observations, with the standard deviations of the last adjustment
+    screened: Screened  # the solution and how it was cleaned
+    groups: tuple[reliability.Group, ...]  # observations that took part with their redundancy numbers
+    sigma0: reliability.Sigma0Test  # test of sigma0, with the stated standard deviations
+    components: tuple[variance_components.Component, ...]  # variance components; empty when none were asked for
     parameters: tuple[self_calibration.Parameter, ...]
+    # correlations above 0.95: of parameters that photos share with each other and with the photo where it is largest,
+    # and the largest within photos
     correlations: tuple[Correlation, ...]
-    singles: tuple[SinglePhoto, ...]
-    photo_covariances: Floats
-    unit: float
+    singles: tuple[SinglePhoto, ...]  # photos that are strips of their own
+    photo_covariances: Floats  # (m, 6, 6): covariances of all photos, strip by strip, as in ``results.Precision``
+    unit: float  # standard deviation of unit weight behind the covariances: sigma0, or 1 with Baarda's test
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What a run found, stage by stage; everything written and printed is rendered from it.
+    """What a run found, stage by stage; everything written and printed is rendered from it."""
 
-    Parameters
-    ----------
-    inputs, settings
-        What was given and asked for.
-    frames : tuple of GroundFrame
-        Ground frames of the control lists.
-    output : GroundFrame
-        Ground frame of the result.
-    refined : corrections.Refined
-        Ideal image coordinates and the size of each correction.
-    control_rows : ndarray of int, shape (c,)
-        Row in ``points`` of every point of ``inputs.control``; -1 where it has no coordinates.
-    control_differences : ndarray, shape (c, 3)
-        Adjusted minus given in metres along east, north, up of the point's own ground frame; NaN where it is not
-        given, does not count or has no result.
-    precision : Precision or None
-        How precise points and photos are; None when it was not computed.
-    bundle : Bundle or None
-        The bundle adjustment; ``strips`` then carry its orientations and points.
-    findings : tuple of Finding
-        What the data say against themselves.
-    linked : tuple of LinkedStrip
-        Strips of independent models; there are then no `strips`.
-    """
-
+    # inputs, settings: what was given and asked for
     inputs: Inputs
     settings: Settings
-    frames: tuple[GroundFrame, ...]
-    output: GroundFrame
+    frames: tuple[GroundFrame, ...]  # ground frames of the control lists
+    output: GroundFrame  # ground frame of the result
     interior: interior.InteriorOrientation | None
-    refined: corrections.Refined
+    refined: corrections.Refined  # ideal image coordinates and the size of each correction
     strips: tuple[StripResult, ...]
     points: Adjusted
+    # (c,): row in ``points`` of every point of ``inputs.control``; -1 where it has no coordinates
     control_rows: Numbers
+    # (c, 3): adjusted minus given in metres along east, north, up of the point's own ground frame; NaN where it is not
+    # given, does not count or has no result
     control_differences: Floats
     ties: Ties
     not_determined: dict[str, str]
     notes: tuple[Note, ...]
-    precision: Precision | None = None
-    bundle: Bundle | None = None
-    findings: tuple[Finding, ...] = ()
-    linked: tuple[LinkedStrip, ...] = ()
+    precision: Precision | None = None  # how precise points and photos are; None when it was not computed
+    bundle: Bundle | None = None  # the bundle adjustment; ``strips`` then carry its orientations and points
+    findings: tuple[Finding, ...] = ()  # what the data say against themselves
+    linked: tuple[LinkedStrip, ...] = ()  # strips of independent models; there are then no `strips`
 
     @property
     def flights(self) -> tuple[StripResult | LinkedStrip, ...]:

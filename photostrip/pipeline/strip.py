@@ -63,26 +63,14 @@ def adjust_strip(
 
 @dataclass(frozen=True, eq=False)
 class Formed:
-    """A strip before it meets its control.
-
-    Parameters
-    ----------
-    sigma : float
-        Median standard deviation of its image coordinates, mm.
-    screened : screening.Screened
-        The search for gross errors in its pairs.
-    oriented : relative.Orientation
-        Relative orientation of the pairs, as the strip was formed.
-    contradictions : strip_screening.Verdict
-        Points whose rays contradict each other from model to model.
-    """
+    """A strip before it meets its control."""
 
     strip: Strip
-    sigma: float
-    screened: screening.Screened
-    oriented: relative.Orientation
+    sigma: float  # median standard deviation of its image coordinates, mm
+    screened: screening.Screened  # the search for gross errors in its pairs
+    oriented: relative.Orientation  # relative orientation of the pairs, as the strip was formed
     formed: formation.FormedStrip
-    contradictions: strip_screening.Verdict
+    contradictions: strip_screening.Verdict  # points whose rays contradict each other from model to model
 
 
 def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> Formed:

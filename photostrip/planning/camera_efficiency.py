@@ -15,25 +15,13 @@ if TYPE_CHECKING:
 
 
 class Camera(NamedTuple):
-    """A camera to compare.
-
-    Parameters
-    ----------
-    focal : float
-        Principal distance f, mm.
-    sigma : float
-        Standard deviation m_p of an x parallax, mm.
-    base : float
-        Photo base b, mm.
-    width : float
-        Width l of a photo across the flight, mm.
-    """
+    """A camera to compare."""
 
     name: str
-    focal: float
-    sigma: float
-    base: float
-    width: float
+    focal: float  # principal distance f, mm
+    sigma: float  # standard deviation m_p of an x parallax, mm
+    base: float  # photo base b, mm
+    width: float  # width l of a photo across the flight, mm
 
     @property
     def coefficient(self) -> float:
@@ -50,27 +38,14 @@ class Camera(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """A camera beside another, both flown for the same standard deviation of heights, unless said otherwise.
+    """A camera beside another, both flown for the same standard deviation of heights, unless said otherwise."""
 
-    Parameters
-    ----------
-    scale : float
-        Ratio of the denominators of photo scale, m1 / m2.
-    height_error : float
-        eta_mh: ratio of the standard deviations of heights, m_h1 / m_h2, where the two cover the same area.
-    printed_area : float
-        eta_S as printed (eq. 2): the scale to the first power.
-    area : float
-        The ratio of the areas that a model covers: the scale squared.
-    photos : float
-        How many times as many photos are needed for an area: the inverse of `area`.
-    """
-
-    scale: float
+    scale: float  # ratio of the denominators of photo scale, m1 / m2
+    # eta_mh: ratio of the standard deviations of heights, m_h1 / m_h2, where the two cover the same area
     height_error: float
-    printed_area: float
-    area: float
-    photos: float
+    printed_area: float  # eta_S as printed (eq. 2): the scale to the first power
+    area: float  # the ratio of the areas that a model covers: the scale squared
+    photos: float  # how many times as many photos are needed for an area: the inverse of `area`
 
 
 def compare(first: Camera, second: Camera) -> Comparison:
@@ -92,19 +67,12 @@ def compare(first: Camera, second: Camera) -> Comparison:
 
 
 class PrintedRow(NamedTuple):
-    """A row of the table of the source, as it is printed.
+    """A row of the table of the source, as it is printed."""
 
-    Parameters
-    ----------
-    focal, sigma : float
-        f and m_p, mm.
-    coefficient : float
-        K, mm².
-    """
-
+    # focal, sigma: f and m_p, mm
     focal: float
     sigma: float
-    coefficient: float
+    coefficient: float  # K, mm²
     height_ratio: float
     area: float
 

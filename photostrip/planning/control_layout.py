@@ -20,57 +20,28 @@ Triple = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Spot:
-    """One control point.
+    """One control point."""
 
-    Parameters
-    ----------
-    photo : int
-        Photo at whose nadir it lies, counted from 1.
-    row : int
-        Row of pass points from left to right, counted from 1.
-    use : str
-        ``xyz``, ``xy`` or ``z``.
-    """
-
-    photo: int
-    row: int
-    use: str = "xyz"
+    photo: int  # photo at whose nadir it lies, counted from 1
+    row: int  # row of pass points from left to right, counted from 1
+    use: str = "xyz"  # ``xyz``, ``xy`` or ``z``
 
 
 @dataclass(frozen=True)
 class Layout:
-    """A layout of control to be compared with others.
-
-    Parameters
-    ----------
-    bands : int
-        Number of bands, spread evenly from the first to the last photo.
-    every : int or None
-        Models from band to band, instead of `bands`; the last photo always has a band.
-    per_band : int
-        Points of a band: 1 in the middle, 2 at the edges, and so on.
-    use : str
-        ``xyz``, ``xy`` or ``z`` of the points of bands and corners.
-    spots : tuple of Spot
-        Points, for ``points`` instead of bands, and in addition to the others.
-    sigma : tuple of float
-        Standard deviations along, across and in height, metres.
-    gnss : tuple of float or None
-        Standard deviations of measured perspective centres along, across and in height, metres.
-    gnss_offset : bool
-        Whether they have a constant offset, which is to be determined.
-    """
+    """A layout of control to be compared with others."""
 
     name: str
     kind: str = "bands"
-    bands: int = 3
-    every: int | None = None
-    per_band: int = 3
-    use: str = "xyz"
-    spots: tuple[Spot, ...] = ()
-    sigma: Triple = (0.05, 0.05, 0.08)
+    bands: int = 3  # number of bands, spread evenly from the first to the last photo
+    every: int | None = None  # models from band to band, instead of `bands`; the last photo always has a band
+    per_band: int = 3  # points of a band: 1 in the middle, 2 at the edges, and so on
+    use: str = "xyz"  # ``xyz``, ``xy`` or ``z`` of the points of bands and corners
+    spots: tuple[Spot, ...] = ()  # points, for ``points`` instead of bands, and in addition to the others
+    sigma: Triple = (0.05, 0.05, 0.08)  # standard deviations along, across and in height, metres
+    # standard deviations of measured perspective centres along, across and in height, metres
     gnss: Triple | None = None
-    gnss_offset: bool = True
+    gnss_offset: bool = True  # whether they have a constant offset, which is to be determined
 
 
 def spots_of(layout: Layout, photos: int, rows: int) -> tuple[Spot, ...]:

@@ -108,14 +108,9 @@ def ground_errors(
 
 
 class Constants(NamedTuple):
-    """Factors of the standard deviation of one y parallax.
+    """Factors of the standard deviation of one y parallax."""
 
-    Parameters
-    ----------
-    plan, height : float
-        With m they give ground units: m_D = plan m m_q, m_Z = height m (f/b) m_q.
-    """
-
+    # plan, height: with m they give ground units: m_D = plan m m_q, m_Z = height m (f/b) m_q
     plan: float
     height: float
 
@@ -212,22 +207,13 @@ def paraboloid(elements: ArrayLike, scale: float, focal: float, base: float) -> 
 
 @dataclass(frozen=True, eq=False)
 class Paraboloid:
-    """A deformation paraboloid fitted to height residuals.
+    """A deformation paraboloid fitted to height residuals."""
 
-    Parameters
-    ----------
-    coefficients : ndarray, shape (5,)
-        E0, A, B, C, D, in the unit of the residuals for x, y in their unit.
-    sigmas : ndarray, shape (5,)
-        Standard deviations: from the residuals with a `redundancy` of three or more, else from the stated ones.
-    sigma0 : float
-        Standard deviation of unit weight from the residuals; NaN without redundancy.
-    """
-
-    coefficients: Array
+    coefficients: Array  # (5,): E0, A, B, C, D, in the unit of the residuals for x, y in their unit
+    # (5,): standard deviations: from the residuals with a `redundancy` of three or more, else from the stated ones
     sigmas: Array
     redundancy: int
-    sigma0: float
+    sigma0: float  # standard deviation of unit weight from the residuals; NaN without redundancy
 
     @property
     def t_values(self) -> Array:

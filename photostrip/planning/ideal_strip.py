@@ -36,24 +36,15 @@ USUAL_POINTS = Points(rows=5, scatter_percent=0.0, extra_per_model=0)
 
 @dataclass(frozen=True)
 class StripGeometry:
-    """What is flown and measured.
+    """What is flown and measured."""
 
-    Parameters
-    ----------
-    camera : Camera
-        The camera; its lens counts as ideal.
-    points : Points
-        Pass points: rows of them across the flight at each nadir, and further ones in each model.
-    image_sigma : float
-        Standard deviation of an image coordinate, mm.
-    """
-
-    camera: Camera
+    camera: Camera  # the camera; its lens counts as ideal
     photos: int
     end_lap_percent: float = 60.0
     scale: float = 10_000.0
+    # pass points: rows of them across the flight at each nadir, and further ones in each model
     points: Points = USUAL_POINTS
-    image_sigma: float = 0.005
+    image_sigma: float = 0.005  # standard deviation of an image coordinate, mm
 
     @property
     def base(self) -> float:
@@ -88,40 +79,23 @@ class StripGeometry:
 
 @dataclass(frozen=True, eq=False)
 class IdealStrip:
-    """An error-free strip with its derivatives.
-
-    Parameters
-    ----------
-    photos : tuple of str
-        Photos in flight order.
-    observations : PhotoPoints
-        Image coordinates without errors, with their standard deviations.
-    formed : FormedStrip
-        The strip in the frame of its first photo.
-    similarity : Similarity
-        From there to the ground: X along the strip, Y to its left, Z up, metres, the middle of the strip at 0.
-    xyz : ndarray, shape (q, 3)
-        Points of ``formed.point`` on the ground.
-    centers, rotations : ndarray, shape (m, 3), (m, 3, 3)
-        Photos on the ground.
-    station, row : ndarray of int, shape (q,)
-        Photo at whose nadir a point lies and its row from left to right; -1 for further points.
-    errors : StripErrors
-        Derivatives of the strip by the image coordinates.
-    """
+    """An error-free strip with its derivatives."""
 
     geometry: StripGeometry
-    photos: tuple[str, ...]
-    observations: PhotoPoints
+    photos: tuple[str, ...]  # photos in flight order
+    observations: PhotoPoints  # image coordinates without errors, with their standard deviations
     orientation: Orientation
-    formed: FormedStrip
+    formed: FormedStrip  # the strip in the frame of its first photo
+    # from there to the ground: X along the strip, Y to its left, Z up, metres, the middle of the strip at 0
     similarity: Similarity
-    xyz: Floats
+    xyz: Floats  # (q, 3): points of ``formed.point`` on the ground
+    # centers, rotations: (m, 3), (m, 3, 3): photos on the ground
     centers: Floats
     rotations: Floats
+    # station, row: (q,): photo at whose nadir a point lies and its row from left to right; -1 for further points
     station: Numbers
     row: Numbers
-    errors: StripErrors
+    errors: StripErrors  # derivatives of the strip by the image coordinates
 
     @property
     def candidates(self) -> Numbers:

@@ -25,25 +25,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class AdjustedModel:
-    """An oriented model.
-
-    Parameters
-    ----------
-    parameters : ndarray, shape (7,)
-        Absolute orientation, in the order of `PARAMETERS`.
-    elements : ndarray, shape (4,)
-        Estimated errors of the relative orientation: dkappa, dbz, dalpha2, domega.
-    cofactors : ndarray, shape (11, 11)
-        Covariance of both.
-    weights : ndarray, shape (n, 3, 3)
-        Inverse covariances of the misclosures without the elements; zero where a coordinate is not given.
-    """
+    """An oriented model."""
 
     control: Control
     base: float
-    parameters: Array
-    elements: Array
-    cofactors: Array
+    parameters: Array  # (7,): absolute orientation, in the order of `PARAMETERS`
+    elements: Array  # (4,): estimated errors of the relative orientation: dkappa, dbz, dalpha2, domega
+    cofactors: Array  # (11, 11): covariance of both
+    # (n, 3, 3): inverse covariances of the misclosures without the elements; zero where a coordinate is not given
     weights: Array
 
     def correction(self, points: ArrayLike) -> Array:

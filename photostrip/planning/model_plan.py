@@ -32,54 +32,28 @@ METRE = 1e3  # mm
 
 @dataclass(frozen=True)
 class ControlPoint:
-    """A control point of a model.
+    """A control point of a model."""
 
-    Parameters
-    ----------
-    at : tuple of float
-        x and y from the left nadir at photo scale, mm.
-    use : str
-        ``xyz``, ``xy`` or ``z``.
-    """
-
-    at: Place
-    use: str = "xyz"
+    at: Place  # x and y from the left nadir at photo scale, mm
+    use: str = "xyz"  # ``xyz``, ``xy`` or ``z``
 
 
 @dataclass(frozen=True)
 class ModelSpec:
-    """One model.
+    """One model."""
 
-    Parameters
-    ----------
-    focal : float
-        Principal distance, mm.
-    base : float
-        Photo base b, mm.
-    width : float
-        Distance a of the side points from the flight line, mm.
-    image_sigma : float
-        Standard deviation of an image coordinate, mm.
-    zone_points : int
-        Points in each of the six standard zones that orient the pair; 1: the six standard points.
-    orientation_points : tuple of tuple of float
-        Points that orient the pair, x and y in mm, instead of the standard zones.
-    control_sigma : tuple of float
-        Standard deviations of given coordinates along, across and in height, metres.
-    grid : tuple of int
-        Points along and across at which errors are computed.
-    """
-
-    focal: float
-    base: float
-    width: float
+    focal: float  # principal distance, mm
+    base: float  # photo base b, mm
+    width: float  # distance a of the side points from the flight line, mm
     scale: float = 10_000.0
-    image_sigma: float = 0.005
-    zone_points: int = 1
+    image_sigma: float = 0.005  # standard deviation of an image coordinate, mm
+    zone_points: int = 1  # points in each of the six standard zones that orient the pair; 1: the six standard points
+    # points that orient the pair, x and y in mm, instead of the standard zones
     orientation_points: tuple[Place, ...] = ()
     control: tuple[ControlPoint, ...] = ()
+    # standard deviations of given coordinates along, across and in height, metres
     control_sigma: tuple[float, float, float] = (0.05, 0.05, 0.08)
-    grid: tuple[int, int] = (5, 7)
+    grid: tuple[int, int] = (5, 7)  # points along and across at which errors are computed
 
     @property
     def parallax_sigma(self) -> float:
@@ -112,28 +86,14 @@ def control_layout(name: str, base: float, width: float) -> tuple[ControlPoint, 
 
 @dataclass(frozen=True, eq=False)
 class Forecast:
-    """Expected errors of one model.
-
-    Parameters
-    ----------
-    places : ndarray, shape (q, 2)
-        Points of the grid, mm at photo scale, rows across the flight after each other.
-    expected : Expected
-        Their errors after the plain absolute orientation, mm at photo scale.
-    adjusted : ndarray, shape (q, 3, 3)
-        Their covariance when the elements are unknowns of the orientation.
-    at_control : ndarray, shape (n, 3)
-        Standard deviations of the adjusted control points, metres.
-    elements : ndarray, shape (4,)
-        Standard deviations of `FREE`: radians, dbz in mm at photo scale.
-    """
+    """Expected errors of one model."""
 
     spec: ModelSpec
-    places: Array
-    expected: Expected
-    adjusted: Array
-    at_control: Array
-    elements: Array
+    places: Array  # (q, 2): points of the grid, mm at photo scale, rows across the flight after each other
+    expected: Expected  # their errors after the plain absolute orientation, mm at photo scale
+    adjusted: Array  # (q, 3, 3): their covariance when the elements are unknowns of the orientation
+    at_control: Array  # (n, 3): standard deviations of the adjusted control points, metres
+    elements: Array  # (4,): standard deviations of `FREE`: radians, dbz in mm at photo scale
 
     @property
     def sigmas(self) -> Array:
@@ -166,21 +126,12 @@ class Forecast:
 
 @dataclass(frozen=True)
 class SimpleAccuracy:
-    """What the simple formulas say of a place of the model, metres.
+    """What the simple formulas say of a place of the model, metres."""
 
-    Parameters
-    ----------
-    place : str
-        Which place.
-    at : tuple of float
-        x and y, mm.
-    source, rigorous : Constants
-        Plan (both coordinates together) and height: with the constants as printed, and with the cofactors of six
-        standard points.
-    """
-
-    place: str
-    at: Place
+    place: str  # which place
+    at: Place  # x and y, mm
+    # source, rigorous: plan (both coordinates together) and height: with the constants as printed, and with the
+    # cofactors of six standard points
     source: deformation.Constants
     rigorous: deformation.Constants
 

@@ -30,14 +30,9 @@ FARTHEST = 3  # photos that a point is moved by in one step
 
 @dataclass(frozen=True)
 class Required:
-    """Standard deviations that every point must reach.
+    """Standard deviations that every point must reach."""
 
-    Parameters
-    ----------
-    plan, height : float or None
-        Both coordinates of the plan together, and height, metres; None: anything will do.
-    """
-
+    # plan, height: both coordinates of the plan together, and height, metres; None: anything will do
     plan: float | None = None
     height: float | None = None
 
@@ -49,22 +44,12 @@ class Required:
 
 @dataclass(frozen=True)
 class Placement:
-    """Further control points to be placed as well as possible.
-
-    Parameters
-    ----------
-    into : str
-        Name of the layout that they are added to.
-    method : str
-        Method of adjustment whose worst point counts.
-    use : str
-        ``xyz``, ``xy`` or ``z``.
-    """
+    """Further control points to be placed as well as possible."""
 
     points: int
-    into: str
-    method: str = "bundle"
-    use: str = "xyz"
+    into: str  # name of the layout that they are added to
+    method: str = "bundle"  # method of adjustment whose worst point counts
+    use: str = "xyz"  # ``xyz``, ``xy`` or ``z``
 
 
 @dataclass(frozen=True)
@@ -104,21 +89,13 @@ def worst(expected: Accuracy) -> tuple[float, float]:
 
 @dataclass
 class _Search:
-    """Looks at layouts, each once, and counts them.
+    """Looks at layouts, each once, and counts them."""
 
-    Parameters
-    ----------
-    look : callable
-        Gives the worst standard deviations of a set of further points, metres.
-    required : bool
-        Whether the scale is what is required: then the larger of plan and height counts.
-    counts : tuple of bool
-        Whether plan and height count otherwise: a point in height only can do nothing for the plan.
-    """
-
+    # gives the worst standard deviations of a set of further points, metres
     look: Callable[[frozenset[Spot]], tuple[float, float]]
     scale: tuple[float, float]
-    required: bool
+    required: bool  # whether the scale is what is required: then the larger of plan and height counts
+    # whether plan and height count otherwise: a point in height only can do nothing for the plan
     counts: tuple[bool, bool]
     seen: dict[frozenset[Spot], tuple[float, float]]
 

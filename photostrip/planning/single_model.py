@@ -40,46 +40,27 @@ CLOSEST = 1e-12  # of control in plan: B against the square of the size of its c
 
 @dataclass(frozen=True, eq=False)
 class Control:
-    """Control points of a model.
+    """Control points of a model."""
 
-    Parameters
-    ----------
-    points : ndarray, shape (n, 3)
-        x, y and depth.
-    plan, height : ndarray of bool, shape (n,)
-        Whether the point is given in plan, in height.
-    measured : ndarray, shape (n, 3, 3)
-        Covariance of the measured model coordinates.
-    given : ndarray, shape (n, 3, 3)
-        Covariance of the given coordinates.
-    """
-
-    points: Array
+    points: Array  # (n, 3): x, y and depth
+    # plan, height: (n,): whether the point is given in plan, in height
     plan: Flags
     height: Flags
-    measured: Array
-    given: Array
+    measured: Array  # (n, 3, 3): covariance of the measured model coordinates
+    given: Array  # (n, 3, 3): covariance of the given coordinates
 
 
 @dataclass(frozen=True, eq=False)
 class Expected:
-    """Expected errors of points.
+    """Expected errors of points."""
 
-    Parameters
-    ----------
-    covariance : ndarray, shape (q, 3, 3)
-        Covariance of x, y and height.
-    sources : dict of str to ndarray, shape (q, 3, 3)
-        What each source contributes: ``measuring`` of the point itself (for a control point with what its own
-        measurement does through the orientation), ``orientation`` relative, ``control measured``, ``control given``.
-        They add up to the covariance.
-    elements : ndarray, shape (q, 3, 4)
-        Standard deviations from each of `FREE` alone. Their squares add up to the variances of ``orientation`` where
-        the four are not correlated, as with six standard points.
-    """
-
-    covariance: Array
+    covariance: Array  # (q, 3, 3): covariance of x, y and height
+    # (q, 3, 3): what each source contributes: ``measuring`` of the point itself (for a control point with what its own
+    # measurement does through the orientation), ``orientation`` relative, ``control measured``, ``control given``. They
+    # add up to the covariance
     sources: dict[str, Array]
+    # (q, 3, 4): standard deviations from each of `FREE` alone. Their squares add up to the variances of ``orientation``
+    # where the four are not correlated, as with six standard points
     elements: Array
 
     @property

@@ -27,70 +27,46 @@ ANYTHING = Required()
 
 @dataclass(frozen=True)
 class Design:
-    """What is to be designed.
-
-    Parameters
-    ----------
-    required : Required
-        Accuracy that is needed.
-    """
+    """What is to be designed."""
 
     geometry: StripGeometry
     layouts: tuple[Layout, ...]
     methods: tuple[str, ...] = METHODS
-    required: Required = ANYTHING
+    required: Required = ANYTHING  # accuracy that is needed
     placement: Placement | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """One layout adjusted by one method.
-
-    Parameters
-    ----------
-    accuracy : Accuracy or None
-        Expected precision; None where the control does not determine the strip.
-    """
+    """One layout adjusted by one method."""
 
     layout: Layout
     spots: tuple[Spot, ...]
     method: str
-    accuracy: Accuracy | None
+    accuracy: Accuracy | None  # expected precision; None where the control does not determine the strip
     reason: str = ""
 
 
 @dataclass(frozen=True)
 class Needed:
-    """The least number of bands that reaches the required accuracy.
-
-    Parameters
-    ----------
-    bands, points : int or None
-        Bands and control points; None: not even a band at every photo does.
-    worst : tuple of float
-        Worst standard deviations in plan and height with them (with all bands where it is not reached), metres.
-    """
+    """The least number of bands that reaches the required accuracy."""
 
     method: str
+    # bands, points: bands and control points; None: not even a band at every photo does
     bands: int | None
     points: int | None
+    # worst standard deviations in plan and height with them (with all bands where it is not reached), metres
     worst: tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """Everything about a design.
-
-    Parameters
-    ----------
-    needed : tuple of Needed
-        Bands that the required accuracy needs, by method; empty when none is required.
-    """
+    """Everything about a design."""
 
     design: Design
     strip: IdealStrip
     outcomes: tuple[Outcome, ...]
-    needed: tuple[Needed, ...]
+    needed: tuple[Needed, ...]  # bands that the required accuracy needs, by method; empty when none is required
     placed: Placed | None
 
 

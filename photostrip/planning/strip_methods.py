@@ -42,25 +42,14 @@ TINY = 1e-9  # redundancy number of a control coordinate that nothing checks
 
 @dataclass(frozen=True, eq=False)
 class Accuracy:
-    """Expected precision of a strip.
-
-    Parameters
-    ----------
-    used : str
-        What the control carries of it: ``degree 2`` where degree 3 was asked for and three bands are given.
-    covariance : ndarray, shape (q, 3, 3)
-        Of the points of the strip, along, across and up, metres^2.
-    control : ndarray of int, shape (c,)
-        Points that are control.
-    detectable : ndarray, shape (c, 3)
-        Smallest error of each given coordinate that a test at 0.1 % finds in 80 % of cases, metres; infinite where
-        nothing checks it, NaN where it is not given.
-    """
+    """Expected precision of a strip."""
 
     method: str
-    used: str
-    covariance: Floats
-    control: Numbers
+    used: str  # what the control carries of it: ``degree 2`` where degree 3 was asked for and three bands are given
+    covariance: Floats  # (q, 3, 3): of the points of the strip, along, across and up, metres^2
+    control: Numbers  # (c,): points that are control
+    # (c, 3): smallest error of each given coordinate that a test at 0.1 % finds in 80 % of cases, metres; infinite
+    # where nothing checks it, NaN where it is not given
     detectable: Floats
 
     @property
@@ -137,25 +126,13 @@ def _require_control(control: ControlPoints) -> None:
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """Absolute orientation of the strip as a run would do it.
+    """Absolute orientation of the strip as a run would do it."""
 
-    Parameters
-    ----------
-    numbers : ndarray of int, shape (c,)
-        Points that are control.
-    targets : Targets
-        The same from the intermediate frame.
-    weight : ndarray, shape (c, 3)
-        Weights of its coordinates.
-    xyz : ndarray, shape (q, 3)
-        All points in the intermediate frame, metres.
-    """
-
-    numbers: Numbers
+    numbers: Numbers  # (c,): points that are control
     control: ControlPoints
-    targets: absolute_orientation.Targets
-    weight: Floats
-    xyz: Floats
+    targets: absolute_orientation.Targets  # the same from the intermediate frame
+    weight: Floats  # (c, 3): weights of its coordinates
+    xyz: Floats  # (q, 3): all points in the intermediate frame, metres
 
 
 def _oriented(strip: IdealStrip, numbers: Numbers, control: ControlPoints) -> _Fit:

@@ -36,21 +36,11 @@ RADIANS = {"deg": np.pi / 180, "gon": np.pi / 200, "rad": 1.0}  # in a unit of a
 
 @dataclass(frozen=True, slots=True)
 class ImageSystem:
-    """Unit, direction and origin of measured image coordinates.
+    """Unit, direction and origin of measured image coordinates."""
 
-    Parameters
-    ----------
-    unit : str
-        ``mm``, ``um``, ``0.1um`` or ``px``.
-    y_axis : str
-        ``up`` or ``down``.
-    origin : str
-        ``center``, ``top-left`` or ``first-pixel``.
-    """
-
-    unit: str
-    y_axis: str
-    origin: str
+    unit: str  # ``mm``, ``um``, ``0.1um`` or ``px``
+    y_axis: str  # ``up`` or ``down``
+    origin: str  # ``center``, ``top-left`` or ``first-pixel``
     sigma: float | None
 
 

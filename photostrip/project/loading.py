@@ -56,31 +56,18 @@ __all__ = ["Project", "json_schema", "load_project"]
 
 @dataclass(frozen=True, eq=False)
 class Project:
-    """A project, ready to run.
-
-    Parameters
-    ----------
-    files : tuple of Path
-        Every file that was read, the project file first, grid files beside it last.
-    resolved : str
-        The project as YAML with all defaults filled in, without absolute paths.
-    hints : tuple of Note
-        What was passed over or not used, and why.
-    tree : Node
-        The project file with everything merged into it: it knows where each value stands.
-    grids : tuple of str
-        Names of the grid files that the ground frames ask for. Those that stand beside the project file are used; for
-        the others PROJ looks elsewhere.
-    """
+    """A project, ready to run."""
 
     inputs: Inputs
     settings: Settings
     path: Path
-    files: tuple[Path, ...]
-    resolved: str
-    hints: tuple[Note, ...]
-    tree: Node
+    files: tuple[Path, ...]  # every file that was read, the project file first, grid files beside it last
+    resolved: str  # the project as YAML with all defaults filled in, without absolute paths
+    hints: tuple[Note, ...]  # what was passed over or not used, and why
+    tree: Node  # the project file with everything merged into it: it knows where each value stands
     tables: Tables
+    # names of the grid files that the ground frames ask for. Those that stand beside the project file are used; for the
+    # others PROJ looks elsewhere
     grids: tuple[str, ...]
     grid_folder: Path
 

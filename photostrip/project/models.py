@@ -34,14 +34,9 @@ MILLIMETRES = {"mm": 1.0, "um": 1e-3, "m": 1e3}  # in a unit
 
 @dataclass(frozen=True, eq=False)
 class ModelTables:
-    """What the tables of model coordinates hold.
+    """What the tables of model coordinates hold."""
 
-    Parameters
-    ----------
-    points : ModelTable
-        Points; rows whose id is that of a photo are perspective centres, when there is no table of those.
-    """
-
+    # points; rows whose id is that of a photo are perspective centres, when there is no table of those
     points: ModelTable
     centers: ModelTable | None
 

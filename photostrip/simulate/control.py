@@ -28,21 +28,11 @@ CHECK_POINTS = 10  # when the specification does not say how many
 
 @dataclass(frozen=True, eq=False)
 class Roles:
-    """Numbers of the points that are given.
+    """Numbers of the points that are given."""
 
-    Parameters
-    ----------
-    control : ndarray of int, shape (c,)
-        Control points, by strip, along it, then from left to right.
-    use : ndarray of bool, shape (c, 3)
-        Which of their coordinates are given: east, north, up (X, Y, Z).
-    check : ndarray of int, shape (k,)
-        Check points, by number.
-    """
-
-    control: Rows
-    use: NDArray[np.bool_]
-    check: Rows
+    control: Rows  # (c,): control points, by strip, along it, then from left to right
+    use: NDArray[np.bool_]  # (c, 3): which of their coordinates are given: east, north, up (X, Y, Z)
+    check: Rows  # (k,): check points, by number
 
 
 def roles(spec: Spec, placed: Placed, rays: Rows) -> Roles:

@@ -23,27 +23,13 @@ LENGTHS = (1.0, 0.7, 0.5)  # wavelengths of the irregular deformation, parts of 
 
 @dataclass(frozen=True, eq=False)
 class Sheets:
-    """What happens to the film of each photo.
+    """What happens to the film of each photo."""
 
-    Parameters
-    ----------
-    matrix : ndarray, shape (m, 2, 2)
-        Affine part: comparator axes from photo axes, with the turn of the film.
-    offset : ndarray, shape (m, 2)
-        Place of the photo's origin in the comparator, mm.
-    wave : ndarray, shape (m, 2, w, 2)
-        Wave numbers of the irregular part of each coordinate, radians per mm.
-    phase : ndarray, shape (m, 2, w)
-        Their phases, radians.
-    amplitude : float
-        Their amplitude, mm.
-    """
-
-    matrix: Array
-    offset: Array
-    wave: Array
-    phase: Array
-    amplitude: float
+    matrix: Array  # (m, 2, 2): affine part: comparator axes from photo axes, with the turn of the film
+    offset: Array  # (m, 2): place of the photo's origin in the comparator, mm
+    wave: Array  # (m, 2, w, 2): wave numbers of the irregular part of each coordinate, radians per mm
+    phase: Array  # (m, 2, w): their phases, radians
+    amplitude: float  # their amplitude, mm
 
     def comparator_from_photo(self, photo: Rows, xy: Array) -> Array:
         """Give comparator coordinates of points on the film, one for each row.

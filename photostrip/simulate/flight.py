@@ -24,30 +24,18 @@ BASE_SCATTER = (0.02, 0.02, 0.01)  # of the base: along, across, height
 
 @dataclass(frozen=True, eq=False)
 class Photos:
-    """The true exterior orientations, strip after strip, each in flight order.
-
-    Parameters
-    ----------
-    strips : tuple of tuple (str, tuple of str)
-        Each strip's id and its photos in flight order.
-    along, across, height : ndarray, shape (n,)
-        Places of the perspective centres from the middle of the strips and heights above the ellipsoid, metres.
-    centers : ndarray, shape (n, 3)
-        Perspective centres in the Cartesian frame, metres.
-    rotations : ndarray, shape (n, 3, 3)
-        Rotations that take image axes to the Cartesian frame.
-    up : ndarray, shape (n, 3)
-        The vertical at the perspective centres, in the Cartesian frame.
-    """
+    """The true exterior orientations, strip after strip, each in flight order."""
 
     ids: tuple[str, ...]
-    strips: tuple[tuple[str, tuple[str, ...]], ...]
+    strips: tuple[tuple[str, tuple[str, ...]], ...]  # each strip's id and its photos in flight order
+    # along, across, height: (n,): places of the perspective centres from the middle of the strips and heights above the
+    # ellipsoid, metres
     along: Array
     across: Array
     height: Array
-    centers: Array
-    rotations: Array
-    up: Array
+    centers: Array  # (n, 3): perspective centres in the Cartesian frame, metres
+    rotations: Array  # (n, 3, 3): rotations that take image axes to the Cartesian frame
+    up: Array  # (n, 3): the vertical at the perspective centres, in the Cartesian frame
 
 
 def strip_id(number: int) -> str:

@@ -22,29 +22,16 @@ HALF = 0.5
 
 @dataclass(frozen=True)
 class InjectedError:
-    """One gross error that was put in.
+    """One gross error that was put in."""
 
-    Parameters
-    ----------
-    kind : str
-        ``image``, ``control`` or ``swap``.
-    photo : str
-        The photo; empty for control.
-    axis : str
-        Which coordinate; empty for a swap. In the image x to the right, y up; at control x, y, z stand for east,
-        north, up (X, Y, Z).
-    size : float
-        What was added to the coordinate: mm in the image, metres at control; 0 for a swap.
-    other : str
-        The point it was exchanged with.
-    """
-
-    kind: str
+    kind: str  # ``image``, ``control`` or ``swap``
     point: str
-    photo: str = ""
+    photo: str = ""  # the photo; empty for control
+    # which coordinate; empty for a swap. In the image x to the right, y up; at control x, y, z stand for east, north,
+    # up (X, Y, Z)
     axis: str = ""
-    size: float = 0.0
-    other: str = ""
+    size: float = 0.0  # what was added to the coordinate: mm in the image, metres at control; 0 for a swap
+    other: str = ""  # the point it was exchanged with
 
 
 def spoil_control(

@@ -28,21 +28,14 @@ WAVES = 5  # sine waves that make up the relief
 
 @dataclass(frozen=True, eq=False)
 class World:
-    """Space around the strips.
+    """Space around the strips."""
 
-    Parameters
-    ----------
-    axes : ndarray, shape (3, 3)
-        Rows: the direction of flight, its left and the vertical in the middle of the strips, in the Cartesian frame.
-    ellipsoid : tuple of float or None
-        Semi-axes (a, b), metres; None: the world is flat and the middle is the origin.
-    radius : float
-        Mean radius of the surface in the middle, metres.
-    """
-
+    # (3, 3): rows: the direction of flight, its left and the vertical in the middle of the strips, in the Cartesian
+    # frame
     axes: Array
+    # semi-axes (a, b), metres; None: the world is flat and the middle is the origin
     ellipsoid: tuple[float, float] | None = None
-    radius: float = np.inf
+    radius: float = np.inf  # mean radius of the surface in the middle, metres
 
     def cartesian(self, along: Array, across: Array, height: Array) -> Array:
         """Points in the Cartesian frame.
@@ -113,27 +106,13 @@ def world(spec: Spec, ellipsoid: tuple[float, float] | None) -> World:
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Heights of the terrain: a plane and sine waves of random directions and phases.
+    """Heights of the terrain: a plane and sine waves of random directions and phases."""
 
-    Parameters
-    ----------
-    height : float
-        Mean height, metres.
-    slope : tuple of float
-        Rise along and across, metres per metre.
-    amplitude : ndarray, shape (m,)
-        Amplitudes of the waves, metres.
-    wave : ndarray, shape (m, 2)
-        Wave numbers along and across, radians per metre.
-    phase : ndarray, shape (m,)
-        Phases, radians.
-    """
-
-    height: float
-    slope: tuple[float, float]
-    amplitude: Array
-    wave: Array
-    phase: Array
+    height: float  # mean height, metres
+    slope: tuple[float, float]  # rise along and across, metres per metre
+    amplitude: Array  # (m,): amplitudes of the waves, metres
+    wave: Array  # (m, 2): wave numbers along and across, radians per metre
+    phase: Array  # (m,): phases, radians
 
     def __call__(self, along: Array, across: Array) -> Array:
         """Return the heights at places.

@@ -32,30 +32,18 @@ EXTRA_TRIES = tuple((shift, part) for part in (1.0, 0.85, 0.7, 0.5, 0.3) for shi
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """Points on the terrain.
+    """Points on the terrain."""
 
-    Parameters
-    ----------
-    ids : tuple of str
-        Point ids: the photo and a number. The Gruber points of a photo have the numbers from 1 on, from left to
-        right; further points of the model that begins with it have the next numbers.
-    home : ndarray of int, shape (n,)
-        Number of that photo.
-    row : ndarray of int, shape (n,)
-        Number of the row of a Gruber point, -1 for other points.
-    along, across, height : ndarray, shape (n,)
-        Places from the middle of the strips and heights above the ellipsoid, metres.
-    xyz : ndarray, shape (n, 3)
-        Points in the Cartesian frame, metres.
-    """
-
+    # point ids: the photo and a number. The Gruber points of a photo have the numbers from 1 on, from left to right;
+    # further points of the model that begins with it have the next numbers
     ids: tuple[str, ...]
-    home: Rows
-    row: Rows
+    home: Rows  # (n,): number of that photo
+    row: Rows  # (n,): number of the row of a Gruber point, -1 for other points
+    # along, across, height: (n,): places from the middle of the strips and heights above the ellipsoid, metres
     along: Array
     across: Array
     height: Array
-    xyz: Array
+    xyz: Array  # (n, 3): points in the Cartesian frame, metres
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,22 +33,12 @@ STATED_UM = 1.0  # stated of model coordinates without errors
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """True places of points and photos, in the Cartesian frame.
-
-    Parameters
-    ----------
-    points : ndarray, shape (n, 3)
-        Points, in the order of the observations' points, metres.
-    centers : ndarray, shape (m, 3)
-        Perspective centres, metres.
-    rotations : ndarray, shape (m, 3, 3)
-        Image axes to the frame.
-    """
+    """True places of points and photos, in the Cartesian frame."""
 
     photo_ids: tuple[str, ...]
-    points: Array
-    centers: Array
-    rotations: Array
+    points: Array  # (n, 3): points, in the order of the observations' points, metres
+    centers: Array  # (m, 3): perspective centres, metres
+    rotations: Array  # (m, 3, 3): image axes to the frame
 
 
 def plotted(

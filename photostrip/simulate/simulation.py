@@ -49,71 +49,38 @@ NEEDED = 5  # points common to two photos that relative orientation needs
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """What only a simulation knows.
+    """What only a simulation knows."""
 
-    Parameters
-    ----------
-    points : PointTable
-        True coordinates of all points in the Cartesian frame, in the order of the observations' points.
-    ground : PointTable
-        The same east, north, up in the output frame, in its units.
-    photo_ids : tuple of str
-        Photos, in the order of the observations' photos.
-    centers : ndarray, shape (m, 3)
-        Perspective centres in the Cartesian frame, metres.
-    centers_ground : ndarray, shape (m, 3)
-        The same east, north, up in the output frame, in its units.
-    rotations : ndarray, shape (m, 3, 3)
-        Rotations that take image axes to the Cartesian frame.
-    rotations_local : ndarray, shape (m, 3, 3)
-        Rotations that take image axes to the output frame's east, north, up at the perspective centre.
-    image : ndarray, shape (n, 2)
-        What would be measured without any error of measurement, in the system and order of the observations, mm.
-    """
-
+    # true coordinates of all points in the Cartesian frame, in the order of the observations' points
     points: PointTable
-    ground: PointTable
-    photo_ids: tuple[str, ...]
-    centers: Array
-    centers_ground: Array
-    rotations: Array
+    ground: PointTable  # the same east, north, up in the output frame, in its units
+    photo_ids: tuple[str, ...]  # photos, in the order of the observations' photos
+    centers: Array  # (m, 3): perspective centres in the Cartesian frame, metres
+    centers_ground: Array  # (m, 3): the same east, north, up in the output frame, in its units
+    rotations: Array  # (m, 3, 3): rotations that take image axes to the Cartesian frame
+    # (m, 3, 3): rotations that take image axes to the output frame's east, north, up at the perspective centre
     rotations_local: Array
+    # (n, 2): what would be measured without any error of measurement, in the system and order of the observations, mm
     image: Array
     errors: tuple[InjectedError, ...]
 
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """A simulated project: everything that would be given, and the truth.
-
-    Parameters
-    ----------
-    strips : tuple of tuple (str, tuple of str)
-        Id and photos, in flight order, of each strip.
-    observations : PhotoPoints
-        Measured image points in mm, y up: in the comparator when there are fiducial measurements, otherwise in the
-        camera's image system (its principal point is not subtracted).
-    control : ControlPoints
-        Control and check points; ``frame`` counts in `frames`.
-    frames : tuple of FrameSpec
-        Frame of each control list; the first is that of the output.
-    fiducials : PhotoPoints or None
-        Measured fiducial marks, mm.
-    gnss : ndarray, shape (m, 3), or None
-        Measured perspective centres east, north, up in the first frame, in its units.
-    models : ModelPoints or None
-        Measured models, when they stand in place of image coordinates; the observations then only say what is seen.
-    """
+    """A simulated project: everything that would be given, and the truth."""
 
     spec: Spec
-    strips: tuple[tuple[str, tuple[str, ...]], ...]
+    strips: tuple[tuple[str, tuple[str, ...]], ...]  # id and photos, in flight order, of each strip
     camera: Camera
+    # measured image points in mm, y up: in the comparator when there are fiducial measurements, otherwise in the
+    # camera's image system (its principal point is not subtracted)
     observations: PhotoPoints
-    control: ControlPoints
-    frames: tuple[FrameSpec, ...]
-    fiducials: PhotoPoints | None
-    gnss: Array | None
+    control: ControlPoints  # control and check points; ``frame`` counts in `frames`
+    frames: tuple[FrameSpec, ...]  # frame of each control list; the first is that of the output
+    fiducials: PhotoPoints | None  # measured fiducial marks, mm
+    gnss: Array | None  # (m, 3), or None: measured perspective centres east, north, up in the first frame, in its units
     truth: Truth
+    # measured models, when they stand in place of image coordinates; the observations then only say what is seen
     models: ModelPoints | None = None
 
 

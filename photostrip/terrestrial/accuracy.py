@@ -25,21 +25,11 @@ LEVEL = 1e-12  # difference of a rotation from that of a level camera
 
 @dataclass(frozen=True, eq=False)
 class Required:
-    """Standard errors with which correction directions must be known.
+    """Standard errors with which correction directions must be known."""
 
-    Parameters
-    ----------
-    angle : ndarray, shape (...)
-        m_lambda', of the angle between a point and the optical axis as the photo gives it, radians.
-    horizontal : ndarray, shape (...)
-        m_lambda, of a horizontal direction: an angle is the difference of two of them, radians.
-    vertical : ndarray, shape (...)
-        m_beta, of a vertical direction, radians.
-    """
-
-    angle: Floats
-    horizontal: Floats
-    vertical: Floats
+    angle: Floats  # (...): m_lambda', of the angle between a point and the optical axis as the photo gives it, radians
+    horizontal: Floats  # (...): m_lambda, of a horizontal direction: an angle is the difference of two of them, radians
+    vertical: Floats  # (...): m_beta, of a vertical direction, radians
 
 
 def required(xz: ArrayLike, principal_distance: float, sigma: float, rotation: ArrayLike) -> Required:
@@ -73,17 +63,10 @@ def required(xz: ArrayLike, principal_distance: float, sigma: float, rotation: A
 
 @dataclass(frozen=True, eq=False)
 class Printed:
-    """Standard errors by the formulas as they are printed, for a level camera.
+    """Standard errors by the formulas as they are printed, for a level camera."""
 
-    Parameters
-    ----------
-    horizontal : ndarray, shape (...)
-        m_lambda by eq. 5 and 6, which is right, radians.
-    vertical_eq5, vertical_eq6 : ndarray, shape (...)
-        m_beta by eq. 5 and by its shorter form eq. 6, radians.
-    """
-
-    horizontal: Floats
+    horizontal: Floats  # (...): m_lambda by eq. 5 and 6, which is right, radians
+    # vertical_eq5, vertical_eq6: (...): m_beta by eq. 5 and by its shorter form eq. 6, radians
     vertical_eq5: Floats
     vertical_eq6: Floats
 
@@ -212,21 +195,15 @@ def grid(photo_format: tuple[float, float], step: float, *, level: bool = True) 
 
 @dataclass(frozen=True, slots=True)
 class Example:
-    """A worked example of the source.
-
-    Parameters
-    ----------
-    f, x, z, sigma : float
-        Principal distance, image coordinates and their standard error, mm.
-    horizontal, vertical : float
-        m_lambda and m_beta as printed, arcseconds.
-    """
+    """A worked example of the source."""
 
     camera: str
+    # f, x, z, sigma: principal distance, image coordinates and their standard error, mm
     f: float
     x: float
     z: float
     sigma: float
+    # horizontal, vertical: m_lambda and m_beta as printed, arcseconds
     horizontal: float
     vertical: float
     factor: float
@@ -241,32 +218,17 @@ EXAMPLES = (
 
 @dataclass(frozen=True, slots=True)
 class WorkedExample:
-    """An example computed again, step by step; standard errors in arcseconds.
-
-    Parameters
-    ----------
-    horizontal : float
-        m_lambda, exact.
-    printed_factor : float
-        m_beta by eq. 6 with the factor that is printed: what the source computed.
-    eq5, eq6 : float
-        m_beta by eq. 5 and by eq. 6 with the factor of the camera.
-    factor : float
-        The factor 1 + x^2/f^2 of the camera.
-    vertical : float
-        m_beta, exact.
-    returned_z : float
-        What z comes back as, when beta is computed by eq. 3 as printed and put into eq. 2, mm.
-    """
+    """An example computed again, step by step; standard errors in arcseconds."""
 
     example: Example
-    horizontal: float
-    printed_factor: float
+    horizontal: float  # m_lambda, exact
+    printed_factor: float  # m_beta by eq. 6 with the factor that is printed: what the source computed
+    # eq5, eq6: m_beta by eq. 5 and by eq. 6 with the factor of the camera
     eq5: float
     eq6: float
-    factor: float
-    vertical: float
-    returned_z: float
+    factor: float  # the factor 1 + x^2/f^2 of the camera
+    vertical: float  # m_beta, exact
+    returned_z: float  # what z comes back as, when beta is computed by eq. 3 as printed and put into eq. 2, mm
 
 
 def worked(example: Example) -> WorkedExample:

@@ -31,23 +31,14 @@ REJECTION = 0.01  # probability of rejecting any of the stable points of an epoc
 
 @dataclass(frozen=True, eq=False)
 class ImagePair:
-    """The stable points on two photos of one camera.
+    """The stable points on two photos of one camera."""
 
-    Parameters
-    ----------
-    before, after : ndarray, shape (m, 2)
-        x, z in mm, reduced to the principal point, in the reference epoch and now. NaN in `after` where a coordinate
-        was not measured now.
-    variances : ndarray, shape (m, 2)
-        Variances of the differences, mm^2.
-    principal_distance : float
-        f in mm.
-    """
-
+    # before, after: (m, 2): x, z in mm, reduced to the principal point, in the reference epoch and now. NaN in `after`
+    # where a coordinate was not measured now
     before: Floats
     after: Floats
-    variances: Floats
-    principal_distance: float
+    variances: Floats  # (m, 2): variances of the differences, mm^2
+    principal_distance: float  # f in mm
 
     @property
     def measured(self) -> Flags:
@@ -57,26 +48,13 @@ class ImagePair:
 
 @dataclass(frozen=True, eq=False)
 class Turn:
-    """The fitted turn of one camera in one epoch.
+    """The fitted turn of one camera in one epoch."""
 
-    Parameters
-    ----------
-    values : ndarray, shape (3,)
-        Turn to the right, up, and counter-clockwise about the optical axis, radians.
-    normal : ndarray, shape (3, 3)
-        Inverse of its covariance, rad^-2.
-    design : ndarray, shape (m, 2, 3)
-        Derivatives of the coordinates by the turn, mm/rad; zero where a point was not used.
-    weights : ndarray, shape (m, 2)
-        Weights of the coordinates, mm^-2; zero where a point was not used.
-    residuals : ndarray, shape (m, 2)
-        Measured minus computed coordinates of all points, mm; NaN where they cannot be compared.
-    """
-
-    values: Floats
-    normal: Floats
-    design: Floats
-    weights: Floats
+    values: Floats  # (3,): turn to the right, up, and counter-clockwise about the optical axis, radians
+    normal: Floats  # (3, 3): inverse of its covariance, rad^-2
+    design: Floats  # (m, 2, 3): derivatives of the coordinates by the turn, mm/rad; zero where a point was not used
+    weights: Floats  # (m, 2): weights of the coordinates, mm^-2; zero where a point was not used
+    # (m, 2): measured minus computed coordinates of all points, mm; NaN where they cannot be compared
     residuals: Floats
 
     @property
@@ -217,20 +195,12 @@ def determined(normal: Floats) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """What the stable points say of both cameras in one epoch.
+    """What the stable points say of both cameras in one epoch."""
 
-    Parameters
-    ----------
-    turns : tuple of Turn or None
-        Of the left and the right camera; None where the stable points do not determine it.
-    used : ndarray of bool, shape (m,)
-        Stable points that fit together.
-    rejected : tuple of tuple
-        Number, test value and limit of points that do not fit to the others, in order.
-    """
-
+    # of the left and the right camera; None where the stable points do not determine it
     turns: tuple[Turn | None, Turn | None]
-    used: Flags
+    used: Flags  # (m,): stable points that fit together
+    # number, test value and limit of points that do not fit to the others, in order
     rejected: tuple[tuple[int, float, float], ...]
 
 

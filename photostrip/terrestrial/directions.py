@@ -22,38 +22,20 @@ BEHIND = 1e-6  # cosine of the angle to the optical axis below which a direction
 
 @dataclass(frozen=True, slots=True)
 class Phototheodolite:
-    """What a terrestrial camera is made of.
-
-    Parameters
-    ----------
-    principal_distance : float
-        Principal distance f in mm.
-    principal_point : tuple of float
-        x0, z0 in mm in the system of the image coordinates.
-    format : tuple of float, optional
-        Width and height in mm of the field in which points are measured.
-    """
+    """What a terrestrial camera is made of."""
 
     name: str
-    principal_distance: float
-    principal_point: tuple[float, float] = (0.0, 0.0)
-    format: tuple[float, float] | None = None
+    principal_distance: float  # principal distance f in mm
+    principal_point: tuple[float, float] = (0.0, 0.0)  # x0, z0 in mm in the system of the image coordinates
+    format: tuple[float, float] | None = None  # width and height in mm of the field in which points are measured
 
 
 @dataclass(frozen=True, eq=False)
 class Partials:
-    """Derivatives of the directions of image points.
+    """Derivatives of the directions of image points."""
 
-    Parameters
-    ----------
-    by_xz : ndarray, shape (..., 2, 2)
-        Rows lambda and beta, columns x and z, rad/mm.
-    by_f : ndarray, shape (..., 2)
-        By the principal distance, rad/mm.
-    """
-
-    by_xz: Floats
-    by_f: Floats
+    by_xz: Floats  # (..., 2, 2): rows lambda and beta, columns x and z, rad/mm
+    by_f: Floats  # (..., 2): by the principal distance, rad/mm
 
 
 def directions_from_photo(xz: ArrayLike, principal_distance: float, rotation: ArrayLike) -> Floats:

@@ -36,90 +36,49 @@ REASONS = {
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How displacements are judged.
+    """How displacements are judged."""
 
-    Parameters
-    ----------
-    significance : float
-        Probability of calling a point, or a camera, moved that did not move.
-    moved_camera : str
-        ``"always"`` takes out the turn of a camera whenever the stable points determine it: the tests keep their level
-        whether the camera turned or not. ``"auto"`` takes it out when it is significant: a little more precise with few
-        stable points, but a turn just too small to be found makes up to twice as many points seem to move. ``"never"``
-        only reports it.
-    """
-
-    significance: float = 0.05
+    significance: float = 0.05  # probability of calling a point, or a camera, moved that did not move
+    # ``"always"`` takes out the turn of a camera whenever the stable points determine it: the tests keep their level
+    # whether the camera turned or not. ``"auto"`` takes it out when it is significant: a little more precise with few
+    # stable points, but a turn just too small to be found makes up to twice as many points seem to move. ``"never"``
+    # only reports it
     moved_camera: str = "always"
 
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """Measurements of all epochs.
+    """Measurements of all epochs."""
 
-    Parameters
-    ----------
-    points, epochs : tuple of str
-        Ids; the first epoch is the reference.
-    coordinates : ndarray, shape (e, n, 4)
-        x, z of the left and x, z of the right photo in mm, reduced to the principal points. NaN where a point was not
-        measured; the last alone is NaN where z was not measured on the right photo.
-    own : ndarray, shape (e, n, 4)
-        Variances of the errors that an epoch has for itself, mm^2.
-    shared : ndarray, shape (n, 4)
-        Variances of the errors that all epochs share, mm^2.
-    stable : ndarray of bool, shape (n,)
-        Points that are taken not to move.
-    times : ndarray, shape (e,), optional
-        Times of the epochs in a unit of the user's choice, ascending.
-    """
-
+    # points, epochs: ids; the first epoch is the reference
     points: tuple[str, ...]
     epochs: tuple[str, ...]
+    # (e, n, 4): x, z of the left and x, z of the right photo in mm, reduced to the principal points. NaN where a point
+    # was not measured; the last alone is NaN where z was not measured on the right photo
     coordinates: Floats
-    own: Floats
-    shared: Floats
-    stable: Flags
-    times: Floats | None = None
+    own: Floats  # (e, n, 4): variances of the errors that an epoch has for itself, mm^2
+    shared: Floats  # (n, 4): variances of the errors that all epochs share, mm^2
+    stable: Flags  # (n,): points that are taken not to move
+    times: Floats | None = None  # (e,), optional: times of the epochs in a unit of the user's choice, ascending
 
 
 @dataclass(frozen=True, eq=False)
 class CameraState:
-    """What is known of one camera in one epoch.
-
-    Parameters
-    ----------
-    side : str
-        ``"left"`` or ``"right"``.
-    turn : Turn or None
-        The fitted turn; None where the stable points do not determine it.
-    moved : bool
-        Whether it is significant.
-    removed : bool
-        Whether it was taken out of the displacements.
-    """
+    """What is known of one camera in one epoch."""
 
     epoch: int
-    side: str
-    turn: Turn | None
-    moved: bool
-    removed: bool
+    side: str  # ``"left"`` or ``"right"``
+    turn: Turn | None  # the fitted turn; None where the stable points do not determine it
+    moved: bool  # whether it is significant
+    removed: bool  # whether it was taken out of the displacements
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """Displacements between two epochs, or rates.
+    """Displacements between two epochs, or rates."""
 
-    Parameters
-    ----------
-    values : ndarray, shape (n, 3)
-        On the ground: metres, or metres per unit of time; NaN where not determined.
-    covariance : ndarray, shape (n, 3, 3)
-        Its covariance; NaN where not determined.
-    """
-
-    values: Floats
-    covariance: Floats
+    values: Floats  # (n, 3): on the ground: metres, or metres per unit of time; NaN where not determined
+    covariance: Floats  # (n, 3, 3): its covariance; NaN where not determined
 
     @cached_property
     def statistic(self) -> Floats:
@@ -134,60 +93,36 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Rates:
-    """Uniform motion fitted to the epochs.
+    """Uniform motion fitted to the epochs."""
 
-    Parameters
-    ----------
-    step : Step
-        Velocities, metres per unit of time.
-    misfit : ndarray, shape (n,)
-        Weighted sum of squares of what the uniform motion leaves; NaN where there are fewer than three epochs.
-    dof : ndarray of int, shape (n,)
-        Its degrees of freedom.
-    """
-
-    step: Step
+    step: Step  # velocities, metres per unit of time
+    # (n,): weighted sum of squares of what the uniform motion leaves; NaN where there are fewer than three epochs
     misfit: Floats
-    dof: NDArray[np.intp]
+    dof: NDArray[np.intp]  # (n,): its degrees of freedom
 
 
 @dataclass(frozen=True, eq=False)
 class Monitoring:
-    """Displacements of all points in all epochs.
-
-    Parameters
-    ----------
-    positions : tuple of Step
-        Coordinates on the ground in each epoch (``values``), with covariance.
-    since_first, since_previous : tuple of Step
-        Displacements of each epoch after the first, on the ground.
-    rates : Rates or None
-        Uniform motion, when the epochs have times.
-    reason : ndarray of int, shape (e, n)
-        Why a point has no coordinates in an epoch: a key of ``REASONS``; 0 where it has.
-    parallax, parallax_sigma : ndarray, shape (e, n)
-        Vertical parallaxes in mm with their standard deviations; NaN where z was not measured on the right photo.
-    parallax_change, parallax_change_sigma : ndarray, shape (e, n)
-        Their changes since the first epoch.
-    cameras : tuple of CameraState
-        Left and right camera of each epoch after the first.
-    motions : tuple of Motion or None
-        What the stable points say in each epoch after the first; None where there are none.
-    """
+    """Displacements of all points in all epochs."""
 
     series: Series
     pair: StereoPair
     settings: Settings
-    positions: tuple[Step, ...]
+    positions: tuple[Step, ...]  # coordinates on the ground in each epoch (``values``), with covariance
+    # since_first, since_previous: displacements of each epoch after the first, on the ground
     since_first: tuple[Step, ...]
     since_previous: tuple[Step, ...]
-    rates: Rates | None
-    reason: NDArray[np.intp]
+    rates: Rates | None  # uniform motion, when the epochs have times
+    reason: NDArray[np.intp]  # (e, n): why a point has no coordinates in an epoch: a key of ``REASONS``; 0 where it has
+    # parallax, parallax_sigma: (e, n): vertical parallaxes in mm with their standard deviations; NaN where z was not
+    # measured on the right photo
     parallax: Floats
     parallax_sigma: Floats
+    # parallax_change, parallax_change_sigma: (e, n): their changes since the first epoch
     parallax_change: Floats
     parallax_change_sigma: Floats
-    cameras: tuple[CameraState, ...]
+    cameras: tuple[CameraState, ...]  # left and right camera of each epoch after the first
+    # what the stable points say in each epoch after the first; None where there are none
     motions: tuple[Motion | None, ...]
     notes: tuple[Note, ...] = ()
 

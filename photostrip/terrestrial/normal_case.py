@@ -30,21 +30,11 @@ CONDITION = np.array([0.0, 1.0, 0.0, -1.0])  # the z coordinates of both photos 
 
 @dataclass(frozen=True, eq=False)
 class StereoPair:
-    """Two stations from which the same object is photographed again and again.
+    """Two stations from which the same object is photographed again and again."""
 
-    Parameters
-    ----------
-    principal_distances : tuple of float
-        Of the left and right camera, mm.
-    centers : ndarray, shape (2, 3)
-        Perspective centres of the left and right camera on the ground, metres.
-    rotations : ndarray, shape (2, 3, 3)
-        Photo to ground in the reference epoch.
-    """
-
-    principal_distances: tuple[float, float]
-    centers: Floats
-    rotations: Floats
+    principal_distances: tuple[float, float]  # of the left and right camera, mm
+    centers: Floats  # (2, 3): perspective centres of the left and right camera on the ground, metres
+    rotations: Floats  # (2, 3, 3): photo to ground in the reference epoch
 
     @property
     def base(self) -> float:
@@ -98,32 +88,19 @@ def normal_pair(principal_distance: float, base: float) -> StereoPair:
 
 @dataclass(frozen=True, eq=False)
 class Normal:
-    """Coordinates of points in the normal case, with their derivatives.
+    """Coordinates of points in the normal case, with their derivatives."""
 
-    Parameters
-    ----------
-    coordinates : ndarray, shape (n, 4)
-        x, z of the left and x, z of the right photo in mm; both z equal: the rays meet. NaN where a ray is missing or
-        cannot be transformed.
-    by_measured : ndarray, shape (n, 4, 4)
-        Derivatives by the measured coordinates.
-    by_turn : ndarray, shape (n, 4, 6)
-        Derivatives by small turns (alpha, omega, kappa) of the left and of the right camera, mm/rad.
-    parallax : ndarray, shape (n,)
-        Vertical parallax z_left - z_right before the rays were made to meet, mm; NaN where z was not measured on the
-        right photo.
-    parallax_by_measured : ndarray, shape (n, 4)
-        Its derivatives.
-    parallax_by_turn : ndarray, shape (n, 6)
-        Its derivatives by the turns, mm/rad.
-    """
-
+    # (n, 4): x, z of the left and x, z of the right photo in mm; both z equal: the rays meet. NaN where a ray is
+    # missing or cannot be transformed
     coordinates: Floats
-    by_measured: Floats
+    by_measured: Floats  # (n, 4, 4): derivatives by the measured coordinates
+    # (n, 4, 6): derivatives by small turns (alpha, omega, kappa) of the left and of the right camera, mm/rad
     by_turn: Floats
+    # (n,): vertical parallax z_left - z_right before the rays were made to meet, mm; NaN where z was not measured on
+    # the right photo
     parallax: Floats
-    parallax_by_measured: Floats
-    parallax_by_turn: Floats
+    parallax_by_measured: Floats  # (n, 4): its derivatives
+    parallax_by_turn: Floats  # (n, 6): its derivatives by the turns, mm/rad
 
 
 def to_normal(measured: Floats, variances: Floats, pair: StereoPair, rotations: Floats) -> Normal:

@@ -45,25 +45,13 @@ NEGLIGIBLE = 1e-18  # weighted sum of squares of error-free data: rounding, noth
 
 @dataclass(frozen=True, eq=False)
 class Sightings:
-    """Points of one photo with their measured directions.
-
-    Parameters
-    ----------
-    xz : ndarray, shape (n, 2)
-        Image coordinates in mm in the system of the principal point.
-    directions : ndarray, shape (n, 2)
-        Horizontal and vertical directions in radians; NaN where none was measured.
-    sigma_xz : ndarray, shape (n, 2)
-        Standard deviations of the image coordinates, mm.
-    sigma_directions : ndarray, shape (n, 2)
-        Standard deviations of the directions, radians.
-    """
+    """Points of one photo with their measured directions."""
 
     ids: tuple[str, ...]
-    xz: Floats
-    directions: Floats
-    sigma_xz: Floats
-    sigma_directions: Floats
+    xz: Floats  # (n, 2): image coordinates in mm in the system of the principal point
+    directions: Floats  # (n, 2): horizontal and vertical directions in radians; NaN where none was measured
+    sigma_xz: Floats  # (n, 2): standard deviations of the image coordinates, mm
+    sigma_directions: Floats  # (n, 2): standard deviations of the directions, radians
 
     @cached_property
     def measured(self) -> Flags:
@@ -73,88 +61,47 @@ class Sightings:
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """How a photo is oriented.
+    """How a photo is oriented."""
 
-    Parameters
-    ----------
-    free : tuple of str
-        What is determined besides the angles: ``"principal-distance"``, ``"principal-point"``.
-    screening : str
-        ``"deletion"`` tests each point against the scatter of the others, ``"stated"`` against the stated standard
-        deviations, ``"none"`` tests nothing.
-    significance : float
-        Probability of rejecting any point of a photo without gross errors, and of a false global test.
-    """
-
-    free: tuple[str, ...] = ()
+    free: tuple[str, ...] = ()  # what is determined besides the angles: ``"principal-distance"``, ``"principal-point"``
+    # ``"deletion"`` tests each point against the scatter of the others, ``"stated"`` against the stated standard
+    # deviations, ``"none"`` tests nothing
     screening: str = "deletion"
+    # probability of rejecting any point of a photo without gross errors, and of a false global test
     significance: float = 0.05
 
 
 @dataclass(frozen=True, slots=True)
 class Rejection:
-    """A point that was taken out.
-
-    Parameters
-    ----------
-    test : str
-        ``"deletion"`` or ``"stated"``.
-    value, limit : float
-        Test value and critical value: for ``"deletion"`` the p value and the probability below which it is rejected,
-        for ``"stated"`` chi-square.
-    residual : tuple of float
-        Misclosure of its directions against the orientation without it, radians; NaN where not measured.
-    """
+    """A point that was taken out."""
 
     point: int
-    test: str
+    test: str  # ``"deletion"`` or ``"stated"``
+    # value, limit: test value and critical value: for ``"deletion"`` the p value and the probability below which it is
+    # rejected, for ``"stated"`` chi-square
     value: float
     limit: float
+    # misclosure of its directions against the orientation without it, radians; NaN where not measured
     residual: tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
 class Orientation:
-    """A photo oriented by directions.
+    """A photo oriented by directions."""
 
-    Parameters
-    ----------
-    names : tuple of str
-        Unknowns: alpha, omega, kappa, then what else was determined: f, x0, z0.
-    values : ndarray, shape (u,)
-        Radians and mm.
-    cofactors : ndarray, shape (u, u)
-        Their covariance for the stated standard deviations.
-    principal_distance : float
-        f in mm.
-    principal_point : tuple of float
-        x0, z0 in mm.
-    residuals : ndarray, shape (n, 2)
-        Computed minus measured directions in radians; NaN where not measured. Of rejected points the misclosure.
-    redundancy : ndarray, shape (n, 2)
-        Redundancy numbers of the directions; NaN where they were not used.
-    used : ndarray of bool, shape (n,)
-        Points that were used.
-    weighted_sum : float
-        Weighted sum of squared residuals, chi-square with `dof` degrees of freedom.
-    condition : float
-        Condition number of the equations, columns scaled to equal length.
-    rejected : tuple of Rejection
-        Points taken out, in order.
-    """
-
-    names: tuple[str, ...]
-    values: Floats
-    cofactors: Floats
-    principal_distance: float
-    principal_point: tuple[float, float]
+    names: tuple[str, ...]  # unknowns: alpha, omega, kappa, then what else was determined: f, x0, z0
+    values: Floats  # (u,): radians and mm
+    cofactors: Floats  # (u, u): their covariance for the stated standard deviations
+    principal_distance: float  # f in mm
+    principal_point: tuple[float, float]  # x0, z0 in mm
+    # (n, 2): computed minus measured directions in radians; NaN where not measured. Of rejected points the misclosure
     residuals: Floats
-    redundancy: Floats
-    used: Flags
-    weighted_sum: float
+    redundancy: Floats  # (n, 2): redundancy numbers of the directions; NaN where they were not used
+    used: Flags  # (n,): points that were used
+    weighted_sum: float  # weighted sum of squared residuals, chi-square with `dof` degrees of freedom
     dof: int
-    condition: float
-    rejected: tuple[Rejection, ...] = ()
+    condition: float  # condition number of the equations, columns scaled to equal length
+    rejected: tuple[Rejection, ...] = ()  # points taken out, in order
 
     @property
     def rotation(self) -> Floats:

@@ -43,38 +43,21 @@ PLAN, HEIGHT = slice(0, 2), 2
 
 @dataclass(frozen=True)
 class Settings:
-    """How the Earth's shape enters.
+    """How the Earth's shape enters."""
 
-    Parameters
-    ----------
-    earth_curvature : str
-        ``"auto"`` or ``"none"``: the frames carry it (``local`` is truly Cartesian); ``"model"``: eq. 153, for plane
-        map coordinates of unknown projection given as ``local``; ``"image"``: in image space.
-    earth_radius : float
-        Radius in metres for ``"model"``.
-    """
-
+    # ``"auto"`` or ``"none"``: the frames carry it (``local`` is truly Cartesian); ``"model"``: eq. 153, for plane map
+    # coordinates of unknown projection given as ``local``; ``"image"``: in image space
     earth_curvature: str = "auto"
-    earth_radius: float = 6_371_000.0
+    earth_radius: float = 6_371_000.0  # radius in metres for ``"model"``
 
 
 @dataclass(frozen=True, eq=False)
 class Targets:
-    """Control points seen from an intermediate frame.
+    """Control points seen from an intermediate frame."""
 
-    Parameters
-    ----------
-    control : ControlPoints
-        The points, none of them a check point.
-    frames : sequence of GroundFrame
-        Ground frames the points refer to.
-    intermediate : IntermediateFrame
-        The frame in which the strip is oriented.
-    """
-
-    control: ControlPoints
-    frames: Sequence[GroundFrame]
-    intermediate: IntermediateFrame
+    control: ControlPoints  # the points, none of them a check point
+    frames: Sequence[GroundFrame]  # ground frames the points refer to
+    intermediate: IntermediateFrame  # the frame in which the strip is oriented
 
     def of(self, xyz: Floats) -> Floats:
         """Targets of the control points.
@@ -166,27 +149,17 @@ class Targets:
 
 @dataclass(frozen=True, eq=False)
 class AbsoluteOrientation:
-    """The similarity from the strip to the intermediate frame, and how well it fits.
+    """The similarity from the strip to the intermediate frame, and how well it fits."""
 
-    Parameters
-    ----------
-    similarity : Similarity
-        Strip to intermediate frame.
-    misclosures : ndarray, shape (n, 3)
-        Strip minus control along the axes compared (``Targets.axes``) in metres, after the similarity; 0 where a
-        coordinate does not count.
-    sigma0 : float
-        Standard deviation of unit weight, without unit (1 when the strip fits within the sigmas of the control and the
-        a-priori precision of its points); NaN without redundancy.
-    condition : float
-        Largest over smallest singular value of the design for motions of the strip of the same size.
-    """
-
-    similarity: Similarity
+    similarity: Similarity  # strip to intermediate frame
+    # (n, 3): strip minus control along the axes compared (``Targets.axes``) in metres, after the similarity; 0 where a
+    # coordinate does not count
     misclosures: Floats
+    # standard deviation of unit weight, without unit (1 when the strip fits within the sigmas of the control and the
+    # a-priori precision of its points); NaN without redundancy
     sigma0: float
     redundancy: int
-    condition: float
+    condition: float  # largest over smallest singular value of the design for motions of the strip of the same size
     iterations: int
 
 

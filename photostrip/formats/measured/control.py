@@ -37,24 +37,15 @@ CONTROL = (
 
 @dataclass(frozen=True, eq=False)
 class ControlTable:
-    """Given coordinates as the table has them: columns in the order of the list's axes.
-
-    Parameters
-    ----------
-    xyz, sigma : ndarray, shape (n, 3)
-        Coordinates and standard deviations, columns x, y, z; NaN where a cell is empty.
-    use : ndarray of bool, shape (n, 3)
-        Which columns count.
-    check : ndarray of bool, shape (n,)
-        True for check points.
-    """
+    """Given coordinates as the table has them: columns in the order of the list's axes."""
 
     table: Table
     ids: list[str]
+    # xyz, sigma: (n, 3): coordinates and standard deviations, columns x, y, z; NaN where a cell is empty
     xyz: Floats
     sigma: Floats
-    use: Flags
-    check: Flags
+    use: Flags  # (n, 3): which columns count
+    check: Flags  # (n,): true for check points
 
     @cached_property
     def used(self) -> Flags:

@@ -42,24 +42,15 @@ POSITIONS = (
 
 @dataclass(frozen=True, eq=False)
 class PositionTable:
-    """Measured positions of cameras as the table has them: columns in the order of the list's axes.
-
-    Parameters
-    ----------
-    xyz, sigma : ndarray, shape (n, 3)
-        Coordinates and standard deviations, columns x, y, z; NaN where a cell is empty.
-    use : ndarray of bool, shape (n, 3)
-        Which columns count.
-    time : ndarray, shape (n,)
-        Time of exposure in the table's unit; NaN where there is none.
-    """
+    """Measured positions of cameras as the table has them: columns in the order of the list's axes."""
 
     table: Table
     ids: list[str]
+    # xyz, sigma: (n, 3): coordinates and standard deviations, columns x, y, z; NaN where a cell is empty
     xyz: Floats
     sigma: Floats
-    use: Flags
-    time: Floats
+    use: Flags  # (n, 3): which columns count
+    time: Floats  # (n,): time of exposure in the table's unit; NaN where there is none
 
     @cached_property
     def used(self) -> Flags:
@@ -69,20 +60,14 @@ class PositionTable:
 
 @dataclass(frozen=True, eq=False)
 class OrientationTable:
-    """Given exterior orientations as the table has them.
-
-    Parameters
-    ----------
-    xyz, sigma : ndarray, shape (n, 3)
-        Perspective centres and their standard deviations, columns x, y, z; NaN where a cell is empty.
-    angles, sigma_angles : ndarray, shape (n, 3)
-        Angles in the order and unit of their system, and their standard deviations.
-    """
+    """Given exterior orientations as the table has them."""
 
     table: Table
     ids: list[str]
+    # xyz, sigma: (n, 3): perspective centres and their standard deviations, columns x, y, z; NaN where a cell is empty
     xyz: Floats
     sigma: Floats
+    # angles, sigma_angles: (n, 3): angles in the order and unit of their system, and their standard deviations
     angles: Floats
     sigma_angles: Floats
 

@@ -18,30 +18,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Measurements:
-    """Measured image coordinates as the table gives them: in its unit, with its direction of y.
-
-    Parameters
-    ----------
-    photo_ids, target_ids : tuple of str
-        Ids of the photos, and of the points or marks, in order of first appearance.
-    photo, target : ndarray of int, shape (n,)
-        Photo and target of each row.
-    xy : ndarray, shape (n, 2)
-        Coordinates in the unit of the table.
-    sigma : ndarray, shape (n, 2)
-        Standard deviations in the unit of the table; NaN where the row has none.
-    times : ndarray of int, shape (n,)
-        Number of measurements of which each row is the mean.
-    """
+    """Measured image coordinates as the table gives them: in its unit, with its direction of y."""
 
     table: Table
+    # photo_ids, target_ids: ids of the photos, and of the points or marks, in order of first appearance
     photo_ids: tuple[str, ...]
     target_ids: tuple[str, ...]
+    # photo, target: (n,): photo and target of each row
     photo: Numbers
     target: Numbers
-    xy: Floats
-    sigma: Floats
-    times: Numbers
+    xy: Floats  # (n, 2): coordinates in the unit of the table
+    sigma: Floats  # (n, 2): standard deviations in the unit of the table; NaN where the row has none
+    times: Numbers  # (n,): number of measurements of which each row is the mean
 
     @cached_property
     def photos_measured(self) -> frozenset[str]:

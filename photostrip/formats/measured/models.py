@@ -40,24 +40,16 @@ MODEL_CENTERS = (MODEL, PHOTO, *COORDINATES)
 
 @dataclass(frozen=True, eq=False)
 class ModelTable:
-    """Model coordinates as the table has them.
-
-    Parameters
-    ----------
-    target : str
-        What is measured: ``point`` or ``photo``, for its perspective centre.
-    models, targets : ndarray of int, shape (n,)
-        Numbers of the model and of the point of each row.
-    xyz, sigma : ndarray, shape (n, 3)
-        Coordinates and standard deviations in the unit of the table; NaN where a cell is empty.
-    """
+    """Model coordinates as the table has them."""
 
     table: Table
-    target: str
+    target: str  # what is measured: ``point`` or ``photo``, for its perspective centre
     model_ids: tuple[str, ...]
     target_ids: tuple[str, ...]
+    # models, targets: (n,): numbers of the model and of the point of each row
     models: Numbers
     targets: Numbers
+    # xyz, sigma: (n, 3): coordinates and standard deviations in the unit of the table; NaN where a cell is empty
     xyz: Floats
     sigma: Floats
 

@@ -40,30 +40,17 @@ FIDUCIALS = (PHOTO, MARK, *COORDINATES)
 
 @dataclass(frozen=True)
 class Manner:
-    """How a table of image coordinates is to be read.
+    """How a table of image coordinates is to be read."""
 
-    Parameters
-    ----------
-    marks : bool
-        Whether fiducial marks are measured; otherwise points.
-    has_sigma : bool
-        Whether the project has a standard deviation for rows without one.
-    sigma : float or None
-        That standard deviation, in the unit of the table; None when it is none, or stands in another unit.
-    repeated : str
-        ``refuse`` or ``average`` several measurements of one point on a photo; empty: averaged in lists of pairs.
-    columns : mapping of str to str
-        Names in the header of columns that are called otherwise than here.
-    photos : frozenset of str
-        Photos of the strips, by which the names of pairs are understood.
-    """
-
-    marks: bool = False
-    has_sigma: bool = True
+    marks: bool = False  # whether fiducial marks are measured; otherwise points
+    has_sigma: bool = True  # whether the project has a standard deviation for rows without one
+    # that standard deviation, in the unit of the table; None when it is none, or stands in another unit
     sigma: float | None = None
+    # ``refuse`` or ``average`` several measurements of one point on a photo; empty: averaged in lists of pairs
     repeated: str = ""
+    # names in the header of columns that are called otherwise than here
     columns: Mapping[str, str] = field(default_factory=dict)
-    photos: frozenset[str] = frozenset()
+    photos: frozenset[str] = frozenset()  # photos of the strips, by which the names of pairs are understood
 
 
 def read_measurements(file: str, findings: Findings, manner: Manner | None = None) -> Measurements | None:

@@ -94,19 +94,13 @@ def _refuse_repeated(table: Table, key: Numbers, where: str, findings: Findings)
 
 @dataclass(frozen=True, eq=False)
 class EpochTable:
-    """Measurements of several epochs, row by row.
-
-    Parameters
-    ----------
-    epochs, points : tuple of str
-        Ids in order of first appearance; no epoch when the table has no such column.
-    epoch, point : ndarray of int, shape (n,)
-        Epoch and point of each row.
-    """
+    """Measurements of several epochs, row by row."""
 
     table: Table
+    # epochs, points: ids in order of first appearance; no epoch when the table has no such column
     epochs: tuple[str, ...]
     points: tuple[str, ...]
+    # epoch, point: (n,): epoch and point of each row
     epoch: Numbers
     point: Numbers
 

@@ -19,24 +19,13 @@ if TYPE_CHECKING:
 
 @dataclass
 class Source:
-    """Where files come from while one project is read.
+    """Where files come from while one project is read."""
 
-    Parameters
-    ----------
-    given : mapping of str to bytes, optional
-        Content by path as the user typed it; None: the files are read from the disk.
-    folder : str
-        Working folder to which relative paths refer; empty: that of the process.
-    grids : Path, optional
-        Folder that stands in for the project's folder where grid files are looked for.
-    digests : dict of str to str
-        SHA-256 of every file read so far, by its path.
-    """
-
+    # content by path as the user typed it; None: the files are read from the disk
     given: Mapping[str, bytes] | None = None
-    folder: str = ""
-    grids: Path | None = None
-    digests: dict[str, str] = field(default_factory=dict)
+    folder: str = ""  # working folder to which relative paths refer; empty: that of the process
+    grids: Path | None = None  # folder that stands in for the project's folder where grid files are looked for
+    digests: dict[str, str] = field(default_factory=dict)  # SHA-256 of every file read so far, by its path
 
     def account(self, file: str, data: bytes) -> None:
         """Remember what was read."""

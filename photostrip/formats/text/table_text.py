@@ -17,19 +17,11 @@ STEP = 4 * MEGABYTE
 
 @dataclass(eq=False)
 class TableText:
-    """The text of a table and where its columns stand: what positions are made from.
-
-    Parameters
-    ----------
-    data : bytes
-        UTF-8; as a text, one long id in another script would make it four times as large.
-    where : dict of str to int
-        Number of the field in a row, by column.
-    """
+    """The text of a table and where its columns stand: what positions are made from."""
 
     file: str
-    data: bytes
-    where: dict[str, int] = field(default_factory=dict)
+    data: bytes  # UTF-8; as a text, one long id in another script would make it four times as large
+    where: dict[str, int] = field(default_factory=dict)  # number of the field in a row, by column
     header: dict[str, str] = field(default_factory=dict)
 
     def stream(self) -> TextIOWrapper:

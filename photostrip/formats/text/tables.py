@@ -39,26 +39,16 @@ SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "vertical bars"}
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One column of a table as the format defines it.
-
-    Parameters
-    ----------
-    number : bool
-        Whether its cells are numbers; otherwise they are ids.
-    words : tuple of str
-        The only values allowed, the first being that of an empty cell.
-    header : str
-        The only name for it in this table, in lower case; empty: its name and its aliases.
-    """
+    """One column of a table as the format defines it."""
 
     name: str
-    number: bool = False
+    number: bool = False  # whether its cells are numbers; otherwise they are ids
     required: bool = True
     filled: bool = True
     positive: bool = False
-    words: tuple[str, ...] = ()
+    words: tuple[str, ...] = ()  # the only values allowed, the first being that of an empty cell
     aliases: tuple[str, ...] = ()
-    header: str = ""
+    header: str = ""  # the only name for it in this table, in lower case; empty: its name and its aliases
 
     @property
     def accepted(self) -> tuple[str, ...]:
@@ -68,25 +58,13 @@ class Column:
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """What a CSV file holds.
-
-    Parameters
-    ----------
-    lines : ndarray of int, shape (n,)
-        Line of each row, counted from 1.
-    numbers : dict of str to ndarray, shape (n,)
-        Columns of numbers; NaN where a cell is empty or wrong.
-    codes : dict of str to ndarray of int, shape (n,)
-        Columns of ids, as numbers that count in ``ids``.
-    ids : dict of str to tuple of str
-        The different ids of a column in order of first appearance.
-    """
+    """What a CSV file holds."""
 
     file: str
-    lines: Numbers
-    numbers: dict[str, Floats]
-    codes: dict[str, Numbers]
-    ids: dict[str, tuple[str, ...]]
+    lines: Numbers  # (n,): line of each row, counted from 1
+    numbers: dict[str, Floats]  # (n,): columns of numbers; NaN where a cell is empty or wrong
+    codes: dict[str, Numbers]  # (n,): columns of ids, as numbers that count in ``ids``
+    ids: dict[str, tuple[str, ...]]  # the different ids of a column in order of first appearance
     _source: TableText = field(repr=False)
 
     def __len__(self) -> int:

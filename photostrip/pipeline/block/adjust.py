@@ -58,22 +58,12 @@ OF_THE_STRIP_METHOD = {
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """A bundle adjustment as the pipeline goes on with it.
+    """A bundle adjustment as the pipeline goes on with it."""
 
-    Parameters
-    ----------
-    strips : tuple of StripResult
-        Strips with the orientations and points of the bundle.
-    precision : Precision
-        Covariances of points and photos.
-    observations : PhotoPoints
-        Ideal image coordinates, the calibration found taken into account.
-    """
-
-    strips: tuple[StripResult, ...]
+    strips: tuple[StripResult, ...]  # strips with the orientations and points of the bundle
     points: Adjusted
-    precision: Precision
-    observations: PhotoPoints
+    precision: Precision  # covariances of points and photos
+    observations: PhotoPoints  # ideal image coordinates, the calibration found taken into account
     bundle: Bundle
     notes: tuple[Note, ...]
 

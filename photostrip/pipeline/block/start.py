@@ -47,25 +47,14 @@ ROLL_WEIGHT = 1e-4  # of the assumption that cameras look down, where nothing el
 
 @dataclass(frozen=True, eq=False)
 class Known:
-    """What is known on the ground, all in the project's Cartesian frame.
-
-    Parameters
-    ----------
-    output : GroundFrame
-        Frame of the result.
-    centers : dict of str to ndarray
-        Known positions of antennas or perspective centres, by photo.
-    rotations : dict of str to ndarray
-        Known rotations, photo to Cartesian frame, by photo.
-    lever : ndarray, shape (3,)
-        Antenna from the perspective centre along the image axes, metres, for photos without a known rotation.
-    """
+    """What is known on the ground, all in the project's Cartesian frame."""
 
     control: ControlPoints
     frames: tuple[GroundFrame, ...]
-    output: GroundFrame
-    centers: dict[str, Floats]
-    rotations: dict[str, Floats]
+    output: GroundFrame  # frame of the result
+    centers: dict[str, Floats]  # known positions of antennas or perspective centres, by photo
+    rotations: dict[str, Floats]  # known rotations, photo to Cartesian frame, by photo
+    # (3,): antenna from the perspective centre along the image axes, metres, for photos without a known rotation
     lever: Floats
 
 

@@ -30,49 +30,26 @@ class LinkedStrip:
     """Every stage of one strip of independent models, in order.
 
     What it has in common with ``results.StripResult`` has the same name.
-
-    Parameters
-    ----------
-    formed : FormedModels
-        Its models in one system, and the links between them.
-    precision : tuple of float
-        A-priori standard deviation of a point of one model in plan and height, metres.
-    control : ControlPoints
-        Control that took part.
-    control_rows : ndarray of int, shape (n,)
-        Its rows in the strip's points.
-    polynomial : polynomial.Polynomial or None
-        Correction of the strip deformation; None with ``adjustment: similarity``.
-    xyz : ndarray, shape (q, 3)
-        Adjusted points, intermediate frame, metres; points of ``formed.point``.
-    cartesian : ndarray, shape (q, 3)
-        The same in the project's Cartesian frame.
-    centers : ndarray, shape (f, 3)
-        Adjusted perspective centres in flight order, intermediate frame, metres; NaN where none was measured.
-    depth : float
-        Mean height of the centres above the points, metres; NaN without centres.
-    notes : tuple of Note
-        What this strip's numbers say beside themselves.
-    wrong_control : tuple of control_screening.ControlRejection
-        Control coordinates that were not used; ``control`` says so in its ``use``.
-    judged_control : control_significance.Judged or None
-        What the covariance of the strip says of each coordinate of ``control``; None without.
     """
 
     strip: ModelStrip
-    formed: FormedModels
-    precision: tuple[float, float]
+    formed: FormedModels  # its models in one system, and the links between them
+    precision: tuple[float, float]  # a-priori standard deviation of a point of one model in plan and height, metres
     intermediate: IntermediateFrame
-    control: ControlPoints
-    control_rows: Numbers
+    control: ControlPoints  # control that took part
+    control_rows: Numbers  # (n,): its rows in the strip's points
     absolute: absolute.AbsoluteOrientation
+    # correction of the strip deformation; None with ``adjustment: similarity``
     polynomial: polynomial.Polynomial | None
-    xyz: Floats
-    cartesian: Floats
+    xyz: Floats  # (q, 3): adjusted points, intermediate frame, metres; points of ``formed.point``
+    cartesian: Floats  # (q, 3): the same in the project's Cartesian frame
+    # (f, 3): adjusted perspective centres in flight order, intermediate frame, metres; NaN where none was measured
     centers: Floats
-    depth: float
-    notes: tuple[Note, ...]
+    depth: float  # mean height of the centres above the points, metres; NaN without centres
+    notes: tuple[Note, ...]  # what this strip's numbers say beside themselves
+    # control coordinates that were not used; ``control`` says so in its ``use``
     wrong_control: tuple[control_screening.ControlRejection, ...]
+    # what the covariance of the strip says of each coordinate of ``control``; None without
     judged_control: control_significance.Judged | None = None
 
     @property

@@ -38,15 +38,9 @@ MOSAIC_SIGMA = 0.02  # of the flying height: what relief and tilts leave in a mo
 
 @dataclass(frozen=True, eq=False)
 class Formed:
-    """A strip, formed for evidence.
+    """A strip, formed for evidence."""
 
-    Parameters
-    ----------
-    strip : Strip
-        The strip with its photos in the order in which they were formed.
-    """
-
-    strip: Strip
+    strip: Strip  # the strip with its photos in the order in which they were formed
     orientation: Orientation
     formed: FormedStrip
 

@@ -45,26 +45,14 @@ OF_CAMERAS = ("P105",)  # findings on principal distances: models have none
 
 @dataclass(frozen=True, eq=False)
 class Examined:
-    """What the image coordinates alone say.
-
-    Parameters
-    ----------
-    observations : PhotoPoints
-        Image points with what was found put right, for further evidence only; mm, y up.
-    arranged : tuple of Arranged
-        Each strip as its photos lie.
-    steps : dict of str to complex
-        Centre of the next photo, as the photos lie, on each photo; mm, y up.
-    light : bool
-        Whether no strip may be formed, as in ``photostrip check``.
-    """
+    """What the image coordinates alone say."""
 
     findings: tuple[Finding, ...]
-    observations: PhotoPoints
-    arranged: tuple[Arranged, ...]
-    steps: dict[str, complex]
+    observations: PhotoPoints  # image points with what was found put right, for further evidence only; mm, y up
+    arranged: tuple[Arranged, ...]  # each strip as its photos lie
+    steps: dict[str, complex]  # centre of the next photo, as the photos lie, on each photo; mm, y up
     settings: Settings
-    light: bool = False
+    light: bool = False  # whether no strip may be formed, as in ``photostrip check``
 
 
 def before(inputs: Inputs, settings: Settings) -> Examined:

@@ -46,19 +46,11 @@ FIXES = {
 
 
 class Placed(NamedTuple):
-    """Given perspective centres, level.
+    """Given perspective centres, level."""
 
-    Parameters
-    ----------
-    key : str
-        Where they stand in the project file.
-    xyz : ndarray, shape (n, 3)
-        East, north and height, metres.
-    """
-
-    key: str
+    key: str  # where they stand in the project file
     photos: tuple[str, ...]
-    xyz: Floats
+    xyz: Floats  # (n, 3): east, north and height, metres
 
 
 def centers(

@@ -28,30 +28,16 @@ UP = np.array([0.0, 0.0, 1.0])  # of a strip of models with perspective centres
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """A strip of models with centres, as the gate sees it.
-
-    Parameters
-    ----------
-    centers : ndarray, shape (f, 3)
-        Perspective centres of the photos that have one, in strip coordinates.
-    depth : ndarray, shape (f,)
-        Height of each above the points of its models.
-    rows : ndarray of int
-        Rows of the given points that the strip holds.
-    place : ndarray
-        Place of each of them along the strip in bases, from 0 at the first photo.
-    breadth : float
-        Half breadth of the strip over its length.
-    """
+    """A strip of models with centres, as the gate sees it."""
 
     strip: ModelStrip
-    centers: Floats
+    centers: Floats  # (f, 3): perspective centres of the photos that have one, in strip coordinates
     photos: tuple[str, ...]
-    depth: Floats
-    rows: Numbers
+    depth: Floats  # (f,): height of each above the points of its models
+    rows: Numbers  # rows of the given points that the strip holds
     seen: Seen
-    place: Floats
-    breadth: float
+    place: Floats  # place of each of them along the strip in bases, from 0 at the first photo
+    breadth: float  # half breadth of the strip over its length
 
 
 def sights(models: MeasuredModels, control: ControlPoints, settings: Settings) -> Iterator[Sight]:

@@ -87,17 +87,11 @@ def by_covariance(own: CovarianceAdjustment, given: Given) -> covariances.CheckT
 
 @dataclass(frozen=True, eq=False)
 class Given:
-    """What check points say.
-
-    Parameters
-    ----------
-    difference : ndarray, shape (w,)
-        Adjusted minus given, metres.
-    """
+    """What check points say."""
 
     points: int
     seen: Misclosures
-    difference: Floats
+    difference: Floats  # (w,): adjusted minus given, metres
 
 
 def given_at(

@@ -27,29 +27,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Propagation:
-    """Rows of derivatives of one strip in its intermediate frame, and what the fit to the control takes away.
-
-    Parameters
-    ----------
-    control : control_errors.Misclosures
-        Control coordinates that count.
-    influence : ndarray, shape (q, 3, t)
-        Points by the parameters of the fit.
-    photos : Rows
-        Photos that could be oriented.
-    photo_influence : ndarray, shape (k, 6, t)
-        The same of them.
-    oriented : ndarray of int, shape (k,)
-        Their places in the strip.
-    """
+    """Rows of derivatives of one strip in its intermediate frame, and what the fit to the control takes away."""
 
     errors: strip_errors.StripErrors
-    control: control_errors.Misclosures
+    control: control_errors.Misclosures  # control coordinates that count
     fit: control_errors.Correction
-    influence: Floats
-    photos: Rows
-    photo_influence: Floats
-    oriented: Numbers
+    influence: Floats  # (q, 3, t): points by the parameters of the fit
+    photos: Rows  # photos that could be oriented
+    photo_influence: Floats  # (k, 6, t): the same of them
+    oriented: Numbers  # (k,): their places in the strip
 
 
 def propagation(strip: StripResult, observations: PhotoPoints, frames: Sequence[GroundFrame]) -> Propagation:

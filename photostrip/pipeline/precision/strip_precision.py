@@ -34,37 +34,20 @@ AT_A_TIME = 100  # control coordinates that two strips share, looked at together
 
 @dataclass(frozen=True, eq=False)
 class StripPrecision:
-    """Covariances of one strip in the axes of the Cartesian frame.
+    """Covariances of one strip in the axes of the Cartesian frame."""
 
-    Parameters
-    ----------
-    points : ndarray, shape (q, 3, 3)
-        Of the points of the strip, metres^2.
-    photos : ndarray, shape (m, 6, 6)
-        Of centre and small rotation of its photos; NaN where a photo could not be oriented.
-    by_control : callable
-        Takes rows of points (n,) and of control coordinates (c,), gives what errors of these coordinates subtract from
-        these points, (n, 3, c), in the same axes.
-    control : ndarray of int, shape (w, 2)
-        The control coordinates that count: the control point's number among the image points' ids, and its ground axis.
-    variance : ndarray, shape (w,)
-        Their variances, metres^2.
-    sigma : float
-        Standard deviation of an image coordinate of weight one, mm.
-    basis : str
-        Where that comes from.
-    check : CheckTest or None
-        Test of the strip's check points together.
-    """
-
-    points: Floats
-    photos: Floats
+    points: Floats  # (q, 3, 3): of the points of the strip, metres^2
+    photos: Floats  # (m, 6, 6): of centre and small rotation of its photos; NaN where a photo could not be oriented
+    # takes rows of points (n,) and of control coordinates (c,), gives what errors of these coordinates subtract from
+    # these points, (n, 3, c), in the same axes
     by_control: Callable[[Numbers, Numbers], Floats]
+    # (w, 2): the control coordinates that count: the control point's number among the image points' ids, and its ground
+    # axis
     control: Numbers
-    variance: Floats
-    sigma: float
-    basis: str
-    check: covariances.CheckTest | None
+    variance: Floats  # (w,): their variances, metres^2
+    sigma: float  # standard deviation of an image coordinate of weight one, mm
+    basis: str  # where that comes from
+    check: covariances.CheckTest | None  # test of the strip's check points together
 
 
 def of_strip(

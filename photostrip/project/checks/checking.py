@@ -53,21 +53,13 @@ MILLIMETRES = 1000.0  # in a metre
 
 @dataclass(frozen=True)
 class Checked:
-    """What was found in one project.
-
-    Parameters
-    ----------
-    faults : tuple of Fault
-        What must be put right before the project can be adjusted.
-    document : dict
-        What was decoded: counts, rows, frames, control; empty when the files could not be read.
-    """
+    """What was found in one project."""
 
     path: str
-    faults: tuple[Fault, ...]
+    faults: tuple[Fault, ...]  # what must be put right before the project can be adjusted
     findings: tuple[Finding, ...]
     notes: tuple[Note, ...]
-    document: Document
+    document: Document  # what was decoded: counts, rows, frames, control; empty when the files could not be read
 
     @property
     def told(self) -> tuple[Fault | Finding | Note, ...]:

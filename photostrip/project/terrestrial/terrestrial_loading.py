@@ -39,22 +39,14 @@ MICROMETRES = 1000.0
 
 @dataclass(frozen=True, eq=False)
 class Survey:
-    """What displacements are computed from.
-
-    Parameters
-    ----------
-    pair : StereoPair
-        Stations; ground axes are east, north, up, or right, ahead, up in the normal case.
-    axes : tuple of str
-        Names of the ground axes in the order in which the user wants them.
-    """
+    """What displacements are computed from."""
 
     name: str
     series: Series
-    pair: StereoPair
+    pair: StereoPair  # stations; ground axes are east, north, up, or right, ahead, up in the normal case
     settings: Settings
     cameras: tuple[Phototheodolite, Phototheodolite]
-    axes: tuple[str, str, str]
+    axes: tuple[str, str, str]  # names of the ground axes in the order in which the user wants them
     order: tuple[int, int, int]
     time_unit: str
     files: tuple[str, ...]

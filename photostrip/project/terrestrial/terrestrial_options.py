@@ -46,19 +46,12 @@ GIMBAL = 1e-6  # cosine of the elevation of the camera below which azimuth and r
 
 @dataclass(frozen=True, slots=True)
 class CameraOptions:
-    """Options that say which camera it is.
-
-    Parameters
-    ----------
-    principal_distance : float or None
-        f in mm, instead of the list's.
-    principal_point, photo_format : str or None
-        Pairs of numbers in mm, likewise.
-    """
+    """Options that say which camera it is."""
 
     camera: str | None = None
     presets: str | None = None
-    principal_distance: float | None = None
+    principal_distance: float | None = None  # f in mm, instead of the list's
+    # principal_point, photo_format: pairs of numbers in mm, likewise
     principal_point: str | None = None
     photo_format: str | None = None
 
@@ -248,23 +241,12 @@ def _given(
 
 @dataclass(frozen=True, slots=True)
 class SightingOptions:
-    """What the numbers of a table of sightings mean.
+    """What the numbers of a table of sightings mean."""
 
-    Parameters
-    ----------
-    unit : str
-        Unit of image coordinates, ``"mm"`` or ``"um"``.
-    angles : str
-        Unit of directions, ``"deg"`` or ``"gon"``.
-    sigma : float
-        Standard deviation of image coordinates in mm of rows without one.
-    horizontal, vertical : float
-        Standard deviations of directions in arcseconds of rows without one.
-    """
-
-    unit: str
-    angles: str
-    sigma: float
+    unit: str  # unit of image coordinates, ``"mm"`` or ``"um"``
+    angles: str  # unit of directions, ``"deg"`` or ``"gon"``
+    sigma: float  # standard deviation of image coordinates in mm of rows without one
+    # horizontal, vertical: standard deviations of directions in arcseconds of rows without one
     horizontal: float
     vertical: float
 

@@ -39,38 +39,21 @@ FEWEST_EPOCHS = 2
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """What the numbers of a table mean.
+    """What the numbers of a table mean."""
 
-    Parameters
-    ----------
-    kind : str
-        ``"coordinates"`` or ``"pseudo_parallaxes"``.
-    unit : str
-        ``"mm"`` or ``"um"``.
-    z_axis : str
-        ``"up"`` or ``"down"``.
-    sigma, sigma_d : float or None
-        Standard deviations of coordinates and of pseudo-parallaxes, in the unit, of rows without one.
-    """
-
-    kind: str
-    unit: str
-    z_axis: str
+    kind: str  # ``"coordinates"`` or ``"pseudo_parallaxes"``
+    unit: str  # ``"mm"`` or ``"um"``
+    z_axis: str  # ``"up"`` or ``"down"``
+    # sigma, sigma_d: standard deviations of coordinates and of pseudo-parallaxes, in the unit, of rows without one
     sigma: float | None
     sigma_d: float | None
 
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What the project says of epochs and points.
+    """What the project says of epochs and points."""
 
-    Parameters
-    ----------
-    epochs : tuple of str
-        Epochs in order, the first being the reference; empty: as they stand in the table.
-    """
-
-    epochs: tuple[str, ...] = ()
+    epochs: tuple[str, ...] = ()  # epochs in order, the first being the reference; empty: as they stand in the table
     times: tuple[float, ...] | None = None
     stable: tuple[str, ...] = ()
 

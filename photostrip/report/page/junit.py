@@ -13,23 +13,13 @@ FORBIDDEN = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]") 
 
 
 class Case(NamedTuple):
-    """One test case.
-
-    Parameters
-    ----------
-    failure : str
-        Why it failed, in one line; empty when it passed.
-    skipped : str
-        Why it was not tested; empty when it was.
-    error : str
-        Why it could not be tested, in one line; empty when it could.
-    """
+    """One test case."""
 
     name: str
-    failure: str = ""
+    failure: str = ""  # why it failed, in one line; empty when it passed
     details: str = ""
-    skipped: str = ""
-    error: str = ""
+    skipped: str = ""  # why it was not tested; empty when it was
+    error: str = ""  # why it could not be tested, in one line; empty when it could
 
 
 def to_junit(suite: str, cases: Iterable[Case]) -> str:

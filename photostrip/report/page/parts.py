@@ -9,36 +9,22 @@ DASH = "–"  # stands where there is no value
 
 
 class Column(NamedTuple):
-    """One column of a table.
-
-    Parameters
-    ----------
-    unit : str
-        Unit of its numbers, in the second line of the head.
-    rank : int
-        0: always shown; where the page is too narrow, columns of the highest rank are left out first.
-    """
+    """One column of a table."""
 
     name: str
-    unit: str = ""
+    unit: str = ""  # unit of its numbers, in the second line of the head
     left: bool = False
-    rank: int = 0
+    rank: int = 0  # 0: always shown; where the page is too narrow, columns of the highest rank are left out first
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table.
-
-    Parameters
-    ----------
-    note : str
-        A sentence below: what is not shown, and where it is.
-    """
+    """A table."""
 
     columns: tuple[Column, ...]
     rows: tuple[tuple[str, ...], ...]
     foot: tuple[tuple[str, ...], ...] = ()
-    note: str = ""
+    note: str = ""  # a sentence below: what is not shown, and where it is
 
 
 @dataclass(frozen=True)
@@ -50,19 +36,11 @@ class Facts:
 
 @dataclass(frozen=True)
 class Words:
-    """A paragraph.
-
-    Parameters
-    ----------
-    style : str
-        ``"good"``, ``"look"``, ``"failed"`` or empty.
-    mark : str
-        What stands before it: a number or a bullet; lines after the first are indented below the text.
-    """
+    """A paragraph."""
 
     text: str
-    style: str = ""
-    mark: str = ""
+    style: str = ""  # ``"good"``, ``"look"``, ``"failed"`` or empty
+    mark: str = ""  # what stands before it: a number or a bullet; lines after the first are indented below the text
 
 
 Part = Table | Facts | Words

@@ -11,28 +11,16 @@ EARTH = 6_371_000.0  # m, for degrees of a body whose size is not said
 
 
 class Spot(NamedTuple):
-    """A thing on the plan.
-
-    Parameters
-    ----------
-    role : str
-        ``photo``, ``new``, ``control`` or ``check``.
-    along, across : float
-        Place along the first strip, from its first photo, and to the left of it, metres.
-    shift : tuple of float or None
-        Adjusted minus given, along and across, metres.
-    up : float or None
-        Adjusted minus given in height, metres.
-    ellipse : tuple of float or None
-        Axes a and b of the standard ellipse in metres, and the direction of a counter-clockwise from along, radians.
-    """
+    """A thing on the plan."""
 
     id: str
-    role: str
+    role: str  # ``photo``, ``new``, ``control`` or ``check``
+    # along, across: place along the first strip, from its first photo, and to the left of it, metres
     along: float
     across: float
-    shift: Pair | None = None
-    up: float | None = None
+    shift: Pair | None = None  # adjusted minus given, along and across, metres
+    up: float | None = None  # adjusted minus given in height, metres
+    # axes a and b of the standard ellipse in metres, and the direction of a counter-clockwise from along, radians
     ellipse: tuple[float, float, float] | None = None
 
 

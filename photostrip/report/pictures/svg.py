@@ -15,18 +15,12 @@ TICKS = 6  # about so many on an axis
 
 
 class Picture(NamedTuple):
-    """A picture with the words that go with it.
-
-    Parameters
-    ----------
-    svg : str
-        The picture; its title and description are those for readers who cannot see it.
-    """
+    """A picture with the words that go with it."""
 
     name: str
     title: str
     caption: str
-    svg: str
+    svg: str  # the picture; its title and description are those for readers who cannot see it
 
 
 class Axis(NamedTuple):

@@ -26,25 +26,16 @@ MILLIMETRES = 1000.0  # per metre
 
 @dataclass(frozen=True, eq=False)
 class ModelDeformation:
-    """Twist and bending of one model.
-
-    Parameters
-    ----------
-    surface : Paraboloid
-        Height residuals in metres as a function of x and y at photo scale, mm.
-    base, width : float
-        Photo base, and distance of the outermost of the points from the line of flight, mm at photo scale.
-    sigma : float
-        Mean stated standard deviation of a height residual, metres.
-    """
+    """Twist and bending of one model."""
 
     model: int
     points: tuple[str, ...]
-    surface: Paraboloid
+    surface: Paraboloid  # height residuals in metres as a function of x and y at photo scale, mm
+    # base, width: photo base, and distance of the outermost of the points from the line of flight, mm at photo scale
     base: float
     width: float
     scale: float
-    sigma: float
+    sigma: float  # mean stated standard deviation of a height residual, metres
 
     @property
     def at_corner(self) -> tuple[float, float]:

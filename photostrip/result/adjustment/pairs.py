@@ -38,24 +38,12 @@ REASONS = {
 
 @dataclass(frozen=True, eq=False)
 class Parallaxes:
-    """What the residual y parallaxes of a strip's pairs come to.
+    """What the residual y parallaxes of a strip's pairs come to."""
 
-    Parameters
-    ----------
-    squares : ndarray, shape (p,)
-        Sums of weighted squares, mm^2.
-    redundancy : ndarray of int, shape (p,)
-        Points used minus five.
-    rms : ndarray, shape (p,)
-        Root mean square over the points used, mm.
-    worst : ndarray of int, shape (p,)
-        Row of the largest one in the pairs' table.
-    """
-
-    squares: Floats
-    redundancy: Numbers
-    rms: Floats
-    worst: Numbers
+    squares: Floats  # (p,): sums of weighted squares, mm^2
+    redundancy: Numbers  # (p,): points used minus five
+    rms: Floats  # (p,): root mean square over the points used, mm
+    worst: Numbers  # (p,): row of the largest one in the pairs' table
 
     @classmethod
     def of(cls, strip: StripResult) -> Parallaxes:

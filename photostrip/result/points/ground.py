@@ -27,32 +27,17 @@ LEAST_SHARE = 0.1  # of its standard deviation that a control point shows of its
 
 @dataclass(frozen=True, eq=False)
 class Differences:
-    """Adjusted minus given at every given point, in the order of the inputs' control.
+    """Adjusted minus given at every given point, in the order of the inputs' control."""
 
-    Parameters
-    ----------
-    axes : ndarray, shape (c, 3)
-        Metres in the order of the result's axes; NaN where it does not count or is not known.
-    parts : ndarray, shape (c, 3)
-        Metres to the east, to the north and up at the point.
-    sigma : ndarray, shape (c, 3)
-        Standard deviation of each difference along the point's own axes in the fit, metres: of the given coordinate
-        and of a point of one model together.
-    normalised : ndarray, shape (c,)
-        The largest difference of a point in units of that standard deviation.
-    scale : ndarray, shape (c,)
-        Denominator of the photo scale at the point; NaN where it has no coordinates.
-    rejected : ndarray of bool, shape (c, 3)
-        Coordinates east, north, up of the control that were found wrong and not used.
-    """
-
-    axes: Floats
-    parts: Floats
+    axes: Floats  # (c, 3): metres in the order of the result's axes; NaN where it does not count or is not known
+    parts: Floats  # (c, 3): metres to the east, to the north and up at the point
+    # (c, 3): standard deviation of each difference along the point's own axes in the fit, metres: of the given
+    # coordinate and of a point of one model together
     sigma: Floats
-    normalised: Floats
-    scale: Floats
+    normalised: Floats  # (c,): the largest difference of a point in units of that standard deviation
+    scale: Floats  # (c,): denominator of the photo scale at the point; NaN where it has no coordinates
     strips: tuple[tuple[str, ...], ...]
-    rejected: Flags
+    rejected: Flags  # (c, 3): coordinates east, north, up of the control that were found wrong and not used
 
     @property
     def plan(self) -> Floats:

@@ -28,24 +28,12 @@ PER_RADIAN = {"deg": (180 / np.pi, DEGREES), "gon": (200 / np.pi, DEGREES), "rad
 
 @dataclass(frozen=True, eq=False)
 class ImageResiduals:
-    """Measured minus computed image coordinates of one strip, also of measurements that took no part.
+    """Measured minus computed image coordinates of one strip, also of measurements that took no part."""
 
-    Parameters
-    ----------
-    rows : ndarray of int, shape (m,)
-        Rows of the observations, by photo in flight order, then by natural order of the points.
-    photo : ndarray of int, shape (m,)
-        Place of each row's photo in the strip.
-    residuals : ndarray, shape (m, 2)
-        In x and y, mm; NaN where the point has no coordinates in the strip.
-    used : ndarray of bool, shape (m,)
-        Whether the measurement took part.
-    """
-
-    rows: Numbers
-    photo: Numbers
-    residuals: Floats
-    used: Flags
+    rows: Numbers  # (m,): rows of the observations, by photo in flight order, then by natural order of the points
+    photo: Numbers  # (m,): place of each row's photo in the strip
+    residuals: Floats  # (m, 2): in x and y, mm; NaN where the point has no coordinates in the strip
+    used: Flags  # (m,): whether the measurement took part
 
     @classmethod
     def of(cls, result: Result, strip: StripResult, rank: Numbers) -> ImageResiduals:

@@ -32,51 +32,29 @@ SAME = 1e-6  # rad
 
 @dataclass(frozen=True, eq=False)
 class PairStep:
-    """One step of the relative orientation of a pair.
+    """One step of the relative orientation of a pair."""
 
-    Parameters
-    ----------
-    elements : ndarray, shape (5,)
-        alpha1', kappa1', alpha2', omega2', kappa2' before the step, radians.
-    squares : float
-        [w q q], sum of weighted squares of the y parallaxes before the step, mm^2.
-    step : ndarray, shape (5,)
-        What is added, radians.
-    """
-
-    elements: Floats
-    squares: float
-    step: Floats
+    elements: Floats  # (5,): alpha1', kappa1', alpha2', omega2', kappa2' before the step, radians
+    squares: float  # [w q q], sum of weighted squares of the y parallaxes before the step, mm^2
+    step: Floats  # (5,): what is added, radians
 
 
 @dataclass(frozen=True, eq=False)
 class PairRound:
-    """The iteration of a pair with one choice of points.
-
-    Parameters
-    ----------
-    end : ndarray, shape (5,)
-        Elements in the end, radians.
-    """
+    """The iteration of a pair with one choice of points."""
 
     points: int
     steps: tuple[PairStep, ...]
-    end: Floats
+    end: Floats  # (5,): elements in the end, radians
 
 
 @dataclass(frozen=True, eq=False)
 class SimilarityStep:
-    """One step of the absolute orientation.
-
-    Parameters
-    ----------
-    step : ndarray, shape (7,)
-        Three shifts, three rotations and the scale, metres at the end of the strip.
-    """
+    """One step of the absolute orientation."""
 
     similarity: Similarity
     squares: float
-    step: Floats
+    step: Floats  # (7,): three shifts, three rotations and the scale, metres at the end of the strip
 
 
 def pair_rounds(result: Result, strip: StripResult) -> list[list[PairRound]]:

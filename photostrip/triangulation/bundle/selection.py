@@ -23,17 +23,10 @@ LEAST_RAYS = 2
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """Which observations take part.
+    """Which observations take part."""
 
-    Parameters
-    ----------
-    images : ndarray of bool, shape (n,)
-        Rays.
-    control, positions, attitudes : ndarray of bool, shapes (c, 3), (g, 3), (a, 3)
-        Coordinates.
-    """
-
-    images: Flags
+    images: Flags  # (n,): rays
+    # control, positions, attitudes: (c, 3), (g, 3), (a, 3): coordinates
     control: Flags
     positions: Flags
     attitudes: Flags

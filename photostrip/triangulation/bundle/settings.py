@@ -22,32 +22,17 @@ CALIBRATION_UNITS = {
 
 @dataclass(frozen=True)
 class Settings:
-    """What is asked of the bundle adjustment.
+    """What is asked of the bundle adjustment."""
 
-    Parameters
-    ----------
-    screening : str
-        How gross errors are searched for: ``"snooping"`` (one after the other, by the largest test value),
-        ``"robust"`` (re-weighted first, then tested) or ``"none"``.
-    test : str
-        ``"tau"``: residuals are compared with the sigma0 found; ``"baarda"``: with the stated standard deviations.
-    alpha : float
-        Probability that the test of one good observation rejects it.
-    power : float
-        Probability with which an error of the size of the minimal detectable one is found.
-    variance_components : bool
-        Whether the standard deviations of the groups of observations are estimated.
-    self_calibration : tuple of str
-        Parameters of every camera that are estimated, of ``CALIBRATION``.
-    calibration_sigma : dict of str to float
-        A-priori standard deviations of these parameters about the given calibration, in their units; without one a
-        parameter is free.
-    """
-
+    # how gross errors are searched for: ``"snooping"`` (one after the other, by the largest test value), ``"robust"``
+    # (re-weighted first, then tested) or ``"none"``
     screening: str = "snooping"
+    # ``"tau"``: residuals are compared with the sigma0 found; ``"baarda"``: with the stated standard deviations
     test: str = "tau"
-    alpha: float = 0.001
-    power: float = 0.80
-    variance_components: bool = False
-    self_calibration: tuple[str, ...] = ()
+    alpha: float = 0.001  # probability that the test of one good observation rejects it
+    power: float = 0.80  # probability with which an error of the size of the minimal detectable one is found
+    variance_components: bool = False  # whether the standard deviations of the groups of observations are estimated
+    self_calibration: tuple[str, ...] = ()  # parameters of every camera that are estimated, of ``CALIBRATION``
+    # a-priori standard deviations of these parameters about the given calibration, in their units; without one a
+    # parameter is free
     calibration_sigma: dict[str, float] = field(default_factory=dict)

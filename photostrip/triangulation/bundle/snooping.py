@@ -36,51 +36,27 @@ NEAR = 0.5  # test value of what may go in the same round, in units of the worst
 
 @dataclass(frozen=True)
 class Rejection:
-    """One observation that was taken out.
+    """One observation that was taken out."""
 
-    Parameters
-    ----------
-    kind : str
-        ``image``, ``control``, ``position`` or ``attitude``.
-    axis : int
-        The coordinate beyond the limit: 0, 1 or 2. A ray goes out as a whole.
-    test : str
-        Name of the test; ``start`` for what the strip method had rejected already and does not fit.
-    size : float
-        What error would explain the residual: mm, metres or radians.
-    readmitted : bool
-        Whether it came back.
-    """
-
-    kind: str
+    kind: str  # ``image``, ``control``, ``position`` or ``attitude``
     row: int
-    axis: int
-    test: str
+    axis: int  # the coordinate beyond the limit: 0, 1 or 2. A ray goes out as a whole
+    test: str  # name of the test; ``start`` for what the strip method had rejected already and does not fit
     value: float
     limit: float
-    size: float
-    readmitted: bool = False
+    size: float  # what error would explain the residual: mm, metres or radians
+    readmitted: bool = False  # whether it came back
 
 
 @dataclass(frozen=True, eq=False)
 class Screened:
-    """A solution and how it was cleaned.
+    """A solution and how it was cleaned."""
 
-    Parameters
-    ----------
-    problem : Problem
-        The problem with the observations that took part.
-    selection : Selection
-        Which those are.
-    rejections : tuple of Rejection
-        What was taken out, in order; re-admitted ones are marked.
-    """
-
-    problem: Problem
-    selection: Selection
+    problem: Problem  # the problem with the observations that took part
+    selection: Selection  # which those are
     solution: Solution
     precision: Precision
-    rejections: tuple[Rejection, ...]
+    rejections: tuple[Rejection, ...]  # what was taken out, in order; re-admitted ones are marked
     rounds: int
 
 

@@ -16,74 +16,36 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Step:
-    """One step of the adjustment.
+    """One step of the adjustment."""
 
-    Parameters
-    ----------
-    chi_square : float
-        Weighted sum of squares of all residuals before the step.
-    length : float
-        Length of the step in standard deviations: the root of ``dx' N dx`` over all parameters.
-    damping : float
-        Damping of the step; 0 for a full Gauss-Newton step.
-    shift, turn : float
-        Largest shift of a perspective centre or point in metres, largest rotation of a photo in radians.
-    """
-
-    chi_square: float
-    length: float
-    damping: float
+    chi_square: float  # weighted sum of squares of all residuals before the step
+    length: float  # length of the step in standard deviations: the root of ``dx' N dx`` over all parameters
+    damping: float  # damping of the step; 0 for a full Gauss-Newton step
+    # shift, turn: largest shift of a perspective centre or point in metres, largest rotation of a photo in radians
     shift: float
     turn: float
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """The least-squares estimate.
+    """The least-squares estimate."""
 
-    Parameters
-    ----------
-    centers : ndarray, shape (m, 3)
-        Perspective centres, metres, in the frame of the problem.
-    rotations : ndarray, shape (m, 3, 3)
-        Rotations, photo to Cartesian frame.
-    points : ndarray, shape (q, 3)
-        Points, metres. A point without rays keeps its start.
-    common : ndarray, shape (p,)
-        Calibration, offset and drift parameters, in the order of ``Problem.common_names()``.
-    image_residuals : ndarray, shape (n, 2)
-        Measured minus adjusted image coordinates, mm, in the order of ``problem.images``.
-    control_residuals : ndarray, shape (c, 3)
-        Adjusted minus given coordinates along the axes of each row, metres, also where the sigma is infinite.
-    position_residuals : ndarray, shape (g, 3)
-        Adjusted minus given camera positions along the axes, metres, offset and drift taken off.
-    attitude_residuals : ndarray, shape (a, 3)
-        Rotation from the given to the adjusted attitude about the photo axes, radians.
-    chi_square : float
-        Weighted sum of squares of all residuals, those of weighted parameters included.
-    redundancy : int
-        Observations (weighted parameters included) minus parameters, plus the datum defect of a free network.
-    free : bool
-        True when the datum came from inner constraints on the points: no control, no positions.
-    steps : tuple of Step
-        The way from the start, one entry for each step that was taken or refused.
-    model : Model
-        The problem as it was laid out; spares the precision that work.
-    """
-
-    centers: Floats
-    rotations: Floats
-    points: Floats
-    common: Floats
-    image_residuals: Floats
+    centers: Floats  # (m, 3): perspective centres, metres, in the frame of the problem
+    rotations: Floats  # (m, 3, 3): rotations, photo to Cartesian frame
+    points: Floats  # (q, 3): points, metres. A point without rays keeps its start
+    common: Floats  # (p,): calibration, offset and drift parameters, in the order of ``Problem.common_names()``
+    image_residuals: Floats  # (n, 2): measured minus adjusted image coordinates, mm, in the order of ``problem.images``
+    # (c, 3): adjusted minus given coordinates along the axes of each row, metres, also where the sigma is infinite
     control_residuals: Floats
+    # (g, 3): adjusted minus given camera positions along the axes, metres, offset and drift taken off
     position_residuals: Floats
-    attitude_residuals: Floats
-    chi_square: float
+    attitude_residuals: Floats  # (a, 3): rotation from the given to the adjusted attitude about the photo axes, radians
+    chi_square: float  # weighted sum of squares of all residuals, those of weighted parameters included
+    # observations (weighted parameters included) minus parameters, plus the datum defect of a free network
     redundancy: int
-    free: bool
-    steps: tuple[Step, ...]
-    model: Model
+    free: bool  # true when the datum came from inner constraints on the points: no control, no positions
+    steps: tuple[Step, ...]  # the way from the start, one entry for each step that was taken or refused
+    model: Model  # the problem as it was laid out; spares the precision that work
 
     @property
     def sigma0(self) -> float:
@@ -93,39 +55,21 @@ class Solution:
 
 @dataclass(frozen=True, eq=False)
 class Precision:
-    """Cofactors: covariances for a sigma0 of 1. Multiply by sigma0 squared where that is wanted.
+    """Cofactors: covariances for a sigma0 of 1. Multiply by sigma0 squared where that is wanted."""
 
-    Parameters
-    ----------
-    points : ndarray, shape (q, 3, 3)
-        Cofactors of the points, m^2, Cartesian; NaN for a point without rays.
-    photos : ndarray, shape (m, 6, 6)
-        Cofactors of the photos: shift of the perspective centre (m), then rotation vector (rad), both in the
-        Cartesian frame; the rotation is ``from_vector(v) @ R``.
-    common : ndarray, shape (p, p)
-        Cofactors of the common parameters.
-    image_residuals : ndarray, shape (n, 2, 2)
-        Cofactors of the residuals of each ray, mm^2: with sigma of a coordinate, its redundancy number is
-        ``diagonal / sigma**2``.
-    control_residuals : ndarray, shape (c, 3, 3)
-        The same for control, along its axes, m^2; of rows and columns that are not given: minus the cofactor
-        of the adjusted coordinate.
-    position_residuals : ndarray, shape (g, 3, 3)
-        The same for camera positions.
-    attitude_residuals : ndarray, shape (a, 3, 3)
-        The same for attitudes, rad^2.
-    common_residuals : ndarray, shape (p,)
-        The same for the a-priori values of weighted common parameters; 0 where a parameter is free.
-    photo_common : ndarray, shape (m, 6, p)
-        Cofactors between photos and common parameters.
-    """
-
-    points: Floats
+    points: Floats  # (q, 3, 3): cofactors of the points, m^2, Cartesian; NaN for a point without rays
+    # (m, 6, 6): cofactors of the photos: shift of the perspective centre (m), then rotation vector (rad), both in the
+    # Cartesian frame; the rotation is ``from_vector(v) @ R``
     photos: Floats
-    common: Floats
+    common: Floats  # (p, p): cofactors of the common parameters
+    # (n, 2, 2): cofactors of the residuals of each ray, mm^2: with sigma of a coordinate, its redundancy number is
+    # ``diagonal / sigma**2``
     image_residuals: Floats
+    # (c, 3, 3): the same for control, along its axes, m^2; of rows and columns that are not given: minus the cofactor
+    # of the adjusted coordinate
     control_residuals: Floats
-    position_residuals: Floats
-    attitude_residuals: Floats
+    position_residuals: Floats  # (g, 3, 3): the same for camera positions
+    attitude_residuals: Floats  # (a, 3, 3): the same for attitudes, rad^2
+    # (p,): the same for the a-priori values of weighted common parameters; 0 where a parameter is free
     common_residuals: Floats
-    photo_common: Floats
+    photo_common: Floats  # (m, 6, p): cofactors between photos and common parameters

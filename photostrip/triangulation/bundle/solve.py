@@ -44,18 +44,11 @@ ROUNDING = 1e-9  # part of the sum of squares by which it may seem to grow at th
 
 @dataclass(frozen=True)
 class Settings:
-    """How the adjustment is driven.
+    """How the adjustment is driven."""
 
-    Parameters
-    ----------
-    iterations : int
-        Steps after which it is given up.
-    converged : float
-        What the steps after the last one may still move, in standard deviations over all parameters together,
-        judged by how much shorter the last step was than the one before it.
-    """
-
-    iterations: int = 30
+    iterations: int = 30  # steps after which it is given up
+    # what the steps after the last one may still move, in standard deviations over all parameters together, judged by
+    # how much shorter the last step was than the one before it
     converged: float = 1e-6
 
 

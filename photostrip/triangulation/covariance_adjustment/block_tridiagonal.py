@@ -20,18 +20,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Factors:
-    """An eliminated system of n blocks of b rows.
+    """An eliminated system of n blocks of b rows."""
 
-    Parameters
-    ----------
-    inverses : ndarray, shape (n, b, b)
-        Inverses of the pivot blocks.
-    shares : ndarray, shape (n, b, b)
-        Those times the blocks beside the diagonal; the last is 0.
-    """
-
-    inverses: Floats
-    shares: Floats
+    inverses: Floats  # (n, b, b): inverses of the pivot blocks
+    shares: Floats  # (n, b, b): those times the blocks beside the diagonal; the last is 0
 
     def solve(self, right: Floats) -> Floats:
         """Solve for right sides.

@@ -36,31 +36,18 @@ JOINT, CONTROL, DISTANCE = 0, 1, 2
 
 @dataclass(frozen=True)
 class Settings:
-    """Which misclosures an adjustment with the covariance of the strip distributes.
+    """Which misclosures an adjustment with the covariance of the strip distributes."""
 
-    Parameters
-    ----------
-    distances : bool
-        Whether distances of pass points from the common centres of their models count beside the control.
-    """
-
+    # whether distances of pass points from the common centres of their models count beside the control
     distances: bool = True
 
 
 @dataclass(frozen=True, eq=False)
 class Local:
-    """Similarities of the models about their own left photos.
+    """Similarities of the models about their own left photos."""
 
-    Parameters
-    ----------
-    to_common : ndarray, shape (p, 7, 7)
-        From the unknowns of each model to the similarity about the common origin.
-    from_common : ndarray, shape (p, 7, 7)
-        The way back.
-    """
-
-    to_common: Floats
-    from_common: Floats
+    to_common: Floats  # (p, 7, 7): from the unknowns of each model to the similarity about the common origin
+    from_common: Floats  # (p, 7, 7): the way back
 
     @classmethod
     def about(cls, centers: Floats, length: float) -> Local:
@@ -76,30 +63,14 @@ class Local:
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """Conditions ``w = A y + H v + g``, in the order of the strip.
+    """Conditions ``w = A y + H v + g``, in the order of the strip."""
 
-    Parameters
-    ----------
-    rows : Rows
-        H, d = 1; ``frame`` is A in the columns of the condition's own model.
-    following : ndarray, shape (n, 7)
-        A in the columns of the next model.
-    value : ndarray, shape (n,)
-        w, metres.
-    noise : ndarray, shape (n,)
-        Variance of g, metres^2.
-    kind : ndarray of int, shape (n,)
-        ``JOINT``, ``CONTROL`` or ``DISTANCE``.
-    source : ndarray of int, shape (n,)
-        Joint; row of the misclosures; row of the junctions.
-    """
-
-    rows: Rows
-    following: Floats
-    value: Floats
-    noise: Floats
-    kind: Numbers
-    source: Numbers
+    rows: Rows  # H, d = 1; ``frame`` is A in the columns of the condition's own model
+    following: Floats  # (n, 7): a in the columns of the next model
+    value: Floats  # (n,): w, metres
+    noise: Floats  # (n,): variance of g, metres^2
+    kind: Numbers  # (n,): ``JOINT``, ``CONTROL`` or ``DISTANCE``
+    source: Numbers  # (n,): joint; row of the misclosures; row of the junctions
 
 
 def conditions(

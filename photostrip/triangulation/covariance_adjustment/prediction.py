@@ -37,41 +37,22 @@ CHECKED = 1e-6  # part of a control coordinate's variance that the others must c
 
 @dataclass(frozen=True, eq=False)
 class Predicted:
-    """Errors of things, as the adjustment finds them.
+    """Errors of things, as the adjustment finds them."""
 
-    Parameters
-    ----------
-    error : ndarray, shape (n, d)
-        To be subtracted.
-    covariance : ndarray, shape (n, d, d)
-        Of what is left, for a variance factor of 1.
-    """
-
-    error: Floats
-    covariance: Floats
+    error: Floats  # (n, d): to be subtracted
+    covariance: Floats  # (n, d, d): of what is left, for a variance factor of 1
 
 
 @dataclass(frozen=True, eq=False)
 class Tested:
-    """What the adjustment says about itself, in the order of the control coordinates.
+    """What the adjustment says about itself, in the order of the control coordinates."""
 
-    Parameters
-    ----------
-    squares : float
-        Weighted sum of squares of all misclosures.
-    normalised : ndarray, shape (w,)
-        Test value of each control coordinate, standard normal when it is right; NaN where nothing checks it.
-    size : ndarray, shape (w,)
-        Error of the given coordinate, given minus true, that would explain it, metres.
-    distances : int
-        Distances of pass points that took part.
-    """
-
-    squares: float
+    squares: float  # weighted sum of squares of all misclosures
     redundancy: int
+    # (w,): test value of each control coordinate, standard normal when it is right; NaN where nothing checks it
     normalised: Floats
-    size: Floats
-    distances: int
+    size: Floats  # (w,): error of the given coordinate, given minus true, that would explain it, metres
+    distances: int  # distances of pass points that took part
 
     @property
     def probability(self) -> float:
@@ -150,24 +131,14 @@ def _visit(jobs: Sequence[_Job], number: int, window: Sequence[tuple[Floats, Flo
 
 @dataclass(frozen=True, eq=False)
 class _Job:
-    """Things to be predicted, block by block; results are filled in.
+    """Things to be predicted, block by block; results are filled in."""
 
-    Parameters
-    ----------
-    rows : Rows
-        The things, ordered by their first models.
-    frame : ndarray, shape (n, d, 7)
-        By the unknowns of the first model.
-    shared : tuple of ndarray
-        Things and conditions that use the same image points, and their products; ordered by things.
-    error, quadratic : ndarray, shapes (n, d) and (n, d, d)
-        What is found.
-    """
-
-    rows: Rows
+    rows: Rows  # the things, ordered by their first models
     padded: Padded
-    frame: Floats
+    frame: Floats  # (n, d, 7): by the unknowns of the first model
+    # things and conditions that use the same image points, and their products; ordered by things
     shared: tuple[Numbers, Numbers, Floats]
+    # error, quadratic: (n, d) and (n, d, d): what is found
     error: Floats
     quadratic: Floats
 

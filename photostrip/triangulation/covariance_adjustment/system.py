@@ -29,21 +29,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Padded:
-    """Rows with d = 1 model by model, empty places 0.
+    """Rows with d = 1 model by model, empty places 0."""
 
-    Parameters
-    ----------
-    core : ndarray, shape (p, r, s, 6)
-        Coefficients of units.
-    own : ndarray, shape (p, r, s + 4, 6)
-        Covariances of their own image coordinates with units.
-    whole : ndarray, shape (p, r, s + 4, 6)
-        Covariances of the whole rows, without similarities, with units.
-    """
-
-    core: Floats
-    own: Floats
-    whole: Floats
+    core: Floats  # (p, r, s, 6): coefficients of units
+    own: Floats  # (p, r, s + 4, 6): covariances of their own image coordinates with units
+    whole: Floats  # (p, r, s + 4, 6): covariances of the whole rows, without similarities, with units
 
 
 def pad(errors: StripErrors, rows: Rows, rank: Numbers, slots: int) -> Padded:
@@ -141,26 +131,17 @@ def same_images(a: Rows, b: Rows) -> tuple[Numbers, Numbers, Floats]:
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """Where conditions and unknowns stand.
-
-    Parameters
-    ----------
-    blocks, height : int
-        Number of blocks, and rows of each.
-    rank : ndarray of int, shape (n,)
-        Place of each condition among those of its model.
-    block, position : ndarray of int, shape (n,)
-        Block of each condition, and its place there.
-    start, unknown : ndarray of int, shape (p,)
-        Place in its block of each model's first condition, and of its first unknown.
-    """
+    """Where conditions and unknowns stand."""
 
     width: int
+    # blocks, height: number of blocks, and rows of each
     blocks: int
     height: int
-    rank: Numbers
+    rank: Numbers  # (n,): place of each condition among those of its model
+    # block, position: (n,): block of each condition, and its place there
     block: Numbers
     position: Numbers
+    # start, unknown: (p,): place in its block of each model's first condition, and of its first unknown
     start: Numbers
     unknown: Numbers
 
@@ -189,14 +170,9 @@ class Layout:
 
 @dataclass(frozen=True, eq=False)
 class Matrix:
-    """A symmetric matrix of blocks on and beside the diagonal.
+    """A symmetric matrix of blocks on and beside the diagonal."""
 
-    Parameters
-    ----------
-    diagonal, beside : ndarray, shape (g, b, b)
-        Blocks on the diagonal and to the right of them.
-    """
-
+    # diagonal, beside: (g, b, b): blocks on the diagonal and to the right of them
     diagonal: Floats
     beside: Floats
 
@@ -231,20 +207,12 @@ class Matrix:
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """The solved system.
+    """The solved system."""
 
-    Parameters
-    ----------
-    layout : Layout
-        Where everything stands.
-    solution : ndarray, shape (g, b)
-        Correlates of the conditions, and unknowns.
-    """
-
-    layout: Layout
+    layout: Layout  # where everything stands
     padded: Padded
     factors: block_tridiagonal.Factors
-    solution: Floats
+    solution: Floats  # (g, b): correlates of the conditions, and unknowns
 
     def solved_for(self, value: Floats) -> Floats:
         """Solve for other misclosures.

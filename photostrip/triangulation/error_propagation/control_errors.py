@@ -30,50 +30,25 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Misclosures:
-    """Control coordinates that count, one row each.
+    """Control coordinates that count, one row each."""
 
-    Parameters
-    ----------
-    point : ndarray of int, shape (w,)
-        Control point of each.
-    axis : ndarray of int, shape (w,)
-        0, 1, 2: along its first, second, third ground axis.
-    direction : ndarray, shape (w, 3)
-        That axis as a unit vector in the intermediate frame.
-    variance : ndarray, shape (w,)
-        Variance of the given coordinate, metres^2.
-    rows : Rows
-        Error of the strip along the axis, d = 1.
-    """
-
-    point: Numbers
-    axis: Numbers
-    direction: Floats
-    variance: Floats
-    rows: Rows
+    point: Numbers  # (w,): control point of each
+    axis: Numbers  # (w,): 0, 1, 2: along its first, second, third ground axis
+    direction: Floats  # (w, 3): that axis as a unit vector in the intermediate frame
+    variance: Floats  # (w,): variance of the given coordinate, metres^2
+    rows: Rows  # error of the strip along the axis, d = 1
 
 
 @dataclass(frozen=True, eq=False)
 class Correction:
-    """What is subtracted from the strip: ``X - Phi theta`` with ``theta = M w``, w the misclosures strip minus given.
+    """Subtracted from the strip: ``X - Phi theta`` with ``theta = M w``, w the misclosures strip minus given."""
 
-    Parameters
-    ----------
-    operator : ndarray, shape (t, w)
-        M: seven parameters of the similarity, then those of the polynomials.
-    terms : tuple of tuple of str
-        Terms of the polynomials of X, Y, Z.
-    reach, breadth : float
-        Lengths by which X and Y are divided in the terms, metres.
-    origin : ndarray, shape (3,)
-        Origin of the similarity.
-    """
-
-    operator: Floats
-    terms: tuple[tuple[str, ...], ...]
+    operator: Floats  # (t, w): M: seven parameters of the similarity, then those of the polynomials
+    terms: tuple[tuple[str, ...], ...]  # terms of the polynomials of X, Y, Z
+    # reach, breadth: lengths by which X and Y are divided in the terms, metres
     reach: float
     breadth: float
-    origin: Floats
+    origin: Floats  # (3,): origin of the similarity
 
     def influence(self, xyz: Floats) -> Floats:
         """Phi: displacement of points by the parameters.

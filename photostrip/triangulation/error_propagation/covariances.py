@@ -36,19 +36,11 @@ ENTRIES = 2000  # coefficients of image points worked on at a time: what fits in
 
 @dataclass(frozen=True, eq=False)
 class CheckTest:
-    """Test of the check points of a strip together; their errors are correlated along the strip.
-
-    Parameters
-    ----------
-    coordinates : int
-        Their coordinates, the expectation of the sum of squares.
-    squares : float
-        e^T C^-1 e with the joint covariance C of the differences, that of the given coordinates included.
-    """
+    """Test of the check points of a strip together; their errors are correlated along the strip."""
 
     points: int
-    coordinates: int
-    squares: float
+    coordinates: int  # their coordinates, the expectation of the sum of squares
+    squares: float  # e^T C^-1 e with the joint covariance C of the differences, that of the given coordinates included
 
     @property
     def probability(self) -> float:
@@ -81,40 +73,20 @@ def image_variance(orientation: Orientation, sigma: float) -> tuple[float, str]:
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """Covariances of the similarities of the models, relative to the first.
+    """Covariances of the similarities of the models, relative to the first."""
 
-    Parameters
-    ----------
-    frames : ndarray, shape (p + 1, 7, 7)
-        Of each model, and last of the last photo.
-    ahead : ndarray, shape (p + 1, 2, 7, 6)
-        Of each with the units of its own model and of the next.
-    """
-
-    frames: Floats
-    ahead: Floats
+    frames: Floats  # (p + 1, 7, 7): of each model, and last of the last photo
+    ahead: Floats  # (p + 1, 2, 7, 6): of each with the units of its own model and of the next
 
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """Covariances of the parameters fitted to the control.
+    """Covariances of the parameters fitted to the control."""
 
-    Parameters
-    ----------
-    frames : ndarray, shape (p + 1, 7, t)
-        With the similarities of the models.
-    units : ndarray, shape (p, 6, t)
-        With the units.
-    images : ndarray, shape (n, 2, t)
-        With the image coordinates.
-    parameters : ndarray, shape (t, t)
-        Among themselves.
-    """
-
-    frames: Floats
-    units: Floats
-    images: Floats
-    parameters: Floats
+    frames: Floats  # (p + 1, 7, t): with the similarities of the models
+    units: Floats  # (p, 6, t): with the units
+    images: Floats  # (n, 2, t): with the image coordinates
+    parameters: Floats  # (t, t): among themselves
 
 
 def chain(errors: StripErrors) -> Chain:

@@ -26,23 +26,12 @@ SPAN = REACH + 1  # photos on which the image coordinates of a unit lie
 
 @dataclass(frozen=True, eq=False)
 class Images:
-    """Image points that take part, ordered by photo, and how units depend on them.
+    """Image points that take part, ordered by photo, and how units depend on them."""
 
-    Parameters
-    ----------
-    row : ndarray of int, shape (n,)
-        Row in the table of image points.
-    photo : ndarray of int, shape (n,)
-        Place of its photo in the strip, ascending.
-    sigma : ndarray, shape (n, 2)
-        Stated standard deviations of x and y, mm.
-    units : ndarray, shape (n, 3, 6, 2)
-        Units of the models photo - 2, photo - 1 and photo by x and y in units of their standard deviations.
-    """
-
-    row: Numbers
-    photo: Numbers
-    sigma: Floats
+    row: Numbers  # (n,): row in the table of image points
+    photo: Numbers  # (n,): place of its photo in the strip, ascending
+    sigma: Floats  # (n, 2): stated standard deviations of x and y, mm
+    # (n, 3, 6, 2): units of the models photo - 2, photo - 1 and photo by x and y in units of their standard deviations
     units: Floats
 
 
@@ -52,29 +41,14 @@ class Rows:
 
     The error is ``frame xi + sum_s core[s] u[first + s] + sum own l`` with xi the similarity of model ``first``, u the
     units of the models and l the errors of image coordinates in units of their standard deviations.
-
-    Parameters
-    ----------
-    first : ndarray of int, shape (n,)
-        Model whose similarity moves the thing as a whole.
-    frame : ndarray, shape (n, d, 7)
-        Coefficients of that similarity.
-    core : ndarray, shape (n, s, d, 6)
-        Coefficients of the units of the models from ``first`` on.
-    item : ndarray of int, shape (e,)
-        Thing of each image point that enters by itself, ascending.
-    image : ndarray of int, shape (e,)
-        That image point, a row of ``Images``.
-    own : ndarray, shape (e, d, 2)
-        Its coefficients.
     """
 
-    first: Numbers
-    frame: Floats
-    core: Floats
-    item: Numbers
-    image: Numbers
-    own: Floats
+    first: Numbers  # (n,): model whose similarity moves the thing as a whole
+    frame: Floats  # (n, d, 7): coefficients of that similarity
+    core: Floats  # (n, s, d, 6): coefficients of the units of the models from ``first`` on
+    item: Numbers  # (e,): thing of each image point that enters by itself, ascending
+    image: Numbers  # (e,): that image point, a row of ``Images``
+    own: Floats  # (e, d, 2): its coefficients
 
     def taken(self, order: Numbers) -> Rows:
         """Return the rows of some things, or of all in another order."""

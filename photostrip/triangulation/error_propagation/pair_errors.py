@@ -30,34 +30,17 @@ LEFT, RIGHT = slice(0, 2), slice(2, 5)  # elements that turn the left and the ri
 
 @dataclass(frozen=True, eq=False)
 class PairErrors:
-    """Derivatives of what pairs give, by image coordinates and by elements, in the frame of the ground.
+    """Derivatives of what pairs give, by image coordinates and by elements, in the frame of the ground."""
 
-    Parameters
-    ----------
-    elements : ndarray, shape (m, 5, 4)
-        Elements of the row's pair by x and y of the left and of the right image point, radians per mm; 0 for rows that
-        took no part.
-    base : ndarray, shape (p, 3, 5)
-        Base vector by elements, the left photo held fast, metres per radian.
-    turn : ndarray, shape (p, 3, 5)
-        Small rotation of the right photo by elements, the left photo held fast.
-    deformation : ndarray, shape (m, 3, 5)
-        Model point by elements, the left photo held fast, metres per radian.
-    own : ndarray, shape (m, 3, 4)
-        Model point by its own image coordinates, the elements held fast, metres per mm.
-    arm : ndarray, shape (m, 3)
-        Model point from the left perspective centre, metres.
-    reach : ndarray, shape (p, 3)
-        Right from left perspective centre, metres.
-    """
-
+    # (m, 5, 4): elements of the row's pair by x and y of the left and of the right image point, radians per mm; 0 for
+    # rows that took no part
     elements: Floats
-    base: Floats
-    turn: Floats
-    deformation: Floats
-    own: Floats
-    arm: Floats
-    reach: Floats
+    base: Floats  # (p, 3, 5): base vector by elements, the left photo held fast, metres per radian
+    turn: Floats  # (p, 3, 5): small rotation of the right photo by elements, the left photo held fast
+    deformation: Floats  # (m, 3, 5): model point by elements, the left photo held fast, metres per radian
+    own: Floats  # (m, 3, 4): model point by its own image coordinates, the elements held fast, metres per mm
+    arm: Floats  # (m, 3): model point from the left perspective centre, metres
+    reach: Floats  # (p, 3): right from left perspective centre, metres
 
 
 def differentiate(orientation: Orientation, rotations: Floats, scale: Floats) -> PairErrors:

@@ -25,27 +25,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Sightings:
-    """Image points on which photos were oriented, ordered by photo.
+    """Image points on which photos were oriented, ordered by photo."""
 
-    Parameters
-    ----------
-    photo : ndarray of int, shape (e,)
-        Place of the photo in the strip, ascending.
-    point : ndarray of int, shape (e,)
-        Row of the point in the strip's points.
-    image : ndarray of int, shape (e,)
-        Row in the table of image points.
-    xyz : ndarray, shape (e, 3)
-        Adjusted point, metres.
-    focal : float
-        Principal distance, mm.
-    """
-
-    photo: Numbers
-    point: Numbers
-    image: Numbers
-    xyz: Floats
-    focal: float
+    photo: Numbers  # (e,): place of the photo in the strip, ascending
+    point: Numbers  # (e,): row of the point in the strip's points
+    image: Numbers  # (e,): row in the table of image points
+    xyz: Floats  # (e, 3): adjusted point, metres
+    focal: float  # principal distance, mm
 
 
 def photo_rows(

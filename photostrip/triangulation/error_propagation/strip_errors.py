@@ -49,25 +49,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class StripErrors:
-    """Everything that covariances of a strip are made of.
-
-    Parameters
-    ----------
-    steps : ndarray, shape (p, 7, 6)
-        Step from the similarity of each model to the next by the model's units; after the last model that of the last
-        photo.
-    covariances : ndarray, shape (p, 3, 6, 6)
-        Covariances of the units of each model with those of itself, the next and the one after.
-    origin : ndarray, shape (3,)
-        Common origin of all similarities.
-    """
+    """Everything that covariances of a strip are made of."""
 
     images: Images
+    # (p, 7, 6): step from the similarity of each model to the next by the model's units; after the last model that of
+    # the last photo
     steps: Floats
+    # (p, 3, 6, 6): covariances of the units of each model with those of itself, the next and the one after
     covariances: Floats
     points: Rows
     pairs: PairErrors
-    origin: Floats
+    origin: Floats  # (3,): common origin of all similarities
 
     @property
     def models(self) -> int:

@@ -38,24 +38,12 @@ ITERATIONS = 50
 
 @dataclass(frozen=True, eq=False)
 class Certificate:
-    """Marks solved from distances.
+    """Marks solved from distances."""
 
-    Parameters
-    ----------
-    marks : dict of str to tuple of float
-        Coordinates by mark, mm.
-    residuals : ndarray, shape (d,)
-        Computed minus given distances, mm.
-    sigma0 : float
-        Standard deviation of a distance, mm; NaN without redundancy.
-    redundancy : int
-        Distances more than the figure needs.
-    """
-
-    marks: dict[str, tuple[float, float]]
-    residuals: Floats
-    sigma0: float
-    redundancy: int
+    marks: dict[str, tuple[float, float]]  # coordinates by mark, mm
+    residuals: Floats  # (d,): computed minus given distances, mm
+    sigma0: float  # standard deviation of a distance, mm; NaN without redundancy
+    redundancy: int  # distances more than the figure needs
 
     def __post_init__(self) -> None:
         """Freeze the array."""

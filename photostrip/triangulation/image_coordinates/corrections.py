@@ -49,25 +49,17 @@ ITERATIONS = 20
 
 @dataclass(frozen=True)
 class Settings:
-    """Which corrections are applied.
+    """Which corrections are applied."""
 
-    Parameters
-    ----------
-    principal_point, distortion : bool
-        Reduce to the principal point of the camera; take out its lens distortion.
-    flying_height, ground_height : float or None
-        Mean heights of the perspective centers and of the ground above sea level, in metres; None: derived
-        from camera and control.
-    earth_radius : float or None
-        Radius of the Earth in metres for the correction in image space; None: none.
-    """
-
+    # principal_point, distortion: reduce to the principal point of the camera; take out its lens distortion
     principal_point: bool = True
     distortion: bool = True
     refraction: bool = False
+    # flying_height, ground_height: mean heights of the perspective centers and of the ground above sea level, in
+    # metres; None: derived from camera and control
     flying_height: float | None = None
     ground_height: float | None = None
-    earth_radius: float | None = None
+    earth_radius: float | None = None  # radius of the Earth in metres for the correction in image space; None: none
 
     def seen_by(self, camera: Camera) -> Camera:
         """Return a camera without what is not to be corrected.
@@ -88,18 +80,10 @@ class Settings:
 
 @dataclass(frozen=True)
 class Bending:
-    """How far light and Earth bend away from straight line and plane, over the depth from camera to ground.
+    """How far light and Earth bend away from straight line and plane, over the depth from camera to ground."""
 
-    Parameters
-    ----------
-    refraction : float
-        Constant of ``refraction_constant``; 0: none.
-    curvature : float
-        Constant of ``curvature_constant``; 0: none.
-    """
-
-    refraction: float = 0.0
-    curvature: float = 0.0
+    refraction: float = 0.0  # constant of ``refraction_constant``; 0: none
+    curvature: float = 0.0  # constant of ``curvature_constant``; 0: none
 
     def __bool__(self) -> bool:
         """Whether there is anything to correct."""
@@ -111,18 +95,11 @@ NOTHING_BENT = Bending()
 
 @dataclass(frozen=True, eq=False)
 class Refined:
-    """Refined image coordinates.
+    """Refined image coordinates."""
 
-    Parameters
-    ----------
-    observations : PhotoPoints
-        Ideal image coordinates, reduced to the principal point, mm.
-    largest_um : dict of str to float
-        Largest shift by each effect that was corrected, micrometres: ``"principal point"``, ``"distortion"``,
-        ``"refraction"``, ``"earth curvature"``.
-    """
-
-    observations: PhotoPoints
+    observations: PhotoPoints  # ideal image coordinates, reduced to the principal point, mm
+    # largest shift by each effect that was corrected, micrometres: ``"principal point"``, ``"distortion"``,
+    # ``"refraction"``, ``"earth curvature"``
     largest_um: dict[str, float]
 
 

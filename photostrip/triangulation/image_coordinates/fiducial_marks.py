@@ -32,26 +32,15 @@ KEY = "fiducial_measurements"
 
 @dataclass(frozen=True, eq=False)
 class Marks:
-    """Marks of the photos of one camera; a mark that was not measured has weight zero.
-
-    Parameters
-    ----------
-    photos, names : tuple of str
-        Photos (p) and marks (m).
-    calibrated : ndarray, shape (m, 2)
-        Calibrated coordinates, mm.
-    measured : ndarray, shape (p, m, 2)
-        Measured coordinates.
-    weights : ndarray, shape (p, m)
-        Weights, of mean 1 over the marks of each photo.
-    """
+    """Marks of the photos of one camera; a mark that was not measured has weight zero."""
 
     camera: Camera
+    # photos, names: photos (p) and marks (m)
     photos: tuple[str, ...]
     names: tuple[str, ...]
-    calibrated: Floats
-    measured: Floats
-    weights: Floats
+    calibrated: Floats  # (m, 2): calibrated coordinates, mm
+    measured: Floats  # (p, m, 2): measured coordinates
+    weights: Floats  # (p, m): weights, of mean 1 over the marks of each photo
 
     @property
     def count(self) -> NDArray[np.intp]:
@@ -70,21 +59,11 @@ class Marks:
 
 @dataclass(frozen=True, eq=False)
 class Pattern:
-    """How marks lie against the calibrated ones, by a conformal transformation in one hand.
+    """How marks lie against the calibrated ones, by a conformal transformation in one hand."""
 
-    Parameters
-    ----------
-    misfit : ndarray, shape (p,)
-        Largest residual over the root mean square distance of the marks from their mean.
-    largest : ndarray, shape (p,)
-        Largest residual, mm.
-    rotation : ndarray, shape (p,)
-        Direction of the measured x axis in the photo system, radians.
-    """
-
-    misfit: Floats
-    largest: Floats
-    rotation: Floats
+    misfit: Floats  # (p,): largest residual over the root mean square distance of the marks from their mean
+    largest: Floats  # (p,): largest residual, mm
+    rotation: Floats  # (p,): direction of the measured x axis in the photo system, radians
 
 
 def gather(fiducials: PhotoPoints, camera: Camera, photos: tuple[str, ...]) -> tuple[Marks, list[Fault]]:

@@ -28,18 +28,11 @@ ITERATIONS = 50
 
 @dataclass(frozen=True, eq=False)
 class Deformation:
-    """Residual film deformation of photos.
+    """Residual film deformation of photos."""
 
-    Parameters
-    ----------
-    nodes : tuple of ndarray, shape (m, 2)
-        Transformed coordinates of the marks of each photo, mm; none where they do not show a deformation.
-    shifts : tuple of ndarray, shape (m, 2)
-        Corrections there, calibrated minus transformed, mm.
-    """
-
+    # (m, 2): transformed coordinates of the marks of each photo, mm; none where they do not show a deformation
     nodes: tuple[Floats, ...]
-    shifts: tuple[Floats, ...]
+    shifts: tuple[Floats, ...]  # (m, 2): corrections there, calibrated minus transformed, mm
 
     @classmethod
     def from_residuals(cls, calibrated: Sequence[Floats], residuals: Sequence[Floats]) -> Deformation:

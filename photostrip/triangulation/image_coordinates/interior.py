@@ -49,67 +49,42 @@ SHOWN = 5  # ids in a sentence
 
 @dataclass(frozen=True)
 class Settings:
-    """How photo coordinates are formed from measured fiducial marks.
+    """How photo coordinates are formed from measured fiducial marks."""
 
-    Parameters
-    ----------
-    transform : str
-        ``"conformal"`` (two marks or more), ``"affine"`` (three or more), ``"bilinear"`` or ``"projective"``
-        (four or more); ``"auto"``: affine from four marks on, so that one redundant mark for each axis is left,
-        conformal with two or three.
-    residuals : str
-        ``"interpolate"`` the residuals of the marks to the points, for film that is deformed in other ways than the
-        transformation has, or ``"ignore"`` them.
-    """
-
+    # ``"conformal"`` (two marks or more), ``"affine"`` (three or more), ``"bilinear"`` or ``"projective"`` (four or
+    # more); ``"auto"``: affine from four marks on, so that one redundant mark for each axis is left, conformal with two
+    # or three
     transform: str = "auto"
+    # ``"interpolate"`` the residuals of the marks to the points, for film that is deformed in other ways than the
+    # transformation has, or ``"ignore"`` them
     residuals: str = "ignore"
 
 
 @dataclass(frozen=True, eq=False)
 class InteriorOrientation:
-    """Transformations of photos and how well the marks fit.
-
-    Parameters
-    ----------
-    photo_from_measured : PlaneTransform
-        The transformations, coefficients of shape (p, 3, 4): measured coordinates to photo coordinates, mm.
-    residuals : tuple of ndarray, shape (m, 2)
-        Transformed minus calibrated coordinates of these marks in the photo system, mm.
-    sigma0 : ndarray, shape (p,)
-        Standard deviation of a mark's coordinate of mean weight, mm; NaN without redundancy.
-    redundancy : ndarray of int, shape (p,)
-        Coordinates measured minus unknowns.
-    scale_x, scale_y : ndarray, shape (p,)
-        Scales along the measured axes at the mean of the marks, photo over measured, positive.
-    rotation, shear : ndarray, shape (p,)
-        Direction of the measured x axis in the photo system, and departure of the measured y axis from the right
-        angle to it, both counter-clockwise (shear of mirrored photos: clockwise), radians.
-    mirrored : ndarray of bool, shape (p,)
-        Whether the measured system is left-handed against that of the camera.
-    without_marks : tuple of str
-        Photos of cameras without fiducial marks: their coordinates are taken as they are.
-    notes : tuple of Note
-        What the marks show beside the numbers.
-    film : Deformation or None
-        Deformation beyond the transformations, when it is interpolated.
-    """
+    """Transformations of photos and how well the marks fit."""
 
     photo_ids: tuple[str, ...]
     transforms: tuple[str, ...]
+    # the transformations, coefficients of shape (p, 3, 4): measured coordinates to photo coordinates, mm
     photo_from_measured: plane.PlaneTransform
     marks: tuple[tuple[str, ...], ...]
+    # (m, 2): transformed minus calibrated coordinates of these marks in the photo system, mm
     residuals: tuple[Floats, ...]
-    sigma0: Floats
-    redundancy: NDArray[np.intp]
+    sigma0: Floats  # (p,): standard deviation of a mark's coordinate of mean weight, mm; NaN without redundancy
+    redundancy: NDArray[np.intp]  # (p,): coordinates measured minus unknowns
+    # scale_x, scale_y: (p,): scales along the measured axes at the mean of the marks, photo over measured, positive
     scale_x: Floats
     scale_y: Floats
+    # rotation, shear: (p,): direction of the measured x axis in the photo system, and departure of the measured y axis
+    # from the right angle to it, both counter-clockwise (shear of mirrored photos: clockwise), radians
     rotation: Floats
     shear: Floats
-    mirrored: Flags
+    mirrored: Flags  # (p,): whether the measured system is left-handed against that of the camera
+    # photos of cameras without fiducial marks: their coordinates are taken as they are
     without_marks: tuple[str, ...] = ()
-    notes: tuple[Note, ...] = ()
-    film: Deformation | None = None
+    notes: tuple[Note, ...] = ()  # what the marks show beside the numbers
+    film: Deformation | None = None  # deformation beyond the transformations, when it is interpolated
 
     def __post_init__(self) -> None:
         """Freeze the arrays."""

@@ -35,35 +35,17 @@ NAMED = 4
 
 @dataclass(frozen=True, eq=False)
 class FormedModels:
-    """A strip of independent models, in the scale of its first one.
-
-    Parameters
-    ----------
-    places : Similarities
-        From each model to the strip.
-    model_xyz : ndarray, shape (n, 3)
-        Strip coordinates of every row, from its own model.
-    used : ndarray of bool, shape (n,)
-        Rows that count.
-    node : ndarray of int, shape (k,)
-        Points and centres of the strip, ascending.
-    node_xyz : ndarray, shape (k, 3)
-        Their strip coordinates, means over their models.
-    node_models : ndarray of int, shape (k,)
-        Number of those models.
-    photos : ndarray of int, shape (f,)
-        Node of the centre of each photo of the strip, in flight order.
-    """
+    """A strip of independent models, in the scale of its first one."""
 
     models: StripModels
     links: Screened
-    places: Similarities
-    model_xyz: Floats
-    used: Flags
-    node: Numbers
-    node_xyz: Floats
-    node_models: Numbers
-    photos: Numbers
+    places: Similarities  # from each model to the strip
+    model_xyz: Floats  # (n, 3): strip coordinates of every row, from its own model
+    used: Flags  # (n,): rows that count
+    node: Numbers  # (k,): points and centres of the strip, ascending
+    node_xyz: Floats  # (k, 3): their strip coordinates, means over their models
+    node_models: Numbers  # (k,): number of those models
+    photos: Numbers  # (f,): node of the centre of each photo of the strip, in flight order
 
     @property
     def point(self) -> Numbers:

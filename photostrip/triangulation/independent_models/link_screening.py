@@ -39,74 +39,44 @@ POWER = 21.5  # non-centrality of chi-square with three degrees of freedom found
 
 @dataclass(frozen=True)
 class Settings:
-    """How models are joined by similarities.
+    """How models are joined by similarities."""
 
-    Parameters
-    ----------
-    screening : str
-        ``"auto"`` or ``"none"``.
-    alpha : float
-        Probability of rejecting a good point of a link without gross errors.
-    keep, drop : tuple of str
-        Coordinates, ``model/point`` or ``model/photo``, that take part whatever the test says, or not at all.
-    """
-
-    screening: str = "auto"
-    alpha: float = 0.001
+    screening: str = "auto"  # ``"auto"`` or ``"none"``
+    alpha: float = 0.001  # probability of rejecting a good point of a link without gross errors
+    # keep, drop: coordinates, ``model/point`` or ``model/photo``, that take part whatever the test says, or not at all
     keep: tuple[str, ...] = ()
     drop: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class Rejection:
-    """A common point that a link does not use.
+    """A common point that a link does not use."""
 
-    Parameters
-    ----------
-    link, row : int
-        Link, and row of ``linking.Common``.
-    value, limit : float
-        Test value and its critical value.
-    error : tuple of float
-        Its difference from what the other points say, mm along the axes of the model before.
-    """
-
+    # link, row: link, and row of ``linking.Common``
     link: int
     row: int
+    # value, limit: test value and its critical value
     value: float
     limit: float
+    # its difference from what the other points say, mm along the axes of the model before
     error: tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
 class Screened:
-    """Links with their gross errors taken out.
-
-    Parameters
-    ----------
-    used : ndarray of bool, shape (t,)
-        Rows that took part.
-    value, limit : ndarray, shapes (t,), (j,)
-        Test values of the rows used, and the critical value of each link.
-    rejections : tuple of Rejection
-        What was taken out, worst first.
-    doubtful : tuple of tuple of int
-        Rows of which one is wrong and which one cannot be told.
-    factor : float
-        Variance of the model coordinates over what is stated, with which the tests were made; 1 unless contradicted.
-    reflected : ndarray of bool, shape (j,)
-        Links whose models fit as mirror images.
-    """
+    """Links with their gross errors taken out."""
 
     shared: Common
-    used: Flags
+    used: Flags  # (t,): rows that took part
     solved: Solved
+    # value, limit: (t,), (j,): test values of the rows used, and the critical value of each link
     value: Floats
     limit: Floats
-    rejections: tuple[Rejection, ...]
-    doubtful: tuple[tuple[int, ...], ...]
+    rejections: tuple[Rejection, ...]  # what was taken out, worst first
+    doubtful: tuple[tuple[int, ...], ...]  # rows of which one is wrong and which one cannot be told
+    # variance of the model coordinates over what is stated, with which the tests were made; 1 unless contradicted
     factor: float
-    reflected: Flags = field(default_factory=lambda: np.zeros(0, bool))
+    reflected: Flags = field(default_factory=lambda: np.zeros(0, bool))  # (j,): links whose models fit as mirror images
 
 
 def reflected(shared: Common, models: StripModels, used: Flags) -> Flags:

@@ -34,42 +34,25 @@ LARGEST_STEP = 2.0  # of an iteration, in rotation (radians) and logarithm of th
 
 @dataclass(frozen=True, eq=False)
 class StripModels:
-    """Models of one strip, in flight order.
-
-    Parameters
-    ----------
-    points : int
-        Nodes below this number are points, the others perspective centres.
-    row : ndarray of int, shape (n,)
-        Rows of the project's ``points.ModelPoints``.
-    model, node : ndarray of int, shape (n,)
-        Place of the model in the strip, and point or centre, of each row.
-    xyz, sigma : ndarray, shape (n, 3)
-        Model coordinates and their standard deviations, mm.
-    """
+    """Models of one strip, in flight order."""
 
     count: int
-    points: int
-    row: Numbers
+    points: int  # nodes below this number are points, the others perspective centres
+    row: Numbers  # (n,): rows of the project's ``points.ModelPoints``
+    # model, node: (n,): place of the model in the strip, and point or centre, of each row
     model: Numbers
     node: Numbers
+    # xyz, sigma: (n, 3): model coordinates and their standard deviations, mm
     xyz: Floats
     sigma: Floats
 
 
 @dataclass(frozen=True, eq=False)
 class Common:
-    """Points and centres that neighbouring models have in common; link i takes model i + 1 into model i.
+    """Points and centres that neighbouring models have in common; link i takes model i + 1 into model i."""
 
-    Parameters
-    ----------
-    link : ndarray of int, shape (t,)
-        Link of each row, ascending.
-    before, after : ndarray of int, shape (t,)
-        Rows of ``StripModels`` in the model before and in the one after.
-    """
-
-    link: Numbers
+    link: Numbers  # (t,): link of each row, ascending
+    # before, after: (t,): rows of ``StripModels`` in the model before and in the one after
     before: Numbers
     after: Numbers
     count: int
@@ -83,21 +66,11 @@ class Common:
 
 @dataclass(frozen=True, eq=False)
 class Similarities:
-    """One similarity ``target = scale rotation source + shift`` for each link.
+    """One similarity ``target = scale rotation source + shift`` for each link."""
 
-    Parameters
-    ----------
-    scale : ndarray, shape (j,)
-        Scales.
-    rotation : ndarray, shape (j, 3, 3)
-        Rotations.
-    shift : ndarray, shape (j, 3)
-        Shifts.
-    """
-
-    scale: Floats
-    rotation: Floats
-    shift: Floats
+    scale: Floats  # (j,): scales
+    rotation: Floats  # (j, 3, 3): rotations
+    shift: Floats  # (j, 3): shifts
 
     def of(self, number: Numbers, xyz: Floats) -> Floats:
         """Transform points, each by the similarity of its number."""
@@ -109,36 +82,19 @@ class Similarities:
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """Links after least squares.
+    """Links after least squares."""
 
-    Parameters
-    ----------
-    similarities : Similarities
-        From the model after each link into the model before it.
-    residual : ndarray, shape (t, 3)
-        Coordinates in the model before minus those taken over from the model after, mm, also of rows not used.
-    weight : ndarray, shape (t, 3, 3)
-        Inverse covariances of the residuals' observations, mm^-2.
-    design : ndarray, shape (t, 3, 7)
-        Derivatives of the point taken over by shift, rotation and logarithm of the scale about the link's centroid.
-    cofactors : ndarray, shape (j, 7, 7)
-        Of these parameters.
-    centroid : ndarray, shape (j, 3)
-        Centroids in the model before, mm.
-    squares : ndarray, shape (j,)
-        Weighted squares of the rows used.
-    redundancy : ndarray of int, shape (j,)
-        Three for every row used, minus seven.
-    """
-
-    similarities: Similarities
+    similarities: Similarities  # from the model after each link into the model before it
+    # (t, 3): coordinates in the model before minus those taken over from the model after, mm, also of rows not used
     residual: Floats
-    weight: Floats
+    weight: Floats  # (t, 3, 3): inverse covariances of the residuals' observations, mm^-2
+    # (t, 3, 7): derivatives of the point taken over by shift, rotation and logarithm of the scale about the link's
+    # centroid
     design: Floats
-    cofactors: Floats
-    centroid: Floats
-    squares: Floats
-    redundancy: Numbers
+    cofactors: Floats  # (j, 7, 7): of these parameters
+    centroid: Floats  # (j, 3): centroids in the model before, mm
+    squares: Floats  # (j,): weighted squares of the rows used
+    redundancy: Numbers  # (j,): three for every row used, minus seven
 
 
 def common(models: StripModels) -> Common:

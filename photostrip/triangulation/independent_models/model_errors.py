@@ -30,43 +30,21 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class ModelErrors:
-    """Everything that covariances of a strip of independent models are made of.
+    """Everything that covariances of a strip of independent models are made of."""
 
-    Parameters
-    ----------
-    origin : ndarray, shape (3,)
-        Common origin of all similarities.
-    covariance : ndarray, shape (n, 3, 3)
-        Covariance of the coordinates of every row, metres^2 along the axes of the ground.
-    before, after : ndarray of int, shape (n,)
-        Entry of `gain` with which a row enters the link behind and the link before its model; -1 for none.
-    gain : ndarray, shape (t, 7, 3)
-        Step of each link by the difference of a common point, the row before minus the row after.
-    link : ndarray of int, shape (t,)
-        Link of each entry.
-    rows : tuple of ndarray of int, shape (t,)
-        Rows before and after of each entry.
-    model : ndarray of int, shape (n,)
-        Model of every row.
-    item : ndarray of int, shape (n,)
-        Node of every row, counted in `FormedModels.node`; -1 for rows that make no mean.
-    share : ndarray, shape (n,)
-        Share of the row in the mean of its node.
-    frame : ndarray, shape (k, 3, 7)
-        Displacement of every node by a similarity.
-    """
-
-    origin: Floats
-    covariance: Floats
+    origin: Floats  # (3,): common origin of all similarities
+    covariance: Floats  # (n, 3, 3): covariance of the coordinates of every row, metres^2 along the axes of the ground
+    # before, after: (n,): entry of `gain` with which a row enters the link behind and the link before its model; -1 for
+    # none
     before: Numbers
     after: Numbers
-    gain: Floats
-    link: Numbers
-    rows: tuple[Numbers, Numbers]
-    model: Numbers
-    item: Numbers
-    share: Floats
-    frame: Floats
+    gain: Floats  # (t, 7, 3): step of each link by the difference of a common point, the row before minus the row after
+    link: Numbers  # (t,): link of each entry
+    rows: tuple[Numbers, Numbers]  # (t,): rows before and after of each entry
+    model: Numbers  # (n,): model of every row
+    item: Numbers  # (n,): node of every row, counted in `FormedModels.node`; -1 for rows that make no mean
+    share: Floats  # (n,): share of the row in the mean of its node
+    frame: Floats  # (k, 3, 7): displacement of every node by a similarity
     models: int
 
 

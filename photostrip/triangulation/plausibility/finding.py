@@ -15,18 +15,10 @@ WARNING = "warning"
 
 
 class Kind(NamedTuple):
-    """A kind of mistake.
+    """A kind of mistake."""
 
-    Parameters
-    ----------
-    title : str
-        What it is, in a few words.
-    severity : str
-        ``"error"``: a result made from such data is wrong as a whole; ``"warning"``: some of it may be.
-    """
-
-    title: str
-    severity: str
+    title: str  # what it is, in a few words
+    severity: str  # ``"error"``: a result made from such data is wrong as a whole; ``"warning"``: some of it may be
 
 
 KINDS: dict[str, Kind] = {

@@ -33,40 +33,20 @@ DEGREES = ("auto", "1", "2", "3")
 
 @dataclass(frozen=True)
 class Settings:
-    """Which polynomial takes out the strip deformation.
+    """Which polynomial takes out the strip deformation."""
 
-    Parameters
-    ----------
-    degree : str
-        ``"auto"`` (decided by evidence), ``"1"``, ``"2"`` or ``"3"``.
-    """
-
-    degree: str = "auto"
+    degree: str = "auto"  # ``"auto"`` (decided by evidence), ``"1"``, ``"2"`` or ``"3"``
 
 
 @dataclass(frozen=True, eq=False)
 class Polynomial:
-    """The correction of a strip.
+    """The correction of a strip."""
 
-    Parameters
-    ----------
-    degree : int
-        Highest power of X in use; 0: similarity alone.
-    axes : tuple of AxisFit
-        Fits of X, Y, Z.
-    evidence : tuple of Evidence
-        Degrees that were weighed, ascending.
-    stations : tuple of int
-        Different stations along the strip in plan and in height.
-    reach : tuple of float
-        Range of the control along X, metres.
-    """
-
-    degree: int
-    axes: tuple[AxisFit, AxisFit, AxisFit]
-    evidence: tuple[Evidence, ...]
-    stations: tuple[int, int]
-    reach: tuple[float, float]
+    degree: int  # highest power of X in use; 0: similarity alone
+    axes: tuple[AxisFit, AxisFit, AxisFit]  # fits of X, Y, Z
+    evidence: tuple[Evidence, ...]  # degrees that were weighed, ascending
+    stations: tuple[int, int]  # different stations along the strip in plan and in height
+    reach: tuple[float, float]  # range of the control along X, metres
     asked: str
 
     def corrections(self, xyz: Floats) -> Floats:

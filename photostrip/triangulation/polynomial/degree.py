@@ -31,41 +31,21 @@ SIMILARITY_PARAMETERS = {PLAN: 4, HEIGHT: 3}  # of the seven, those that each gr
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """What speaks for a degree, in plan or in height.
+    """What speaks for a degree, in plan or in height."""
 
-    Parameters
-    ----------
-    group : str
-        ``"plan"`` (X and Y) or ``"height"``.
-    terms : int
-        Number of terms in each axis of the group.
-    redundancy : int
-        Redundancy over the axes of the group.
-    rms : float
-        Root mean square of the residuals at control, metres.
-    left_out : float
-        Root mean square at control points that did not take part in the fit, metres.
-    left_out_by : str
-        ``"band"`` or ``"point"``: what was left out at a time.
-    f, p : float
-        F ratio of the step from the degree compared with, and the probability of a larger one by chance; NaN without.
-    against : int
-        The degree compared with.
-    accepted : bool
-        Whether the step was taken.
-    """
-
-    group: str
+    group: str  # ``"plan"`` (X and Y) or ``"height"``
     degree: int
-    terms: int
-    redundancy: int
-    rms: float
-    left_out: float
-    left_out_by: str
+    terms: int  # number of terms in each axis of the group
+    redundancy: int  # redundancy over the axes of the group
+    rms: float  # root mean square of the residuals at control, metres
+    left_out: float  # root mean square at control points that did not take part in the fit, metres
+    left_out_by: str  # ``"band"`` or ``"point"``: what was left out at a time
+    # f, p: F ratio of the step from the degree compared with, and the probability of a larger one by chance; NaN
+    # without
     f: float
     p: float
-    against: int
-    accepted: bool
+    against: int  # the degree compared with
+    accepted: bool  # whether the step was taken
 
 
 def _candidates(problem: Problem, axis: int, asked: str) -> list[Terms]:

@@ -24,35 +24,20 @@ SETTLED = 1e-9  # m: nothing moves any more
 
 @dataclass(frozen=True, eq=False)
 class AxisFit:
-    """Polynomial of one axis.
+    """Polynomial of one axis."""
 
-    Parameters
-    ----------
-    terms : tuple of str
-        Names of the terms, keys of ``POWERS``; empty when the axis is not corrected.
-    coefficients, sigmas : ndarray, shape (k,)
-        Coefficients for X and Y in metres and their standard deviations (NaN without redundancy).
-    effects : ndarray, shape (k,)
-        Size of each term in metres at the end of the control's range and the edge of the strip.
-    residuals : ndarray, shape (n,)
-        Corrected minus given in metres; 0 for points that do not count in this axis.
-    basis : ndarray, shape (n, k)
-        Orthonormal basis of the weighted design; its rows say how control coordinates share in the fit.
-    sigma0 : float
-        Standard deviation in metres of a control coordinate of mean weight; NaN without redundancy.
-    condition : float
-        Condition number of the scaled design; NaN without terms.
-    """
-
-    terms: tuple[str, ...]
+    terms: tuple[str, ...]  # names of the terms, keys of ``POWERS``; empty when the axis is not corrected
+    # coefficients, sigmas: (k,): coefficients for X and Y in metres and their standard deviations (NaN without
+    # redundancy)
     coefficients: Floats
     sigmas: Floats
-    effects: Floats
-    residuals: Floats
+    effects: Floats  # (k,): size of each term in metres at the end of the control's range and the edge of the strip
+    residuals: Floats  # (n,): corrected minus given in metres; 0 for points that do not count in this axis
+    # (n, k): orthonormal basis of the weighted design; its rows say how control coordinates share in the fit
     basis: Floats
-    sigma0: float
+    sigma0: float  # standard deviation in metres of a control coordinate of mean weight; NaN without redundancy
     redundancy: int
-    condition: float
+    condition: float  # condition number of the scaled design; NaN without terms
 
     @property
     def leverage(self) -> Floats:
@@ -63,25 +48,14 @@ class AxisFit:
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Everything a fit needs: positions, what counts, and the sizes that make columns comparable.
+    """Everything a fit needs: positions, what counts, and the sizes that make columns comparable."""
 
-    Parameters
-    ----------
-    xyz : ndarray, shape (n, 3)
-        Control points after the similarity, intermediate frame, metres.
-    weight : ndarray, shape (n, 3)
-        Weights along the points' axes (east, north, up), metres^-2; 0 where a coordinate does not count.
-    spacing : float
-        Distance along the strip that makes two stations different, metres (one base).
-    breadth : float
-        Half width of the strip, metres.
-    """
-
-    xyz: Floats
+    xyz: Floats  # (n, 3): control points after the similarity, intermediate frame, metres
     targets: Targets
+    # (n, 3): weights along the points' axes (east, north, up), metres^-2; 0 where a coordinate does not count
     weight: Floats
-    spacing: float
-    breadth: float
+    spacing: float  # distance along the strip that makes two stations different, metres (one base)
+    breadth: float  # half width of the strip, metres
 
     @cached_property
     def sizes(self) -> polynomial_terms.Sizes:
@@ -103,34 +77,17 @@ class Problem:
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """What the fit of one axis is made of, before there are misclosures.
+    """What the fit of one axis is made of, before there are misclosures."""
 
-    Parameters
-    ----------
-    terms : tuple of str
-        Terms; empty when the axis is not corrected.
-    rows : ndarray of bool, shape (n,)
-        Points that count.
-    columns : ndarray, shape (n, k)
-        Scaled columns of all points.
-    scales : ndarray, shape (k,)
-        What they were divided by.
-    root : ndarray, shape (n,)
-        Square roots of the weights over their mean; 0 for points that do not count.
-    basis, triangle : ndarray, shape (n, k) and (k, k)
-        The weighted columns, decomposed.
-    condition : float
-        Condition number of the scaled columns.
-    """
-
-    terms: tuple[str, ...]
-    rows: NDArray[np.bool_]
-    columns: Floats
-    scales: Floats
-    root: Floats
+    terms: tuple[str, ...]  # terms; empty when the axis is not corrected
+    rows: NDArray[np.bool_]  # (n,): points that count
+    columns: Floats  # (n, k): scaled columns of all points
+    scales: Floats  # (k,): what they were divided by
+    root: Floats  # (n,): square roots of the weights over their mean; 0 for points that do not count
+    # basis, triangle: (n, k) and (k, k): the weighted columns, decomposed
     basis: Floats
     triangle: Floats
-    condition: float
+    condition: float  # condition number of the scaled columns
 
     @classmethod
     def of(cls, problem: Problem, weight: Floats, terms: tuple[str, ...]) -> Design:

@@ -34,21 +34,11 @@ RANK_LIMIT = 0.02
 
 @dataclass(frozen=True)
 class Sizes:
-    """Sizes that make columns comparable and stations different.
+    """Sizes that make columns comparable and stations different."""
 
-    Parameters
-    ----------
-    reach : float
-        Largest distance of control from the origin along the strip, metres.
-    breadth : float
-        Half width of the strip, metres.
-    spacing : float
-        Distance along the strip that makes two stations different, metres (one base).
-    """
-
-    reach: float
-    breadth: float
-    spacing: float
+    reach: float  # largest distance of control from the origin along the strip, metres
+    breadth: float  # half width of the strip, metres
+    spacing: float  # distance along the strip that makes two stations different, metres (one base)
 
 
 def columns(xyz: Floats, terms: Sequence[str]) -> Floats:

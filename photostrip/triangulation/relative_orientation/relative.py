@@ -47,52 +47,30 @@ BY_ROW = ("parallax", "redundancy")
 
 @dataclass(frozen=True)
 class Settings:
-    """How pairs are oriented and their gross errors found.
+    """How pairs are oriented and their gross errors found."""
 
-    Parameters
-    ----------
-    screening : str
-        ``"auto"`` (robust start where needed, then deletion search), ``"parallax+grubbs"``, ``"tau"``,
-        ``"deletion"``, ``"robust"`` or ``"none"``.
-    grubbs_alpha : float
-        Probability of rejecting a point of a pair without gross errors.
-    parallax_limit : float, optional
-        Largest y parallax in mm that needs no rejection; None: four times its a-priori standard deviation.
-    keep, drop : list of str
-        Measurements, ``photo/point``, that are used or left out whatever the tests say.
-    """
-
+    # ``"auto"`` (robust start where needed, then deletion search), ``"parallax+grubbs"``, ``"tau"``, ``"deletion"``,
+    # ``"robust"`` or ``"none"``
     screening: str = "auto"
-    grubbs_alpha: float = 0.05
+    grubbs_alpha: float = 0.05  # probability of rejecting a point of a pair without gross errors
+    # largest y parallax in mm that needs no rejection; None: four times its a-priori standard deviation
     parallax_limit: float | None = None
+    # keep, drop: measurements, ``photo/point``, that are used or left out whatever the tests say
     keep: list[str] = field(default_factory=list)
     drop: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True, eq=False)
 class Pairs:
-    """What is measured in stereopairs: flat columns, ordered by pair.
+    """What is measured in stereopairs: flat columns, ordered by pair."""
 
-    Parameters
-    ----------
-    starts : ndarray of int, shape (p,)
-        First row of each pair.
-    pair : ndarray of int, shape (m,)
-        Pair of each row.
-    left, right : ndarray, shape (m, 2)
-        Image coordinates in mm, reduced to the principal point.
-    weight : ndarray, shape (m,)
-        Weight of the y parallax; 0 takes a point out.
-    focal : float
-        Principal distance in mm.
-    """
-
-    starts: Numbers
-    pair: Numbers
+    starts: Numbers  # (p,): first row of each pair
+    pair: Numbers  # (m,): pair of each row
+    # left, right: (m, 2): image coordinates in mm, reduced to the principal point
     left: Floats
     right: Floats
-    weight: Floats
-    focal: float
+    weight: Floats  # (m,): weight of the y parallax; 0 takes a point out
+    focal: float  # principal distance in mm
 
     @property
     def size(self) -> int:
@@ -405,42 +383,20 @@ def _score(elements: Floats, converged: NDArray[np.bool_], pairs: Pairs) -> tupl
 
 @dataclass(frozen=True, eq=False)
 class Orientation:
-    """Relative orientation of all pairs of a strip.
+    """Relative orientation of all pairs of a strip."""
 
-    Parameters
-    ----------
-    pairs : Pairs
-        Measurements with the weights in force; rejected points have weight 0.
-    point : ndarray of int, shape (m,)
-        Point of each row.
-    rows : ndarray of int, shape (m, 2)
-        Rows of the measurements on the left and right photo in the table of image points.
-    elements, sigmas : ndarray, shape (p, 5)
-        Elements and their standard deviations in radians; NaN without redundancy.
-    sigma0 : ndarray, shape (p,)
-        Standard deviation of an image coordinate of weight one, in mm; NaN without redundancy.
-    condition : ndarray, shape (p,)
-        Condition number of the column-normalised Jacobian.
-    iterations : ndarray of int, shape (p,)
-        Steps of the iteration.
-    parallax : ndarray, shape (m,)
-        Residual y parallaxes in mm, of rejected points too.
-    redundancy : ndarray, shape (m,)
-        Redundancy numbers; NaN for rejected points.
-    cofactors : ndarray, shape (p, 5, 5)
-        Cofactors of the elements for a y parallax of weight one, rad^2/mm^2; NaN for a degenerate pair.
-    """
-
-    pairs: Pairs
-    point: Numbers
-    rows: Numbers
+    pairs: Pairs  # measurements with the weights in force; rejected points have weight 0
+    point: Numbers  # (m,): point of each row
+    rows: Numbers  # (m, 2): rows of the measurements on the left and right photo in the table of image points
+    # elements, sigmas: (p, 5): elements and their standard deviations in radians; NaN without redundancy
     elements: Floats
     sigmas: Floats
-    sigma0: Floats
-    condition: Floats
-    iterations: Numbers
-    parallax: Floats
-    redundancy: Floats
+    sigma0: Floats  # (p,): standard deviation of an image coordinate of weight one, in mm; NaN without redundancy
+    condition: Floats  # (p,): condition number of the column-normalised Jacobian
+    iterations: Numbers  # (p,): steps of the iteration
+    parallax: Floats  # (m,): residual y parallaxes in mm, of rejected points too
+    redundancy: Floats  # (m,): redundancy numbers; NaN for rejected points
+    # (p, 5, 5): cofactors of the elements for a y parallax of weight one, rad^2/mm^2; NaN for a degenerate pair
     cofactors: Floats
 
     @property

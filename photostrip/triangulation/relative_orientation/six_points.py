@@ -25,24 +25,12 @@ SHARES = np.array([2.0, -2.0, -1.0, 1.0, -1.0, 1.0])  # of the six parallaxes in
 
 @dataclass(frozen=True, eq=False)
 class SixPoints:
-    """First-order orientation of six standard points.
+    """First-order orientation of six standard points."""
 
-    Parameters
-    ----------
-    elements : ndarray, shape (5,)
-        Elements in radians.
-    closing_error : float
-        W, the one check that six points give, mm.
-    sigma : float
-        Standard deviation of a y parallax from the closing error, mm.
-    residuals : ndarray, shape (6,)
-        y parallaxes that remain, mm.
-    """
-
-    elements: Floats
-    closing_error: float
-    sigma: float
-    residuals: Floats
+    elements: Floats  # (5,): elements in radians
+    closing_error: float  # W, the one check that six points give, mm
+    sigma: float  # standard deviation of a y parallax from the closing error, mm
+    residuals: Floats  # (6,): y parallaxes that remain, mm
 
 
 def orient_six_points(parallax: ArrayLike, focal: float, width: float, base: float) -> SixPoints:

@@ -37,51 +37,26 @@ PARALLEL = 1e-9  # reciprocal condition of rays that meet nowhere
 
 @dataclass(frozen=True, eq=False)
 class OrientedPhoto:
-    """A photo oriented on known points.
+    """A photo oriented on known points."""
 
-    Parameters
-    ----------
-    center : ndarray, shape (3,)
-        Perspective centre, metres, in the frame of the points.
-    rotation : ndarray, shape (3, 3)
-        Photo to that frame.
-    covariance : ndarray, shape (6, 6)
-        Of the centre (metres) and of the small rotation about the axes of the frame (radians) that turns the photo; for
-        the stated standard deviations.
-    residuals : ndarray, shape (n, 2)
-        Measured minus computed image coordinates, mm.
-    sigma0 : float
-        Standard deviation of unit weight; NaN without redundancy.
-    """
-
-    center: Floats
-    rotation: Floats
+    center: Floats  # (3,): perspective centre, metres, in the frame of the points
+    rotation: Floats  # (3, 3): photo to that frame
+    # (6, 6): of the centre (metres) and of the small rotation about the axes of the frame (radians) that turns the
+    # photo; for the stated standard deviations
     covariance: Floats
-    residuals: Floats
-    sigma0: float
+    residuals: Floats  # (n, 2): measured minus computed image coordinates, mm
+    sigma0: float  # standard deviation of unit weight; NaN without redundancy
     redundancy: int
 
 
 @dataclass(frozen=True, eq=False)
 class Intersected:
-    """Points from known photos.
+    """Points from known photos."""
 
-    Parameters
-    ----------
-    xyz : ndarray, shape (q, 3)
-        Points, metres; NaN where rays do not meet in front of the cameras.
-    covariance : ndarray, shape (q, 3, 3)
-        Their covariances for the stated standard deviations, metres^2.
-    residuals : ndarray, shape (n, 2)
-        Measured minus computed image coordinates, mm.
-    rays : ndarray of int, shape (q,)
-        Number of rays of each point.
-    """
-
-    xyz: Floats
-    covariance: Floats
-    residuals: Floats
-    rays: Numbers
+    xyz: Floats  # (q, 3): points, metres; NaN where rays do not meet in front of the cameras
+    covariance: Floats  # (q, 3, 3): their covariances for the stated standard deviations, metres^2
+    residuals: Floats  # (n, 2): measured minus computed image coordinates, mm
+    rays: Numbers  # (q,): number of rays of each point
 
 
 def space_resection(xy: Floats, sigma: Floats, points: Floats, focal: float) -> OrientedPhoto:

@@ -24,26 +24,13 @@ SINGULAR = 1e-12  # reciprocal condition of a scaled normal matrix
 
 @dataclass(frozen=True, eq=False)
 class Resection:
-    """Orientation of photos on known points.
+    """Orientation of photos on known points."""
 
-    Parameters
-    ----------
-    centers : ndarray, shape (n, 3)
-        Perspective centres in the frame of the points.
-    rotations : ndarray, shape (n, 3, 3)
-        Photo to that frame.
-    residuals : ndarray, shape (m, 2)
-        Measured minus computed image coordinates in mm.
-    rms : ndarray, shape (n,)
-        Root mean square of a photo's residuals in mm.
-    solved : ndarray of bool, shape (n,)
-        False where a photo kept its start orientation: too few points, or a solution that does not settle.
-    """
-
-    centers: Floats
-    rotations: Floats
-    residuals: Floats
-    rms: Floats
+    centers: Floats  # (n, 3): perspective centres in the frame of the points
+    rotations: Floats  # (n, 3, 3): photo to that frame
+    residuals: Floats  # (m, 2): measured minus computed image coordinates in mm
+    rms: Floats  # (n,): root mean square of a photo's residuals in mm
+    # (n,): false where a photo kept its start orientation: too few points, or a solution that does not settle
     solved: NDArray[np.bool_]
 
 

@@ -38,101 +38,51 @@ STEEPEST_BASE = 1e-6  # cosine of the base inclination
 
 @dataclass(frozen=True)
 class Settings:
-    """How models are brought to one scale.
+    """How models are brought to one scale."""
 
-    Parameters
-    ----------
-    scale_transfer : str
-        ``"least_squares"``: all pass points with their precision; ``"distances"``: the textbook's mean of the
-        ratios of distances from the common centre.
-    """
-
+    # ``"least_squares"``: all pass points with their precision; ``"distances"``: the textbook's mean of the ratios of
+    # distances from the common centre
     scale_transfer: str = "least_squares"
 
 
 @dataclass(frozen=True, eq=False)
 class Junctions:
-    """Pass points that join neighbouring models; joint i lies between models i and i+1, at photo i+1.
+    """Pass points that join neighbouring models; joint i lies between models i and i+1, at photo i+1."""
 
-    Parameters
-    ----------
-    joint : ndarray of int, shape (t,)
-        Joint of each row.
-    before, after : ndarray of int, shape (t,)
-        Rows of the point in the pairs' table, in the model before and after the joint.
-    point : ndarray of int, shape (t,)
-        Point of each row.
-    ratio : ndarray, shape (t,)
-        Distance from the common centre in the model before, divided by that in the model after.
-    used : ndarray of bool, shape (t,)
-        Whether the point took part in the scale transfer.
-    limit : ndarray, shape (t,)
-        Largest relative deviation of each ratio from its joint's factor that is not rejected.
-    factor : ndarray, shape (j,)
-        Ratio of the scales of the models, after over before.
-    spread : ndarray, shape (j,)
-        Relative standard deviation of a single ratio; NaN with one point.
-    weight : ndarray, shape (t,)
-        Weight of each ratio in the factor; 0 where it was not used.
-    """
-
-    joint: Numbers
+    joint: Numbers  # (t,): joint of each row
+    # before, after: (t,): rows of the point in the pairs' table, in the model before and after the joint
     before: Numbers
     after: Numbers
-    point: Numbers
-    ratio: Floats
-    used: Flags
-    limit: Floats
-    factor: Floats
-    spread: Floats
-    weight: Floats
+    point: Numbers  # (t,): point of each row
+    ratio: Floats  # (t,): distance from the common centre in the model before, divided by that in the model after
+    used: Flags  # (t,): whether the point took part in the scale transfer
+    limit: Floats  # (t,): largest relative deviation of each ratio from its joint's factor that is not rejected
+    factor: Floats  # (j,): ratio of the scales of the models, after over before
+    spread: Floats  # (j,): relative standard deviation of a single ratio; NaN with one point
+    weight: Floats  # (t,): weight of each ratio in the factor; 0 where it was not used
 
 
 @dataclass(frozen=True, eq=False)
 class FormedStrip:
-    """A strip in the frame and scale of its first model.
+    """A strip in the frame and scale of its first model."""
 
-    Parameters
-    ----------
-    centers : ndarray, shape (n, 3)
-        Perspective centres.
-    rotations : ndarray, shape (n, 3, 3)
-        Photo to strip.
-    scale : ndarray, shape (n-1,)
-        Scale factor k of each model.
-    base_direction, base_inclination : ndarray, shape (n-1,)
-        tau and nu of each base in radians.
-    model_xyz : ndarray, shape (m, 3)
-        Strip coordinates of every row of the pairs' table, from its own model; NaN where rays do not meet.
-    vectors : ndarray, shape (m, 3)
-        The same in the frame of the left photo of the model, from its centre, base length 1.
-    gap : ndarray, shape (m,)
-        Y gap of the two rays at photo scale, mm.
-    point : ndarray of int, shape (q,)
-        Numbers of the points of the strip, ascending.
-    xyz : ndarray, shape (q, 3)
-        Strip coordinates, mean over the models that hold the point.
-    models : ndarray of int, shape (q,)
-        Number of those models.
-    bridging : ndarray of int, shape (b,)
-        Rows of the observations that place points without a model: of photos that are not neighbours.
-    home : ndarray of int, shape (q,)
-        Model with which such a point moves, -1 for all others; empty when there is none.
-    """
-
-    centers: Floats
-    rotations: Floats
-    scale: Floats
+    centers: Floats  # (n, 3): perspective centres
+    rotations: Floats  # (n, 3, 3): photo to strip
+    scale: Floats  # (n-1,): scale factor k of each model
+    # base_direction, base_inclination: (n-1,): tau and nu of each base in radians
     base_direction: Floats
     base_inclination: Floats
+    # (m, 3): strip coordinates of every row of the pairs' table, from its own model; NaN where rays do not meet
     model_xyz: Floats
-    vectors: Floats
-    gap: Floats
-    point: Numbers
-    xyz: Floats
-    models: Numbers
+    vectors: Floats  # (m, 3): the same in the frame of the left photo of the model, from its centre, base length 1
+    gap: Floats  # (m,): Y gap of the two rays at photo scale, mm
+    point: Numbers  # (q,): numbers of the points of the strip, ascending
+    xyz: Floats  # (q, 3): strip coordinates, mean over the models that hold the point
+    models: Numbers  # (q,): number of those models
     junctions: Junctions
+    # (b,): rows of the observations that place points without a model: of photos that are not neighbours
     bridging: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))
+    # (q,): model with which such a point moves, -1 for all others; empty when there is none
     home: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))
 
     @property

@@ -17,23 +17,12 @@ PARALLEL = 1e-6  # of the principal distance: a smaller x parallax intersects no
 
 @dataclass(frozen=True, eq=False)
 class Intersection:
-    """Model points from two photos.
+    """Model points from two photos."""
 
-    Parameters
-    ----------
-    xyz : ndarray, shape (m, 3)
-        Coordinates relative to the left perspective centre, in the unit of the base.
-    ray_factor : ndarray, shape (m,)
-        Ray factor N of the left ray (model unit per mm).
-    gap : ndarray, shape (m,)
-        Left minus right Y of the two rays, in the unit of the base.
-    sound : ndarray of bool, shape (m,)
-        False where the rays are parallel or meet behind a camera; the coordinates are NaN there.
-    """
-
-    xyz: Floats
-    ray_factor: Floats
-    gap: Floats
+    xyz: Floats  # (m, 3): coordinates relative to the left perspective centre, in the unit of the base
+    ray_factor: Floats  # (m,): ray factor N of the left ray (model unit per mm)
+    gap: Floats  # (m,): left minus right Y of the two rays, in the unit of the base
+    # (m,): false where the rays are parallel or meet behind a camera; the coordinates are NaN there
     sound: NDArray[np.bool_]
 
 

@@ -117,27 +117,13 @@ def listed(noun: str, names: list[str]) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """How a connected part of the network is held by what is given.
+    """How a connected part of the network is held by what is given."""
 
-    Parameters
-    ----------
-    photos : ndarray of int
-        Its photos, in the order of the problem.
-    origin : ndarray, shape (3,)
-        Mean of what is given, metres.
-    radius : float
-        Size of the part, metres.
-    normal : ndarray, shape (7, 7)
-        Information on shift (in radii), rotation about the origin and scale.
-    control : ndarray, shape (c, 3)
-        Positions that are given at all, of points and photos.
-    """
-
-    photos: Numbers
-    origin: Floats
-    radius: float
-    normal: Floats
-    control: Floats
+    photos: Numbers  # its photos, in the order of the problem
+    origin: Floats  # (3,): mean of what is given, metres
+    radius: float  # size of the part, metres
+    normal: Floats  # (7, 7): information on shift (in radii), rotation about the origin and scale
+    control: Floats  # (c, 3): positions that are given at all, of points and photos
 
 
 def refuse_loose(model: Model, state: State) -> None:

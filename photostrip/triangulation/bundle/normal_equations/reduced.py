@@ -27,28 +27,15 @@ WIDE = 1e11  # multiplications for the factor of a band, some seconds: from ther
 
 @dataclass(frozen=True, eq=False)
 class Reduced:
-    """Normal equations at one state.
+    """Normal equations at one state."""
 
-    Parameters
-    ----------
-    blocks : ndarray, shape (b, 6, 6)
-        Blocks of pairs of photos.
-    border : ndarray, shape (m, 6, p + 1)
-        Photos with common parameters, and right-hand sides, in the order of the band.
-    corner : ndarray, shape (p + 1, p + 1)
-        Common parameters, their right-hand sides; last the sum of squares that no step can reach below, before
-        the photos and common parameters move.
-    chi_square : float
-        Weighted sum of squares of all misfits at the state.
-    points : tuple of Eliminated
-        The eliminated points of each batch.
-    """
-
-    blocks: Floats
-    border: Floats
+    blocks: Floats  # (b, 6, 6): blocks of pairs of photos
+    border: Floats  # (m, 6, p + 1): photos with common parameters, and right-hand sides, in the order of the band
+    # (p + 1, p + 1): common parameters, their right-hand sides; last the sum of squares that no step can reach below,
+    # before the photos and common parameters move
     corner: Floats
-    chi_square: float
-    points: tuple[Eliminated, ...]
+    chi_square: float  # weighted sum of squares of all misfits at the state
+    points: tuple[Eliminated, ...]  # the eliminated points of each batch
 
 
 def reduce(model: Model, state: State, damping: float = 0.0) -> Reduced:

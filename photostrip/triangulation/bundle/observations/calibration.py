@@ -22,19 +22,12 @@ PRINCIPAL_DISTANCE = CALIBRATION.index("c")
 
 @dataclass(frozen=True, eq=False)
 class Calibrated:
-    """Which parameters of which cameras are unknown.
+    """Which parameters of which cameras are unknown."""
 
-    Parameters
-    ----------
-    camera, kind : ndarray of int, shape (c,)
-        Camera and number within ``CALIBRATION`` of each parameter.
-    sigma : ndarray, shape (c,)
-        A-priori standard deviations; infinite: free.
-    """
-
+    # camera, kind: (c,): camera and number within ``CALIBRATION`` of each parameter
     camera: Numbers
     kind: Numbers
-    sigma: Floats
+    sigma: Floats  # (c,): a-priori standard deviations; infinite: free
 
     def __len__(self) -> int:
         """Count the parameters."""

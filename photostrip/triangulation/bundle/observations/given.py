@@ -23,27 +23,13 @@ SMALL = 1e-4  # radians: below it the series of the rotation's derivative is exa
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """Linearised observations of photos, three in each row.
+    """Linearised observations of photos, three in each row."""
 
-    Parameters
-    ----------
-    photo : ndarray of int, shape (g,)
-        Photo of each row.
-    residual : ndarray, shape (g, 3)
-        Computed minus given, metres or radians.
-    by_photo : ndarray, shape (g, 3, 6)
-        Partials by the photo's parameters, as ``linearise`` counts them.
-    by_common : ndarray, shape (g, 3, p)
-        Partials by the common parameters.
-    weight : ndarray, shape (g, 3)
-        Reciprocal sigmas.
-    """
-
-    photo: Numbers
-    residual: Floats
-    by_photo: Floats
-    by_common: Floats
-    weight: Floats
+    photo: Numbers  # (g,): photo of each row
+    residual: Floats  # (g, 3): computed minus given, metres or radians
+    by_photo: Floats  # (g, 3, 6): partials by the photo's parameters, as ``linearise`` counts them
+    by_common: Floats  # (g, 3, p): partials by the common parameters
+    weight: Floats  # (g, 3): reciprocal sigmas
 
     def scaled(self) -> tuple[Floats, Floats]:
         """Give partials by photo and common parameters with the misfit as last column, (g, 3, 6 + p + 1); in sigmas."""

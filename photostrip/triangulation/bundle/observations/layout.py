@@ -32,70 +32,31 @@ _SIZES = np.array([1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 28, 32, 40, 48, 56, 
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Points with the same number of rays k, in S slots.
+    """Points with the same number of rays k, in S slots."""
 
-    Parameters
-    ----------
-    point : ndarray of int, shape (S,)
-        Point of each slot; that of a dummy is a point of its group.
-    real : ndarray of int, shape (r,)
-        Slots that are not dummies.
-    dummy : ndarray of int, shape (S - r,)
-        The others.
-    photo : ndarray of int, shape (k, S)
-        Photos of each slot, as numbered by the order of the band, ascending.
-    row : ndarray of int, shape (k, S)
-        Row of each ray in the observations.
-    xy : ndarray, shape (2, k, S)
-        Image coordinates, mm.
-    weight : ndarray, shape (2, k, S)
-        Reciprocal sigmas, 1/mm; zero for dummies.
-    runs : tuple of tuple (int, int, int, int)
-        First and last slot, number of groups, points of a group, for each run.
-    sets : ndarray of int, shape (groups, k)
-        Photos of each group.
-    control : ndarray of int, shape (c,)
-        Slots with control.
-    control_normal : ndarray, shape (3, 3, c)
-        Normal matrices of the control of these slots, 1/m^2.
-    control_right : ndarray, shape (3, c)
-        These matrices times the given positions, 1/m.
-    """
-
-    point: Numbers
-    real: Numbers
-    dummy: Numbers
-    photo: Numbers
-    row: Numbers
-    xy: Floats
-    weight: Floats
+    point: Numbers  # (S,): point of each slot; that of a dummy is a point of its group
+    real: Numbers  # (r,): slots that are not dummies
+    dummy: Numbers  # (S - r,): the others
+    photo: Numbers  # (k, S): photos of each slot, as numbered by the order of the band, ascending
+    row: Numbers  # (k, S): row of each ray in the observations
+    xy: Floats  # (2, k, S): image coordinates, mm
+    weight: Floats  # (2, k, S): reciprocal sigmas, 1/mm; zero for dummies
+    # first and last slot, number of groups, points of a group, for each run
     runs: tuple[tuple[int, int, int, int], ...]
-    sets: Numbers
-    control: Numbers
-    control_normal: Floats
-    control_right: Floats
+    sets: Numbers  # (groups, k): photos of each group
+    control: Numbers  # (c,): slots with control
+    control_normal: Floats  # (3, 3, c): normal matrices of the control of these slots, 1/m^2
+    control_right: Floats  # (3, c): these matrices times the given positions, 1/m
 
 
 @dataclass(frozen=True, eq=False)
 class Sorted:
-    """Rays sorted by point, then photo.
+    """Rays sorted by point, then photo."""
 
-    Parameters
-    ----------
-    row : ndarray of int, shape (n,)
-        Rows of the observations in this order.
-    photo : ndarray of int, shape (n,)
-        Photos of these, as places in the band.
-    point : ndarray of int, shape (n,)
-        Points of these.
-    counts : ndarray of int, shape (q,)
-        Number of rays of each point.
-    """
-
-    row: Numbers
-    photo: Numbers
-    point: Numbers
-    counts: Numbers
+    row: Numbers  # (n,): rows of the observations in this order
+    photo: Numbers  # (n,): photos of these, as places in the band
+    point: Numbers  # (n,): points of these
+    counts: Numbers  # (q,): number of rays of each point
 
 
 def sort_rays(images: Images, points: int, rank: Numbers) -> Sorted:

@@ -32,27 +32,13 @@ SIGNS = np.array([1.0, 1.0, 1.0, -1.0, 1.0, 1.0])  # of a photo's parameters, se
 
 @dataclass(frozen=True, eq=False)
 class Rays:
-    """Rays of a batch at one state.
+    """Rays of a batch at one state."""
 
-    Parameters
-    ----------
-    turn : ndarray, shape (3, 3, k, S)
-        Photo axes as rows of object components: the transposed rotation of each ray.
-    ratio : ndarray, shape (2, k, S)
-        Computed image coordinates divided by the principal distance.
-    depth : ndarray, shape (k, S)
-        Reciprocal of the third photo coordinate, 1/m; negative in front of the camera.
-    pull : ndarray, shape (2, k, S)
-        Principal distance divided by sigma.
-    misfit : ndarray, shape (2, k, S)
-        Measured minus computed image coordinates in units of sigma.
-    """
-
-    turn: Floats
-    ratio: Floats
-    depth: Floats
-    pull: Floats
-    misfit: Floats
+    turn: Floats  # (3, 3, k, S): photo axes as rows of object components: the transposed rotation of each ray
+    ratio: Floats  # (2, k, S): computed image coordinates divided by the principal distance
+    depth: Floats  # (k, S): reciprocal of the third photo coordinate, 1/m; negative in front of the camera
+    pull: Floats  # (2, k, S): principal distance divided by sigma
+    misfit: Floats  # (2, k, S): measured minus computed image coordinates in units of sigma
 
 
 def view(batch: Batch, xyz: Floats, photos: Floats) -> Rays:
@@ -130,22 +116,16 @@ def by_photo(rays: Rays, more: int) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Eliminated:
-    """Points of a batch, eliminated.
+    """Points of a batch, eliminated."""
 
-    Parameters
-    ----------
-    root : tuple of ndarray, shape (S,)
-        Reciprocal diagonal of the Cholesky factor L of the normal matrix of each point (three), then its elements
-        below the diagonal, 21, 31, 32.
-    rows : ndarray, shape (6 k + more + 1, 3, S)
-        T: for each ray six rows, then the common parameters; last L^-1 times the right-hand side of the point.
-    strength : ndarray, shape (S,)
-        Least information on a direction as part of all on the point: about the square of the sine of the angle
-        between rays. NaN where the matrix is not positive definite.
-    """
-
+    # (S,): reciprocal diagonal of the Cholesky factor L of the normal matrix of each point (three), then its elements
+    # below the diagonal, 21, 31, 32
     root: tuple[Floats, ...]
+    # (6 k + more + 1, 3, S): T: for each ray six rows, then the common parameters; last L^-1 times the right-hand side
+    # of the point
     rows: Floats
+    # (S,): least information on a direction as part of all on the point: about the square of the sine of the angle
+    # between rays. NaN where the matrix is not positive definite
     strength: Floats
 
 

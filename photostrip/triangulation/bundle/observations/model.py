@@ -25,40 +25,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Values of all parameters.
+    """Values of all parameters."""
 
-    Parameters
-    ----------
-    centers : ndarray, shape (m, 3)
-        Perspective centres in the order of the problem, metres.
-    rotations : ndarray, shape (m, 3, 3)
-        Rotations in that order, photo to Cartesian frame.
-    xyz : tuple of ndarray, shape (3, S)
-        Points of each batch.
-    common : ndarray, shape (p,)
-        Calibration parameters, offsets, drifts.
-    """
-
-    centers: Floats
-    rotations: Floats
-    xyz: tuple[Floats, ...]
-    common: Floats
+    centers: Floats  # (m, 3): perspective centres in the order of the problem, metres
+    rotations: Floats  # (m, 3, 3): rotations in that order, photo to Cartesian frame
+    xyz: tuple[Floats, ...]  # (3, S): points of each batch
+    common: Floats  # (p,): calibration parameters, offsets, drifts
 
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A problem with everything about it that does not change during the adjustment.
-
-    Parameters
-    ----------
-    prior : ndarray, shape (p,)
-        A-priori sigmas of all common parameters.
-    """
+    """A problem with everything about it that does not change during the adjustment."""
 
     problem: Problem
     structure: Structure
     calibrated: Calibrated
-    prior: Floats
+    prior: Floats  # (p,): a-priori sigmas of all common parameters
 
     def table(self, state: State) -> Floats:
         """Columns of ``view`` for all photos in the order of the band, shape (13, m)."""
@@ -88,24 +70,12 @@ class Model:
 
 @dataclass(frozen=True, eq=False)
 class Move:
-    """A step of all parameters.
+    """A step of all parameters."""
 
-    Parameters
-    ----------
-    photos : ndarray, shape (m, 6)
-        Steps of the photos in the order of the band, in their own axes.
-    common : ndarray, shape (p,)
-        Steps of the common parameters.
-    points : tuple of ndarray, shape (3, S)
-        Steps of the points of each batch, metres.
-    length : float
-        Length in standard deviations.
-    """
-
-    photos: Floats
-    common: Floats
-    points: tuple[Floats, ...]
-    length: float
+    photos: Floats  # (m, 6): steps of the photos in the order of the band, in their own axes
+    common: Floats  # (p,): steps of the common parameters
+    points: tuple[Floats, ...]  # (3, S): steps of the points of each batch, metres
+    length: float  # length in standard deviations
 
 
 def model_of(problem: Problem) -> Model:

@@ -44,22 +44,14 @@ def _no_numbers() -> Numbers:
 
 @dataclass(frozen=True, eq=False)
 class Images:
-    """Measured rays.
+    """Measured rays."""
 
-    Parameters
-    ----------
-    photo, point : ndarray of int, shape (n,)
-        Photo and point of each ray. A point is measured at most once on a photo. Any order; by photo is fastest.
-    xy : ndarray, shape (n, 2)
-        Ideal image coordinates in mm, relative to the principal point.
-    sigma : ndarray, shape (n, 2)
-        Their standard deviations in mm.
-    """
-
+    # photo, point: (n,): photo and point of each ray. A point is measured at most once on a photo. Any order; by photo
+    # is fastest
     photo: Numbers
     point: Numbers
-    xy: Floats
-    sigma: Floats
+    xy: Floats  # (n, 2): ideal image coordinates in mm, relative to the principal point
+    sigma: Floats  # (n, 2): their standard deviations in mm
 
     def __len__(self) -> int:
         """Count the rays."""
@@ -68,25 +60,16 @@ class Images:
 
 @dataclass(frozen=True, eq=False)
 class Control:
-    """Given coordinates of points. What is observed are ``axes @ (X - xyz)``, each with its own sigma.
+    """Given coordinates of points. What is observed are ``axes @ (X - xyz)``, each with its own sigma."""
 
-    Parameters
-    ----------
-    point : ndarray of int, shape (c,)
-        Point of each row; a point may stand in several rows.
-    xyz : ndarray, shape (c, 3)
-        Given position, Cartesian, metres. Where a coordinate is not given (height of a plan-only point) any value
-        near the truth does: its sigma is infinite.
-    axes : ndarray, shape (c, 3, 3)
-        Directions of the three coordinates as rows, orthonormal: east, north, up of the frame of the list at the
-        point (``GroundFrame.axes_at``), so that plan-only and height-only mean what they say in every frame.
-    sigma : ndarray, shape (c, 3)
-        Standard deviations along the three axes, metres; infinite: not given.
-    """
-
-    point: Numbers = field(default_factory=_no_numbers)
+    point: Numbers = field(default_factory=_no_numbers)  # (c,): point of each row; a point may stand in several rows
+    # (c, 3): given position, Cartesian, metres. Where a coordinate is not given (height of a plan-only point) any value
+    # near the truth does: its sigma is infinite
     xyz: Floats = field(default_factory=lambda: _no_rows(3))
+    # (c, 3, 3): directions of the three coordinates as rows, orthonormal: east, north, up of the frame of the list at
+    # the point (``GroundFrame.axes_at``), so that plan-only and height-only mean what they say in every frame
     axes: Floats = field(default_factory=lambda: _no_rows(3, 3))
+    # (c, 3): standard deviations along the three axes, metres; infinite: not given
     sigma: Floats = field(default_factory=lambda: _no_rows(3))
 
     def __len__(self) -> int:
@@ -99,35 +82,23 @@ class Positions:
     """Given camera positions, of the perspective centre or of an antenna.
 
     What is observed are ``axes @ (S + R @ lever - xyz) - offset - drift * time``, with offset and drift of the group.
-
-    Parameters
-    ----------
-    photo : ndarray of int, shape (g,)
-        Photo of each row.
-    xyz : ndarray, shape (g, 3)
-        Given position, Cartesian, metres.
-    axes : ndarray, shape (g, 3, 3)
-        Directions of the three coordinates as rows, as for ``Control``.
-    sigma : ndarray, shape (g, 3)
-        Standard deviations along the axes, metres; infinite: not given.
-    lever : ndarray, shape (g, 3)
-        Antenna minus perspective centre in photo axes, metres.
-    group : ndarray of int, shape (g,)
-        Group (a strip, say) whose offset and drift count; -1: none.
-    time : ndarray, shape (g,)
-        What the drift is multiplied with: time or place along the strip, best centred.
-    offset_sigma, drift_sigma : ndarray, shape (groups,)
-        A-priori standard deviations of each of the three components of a group's offset (metres) and drift (metres
-        per unit of time) about zero; infinite: free; 0: there is none. They are what has to be added to what is given.
     """
 
-    photo: Numbers = field(default_factory=_no_numbers)
-    xyz: Floats = field(default_factory=lambda: _no_rows(3))
+    photo: Numbers = field(default_factory=_no_numbers)  # (g,): photo of each row
+    xyz: Floats = field(default_factory=lambda: _no_rows(3))  # (g, 3): given position, Cartesian, metres
+    # (g, 3, 3): directions of the three coordinates as rows, as for ``Control``
     axes: Floats = field(default_factory=lambda: _no_rows(3, 3))
+    # (g, 3): standard deviations along the axes, metres; infinite: not given
     sigma: Floats = field(default_factory=lambda: _no_rows(3))
+    # (g, 3): antenna minus perspective centre in photo axes, metres
     lever: Floats = field(default_factory=lambda: _no_rows(3))
+    # (g,): group (a strip, say) whose offset and drift count; -1: none
     group: Numbers = field(default_factory=_no_numbers)
+    # (g,): what the drift is multiplied with: time or place along the strip, best centred
     time: Floats = field(default_factory=_no_rows)
+    # offset_sigma, drift_sigma: (groups,): a-priori standard deviations of each of the three components of a group's
+    # offset (metres) and drift (metres per unit of time) about zero; infinite: free; 0: there is none. They are what
+    # has to be added to what is given
     offset_sigma: Floats = field(default_factory=_no_rows)
     drift_sigma: Floats = field(default_factory=_no_rows)
 
@@ -138,20 +109,12 @@ class Positions:
 
 @dataclass(frozen=True, eq=False)
 class Attitudes:
-    """Given attitudes of photos; a given perspective centre is a row of ``Positions``.
+    """Given attitudes of photos; a given perspective centre is a row of ``Positions``."""
 
-    Parameters
-    ----------
-    photo : ndarray of int, shape (a,)
-        Photo of each row.
-    rotations : ndarray, shape (a, 3, 3)
-        Given rotations, photo to Cartesian frame.
-    sigma : ndarray, shape (a, 3)
-        Standard deviations of the rotations about the three photo axes, radians; infinite: not given.
-    """
-
-    photo: Numbers = field(default_factory=_no_numbers)
+    photo: Numbers = field(default_factory=_no_numbers)  # (a,): photo of each row
+    # (a, 3, 3): given rotations, photo to Cartesian frame
     rotations: Floats = field(default_factory=lambda: _no_rows(3, 3))
+    # (a, 3): standard deviations of the rotations about the three photo axes, radians; infinite: not given
     sigma: Floats = field(default_factory=lambda: _no_rows(3))
 
     def __len__(self) -> int:
@@ -161,61 +124,35 @@ class Attitudes:
 
 @dataclass(frozen=True, eq=False)
 class Cameras:
-    """Cameras of the photos, and what is to be calibrated.
+    """Cameras of the photos, and what is to be calibrated."""
 
-    Parameters
-    ----------
-    of_photo : ndarray of int, shape (m,)
-        Camera of each photo.
-    focal : ndarray, shape (cameras,)
-        Principal distances in mm.
-    sigma : ndarray, shape (cameras, 10), or None
-        A-priori standard deviations of the parameters ``CALIBRATION`` about zero, in mm and powers of mm;
-        infinite: free; 0: not a parameter. None: no calibration.
-    """
-
-    of_photo: Numbers
-    focal: Floats
+    of_photo: Numbers  # (m,): camera of each photo
+    focal: Floats  # (cameras,): principal distances in mm
+    # (cameras, 10), or None: a-priori standard deviations of the parameters ``CALIBRATION`` about zero, in mm and
+    # powers of mm; infinite: free; 0: not a parameter. None: no calibration
     sigma: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Where the adjustment starts.
+    """Where the adjustment starts."""
 
-    Parameters
-    ----------
-    centers : ndarray, shape (m, 3)
-        Perspective centres, Cartesian, metres.
-    rotations : ndarray, shape (m, 3, 3)
-        Rotations, photo to Cartesian frame.
-    points : ndarray, shape (q, 3)
-        Points, Cartesian, metres.
-    """
-
-    centers: Floats
-    rotations: Floats
-    points: Floats
+    centers: Floats  # (m, 3): perspective centres, Cartesian, metres
+    rotations: Floats  # (m, 3, 3): rotations, photo to Cartesian frame
+    points: Floats  # (q, 3): points, Cartesian, metres
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """All observations and all start values of one bundle adjustment.
-
-    Parameters
-    ----------
-    start : Start
-        Start values; they say how many photos (m) and points (q) there are.
-    photo_ids, point_ids, camera_ids, group_ids : tuple of str
-        Names for messages; empty: the numbers.
-    """
+    """All observations and all start values of one bundle adjustment."""
 
     images: Images
     cameras: Cameras
-    start: Start
+    start: Start  # start values; they say how many photos (m) and points (q) there are
     control: Control = field(default_factory=Control)
     positions: Positions = field(default_factory=Positions)
     attitudes: Attitudes = field(default_factory=Attitudes)
+    # photo_ids, point_ids, camera_ids, group_ids: names for messages; empty: the numbers
     photo_ids: tuple[str, ...] = ()
     point_ids: tuple[str, ...] = ()
     camera_ids: tuple[str, ...] = ()

@@ -25,21 +25,12 @@ TABLE = 3_000  # photos: up to here pairs are marked in a square table, which is
 
 @dataclass(frozen=True, eq=False)
 class Gather:
-    """Sum of blocks that go to the same place.
+    """Sum of blocks that go to the same place."""
 
-    Parameters
-    ----------
-    target : ndarray of int, shape (t,)
-        Places, each once.
-    order : ndarray of int, shape (b,), or None
-        Blocks in the order of their targets; None when every block has its own target, in order.
-    first : ndarray of int, shape (t,)
-        First block of each target in that order.
-    """
-
-    target: Numbers
+    target: Numbers  # (t,): places, each once
+    # (b,), or None: blocks in the order of their targets; None when every block has its own target, in order
     order: Numbers | None
-    first: Numbers
+    first: Numbers  # (t,): first block of each target in that order
 
     def add(self, blocks: Floats, total: Floats) -> None:
         """Add blocks (b, ...) to the rows of `total`, in place."""
@@ -51,30 +42,19 @@ class Gather:
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """Shape of the normal equations.
+    """Shape of the normal equations."""
 
-    Parameters
-    ----------
-    order : ndarray of int, shape (m,)
-        Photos in the order of the band.
-    rank : ndarray of int, shape (m,)
-        Place of each photo in that order.
-    rows, columns : ndarray of int, shape (b,)
-        Pairs of photos that share points (places in the band, row >= column), every photo with itself among them.
-    own : ndarray of int, shape (m,)
-        Which of the pairs is each photo with itself.
-    pairs, singles : tuple of Gather
-        For each batch: of its blocks to the pairs (by pair within the set of photos, then group), and of its rays to
-        photos (by ray, then group).
-    """
-
-    order: Numbers
-    rank: Numbers
+    order: Numbers  # (m,): photos in the order of the band
+    rank: Numbers  # (m,): place of each photo in that order
+    # rows, columns: (b,): pairs of photos that share points (places in the band, row >= column), every photo with
+    # itself among them
     rows: Numbers
     columns: Numbers
-    own: Numbers
+    own: Numbers  # (m,): which of the pairs is each photo with itself
     width: int
     batches: tuple[Batch, ...]
+    # pairs, singles: for each batch: of its blocks to the pairs (by pair within the set of photos, then group), and of
+    # its rays to photos (by ray, then group)
     pairs: tuple[Gather, ...]
     singles: tuple[Gather, ...]
 

@@ -32,14 +32,9 @@ ELEMENTS = (
 
 @dataclass(frozen=True)
 class Correlation:
-    """Two parameters that depend on each other.
+    """Two parameters that depend on each other."""
 
-    Parameters
-    ----------
-    first, second : str
-        Names: ``camera RC30: c``, ``photo 1003: shift along x``.
-    """
-
+    # first, second: names: ``camera RC30: c``, ``photo 1003: shift along x``
     first: str
     second: str
     value: float

@@ -35,24 +35,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Inverse:
-    """Inverse normal matrix of photos and common parameters, as far as it is known.
+    """Inverse normal matrix of photos and common parameters, as far as it is known."""
 
-    Parameters
-    ----------
-    band : Band or Sparse
-        Elements within the band, or at pairs, of the inverse of the photos' part alone.
-    cross : ndarray, shape (m, 6, p)
-        That inverse times the border.
-    common : ndarray, shape (p, p)
-        Cofactors of the common parameters.
-    factor : Band or Sparse
-        Factor of the photos' part: for photos farther apart than the band is wide.
-    """
-
-    band: Factor
-    cross: Floats
-    common: Floats
-    factor: Factor
+    band: Factor  # elements within the band, or at pairs, of the inverse of the photos' part alone
+    cross: Floats  # (m, 6, p): that inverse times the border
+    common: Floats  # (p, p): cofactors of the common parameters
+    factor: Factor  # factor of the photos' part: for photos farther apart than the band is wide
 
     def joint(self, sets: Numbers, more: int) -> Floats:
         """Joint cofactors of sets of photos and the first common parameters.

@@ -29,24 +29,13 @@ SIGMA0_LEVEL = 0.05  # probability that the test of sigma0 fails with right stan
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Observations of one kind after the adjustment; one row each, k coordinates.
+    """Observations of one kind after the adjustment; one row each, k coordinates."""
 
-    Parameters
-    ----------
-    kind : str
-        ``IMAGE``, ``CONTROL``, ``POSITION`` or ``ATTITUDE``.
-    error : ndarray, shape (n, k)
-        Observed minus adjusted: mm in the image, metres, radians for attitudes; NaN where nothing is given.
-    sigma : ndarray, shape (n, k)
-        Stated standard deviations; NaN where nothing is given.
-    redundancy : ndarray, shape (n, k)
-        Redundancy numbers, 0 to 1; NaN where nothing is given.
-    """
-
-    kind: str
+    kind: str  # ``IMAGE``, ``CONTROL``, ``POSITION`` or ``ATTITUDE``
+    # (n, k): observed minus adjusted: mm in the image, metres, radians for attitudes; NaN where nothing is given
     error: Floats
-    sigma: Floats
-    redundancy: Floats
+    sigma: Floats  # (n, k): stated standard deviations; NaN where nothing is given
+    redundancy: Floats  # (n, k): redundancy numbers, 0 to 1; NaN where nothing is given
 
     @property
     def standardised(self) -> Floats:
@@ -174,18 +163,12 @@ def limit(test: str, alpha: float, redundancy: int) -> float:
 
 @dataclass(frozen=True)
 class Sigma0Test:
-    """Whether the stated standard deviations are right on the whole.
+    """Whether the stated standard deviations are right on the whole."""
 
-    Parameters
-    ----------
-    sigma0 : float
-        Standard deviation of unit weight found.
-    lower, upper : float
-        Limits of sigma0 between which it lies with the probability 1 - ``SIGMA0_LEVEL``; NaN without redundancy.
-    """
-
-    sigma0: float
+    sigma0: float  # standard deviation of unit weight found
     redundancy: int
+    # lower, upper: limits of sigma0 between which it lies with the probability 1 - ``SIGMA0_LEVEL``; NaN without
+    # redundancy
     lower: float
     upper: float
 

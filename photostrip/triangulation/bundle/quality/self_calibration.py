@@ -48,30 +48,18 @@ INSEPARABLE = 0.9999  # correlations of what cannot be told apart
 
 @dataclass(frozen=True)
 class Parameter:
-    """One calibration parameter after the adjustment.
+    """One calibration parameter after the adjustment."""
 
-    Parameters
-    ----------
-    camera, name, unit : str
-        Which it is.
-    value, sigma : float
-        Correction of the given calibration, and its standard deviation with the sigma0 found.
-    p : float
-        Probability of a value so large or larger when the true one is zero.
-    prior : float
-        A-priori standard deviation; infinite for a free parameter.
-    redundancy : float
-        Share of the a-priori value that the measurements control; NaN for a free parameter.
-    """
-
+    # camera, name, unit: which it is
     camera: str
     name: str
     unit: str
+    # value, sigma: correction of the given calibration, and its standard deviation with the sigma0 found
     value: float
     sigma: float
-    p: float
-    prior: float
-    redundancy: float
+    p: float  # probability of a value so large or larger when the true one is zero
+    prior: float  # a-priori standard deviation; infinite for a free parameter
+    redundancy: float  # share of the a-priori value that the measurements control; NaN for a free parameter
 
     @property
     def significant(self) -> bool:

@@ -31,27 +31,16 @@ SMALLEST, LARGEST = 0.05, 20.0  # factors of a stated standard deviation in one 
 
 @dataclass(frozen=True)
 class Component:
-    """The standard deviations of one group.
+    """The standard deviations of one group."""
 
-    Parameters
-    ----------
-    name : str
-        ``image``, ``control plan``, ``control height``, ``control``, ``positions plan``, ``positions height`` or
-        ``attitudes``.
-    factor : float
-        What its stated standard deviations are to be multiplied with; 1 when it was not estimated.
-    sigma : float
-        Relative standard deviation of the factor.
-    estimated : bool
-        Whether its redundancy was enough.
-    """
-
+    # ``image``, ``control plan``, ``control height``, ``control``, ``positions plan``, ``positions height`` or
+    # ``attitudes``
     name: str
     observations: int
     redundancy: float
-    factor: float
-    sigma: float
-    estimated: bool
+    factor: float  # what its stated standard deviations are to be multiplied with; 1 when it was not estimated
+    sigma: float  # relative standard deviation of the factor
+    estimated: bool  # whether its redundancy was enough
 
 
 def labels(kind: str, rows: int, level: Sequence[bool]) -> list[tuple[str, slice | NDArray[np.bool_]]]:

@@ -59,56 +59,34 @@ PLAN = slice(0, 2)
 
 @dataclass(frozen=True, slots=True)
 class ControlRejection:
-    """Wrong coordinates of one control point. With one plan coordinate the other one is not used either.
-
-    Parameters
-    ----------
-    axes : tuple of str
-        Which coordinates look wrong: ``"east"``, ``"north"``, ``"up"`` (of the point's ground frame).
-    value, limit : float
-        Largest test value and its critical value.
-    size : tuple of float
-        Estimated errors of the coordinates east, north, up, metres: given minus what the others predict.
-    redundancy : float
-        Smallest redundancy number of the coordinates rejected.
-    exchanged_with : str
-        The point with which it seems to have been exchanged; empty when there is none.
-    detectable : float
-        Smallest error of the worst coordinate that is found in 80 % of cases, metres; NaN when unknown.
-    """
+    """Wrong coordinates of one control point. With one plan coordinate the other one is not used either."""
 
     id: str
+    # which coordinates look wrong: ``"east"``, ``"north"``, ``"up"`` (of the point's ground frame)
     axes: tuple[str, ...]
+    # value, limit: largest test value and its critical value
     value: float
     limit: float
+    # estimated errors of the coordinates east, north, up, metres: given minus what the others predict
     size: tuple[float, float, float]
-    redundancy: float
-    exchanged_with: str = ""
+    redundancy: float  # smallest redundancy number of the coordinates rejected
+    exchanged_with: str = ""  # the point with which it seems to have been exchanged; empty when there is none
+    # smallest error of the worst coordinate that is found in 80 % of cases, metres; NaN when unknown
     detectable: float = float("nan")
 
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """Where a strip stands when its control is examined.
+    """Where a strip stands when its control is examined."""
 
-    Parameters
-    ----------
-    strip : ndarray, shape (n, 3)
-        Strip coordinates of the control points.
-    precision : tuple of float
-        A-priori standard deviation of a strip point in plan and height, metres.
-    spacing, breadth : float
-        As in ``correction.Problem``.
-    joint : control_significance.Joint, optional
-        Covariance of all misclosures; without it polynomials stand for the strip's deformation.
-    """
-
-    strip: Floats
+    strip: Floats  # (n, 3): strip coordinates of the control points
     frames: Sequence[GroundFrame]
     intermediate: IntermediateFrame
-    precision: tuple[float, float]
+    precision: tuple[float, float]  # a-priori standard deviation of a strip point in plan and height, metres
+    # spacing, breadth: as in ``correction.Problem``
     spacing: float
     breadth: float
+    # covariance of all misclosures; without it polynomials stand for the strip's deformation
     joint: control_significance.Joint | None = None
 
     def problem(self, control: ControlPoints) -> correction.Problem:

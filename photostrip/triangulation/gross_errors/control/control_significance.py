@@ -33,48 +33,26 @@ BENT = 2.5  # standard deviation of unit weight beyond which the strip is bent b
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """Misclosures at the control as one vector.
+    """Misclosures at the control as one vector."""
 
-    Parameters
-    ----------
-    point, axis : ndarray of int, shape (w,)
-        Control point and ground axis of each coordinate.
-    design : ndarray, shape (w, 7)
-        Derivatives by a similarity.
-    covariance : ndarray, shape (w, w)
-        Covariance of the strip and of the given coordinates together, m^2.
-    """
-
+    # point, axis: (w,): control point and ground axis of each coordinate
     point: Numbers
     axis: Numbers
-    design: Floats
-    covariance: Floats
+    design: Floats  # (w, 7): derivatives by a similarity
+    covariance: Floats  # (w, w): covariance of the strip and of the given coordinates together, m^2
 
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """What all other coordinates say of each one; arrays by control point and axis, shape (n, 3).
+    """What all other coordinates say of each one; arrays by control point and axis, shape (n, 3)."""
 
-    Parameters
-    ----------
-    value, limit : ndarray
-        Test values and critical values; value 0 where nothing can be said.
-    size : ndarray
-        Given minus predicted, metres.
-    redundancy : ndarray
-        Redundancy numbers; 1 for coordinates that took no part.
-    detectable : ndarray
-        Smallest error that is found in 80 % of cases, metres; infinite where none is.
-    sigma0 : float
-        Standard deviation of unit weight of the coordinates that took part; NaN without redundancy.
-    """
-
+    # value, limit: test values and critical values; value 0 where nothing can be said
     value: Floats
     limit: Floats
-    size: Floats
-    redundancy: Floats
-    detectable: Floats
-    sigma0: float
+    size: Floats  # given minus predicted, metres
+    redundancy: Floats  # redundancy numbers; 1 for coordinates that took no part
+    detectable: Floats  # smallest error that is found in 80 % of cases, metres; infinite where none is
+    sigma0: float  # standard deviation of unit weight of the coordinates that took part; NaN without redundancy
 
 
 def judge(joint: Joint, misclosures: Floats, used: Flags, alpha: float) -> Judged:

@@ -44,58 +44,32 @@ DETECTABLE = 4.13  # shift of a normal variable found in 80 % of cases by a two-
 
 @dataclass(frozen=True, slots=True)
 class Rejection:
-    """One point taken out of a pair.
-
-    Parameters
-    ----------
-    test : str
-        ``"in front"``, ``"parallax"``, ``"grubbs"``, ``"tau"``, ``"deletion"`` (global test), ``"robust"`` or
-        ``"residual"``.
-    value, limit : float
-        Test value and critical value; mm for a parallax, otherwise without unit.
-    parallax : float
-        Residual y parallax in mm when it was rejected.
-    zone : int
-        Standard zone of the point, 1 to 6; 0 when unknown.
-    size : float
-        Estimated error of the y parallax in mm: what the pair, oriented without the point, leaves of it.
-    readmitted : bool
-        Whether the point was taken back in the end.
-    """
+    """One point taken out of a pair."""
 
     row: int
+    # ``"in front"``, ``"parallax"``, ``"grubbs"``, ``"tau"``, ``"deletion"`` (global test), ``"robust"`` or
+    # ``"residual"``
     test: str
+    # value, limit: test value and critical value; mm for a parallax, otherwise without unit
     value: float
     limit: float
-    parallax: float
-    zone: int = 0
+    parallax: float  # residual y parallax in mm when it was rejected
+    zone: int = 0  # standard zone of the point, 1 to 6; 0 when unknown
+    # estimated error of the y parallax in mm: what the pair, oriented without the point, leaves of it
     size: float = float("nan")
-    readmitted: bool = False
+    readmitted: bool = False  # whether the point was taken back in the end
 
 
 @dataclass(frozen=True, eq=False)
 class Screened:
-    """Oriented pairs after the search for gross errors, and how far errors can be seen in them.
+    """Oriented pairs after the search for gross errors, and how far errors can be seen in them."""
 
-    Parameters
-    ----------
-    orientation : Orientation
-        Pairs oriented without the rejected points.
-    rejections : tuple of Rejection
-        What was rejected, in order; re-admitted points are marked.
-    scatter : screening_search.Scatter
-        Standard deviations of a y parallax of weight one.
-    masked : ndarray of bool, shape (p,)
-        Pairs that fail the global test with nothing left to reject: errors that hide each other are suspected.
-    converged : ndarray of bool, shape (p,)
-        Whether the orientation of each pair converged.
-    """
-
-    orientation: Orientation
-    rejections: tuple[Rejection, ...]
-    scatter: screening_search.Scatter
+    orientation: Orientation  # pairs oriented without the rejected points
+    rejections: tuple[Rejection, ...]  # what was rejected, in order; re-admitted points are marked
+    scatter: screening_search.Scatter  # standard deviations of a y parallax of weight one
+    # (p,): pairs that fail the global test with nothing left to reject: errors that hide each other are suspected
     masked: NDArray[np.bool_]
-    converged: NDArray[np.bool_]
+    converged: NDArray[np.bool_]  # (p,): whether the orientation of each pair converged
 
     @cached_property
     def zone(self) -> NDArray[np.intp]:

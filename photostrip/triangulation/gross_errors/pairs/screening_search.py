@@ -49,35 +49,20 @@ MILD = 10.0  # root of the sum of squares in units of its variance
 
 @dataclass(frozen=True, eq=False)
 class Scatter:
-    """Standard deviations of a y parallax of weight one that the tests are made with.
+    """Standard deviations of a y parallax of weight one that the tests are made with."""
 
-    Parameters
-    ----------
-    stated : float
-        From the stated standard deviation of image coordinates, mm.
-    found : float
-        From the residuals of all pairs of the strip, robust, mm; NaN when they did not contradict the stated one.
-    by_pair : ndarray, shape (p,)
-        Those in force, mm.
-    """
-
-    stated: float
+    stated: float  # from the stated standard deviation of image coordinates, mm
+    # from the residuals of all pairs of the strip, robust, mm; NaN when they did not contradict the stated one
     found: float
-    by_pair: Floats
+    by_pair: Floats  # (p,): those in force, mm
 
 
 @dataclass(frozen=True, eq=False)
 class Deleted:
-    """What a search took out.
-
-    Parameters
-    ----------
-    rows : ndarray of int
-        Rows taken out, in order, re-admitted ones included.
-    """
+    """What a search took out."""
 
     orientation: Orientation
-    rows: Numbers
+    rows: Numbers  # rows taken out, in order, re-admitted ones included
     tests: tuple[str, ...]
     values: Floats
     limits: Floats

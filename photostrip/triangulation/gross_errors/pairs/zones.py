@@ -65,18 +65,10 @@ def zones(elements: Floats, pairs: Pairs) -> Numbers:
 
 @dataclass(frozen=True, eq=False)
 class Support:
-    """What holds the pairs up: their points by zone.
+    """What holds the pairs up: their points by zone."""
 
-    Parameters
-    ----------
-    zone : ndarray of int, shape (m,)
-        Zone of every row, 1 to 6.
-    counts : ndarray of int, shape (p, 6)
-        Points that take part, by pair and zone.
-    """
-
-    zone: Numbers
-    counts: Numbers
+    zone: Numbers  # (m,): zone of every row, 1 to 6
+    counts: Numbers  # (p, 6): points that take part, by pair and zone
 
     @classmethod
     def of(cls, orientation: Orientation, zone: Numbers | None = None) -> Support:

@@ -36,27 +36,18 @@ GOOD, RAY, PAIR, RAYS, NONE = range(5)
 
 @dataclass(frozen=True, eq=False)
 class Decision:
-    """Points judged.
-
-    Parameters
-    ----------
-    weight : ndarray, shape (k, r)
-        1 for a ray that may be used, 0 for one that may not.
-    value, limit : ndarray, shape (k,)
-        Root of the sum of squares of each point's misclosures in units of their standard deviations, and its
-        critical value.
-    size : ndarray, shape (k, r, 2)
-        Estimated errors of the image coordinates in units of their standard deviations; NaN where nothing can be said.
-    kind : ndarray of int, shape (k,)
-        ``GOOD``, ``RAY``, ``PAIR``, ``RAYS`` or ``NONE``.
-    """
+    """Points judged."""
 
     group: Group
-    weight: Floats
+    weight: Floats  # (k, r): 1 for a ray that may be used, 0 for one that may not
+    # value, limit: (k,): root of the sum of squares of each point's misclosures in units of their standard deviations,
+    # and its critical value
     value: Floats
     limit: Floats
+    # (k, r, 2): estimated errors of the image coordinates in units of their standard deviations; NaN where nothing can
+    # be said
     size: Floats
-    kind: Numbers
+    kind: Numbers  # (k,): ``GOOD``, ``RAY``, ``PAIR``, ``RAYS`` or ``NONE``
 
     def take(self, rows: Flags) -> Decision:
         """Give some of the points."""

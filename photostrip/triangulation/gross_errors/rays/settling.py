@@ -37,26 +37,14 @@ STILL = 5e-4  # rad, and relative: the second order of such a change is 0.04 µm
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """What a strip is formed from, beside its oriented pairs.
-
-    Parameters
-    ----------
-    weight : ndarray, shape (m,)
-        Weights of the pairs' rows before anything was rejected.
-    sigma : ndarray, shape (p,)
-        Standard deviations of a y parallax of weight one in each pair, mm.
-    stated : float
-        Stated standard deviation of an image coordinate, mm.
-    kept : ndarray of int
-        Rows of the observations that the user keeps.
-    """
+    """What a strip is formed from, beside its oriented pairs."""
 
     observations: PhotoPoints
     photos: Sequence[str]
-    weight: Floats
-    sigma: Floats
-    stated: float
-    kept: Numbers
+    weight: Floats  # (m,): weights of the pairs' rows before anything was rejected
+    sigma: Floats  # (p,): standard deviations of a y parallax of weight one in each pair, mm
+    stated: float  # stated standard deviation of an image coordinate, mm
+    kept: Numbers  # rows of the observations that the user keeps
 
 
 def settle(

@@ -51,33 +51,20 @@ KINDS = {GOOD: SEVERAL, RAY: TOLD, PAIR: BOTH, RAYS: SEVERAL, NONE: SEVERAL}
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """What the strip says about the points it was asked about.
+    """What the strip says about the points it was asked about."""
 
-    Parameters
-    ----------
-    judged : ndarray of int, shape (j,)
-        Points that were judged.
-    wrong : ndarray of int, shape (c,)
-        Rows of the observations that must not be used.
-    point : ndarray of int, shape (c,)
-        Their points.
-    kind : tuple of str
-        Why: ``TOLD``, ``BOTH`` or ``SEVERAL``.
-    value, limit : ndarray, shape (c,)
-        Test value of the point with all its rays, as the root of a sum of squares, and its critical value.
-    size : ndarray, shape (c, 2)
-        Estimated errors of the image coordinates, mm; NaN where nothing can be said.
-    across : ndarray of bool, shape (c,)
-        Whether the y parallaxes of the point are good: it may orient pairs, but has no place.
-    """
-
-    judged: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))
+    judged: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))  # (j,): points that were judged
+    # (c,): rows of the observations that must not be used
     wrong: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))
-    point: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))
-    kind: tuple[str, ...] = ()
+    point: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))  # (c,): their points
+    kind: tuple[str, ...] = ()  # why: ``TOLD``, ``BOTH`` or ``SEVERAL``
+    # value, limit: (c,): test value of the point with all its rays, as the root of a sum of squares, and its critical
+    # value
     value: Floats = field(default_factory=lambda: np.zeros(0))
     limit: Floats = field(default_factory=lambda: np.zeros(0))
+    # (c, 2): estimated errors of the image coordinates, mm; NaN where nothing can be said
     size: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+    # (c,): whether the y parallaxes of the point are good: it may orient pairs, but has no place
     across: Flags = field(default_factory=lambda: np.zeros(0, bool))
 
     def of(self, points: Flags) -> Verdict:
@@ -98,20 +85,11 @@ class Verdict:
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """Where the image points of a strip are, whatever becomes of them.
+    """Where the image points of a strip are, whatever becomes of them."""
 
-    Parameters
-    ----------
-    position : ndarray of int, shape (n,)
-        Place in the strip of the photo of every image point; -1 for photos of other strips.
-    paired : ndarray of bool, shape (n,)
-        Whether an image point stands in a pair.
-    begin, last : ndarray of int, shape (q,)
-        First and last photo of each point in pairs; the last is -1 for points of no pair.
-    """
-
-    position: Numbers
-    paired: Flags
+    position: Numbers  # (n,): place in the strip of the photo of every image point; -1 for photos of other strips
+    paired: Flags  # (n,): whether an image point stands in a pair
+    # begin, last: (q,): first and last photo of each point in pairs; the last is -1 for points of no pair
     begin: Numbers
     last: Numbers
 
@@ -132,24 +110,14 @@ class Layout:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A formed strip and its measurements.
-
-    Parameters
-    ----------
-    layout : Layout
-        Where they are.
-    sigma : ndarray, shape (p,)
-        Standard deviations of a y parallax of weight one in each pair, mm.
-    stated : float
-        Standard deviation of an image coordinate of weight one, mm.
-    """
+    """A formed strip and its measurements."""
 
     orientation: Orientation
     formed: FormedStrip
     observations: PhotoPoints
-    layout: Layout
-    sigma: Floats
-    stated: float
+    layout: Layout  # where they are
+    sigma: Floats  # (p,): standard deviations of a y parallax of weight one in each pair, mm
+    stated: float  # standard deviation of an image coordinate of weight one, mm
 
     @property
     def photos(self) -> int:

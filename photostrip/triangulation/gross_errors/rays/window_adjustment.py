@@ -28,18 +28,10 @@ INVERTIBLE = 1e-9  # keeps a point that holds its photos alone from stopping the
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """Windows adjusted.
+    """Windows adjusted."""
 
-    Parameters
-    ----------
-    estimate : ndarray, shape (w, 6 length)
-        Changes of the photos.
-    cofactors : ndarray, shape (w, 6 length, 6 length)
-        Their cofactors, place and scale of the window free.
-    """
-
-    estimate: Floats
-    cofactors: Floats
+    estimate: Floats  # (w, 6 length): changes of the photos
+    cofactors: Floats  # (w, 6 length, 6 length): their cofactors, place and scale of the window free
 
     def of(self, group: Group) -> tuple[Floats, Floats]:
         """Give changes and cofactors of the photos of each point, shapes (k, 6r) and (k, 6r, 6r)."""
@@ -55,18 +47,10 @@ class Solved:
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """Conditions of points on the photos of their windows, padded with zeros to equal numbers.
+    """Conditions of points on the photos of their windows, padded with zeros to equal numbers."""
 
-    Parameters
-    ----------
-    design : ndarray, shape (w, c, 6 length)
-        Derivatives by the photos.
-    misfit : ndarray, shape (w, c)
-        Misclosures.
-    """
-
-    design: Floats
-    misfit: Floats
+    design: Floats  # (w, c, 6 length): derivatives by the photos
+    misfit: Floats  # (w, c): misclosures
 
     def take(self, windows: Flags) -> Conditions:
         """Give some of the windows."""

@@ -37,30 +37,14 @@ KEPT = (
 
 @dataclass(frozen=True, eq=False)
 class Group:
-    """Points with equally many rays in their window.
+    """Points with equally many rays in their window."""
 
-    Parameters
-    ----------
-    window : ndarray of int, shape (k,)
-        Window of each point, counted within the batch.
-    ray : ndarray of int, shape (k, r)
-        Rays of the point, in flight order.
-    column : ndarray of int, shape (k, r)
-        Place of their photos in the window.
-    by_point : ndarray, shape (k, 2r, 3)
-        Derivatives of all coordinates by the point.
-    by_photo : ndarray, shape (k, 2r, 6r)
-        Derivatives by the photos of the point, one after the other.
-    misfit : ndarray, shape (k, 2r)
-        Measured minus computed.
-    """
-
-    window: Numbers
-    ray: Numbers
-    column: Numbers
-    by_point: Floats
-    by_photo: Floats
-    misfit: Floats
+    window: Numbers  # (k,): window of each point, counted within the batch
+    ray: Numbers  # (k, r): rays of the point, in flight order
+    column: Numbers  # (k, r): place of their photos in the window
+    by_point: Floats  # (k, 2r, 3): derivatives of all coordinates by the point
+    by_photo: Floats  # (k, 2r, 6r): derivatives by the photos of the point, one after the other
+    misfit: Floats  # (k, 2r): measured minus computed
 
     def take(self, rows: Flags) -> Group:
         """Give some of the points."""

@@ -33,33 +33,15 @@ FEWEST = 2  # rays
 
 @dataclass(frozen=True, eq=False)
 class Rays:
-    """Image points of a strip, linearised, in units of their standard deviations.
+    """Image points of a strip, linearised, in units of their standard deviations."""
 
-    Parameters
-    ----------
-    row : ndarray of int, shape (n,)
-        Row in the observations.
-    photo : ndarray of int, shape (n,)
-        Place of the photo in the strip.
-    point : ndarray of int, shape (n,)
-        Number of the point.
-    by_point : ndarray, shape (n, 2, 3)
-        Derivatives of the image coordinates by the point.
-    by_photo : ndarray, shape (n, 2, 6)
-        Derivatives by shift and rotation of the photo.
-    misfit : ndarray, shape (n, 2)
-        Measured minus computed.
-    sigma : ndarray, shape (n, 2)
-        Standard deviations of the image coordinates, mm.
-    """
-
-    row: Numbers
-    photo: Numbers
-    point: Numbers
-    by_point: Floats
-    by_photo: Floats
-    misfit: Floats
-    sigma: Floats
+    row: Numbers  # (n,): row in the observations
+    photo: Numbers  # (n,): place of the photo in the strip
+    point: Numbers  # (n,): number of the point
+    by_point: Floats  # (n, 2, 3): derivatives of the image coordinates by the point
+    by_photo: Floats  # (n, 2, 6): derivatives by shift and rotation of the photo
+    misfit: Floats  # (n, 2): measured minus computed
+    sigma: Floats  # (n, 2): standard deviations of the image coordinates, mm
 
     def take(self, rows: Numbers) -> Rays:
         """Give some of the rays."""

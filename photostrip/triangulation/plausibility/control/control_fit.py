@@ -38,22 +38,13 @@ SMALL = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Laid:
-    """A strip laid on given points in plan.
+    """A strip laid on given points in plan."""
 
-    Parameters
-    ----------
-    turn, shift : complex
-        Plan from strip: E + iN = turn w + shift, with conj(w) where `mirrored`.
-    mirrored : bool
-        Whether the strip was mirrored.
-    middle : float
-        Misclosure that a good half of the points does not exceed, metres.
-    """
-
+    # turn, shift: plan from strip: E + iN = turn w + shift, with conj(w) where `mirrored`
     turn: complex
     shift: complex
-    mirrored: bool
-    middle: float
+    mirrored: bool  # whether the strip was mirrored
+    middle: float  # misclosure that a good half of the points does not exceed, metres
 
     @property
     def matrix(self) -> Floats:
@@ -187,28 +178,17 @@ def _robust(size: Floats, unknowns: int) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Bent:
-    """What is left at given points after a strip was laid on them and its bending taken out.
+    """What is left at given points after a strip was laid on them and its bending taken out."""
 
-    Parameters
-    ----------
-    residual : ndarray of float or complex, shape (n,)
-        Given minus predicted, metres; of every point, whether it took part or not.
-    spread : ndarray, shape (n,)
-        Standard deviation of a residual of a point that did not take part, in each direction; metres.
-    used : ndarray of bool, shape (n,)
-        Points that took part and go with the others.
-    coefficient, sigma : ndarray, shape (c,)
-        Coefficients of the columns and their standard deviations.
-    sigma0 : float
-        Standard deviation of a given coordinate, metres; not below what makes sense, infinite without redundancy.
-    """
-
-    residual: NDArray[Any]
+    residual: NDArray[Any]  # (n,): given minus predicted, metres; of every point, whether it took part or not
+    # (n,): standard deviation of a residual of a point that did not take part, in each direction; metres
     spread: Floats
-    used: Flags
+    used: Flags  # (n,): points that took part and go with the others
+    # coefficient, sigma: (c,): coefficients of the columns and their standard deviations
     coefficient: NDArray[Any]
     sigma: Floats
     freedom: int
+    # standard deviation of a given coordinate, metres; not below what makes sense, infinite without redundancy
     sigma0: float
 
     @property

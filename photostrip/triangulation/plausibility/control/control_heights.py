@@ -44,31 +44,16 @@ EXPLAINED = 0.5  # of what heights leave without it: what explains a bend of the
 
 @dataclass(frozen=True, eq=False)
 class Heights:
-    """Given heights against those of a strip.
+    """Given heights against those of a strip."""
 
-    Parameters
-    ----------
-    usable, took_part : ndarray of bool, shape (n,)
-        Heights that can be judged, and those that take part in the fit.
-    value : ndarray, shape (n,)
-        Given minus height in the strip, metres.
-    columns : ndarray, shape (n, c)
-        Tilt and, where it is needed, bending.
-    whole : list of ndarray, shape (n,)
-        All columns of tilt and bending.
-    deviation : ndarray, shape (n,)
-        Heights in the strip, against their mean.
-    scaled : Bent
-        Fit with the scale of the heights free; its last coefficient is that scale minus one.
-    """
-
+    # usable, took_part: (n,): heights that can be judged, and those that take part in the fit
     usable: Flags
     took_part: Flags
-    value: Floats
-    columns: Floats
-    whole: list[Floats]
-    deviation: Floats
-    scaled: Bent
+    value: Floats  # (n,): given minus height in the strip, metres
+    columns: Floats  # (n, c): tilt and, where it is needed, bending
+    whole: list[Floats]  # (n,): all columns of tilt and bending
+    deviation: Floats  # (n,): heights in the strip, against their mean
+    scaled: Bent  # fit with the scale of the heights free; its last coefficient is that scale minus one
 
     @property
     def ratio(self) -> tuple[float, float]:
@@ -108,20 +93,11 @@ def compare(given: Given, fitted: Fitted, judged: Flags) -> Heights | None:
 
 
 class Stretched(NamedTuple):
-    """How a strip fits the heights of its control.
+    """How a strip fits the heights of its control."""
 
-    Parameters
-    ----------
-    ratio : float
-        Heights given over heights in the strip.
-    misfit : float
-        What is left of the heights as they are, in units of what makes sense.
-    relief : float
-        Rms of the heights that no tilt and no bend explains, in the same units: what a stretch would show in.
-    """
-
-    ratio: float
-    misfit: float
+    ratio: float  # heights given over heights in the strip
+    misfit: float  # what is left of the heights as they are, in units of what makes sense
+    # rms of the heights that no tilt and no bend explains, in the same units: what a stretch would show in
     relief: float
 
 

@@ -33,22 +33,13 @@ MILLION = 1e6
 
 
 class Place(NamedTuple):
-    """Where a control list lies.
+    """Where a control list lies."""
 
-    Parameters
-    ----------
-    findings : list of Finding
-        P401, P402, P403.
-    sure : bool or None
-        Whether its axes are right because the exchanged ones would lie elsewhere (True), wrong (False), or nobody knows
-        (None).
-    inside : bool
-        Whether it lies where its coordinate reference system is made for, as far as that is known.
-    """
-
-    findings: list[Finding]
+    findings: list[Finding]  # P401, P402, P403
+    # whether its axes are right because the exchanged ones would lie elsewhere (True), wrong (False), or nobody knows
+    # (None)
     sure: bool | None
-    inside: bool
+    inside: bool  # whether it lies where its coordinate reference system is made for, as far as that is known
 
 
 def examine(frame: GroundFrame, area: Area | None, enu: Floats, number: int) -> Place:

@@ -33,19 +33,11 @@ EARTH_RADIUS = 6.37e6  # metres
 
 
 class Left(NamedTuple):
-    """What is left at given points after a strip was laid on them.
-
-    Parameters
-    ----------
-    height : Bent or None
-        In height; None where too few heights are given to say.
-    usable : ndarray of bool, shape (n,)
-        Points whose height can be judged.
-    """
+    """What is left at given points after a strip was laid on them."""
 
     plan: Bent
-    height: Bent | None
-    usable: Flags
+    height: Bent | None  # in height; None where too few heights are given to say
+    usable: Flags  # (n,): points whose height can be judged
 
     def heights(self) -> tuple[Floats, Floats]:
         """Give residual and standard deviation of each height, NaN where it cannot be judged, shape (n,), metres."""

@@ -32,37 +32,19 @@ AXES = ("east", "north", "up")
 
 @dataclass(frozen=True, eq=False)
 class Given:
-    """Given points that a strip shows.
-
-    Parameters
-    ----------
-    level : ndarray, shape (n, 3)
-        East, north, up in metres in a level frame in the middle of the control; NaN where not given.
-    use : ndarray of bool, shape (n, 3)
-        Which coordinates count.
-    check : ndarray of bool, shape (n,)
-        Check points.
-    group : ndarray of int, shape (n,)
-        Control list of each.
-    written : ndarray, shape (n, 3)
-        The coordinates as they are written, east, north, up; NaN where slips of the pen cannot be sought in them.
-    unit : ndarray, shape (n, 3)
-        Metres in a unit of the written coordinates.
-    axes : ndarray, shape (n, 3, 3)
-        Directions of the written axes in the level frame, as rows.
-    sigma : tuple of float
-        Usual standard deviation of the given coordinates in plan and in height, metres.
-    """
+    """Given points that a strip shows."""
 
     ids: tuple[str, ...]
+    # (n, 3): east, north, up in metres in a level frame in the middle of the control; NaN where not given
     level: Floats
-    use: Flags
-    check: Flags
-    group: Numbers
+    use: Flags  # (n, 3): which coordinates count
+    check: Flags  # (n,): check points
+    group: Numbers  # (n,): control list of each
+    # (n, 3): the coordinates as they are written, east, north, up; NaN where slips of the pen cannot be sought in them
     written: Floats
-    unit: Floats
-    axes: Floats
-    sigma: tuple[float, float]
+    unit: Floats  # (n, 3): metres in a unit of the written coordinates
+    axes: Floats  # (n, 3, 3): directions of the written axes in the level frame, as rows
+    sigma: tuple[float, float]  # usual standard deviation of the given coordinates in plan and in height, metres
 
     @property
     def plan(self) -> Complex:
@@ -73,27 +55,13 @@ class Given:
 
 @dataclass(frozen=True, eq=False)
 class Rays:
-    """What the photos of a strip show of one point.
+    """What the photos of a strip show of one point."""
 
-    Parameters
-    ----------
-    xy : ndarray, shape (r, 2)
-        Image coordinates, mm.
-    sigma : ndarray, shape (r,)
-        Their standard deviations, mm.
-    centers : ndarray, shape (r, 3)
-        Perspective centres in the strip.
-    rotations : ndarray, shape (r, 3, 3)
-        Photo to strip.
-    focal : float
-        Principal distance, mm.
-    """
-
-    xy: Floats
-    sigma: Floats
-    centers: Floats
-    rotations: Floats
-    focal: float
+    xy: Floats  # (r, 2): image coordinates, mm
+    sigma: Floats  # (r,): their standard deviations, mm
+    centers: Floats  # (r, 3): perspective centres in the strip
+    rotations: Floats  # (r, 3, 3): photo to strip
+    focal: float  # principal distance, mm
 
     @property
     def count(self) -> int:
@@ -145,60 +113,32 @@ NO_RAYS = Rays(np.zeros((0, 2)), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3, 
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """The same points as a strip sees them.
-
-    Parameters
-    ----------
-    xyz : ndarray, shape (n, 3)
-        Strip coordinates; the third may be NaN, when only a mosaic is known.
-    axes : ndarray, shape (p, 3)
-        Third axes of its photos, from the ground to the camera.
-    centers : ndarray, shape (p, 3)
-        Perspective centres.
-    floor : tuple of float
-        A-priori standard deviation of the difference between strip and given coordinates in plan and in height, as a
-        share of the distance from camera to ground.
-    depth : float
-        Distance from camera to ground, in units of the strip.
-    base_angle : float
-        Direction of the bases on the photos, radians from the x axis; a mean.
-    rays_of : callable
-        Gives the rays of a point by its id; a mosaic knows none.
-    """
+    """The same points as a strip sees them."""
 
     strip: str
-    xyz: Floats
-    axes: Floats
-    centers: Floats
+    xyz: Floats  # (n, 3): strip coordinates; the third may be NaN, when only a mosaic is known
+    axes: Floats  # (p, 3): third axes of its photos, from the ground to the camera
+    centers: Floats  # (p, 3): perspective centres
+    # a-priori standard deviation of the difference between strip and given coordinates in plan and in height, as a
+    # share of the distance from camera to ground
     floor: tuple[float, float]
-    depth: float
-    base_angle: float = 0.0
-    rays_of: Callable[[str], Rays] = lambda _name: NO_RAYS
+    depth: float  # distance from camera to ground, in units of the strip
+    base_angle: float = 0.0  # direction of the bases on the photos, radians from the x axis; a mean
+    rays_of: Callable[[str], Rays] = lambda _name: NO_RAYS  # gives the rays of a point by its id; a mosaic knows none
 
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A strip on its control, bending taken out.
-
-    Parameters
-    ----------
-    along, across : ndarray, shape (n,)
-        Places of the points along and across the strip, metres.
-    height : ndarray, shape (n,)
-        Heights in the strip, metres.
-    floor : tuple of float
-        A-priori standard deviations in plan and height, metres.
-    strip_from_level : ndarray, shape (3, 3)
-        Steps in the strip from steps in the level frame, metres.
-    """
+    """A strip on its control, bending taken out."""
 
     laid: Laid
+    # along, across: (n,): places of the points along and across the strip, metres
     along: Floats
     across: Floats
-    height: Floats
-    floor: tuple[float, float]
+    height: Floats  # (n,): heights in the strip, metres
+    floor: tuple[float, float]  # a-priori standard deviations in plan and height, metres
     plan: Bent
-    strip_from_level: Floats
+    strip_from_level: Floats  # (3, 3): steps in the strip from steps in the level frame, metres
 
 
 def rotated(xyz: Floats, turn: Floats) -> Floats:
@@ -223,27 +163,13 @@ def rotated(xyz: Floats, turn: Floats) -> Floats:
 
 
 class Level(NamedTuple):
-    """A strip, turned level.
+    """A strip, turned level."""
 
-    Parameters
-    ----------
-    w : ndarray of complex, shape (n,)
-        Places of its points.
-    z : ndarray, shape (n,)
-        Their heights, in the same unit.
-    laid : Laid
-        The strip on its control in plan.
-    turn : ndarray, shape (3, 3)
-        Steps of the level strip from steps of the strip as it was formed.
-    depth : float
-        Distance from camera to ground, in the unit of `w`.
-    """
-
-    w: Complex
-    z: Floats
-    laid: Laid
-    turn: Floats
-    depth: float
+    w: Complex  # (n,): places of its points
+    z: Floats  # (n,): their heights, in the same unit
+    laid: Laid  # the strip on its control in plan
+    turn: Floats  # (3, 3): steps of the level strip from steps of the strip as it was formed
+    depth: float  # distance from camera to ground, in the unit of `w`
 
 
 def levelled(given: Given, level: Level, floor: float, took_part: Flags) -> Level:

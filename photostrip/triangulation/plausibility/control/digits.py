@@ -16,18 +16,10 @@ MOST_DECIMALS = 4
 
 
 class Slip(NamedTuple):
-    """A slip of the pen.
+    """A slip of the pen."""
 
-    Parameters
-    ----------
-    meant : float
-        The coordinate that was meant.
-    text : str
-        What happened, in words.
-    """
-
-    meant: float
-    text: str
+    meant: float  # the coordinate that was meant
+    text: str  # what happened, in words
 
 
 def slip(given: float, predicted: float, scatter: float, tolerance: float) -> Slip | None:

@@ -39,27 +39,14 @@ OTHER_SCALE = 1.25  # ratio to both neighbours that tilts and relief do not make
 
 @dataclass(frozen=True)
 class Arranged:
-    """A strip as its photos lie, for the evidence that needs them in order.
+    """A strip as its photos lie, for the evidence that needs them in order."""
 
-    Parameters
-    ----------
-    photos : tuple of str
-        Photos in the order in which they lie, each place once.
-    steps : tuple of complex
-        Centre of the next photo on each of them, in the unit of its coordinates; NaN where it has no link.
-    mirrored : frozenset of str
-        Photos that are mirror images of the others.
-    size : dict of str to float
-        Photos whose coordinates are larger than those of the others, and how many times.
-    changed : bool
-        Whether anything of this differs from what is given.
-    """
-
-    photos: tuple[str, ...]
+    photos: tuple[str, ...]  # photos in the order in which they lie, each place once
+    # centre of the next photo on each of them, in the unit of its coordinates; NaN where it has no link
     steps: tuple[complex, ...]
-    mirrored: frozenset[str]
-    size: dict[str, float]
-    changed: bool
+    mirrored: frozenset[str]  # photos that are mirror images of the others
+    size: dict[str, float]  # photos whose coordinates are larger than those of the others, and how many times
+    changed: bool  # whether anything of this differs from what is given
 
 
 def examine(

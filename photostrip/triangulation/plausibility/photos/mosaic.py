@@ -40,31 +40,16 @@ SMALL = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Links:
-    """Photos of one strip that share points, two and two.
+    """Photos of one strip that share points, two and two."""
 
-    Parameters
-    ----------
-    photo : ndarray of int, shape (l, 2)
-        Places of the two photos in the strip's list, the smaller first.
-    count : ndarray of int, shape (l,)
-        Common points.
-    turn, shift : ndarray of complex, shape (l,)
-        Second photo from first: z_b = turn z_a + shift, or with conj(z_a) where `mirrored`.
-    misfit : ndarray, shape (l,)
-        Mean residual, in the unit of the image coordinates.
-    spread : ndarray, shape (l,)
-        Rms distance of the common points from their centre, on the second photo.
-    mirrored : ndarray of bool, shape (l,)
-        Whether one of the two is a mirror image of the other.
-    """
-
-    photo: Numbers
-    count: Numbers
+    photo: Numbers  # (l, 2): places of the two photos in the strip's list, the smaller first
+    count: Numbers  # (l,): common points
+    # turn, shift: (l,): second photo from first: z_b = turn z_a + shift, or with conj(z_a) where `mirrored`
     turn: Complex
     shift: Complex
-    misfit: Floats
-    spread: Floats
-    mirrored: Flags
+    misfit: Floats  # (l,): mean residual, in the unit of the image coordinates
+    spread: Floats  # (l,): rms distance of the common points from their centre, on the second photo
+    mirrored: Flags  # (l,): whether one of the two is a mirror image of the other
 
     def __len__(self) -> int:
         """Return the number of links."""
@@ -186,28 +171,16 @@ def _shape(z: Complex, starts: Numbers, count: Numbers) -> tuple[Floats, Flags]:
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """Photos of a strip in one plane.
+    """Photos of a strip in one plane."""
 
-    Parameters
-    ----------
-    part : ndarray of int, shape (n,)
-        Which connected part each photo belongs to; the largest part is 0.
-    center : ndarray of complex, shape (n,)
-        Centre of each photo in the plane of its part.
-    factor, offset : ndarray of complex, shape (n,)
-        Plane from photo: Z = factor z + offset, with conj(z) for mirrored photos.
-    mirrored : ndarray of bool, shape (n,)
-        Photos that are mirror images of most of the others of their part.
-    size : ndarray, shape (n,)
-        How many times larger the coordinates of a photo are than those of most others; changes of a few ten percent
-        from photo to photo, which are changes of the flying height, do not count.
-    """
-
-    part: Numbers
-    center: Complex
+    part: Numbers  # (n,): which connected part each photo belongs to; the largest part is 0
+    center: Complex  # (n,): centre of each photo in the plane of its part
+    # factor, offset: (n,): plane from photo: Z = factor z + offset, with conj(z) for mirrored photos
     factor: Complex
     offset: Complex
-    mirrored: Flags
+    mirrored: Flags  # (n,): photos that are mirror images of most of the others of their part
+    # (n,): how many times larger the coordinates of a photo are than those of most others; changes of a few ten percent
+    # from photo to photo, which are changes of the flying height, do not count
     size: Floats
 
 

@@ -46,18 +46,10 @@ READINGS = (
 
 
 class Reading(NamedTuple):
-    """What would bring image coordinates to a likely size.
+    """What would bring image coordinates to a likely size."""
 
-    Parameters
-    ----------
-    factor : float
-        What they would have to be multiplied by.
-    name : str
-        What may have happened; empty when nothing is known that explains it.
-    """
-
-    factor: float
-    name: str
+    factor: float  # what they would have to be multiplied by
+    name: str  # what may have happened; empty when nothing is known that explains it
 
 
 def reading_of(ratio: float, likely: tuple[float, float], pixel_size: float | None = None) -> Reading:
