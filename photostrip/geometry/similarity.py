@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
+from photostrip.geometry.rotation import cross_matrix
 from photostrip.points import frozen
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     Floats = NDArray[np.float64]
+
+SIMILARITY_PARAMETERS = 7  # shift, rotation, logarithm of the scale
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,3 +123,19 @@ def collinearity(points: ArrayLike, weights: ArrayLike | None = None) -> float:
     d = p - np.average(p, axis=0, weights=w)
     values = np.linalg.svd((d * w[:, None]).T @ d, compute_uv=False)
     return float(values[1] / values[0]) if values[0] > 0 else 0.0
+
+
+def similarity_derivatives(xyz: Floats, origin: Floats) -> Floats:
+    """Displacements by an infinitesimal similarity about an origin: dX = t + theta x (X - O) + lambda (X - O).
+
+    Returns
+    -------
+    ndarray, shape (n, 3, 7)
+        Derivatives by shift t, rotation theta (radians) and logarithm of the scale lambda.
+    """
+    arm = xyz - origin
+    derivatives = np.zeros((len(arm), 3, SIMILARITY_PARAMETERS))
+    derivatives[:, :, :3] = np.eye(3)
+    derivatives[:, :, 3:6] = -cross_matrix(arm)
+    derivatives[:, :, 6] = arm
+    return derivatives

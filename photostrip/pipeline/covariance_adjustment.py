@@ -9,6 +9,7 @@ import numpy as np
 
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.geometry.rotation import from_vector
+from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 from photostrip.notes import Note
 from photostrip.triangulation import absolute_orientation as absolute
 from photostrip.triangulation.covariance_adjustment import conditions as strip_conditions
@@ -17,7 +18,7 @@ from photostrip.triangulation.covariance_adjustment import system as strip_syste
 from photostrip.triangulation.covariance_adjustment.conditions import centers_of
 from photostrip.triangulation.error_propagation import control_errors, strip_errors
 from photostrip.triangulation.error_propagation.covariances import image_variance
-from photostrip.triangulation.error_propagation.derivatives import ELEMENTS, PARAMETERS, UNITS, Rows, similarity_rows
+from photostrip.triangulation.error_propagation.derivatives import ELEMENTS, UNITS, Rows
 from photostrip.triangulation.resection import resection as exterior
 
 if TYPE_CHECKING:
@@ -255,8 +256,8 @@ def photo_rows(errors: strip_errors.StripErrors) -> Rows:
     """
     models = errors.models
     centers = centers_of(errors)
-    frame = np.zeros((models + 1, 6, PARAMETERS))
-    frame[:, :3] = similarity_rows(centers, np.zeros(3))
+    frame = np.zeros((models + 1, 6, SIMILARITY_PARAMETERS))
+    frame[:, :3] = similarity_derivatives(centers, np.zeros(3))
     frame[:, 3:, 3:6] = np.eye(3)
     core = np.zeros((models + 1, 1, 6, UNITS))
     core[-1, 0, :3, ELEMENTS] = errors.pairs.base[-1]

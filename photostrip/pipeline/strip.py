@@ -10,12 +10,13 @@ import numpy as np
 
 from photostrip.errors import GeometryError
 from photostrip.geodesy.local_frame import IntermediateFrame, mean_position, strip_azimuth
+from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.notes import Note
 from photostrip.pipeline import covariance_adjustment as covariance
 from photostrip.pipeline import overruling
 from photostrip.pipeline.results import StripResult
 from photostrip.triangulation import absolute_orientation
-from photostrip.triangulation.error_propagation import control_errors, covariances, derivatives, strip_errors
+from photostrip.triangulation.error_propagation import control_errors, covariances, strip_errors
 from photostrip.triangulation.gross_errors.control import control_screening, control_significance
 from photostrip.triangulation.gross_errors.pairs import screening
 from photostrip.triangulation.gross_errors.rays import settling, strip_screening
@@ -202,7 +203,7 @@ def _joint(
     # image coordinates are taken as good as stated, or as bad as the pairs have proved
     factor = max(1.0, float(np.median(screened.scatter.by_pair)) ** 2 / (2 * sigma**2))
     covariance = covariances.fitted(errors, found, np.eye(len(found.point)), factor).parameters * factor
-    moved = derivatives.similarity_rows(xyz[found.point], errors.origin)
+    moved = similarity_derivatives(xyz[found.point], errors.origin)
     design = np.einsum("wi,wij->wj", found.direction, moved)
     return control_significance.Joint(found.point, found.axis, design, covariance)
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.notes import Note
-from photostrip.triangulation.error_propagation.derivatives import similarity_rows
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -107,7 +107,7 @@ def far_ends(formed: FormedModels) -> Floats:
     rows = np.flatnonzero((models.model > 0) & (models.node < models.points))
     link = models.model[rows] - 1
     moved = solved.similarities.of(link, models.xyz[rows])
-    design = similarity_rows(moved - solved.centroid[link], np.zeros(3))
+    design = similarity_derivatives(moved - solved.centroid[link], np.zeros(3))
     variance = np.einsum("nij,njk,nik->ni", design, solved.cofactors[link], design).max(axis=1)
     scale = solved.similarities.scale
     found = np.zeros(len(scale))

@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 from photostrip.pipeline.precision.check_points import check_points
 from photostrip.pipeline.precision.strip_precision import StripPrecision
 from photostrip.statistics import chi2_quantile
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.error_propagation import control_errors
 from photostrip.triangulation.error_propagation.covariances import A_POSTERIORI, A_PRIORI, LEVEL, CheckTest
-from photostrip.triangulation.error_propagation.derivatives import PARAMETERS, Rows, similarity_rows
+from photostrip.triangulation.error_propagation.derivatives import Rows
 from photostrip.triangulation.gross_errors.control import control_significance
 from photostrip.triangulation.independent_models import model_errors, perspective_centers
 from photostrip.triangulation.polynomial.terms import POWERS
@@ -131,7 +132,7 @@ def joint(
     covariance = (
         model_errors.covariance_of_sums(found, model_errors.sums(found, *_weights(seen, rows))) * formed.links.factor
     )
-    moved = similarity_rows(xyz[seen.point], found.origin)
+    moved = similarity_derivatives(xyz[seen.point], found.origin)
     design = np.einsum("wi,wij->wj", seen.direction, moved)
     return control_significance.Joint(seen.point, seen.axis, design, covariance + np.diag(seen.variance))
 
@@ -153,7 +154,7 @@ def _misclosures(control: ControlPoints, axes: Floats, xyz: Floats, origin: Floa
     """Control coordinates that count, with their derivatives by a similarity of the strip."""
     point, axis = np.nonzero(control.use)
     direction = axes[point, axis]
-    frame = direction[:, None] @ similarity_rows(xyz[point], origin)
+    frame = direction[:, None] @ similarity_derivatives(xyz[point], origin)
     nothing = np.zeros(0, np.intp)
     rows = Rows(nothing, frame, np.zeros((len(point), 0, 1, 0)), nothing, nothing, np.zeros((0, 1, 2)))
     return control_errors.Misclosures(point, axis, direction, control.sigma[point, axis] ** 2, rows)
@@ -177,7 +178,7 @@ def _influence(strip: LinkedStrip, fit: Correction) -> Floats:
     if points < len(nodes) and any(fit.terms):
         above = perspective_centers.heights_above(nodes[points:], nodes[:points])
         unit = np.array([fit.reach, fit.breadth, 1.0])
-        start = PARAMETERS
+        start = SIMILARITY_PARAMETERS
         for columns in _scaled_rows(nodes[points:], above, fit.terms, unit):
             influence[points:, :, start : start + columns.shape[2]] = columns
             start += columns.shape[2]

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geometry.rotation import cross_matrix
-from photostrip.triangulation.error_propagation.derivatives import ELEMENTS, PARAMETERS, UNITS, Rows, similarity_rows
+from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
+from photostrip.triangulation.error_propagation.derivatives import ELEMENTS, UNITS, Rows
 from photostrip.triangulation.error_propagation.strip_errors import scale_shares
 
 if TYPE_CHECKING:
@@ -53,9 +54,9 @@ class Local:
     def about(cls, centers: Floats, length: float) -> Local:
         """Make them for models whose left centres are given from the common origin, metres."""
         count = len(centers)
-        shift = np.tile(np.eye(PARAMETERS), (count, 1, 1))
+        shift = np.tile(np.eye(SIMILARITY_PARAMETERS), (count, 1, 1))
         shift[:, :3, 3:6], shift[:, :3, 6] = cross_matrix(centers), -centers
-        back = np.tile(np.eye(PARAMETERS), (count, 1, 1))
+        back = np.tile(np.eye(SIMILARITY_PARAMETERS), (count, 1, 1))
         back[:, :3, 3:6], back[:, :3, 6] = -cross_matrix(centers), centers
         size = np.array([1.0] * 3 + [length] * 4)
         return cls(shift / size, back * size[:, None])
@@ -159,29 +160,31 @@ def _sorted(parts: Sequence[Conditions], slots: int) -> Conditions:
 def _joints(errors: StripErrors, local: Local, slots: int) -> Conditions:
     """Seven for each joint: 0 = y(i+1) - y(i) carried over - step."""
     joints = errors.models - 1
-    count = joints * PARAMETERS
+    count = joints * SIMILARITY_PARAMETERS
     carried = -local.from_common[1:] @ local.to_common[:-1]
-    core = np.zeros((joints, PARAMETERS, slots, 1, UNITS))
+    core = np.zeros((joints, SIMILARITY_PARAMETERS, slots, 1, UNITS))
     core[:, :, 0, 0] = -local.from_common[1:] @ errors.steps[:-1]
     none = np.zeros(0, np.intp)
-    number = np.repeat(np.arange(joints), PARAMETERS)
+    number = np.repeat(np.arange(joints), SIMILARITY_PARAMETERS)
     rows = Rows(
         number,
-        carried.reshape(count, 1, PARAMETERS),
+        carried.reshape(count, 1, SIMILARITY_PARAMETERS),
         core.reshape(count, slots, 1, UNITS),
         none,
         none,
         np.zeros((0, 1, 2)),
     )
     zero = np.zeros(count)
-    return Conditions(rows, np.tile(np.eye(PARAMETERS), (joints, 1)), zero, zero, np.full(count, JOINT), number)
+    return Conditions(
+        rows, np.tile(np.eye(SIMILARITY_PARAMETERS), (joints, 1)), zero, zero, np.full(count, JOINT), number
+    )
 
 
 def _control(control: Misclosures, given: Floats, local: Local) -> Conditions:
     rows, count = control.rows, len(given)
     frame = rows.frame @ local.to_common[rows.first]
     placed = Rows(rows.first, frame, rows.core, rows.item, rows.image, rows.own)
-    zero = np.zeros((count, PARAMETERS))
+    zero = np.zeros((count, SIMILARITY_PARAMETERS))
     return Conditions(placed, zero, given, control.variance, np.full(count, CONTROL), np.arange(count))
 
 
@@ -206,12 +209,12 @@ def _distances(errors: StripErrors, orientation: Orientation, formed: FormedStri
     along = (ray / np.linalg.norm(ray, axis=1)[:, None])[:, None]
     core = np.zeros((len(chosen), slots, 1, UNITS))
     center = centers_of(errors)[joint + 1]
-    place = similarity_rows(center + arms[0], np.zeros(3))
+    place = similarity_derivatives(center + arms[0], np.zeros(3))
     core[:, 0] = along @ place @ errors.steps[joint]
     core[:, 0, :, ELEMENTS] -= along @ pairs.deformation[before]
     core[:, 1, :, ELEMENTS] += along @ pairs.deformation[after]
     item, image, own = _own_of_distances(errors, orientation, (before, after), along)
-    zero, count = np.zeros((len(chosen), 1, PARAMETERS)), len(chosen)
+    zero, count = np.zeros((len(chosen), 1, SIMILARITY_PARAMETERS)), len(chosen)
     rows = Rows(joint, zero, core, item, image, own)
     value = np.einsum("ni,ni->n", along[:, 0], arms[1] - arms[0])
     return Conditions(rows, zero[:, 0], value, np.zeros(count), np.full(count, DISTANCE), chosen)

@@ -15,17 +15,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.distributions import gamma_cdf
+from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.statistics import normal_quantile
 from photostrip.triangulation.covariance_adjustment.conditions import CONTROL, DISTANCE, Conditions, Local
 from photostrip.triangulation.covariance_adjustment.system import Padded, System, pad, products, same_images
 from photostrip.triangulation.error_propagation.covariances import local_covariances, own_with_units
-from photostrip.triangulation.error_propagation.derivatives import PARAMETERS, Rows
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
+    from photostrip.triangulation.error_propagation.derivatives import Rows
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
     Floats = NDArray[np.float64]
@@ -210,8 +211,8 @@ class _Job:
                 ].T
         for place, model in enumerate(mine.tolist()):
             top, left, right = layout.unknown[model], (ends[place] - low) * size, (ends[place + 1] - low) * size
-            frame = self.frame[ends[place] : ends[place + 1]].reshape(-1, PARAMETERS)
-            mixed[1, top : top + PARAMETERS, left:right] = frame.T
+            frame = self.frame[ends[place] : ends[place + 1]].reshape(-1, SIMILARITY_PARAMETERS)
+            mixed[1, top : top + SIMILARITY_PARAMETERS, left:right] = frame.T
 
 
 def influence(errors: StripErrors, wanted: Conditions, local: Local, found: System, rows: Rows) -> Floats:
@@ -286,5 +287,5 @@ def tested(wanted: Conditions, found: System, cofactors: Floats, count: int) -> 
     normalised[wanted.source[checked]] = correlates[checked] / np.sqrt(cofactors[checked])
     size[wanted.source[checked]] = -correlates[checked] / cofactors[checked]  # given minus true
     distances = int((wanted.kind == DISTANCE).sum())
-    redundancy = count - PARAMETERS + distances
+    redundancy = count - SIMILARITY_PARAMETERS + distances
     return Tested(float(wanted.value @ correlates), redundancy, normalised, size, distances)

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.triangulation.error_propagation.covariances import by_images
-from photostrip.triangulation.error_propagation.derivatives import PARAMETERS, REACH, SPAN, UNITS, Rows
+from photostrip.triangulation.error_propagation.derivatives import REACH, SPAN, UNITS, Rows
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -88,6 +89,6 @@ def largest_turn(found: System, length: float) -> float:
     """
     layout = found.layout
     models = np.arange(len(layout.start))
-    columns = layout.unknown[:, None] + np.arange(3, PARAMETERS)
+    columns = layout.unknown[:, None] + np.arange(3, SIMILARITY_PARAMETERS)
     unknowns = found.solution[(models // layout.width)[:, None], columns] / length
     return float(np.sqrt(np.square(unknowns).sum(axis=1).max()))

@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.triangulation.covariance_adjustment import block_tridiagonal
 from photostrip.triangulation.error_propagation.covariances import own_with_units
-from photostrip.triangulation.error_propagation.derivatives import PARAMETERS, REACH, UNITS, Rows
+from photostrip.triangulation.error_propagation.derivatives import REACH, UNITS, Rows
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -150,11 +151,11 @@ class Layout:
         """Lay out conditions that are ordered by their first models."""
         counts = np.bincount(first, minlength=models)
         rank = np.arange(len(first)) - (np.cumsum(counts) - counts)[first]
-        begins = np.cumsum(counts + PARAMETERS) - counts - PARAMETERS
+        begins = np.cumsum(counts + SIMILARITY_PARAMETERS) - counts - SIMILARITY_PARAMETERS
         numbers = np.arange(models)
         start = begins - begins[numbers // width * width]
         unknown = start + counts
-        height = int(unknown.max()) + PARAMETERS
+        height = int(unknown.max()) + SIMILARITY_PARAMETERS
         blocks = (models - 1) // width + 1
         return cls(width, blocks, height, rank, first // width, start[first] + rank, start, unknown)
 
@@ -163,7 +164,7 @@ class Layout:
         used = np.zeros((self.blocks, self.height), bool)
         used[self.block, self.position] = True
         models = np.arange(len(self.start))
-        used[(models // self.width)[:, None], self.unknown[:, None] + np.arange(PARAMETERS)] = True
+        used[(models // self.width)[:, None], self.unknown[:, None] + np.arange(SIMILARITY_PARAMETERS)] = True
         blocks, places = np.nonzero(~used)
         return blocks, places
 
@@ -288,7 +289,7 @@ def _add_design(matrix: Matrix, layout: Layout, wanted: Conditions) -> None:
         (np.arange(len(first)), first, wanted.rows.frame[:, 0]),
         (linked, first[linked] + 1, wanted.following[linked]),
     ):
-        for column in range(PARAMETERS):
+        for column in range(SIMILARITY_PARAMETERS):
             row = layout.block[condition], layout.position[condition]
             target = model // layout.width, layout.unknown[model] + column
             matrix.add(row, target, values[:, column], both=True)

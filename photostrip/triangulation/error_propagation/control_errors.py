@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.triangulation.error_propagation.derivatives import PARAMETERS, Rows, similarity_rows
+from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
+from photostrip.triangulation.error_propagation.derivatives import Rows
 from photostrip.triangulation.polynomial.terms import POWERS
 
 if TYPE_CHECKING:
@@ -65,8 +66,8 @@ class Correction:
         """
         columns = self.polynomial_columns(xyz)
         result = np.zeros((len(xyz), 3, len(self.operator)))
-        result[:, :, :PARAMETERS] = similarity_rows(xyz, self.origin)
-        start = PARAMETERS
+        result[:, :, :SIMILARITY_PARAMETERS] = similarity_derivatives(xyz, self.origin)
+        start = SIMILARITY_PARAMETERS
         for axis, values in enumerate(columns):
             result[:, axis, start : start + values.shape[1]] = values
             start += values.shape[1]

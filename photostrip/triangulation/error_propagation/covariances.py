@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.distributions import gamma_cdf
+from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.statistics import chi2_quantile
-from photostrip.triangulation.error_propagation.derivatives import PARAMETERS, REACH, SPAN, UNITS, Rows
+from photostrip.triangulation.error_propagation.derivatives import REACH, SPAN, UNITS, Rows
 from photostrip.triangulation.relative_orientation.relative import MINIMUM_POINTS
 
 if TYPE_CHECKING:
@@ -107,13 +108,13 @@ def chain(errors: StripErrors) -> Chain:
     P(m+1) = P(m) + Q(m,m) + c + c^T, c = Q(m-1,m) + Q(m-2,m): steps correlate over two models, not one.
     """
     steps, models = errors.steps, errors.models
-    ahead = np.zeros((models + 1, 2, PARAMETERS, UNITS))
+    ahead = np.zeros((models + 1, 2, SIMILARITY_PARAMETERS, UNITS))
     for apart in range(1, SPAN):
         with_units = steps @ errors.covariances[:, apart]
         for slot in range(apart):  # of the steps before model m, those of m - 1 and m - 2 reach units from m on
             before = apart - slot
             ahead[before:, slot] += with_units[: models + 1 - before]
-    added = np.zeros((models + 1, PARAMETERS, PARAMETERS))
+    added = np.zeros((models + 1, SIMILARITY_PARAMETERS, SIMILARITY_PARAMETERS))
     cross = ahead[:models, 0] @ steps.transpose(0, 2, 1)
     added[1:] = steps @ errors.covariances[:, 0] @ steps.transpose(0, 2, 1) + cross + cross.transpose(0, 2, 1)
     return Chain(np.cumsum(added, axis=0), ahead)
@@ -138,7 +139,7 @@ def fitted(errors: StripErrors, found: Misclosures, operator: Floats, factor: fl
     core, units, near, own = _sums(errors, found.rows, operator)
     with_images = _by_photo(errors, core, np.arange(len(images.row)))
     with_images[near] += own
-    frames = np.zeros((errors.models + 1, PARAMETERS, len(operator)))
+    frames = np.zeros((errors.models + 1, SIMILARITY_PARAMETERS, len(operator)))
     frames[1:] = np.cumsum(steps @ units, axis=0)
     parameters = np.einsum("kit,kis->ts", core, units) + np.einsum("nit,nis->ts", own, with_images[near])
     parameters += (operator * (found.variance / factor)) @ operator.T
@@ -201,7 +202,7 @@ def _sums(errors: StripErrors, rows: Rows, operator: Floats) -> tuple[Floats, Fl
 def _summed_units(errors: StripErrors, rows: Rows, weights: Floats) -> Floats:
     """Coefficients of the units in weighted sums of rows with d = 1, shape (p, 6, t)."""
     models, count = errors.models, weights.shape[1]
-    by_first = np.zeros((models + 1, PARAMETERS, count))
+    by_first = np.zeros((models + 1, SIMILARITY_PARAMETERS, count))
     np.add.at(by_first, rows.first, rows.frame[:, 0, :, None] * weights[:, None, :])
     after = np.cumsum(by_first[::-1], axis=0)[::-1][1:]  # rows whose first model comes after each model
     core: Floats = errors.steps.transpose(0, 2, 1) @ after

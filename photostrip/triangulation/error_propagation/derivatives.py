@@ -10,15 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.geometry.rotation import cross_matrix
-
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
 
-UNITS, PARAMETERS = 6, 7
+UNITS = 6
 ELEMENTS, SCALE = slice(0, 5), 5  # units of a model
 REACH = 2  # models between which units share image coordinates
 SPAN = REACH + 1  # photos on which the image coordinates of a unit lie
@@ -76,26 +74,3 @@ class Rows:
             self.image[low:high],
             self.own[low:high],
         )
-
-
-def similarity_rows(xyz: Floats, origin: Floats) -> Floats:
-    """Displacements by an infinitesimal similarity: dX = t + theta x (X - O) + lambda (X - O).
-
-    Parameters
-    ----------
-    xyz : ndarray, shape (n, 3)
-        Positions, metres.
-    origin : ndarray, shape (3,)
-        Origin O.
-
-    Returns
-    -------
-    ndarray, shape (n, 3, 7)
-        Derivatives by shift (metres), rotation (radians) and logarithm of the scale.
-    """
-    arm = xyz - origin
-    rows = np.zeros((len(arm), 3, PARAMETERS))
-    rows[:, :, :3] = np.eye(3)
-    rows[:, :, 3:6] = -cross_matrix(arm)
-    rows[:, :, 6] = arm
-    return rows

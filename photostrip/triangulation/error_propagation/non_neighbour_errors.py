@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geometry.rotation import cross_matrix
-from photostrip.triangulation.error_propagation.derivatives import UNITS, Images, Rows, similarity_rows
+from photostrip.geometry.similarity import similarity_derivatives
+from photostrip.triangulation.error_propagation.derivatives import UNITS, Images, Rows
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -54,7 +55,7 @@ def with_bridges(
     core[:, : points.core.shape[1]] = points.core
     first = points.first.copy()
     first[item] = np.minimum(at[:, 0], len(steps) - 1)
-    moved = by_center @ similarity_rows(photos[0][at[:, 1]], np.zeros(3))
+    moved = by_center @ similarity_derivatives(photos[0][at[:, 1]], np.zeros(3))
     moved[:, :, 3:6] += by_turn
     for slot in range(count):
         inside = np.flatnonzero(at[:, 0] + slot < at[:, 1])

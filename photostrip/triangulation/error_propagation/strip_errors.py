@@ -21,18 +21,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geometry.rotation import cross_matrix
+from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 from photostrip.triangulation.error_propagation import pair_errors
-from photostrip.triangulation.error_propagation.derivatives import (
-    ELEMENTS,
-    PARAMETERS,
-    REACH,
-    SCALE,
-    SPAN,
-    UNITS,
-    Images,
-    Rows,
-    similarity_rows,
-)
+from photostrip.triangulation.error_propagation.derivatives import ELEMENTS, REACH, SCALE, SPAN, UNITS, Images, Rows
 from photostrip.triangulation.error_propagation.non_neighbour_errors import with_bridges
 
 if TYPE_CHECKING:
@@ -157,7 +148,7 @@ def _units(
 
 def _steps(derivatives: PairErrors, next_centers: Floats) -> Floats:
     """Derive steps by units: t = dB - theta x (S - O) - mu (S - O), theta, mu; S the centre that joins the models."""
-    steps = np.zeros((len(next_centers), PARAMETERS, UNITS))
+    steps = np.zeros((len(next_centers), SIMILARITY_PARAMETERS, UNITS))
     steps[:, :3, ELEMENTS] = derivatives.base + cross_matrix(next_centers) @ derivatives.turn
     steps[:, :3, SCALE] = -next_centers
     steps[:, 3:6, ELEMENTS] = derivatives.turn
@@ -207,7 +198,7 @@ def _point_rows(
     held = np.zeros((count, slots + 1))
     held[item, slot] = share
     beyond = np.cumsum(held[:, ::-1], axis=1)[:, ::-1][:, 1:]  # share of the models after each slot
-    frame = similarity_rows(arm, np.zeros(3))
+    frame = similarity_derivatives(arm, np.zeros(3))
     for s in range(slots):
         moved = np.flatnonzero(beyond[:, s] > 0)
         core[moved, s] += beyond[moved, s, None, None] * (frame[moved] @ steps[first[moved] + s])

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geometry.rotation import from_vector
-from photostrip.triangulation.error_propagation.derivatives import PARAMETERS, similarity_rows
+from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -218,7 +218,7 @@ def solve(shared: Common, models: StripModels, used: Flags) -> Solved:
     centroid = shared.sums(share[:, None] * a) / count
     arm = a - centroid[shared.link]
     size = np.sqrt(np.maximum(shared.sums(share * (arm**2).sum(axis=1)) / count[:, 0], 1e-300))
-    unit = np.ones((shared.count, PARAMETERS))
+    unit = np.ones((shared.count, SIMILARITY_PARAMETERS))
     unit[:, 3:] = 1 / size[:, None]  # rotation and scale move the points by as much as a shift
     for _ in range(ITERATIONS):
         turn = found.scale[shared.link, None, None] * found.rotation[shared.link]
@@ -226,7 +226,7 @@ def solve(shared: Common, models: StripModels, used: Flags) -> Solved:
         covariance[:, range(3), range(3)] += variance_a
         weight = np.asarray(np.linalg.inv(covariance), float)
         moved = found.of(shared.link, b)
-        residual, design = a - moved, similarity_rows(moved - centroid[shared.link], np.zeros(3))
+        residual, design = a - moved, similarity_derivatives(moved - centroid[shared.link], np.zeros(3))
         scaled = design * unit[shared.link][:, None, :]
         weighted = scaled.transpose(0, 2, 1) @ weight * share[:, None, None]
         normal, right = shared.sums(weighted @ scaled), shared.sums(np.einsum("tij,tj->ti", weighted, residual))
@@ -237,7 +237,7 @@ def solve(shared: Common, models: StripModels, used: Flags) -> Solved:
             break
     residual = a - found.of(shared.link, b)
     squares = shared.sums(share * np.einsum("ti,tij,tj->t", residual, weight, residual))
-    redundancy = 3 * shared.sums(share).astype(np.intp) - PARAMETERS
+    redundancy = 3 * shared.sums(share).astype(np.intp) - SIMILARITY_PARAMETERS
     cofactors = inverse * unit[:, :, None] * unit[:, None, :]
     return Solved(found, residual, weight, design, cofactors, centroid, squares, redundancy)
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geometry.rotation import cross_matrix
-from photostrip.triangulation.error_propagation.derivatives import PARAMETERS, similarity_rows
+from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -76,7 +76,7 @@ def differentiate(formed: FormedModels, similarity: Similarity) -> ModelErrors:
     before[first], after[second] = np.arange(len(used)), np.arange(len(used))
     item = np.where(formed.used, np.searchsorted(formed.node, models.node), -1)
     share = np.where(formed.used, 1 / formed.node_models[np.maximum(item, 0)], 0.0)
-    frame = similarity_rows(nodes, origin)
+    frame = similarity_derivatives(nodes, origin)
     return ModelErrors(
         origin, covariance, before, after, gain, link, (first, second), models.model, item, share, frame, models.count
     )
@@ -88,13 +88,13 @@ def _gains(link: Numbers, xyz: Floats, covariance: Floats, origin: Floats, count
     center = np.column_stack([np.bincount(link, xyz[:, axis], count) for axis in range(3)]) / number
     arm = xyz - center[link]
     size = np.sqrt(np.bincount(link, (arm**2).sum(axis=1), count) / number[:, 0])
-    unit = np.ones((count, PARAMETERS))
+    unit = np.ones((count, SIMILARITY_PARAMETERS))
     unit[:, 3:] = 1 / np.maximum(size, 1e-300)[:, None]
-    design = similarity_rows(arm, np.zeros(3)) * unit[link][:, None, :]
+    design = similarity_derivatives(arm, np.zeros(3)) * unit[link][:, None, :]
     weighted = design.transpose(0, 2, 1) @ np.linalg.inv(covariance)
-    normal = np.zeros((count, PARAMETERS, PARAMETERS))
+    normal = np.zeros((count, SIMILARITY_PARAMETERS, SIMILARITY_PARAMETERS))
     np.add.at(normal, link, weighted @ design)
-    moved = np.tile(np.eye(PARAMETERS), (count, 1, 1))  # from the link's centre to the common origin
+    moved = np.tile(np.eye(SIMILARITY_PARAMETERS), (count, 1, 1))  # from the link's centre to the common origin
     offset = center - origin
     moved[:, :3, 3:6] = cross_matrix(offset)
     moved[:, :3, 6] = -offset
@@ -126,7 +126,7 @@ def sums(errors: ModelErrors, nodes: Numbers, weights: Floats) -> Floats:
     own = errors.share[rows, None] * weights[:, place[errors.item[rows]]]
     found = np.zeros((len(weights), len(errors.model), 3))
     found[:, rows] = own
-    by_model = np.zeros((errors.models, len(weights), PARAMETERS))
+    by_model = np.zeros((errors.models, len(weights), SIMILARITY_PARAMETERS))
     np.add.at(by_model, errors.model[rows], np.einsum("tri,rij->rtj", own, errors.frame[errors.item[rows]]))
     beyond = np.cumsum(by_model[::-1], axis=0)[::-1][1:]  # of all models after each link
     by_row = np.einsum("etj,eji->tei", beyond[errors.link], errors.gain)
@@ -158,7 +158,7 @@ def with_sums(errors: ModelErrors, coefficients: Floats) -> Floats:
     """
     by_row = np.einsum("rij,trj->rit", errors.covariance, coefficients)
     first, second = errors.rows
-    steps = np.zeros((errors.models, PARAMETERS, len(coefficients)))
+    steps = np.zeros((errors.models, SIMILARITY_PARAMETERS, len(coefficients)))
     np.add.at(steps, errors.link + 1, errors.gain @ (by_row[first] - by_row[second]))
     frames = np.cumsum(steps, axis=0)
     rows = np.flatnonzero(errors.item >= 0)
@@ -186,8 +186,8 @@ def covariances(errors: ModelErrors) -> Floats:
     first model and b_j the share of its models after link j. xi and the steps correlate with their neighbours only.
     """
     steps, mixed = _steps(errors)
-    chain = np.zeros((errors.models, PARAMETERS, PARAMETERS))
-    behind = np.zeros((errors.models, PARAMETERS, PARAMETERS))  # of each similarity with the step that follows it
+    chain = np.zeros((errors.models, SIMILARITY_PARAMETERS, SIMILARITY_PARAMETERS))
+    behind = np.zeros((errors.models, SIMILARITY_PARAMETERS, SIMILARITY_PARAMETERS))
     behind[1:-1] = mixed
     added = steps + behind[:-1] + behind[:-1].transpose(0, 2, 1)
     chain[1:] = np.cumsum(added, axis=0)
@@ -215,9 +215,9 @@ def _steps(errors: ModelErrors) -> tuple[Floats, Floats]:
     first, second = errors.rows
     both = errors.covariance[first] + errors.covariance[second]
     count = errors.models - 1
-    steps = np.zeros((count, PARAMETERS, PARAMETERS))
+    steps = np.zeros((count, SIMILARITY_PARAMETERS, SIMILARITY_PARAMETERS))
     np.add.at(steps, errors.link, errors.gain @ both @ errors.gain.transpose(0, 2, 1))
-    mixed = np.zeros((max(count - 1, 0), PARAMETERS, PARAMETERS))
+    mixed = np.zeros((max(count - 1, 0), SIMILARITY_PARAMETERS, SIMILARITY_PARAMETERS))
     rows = np.flatnonzero((errors.before >= 0) & (errors.after >= 0))  # of a model between two links
     earlier, later = errors.gain[errors.after[rows]], errors.gain[errors.before[rows]]
     np.add.at(mixed, errors.model[rows] - 1, -earlier @ errors.covariance[rows] @ later.transpose(0, 2, 1))
@@ -229,7 +229,7 @@ def _with_own(errors: ModelErrors, place: Floats, parts: tuple[Numbers, Numbers,
     rows, first, beyond = parts
     item, model, share = errors.item[rows], errors.model[rows], errors.share[rows]
     slot = model - first[item]
-    mixed = np.zeros((len(place), PARAMETERS, 3))
+    mixed = np.zeros((len(place), SIMILARITY_PARAMETERS, 3))
     own = share[:, None, None] * errors.covariance[rows]
     behind, ahead = errors.after[rows], errors.before[rows]
     inside = np.flatnonzero(behind >= 0)

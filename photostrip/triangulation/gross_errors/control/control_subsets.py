@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.triangulation import absolute_orientation
-from photostrip.triangulation.error_propagation import derivatives
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -86,7 +86,7 @@ def _sizes(misclosures: Floats) -> Floats:
 def _agreeing(xyz: Floats, targets: Targets, expected: Floats) -> Flags:
     """Coordinates that agree with the best set, to the first order about the present positions."""
     use = targets.control.use
-    rows = targets.axes(xyz) @ derivatives.similarity_rows(xyz, xyz.mean(axis=0))
+    rows = targets.axes(xyz) @ similarity_derivatives(xyz, xyz.mean(axis=0))
     gap = np.nan_to_num(targets.misclosures(xyz))
     good = np.zeros(use.shape, bool)
     plan, height = np.flatnonzero(use[:, 0]), np.flatnonzero(use[:, 2])
