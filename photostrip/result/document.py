@@ -39,7 +39,6 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
     singles = photos.singles_of(result, rank)
     found = ground.differences(result)
     numbers = summary.summary_of(result, found)
-    polynomials = strips.polynomials_of(result)
     body: Document = {
         "adjustment": result.settings.adjustment,
         "frame": ground.frame_of(result),
@@ -52,7 +51,7 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         "cameras": conventions.cameras_of(result),
         "strips": models.strips_of(result) if result.linked else strips.strips_of(result),
         "absolute": strips.absolute_of(result),
-        **({"polynomial": polynomials[0], "polynomials": polynomials} if polynomials else {}),
+        **strips.polynomials_of(result),
         **covariance.covariances_of(result),
         **precision.precision_of(result),
         **bundle.bundle_of(result),

@@ -51,6 +51,12 @@ def test_a_result_agrees_with_itself_and_with_its_short_form(frame: str) -> None
         )
 
 
+def test_a_baseline_of_an_older_version_has_the_first_polynomial_twice() -> None:
+    now, before = documents()
+    before["polynomial"] = copy.deepcopy(before["polynomials"][0])
+    assert compare_results(now, before)["status"] == "same"
+
+
 def test_the_short_form_leaves_out_single_measurements_only() -> None:
     document = case().document
     assert document.keys() - baseline_of(document).keys() == {"version", "residuals", "parallaxes"}

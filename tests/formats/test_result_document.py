@@ -90,7 +90,7 @@ FIXED = {
         "check_rms": {"x": float, "y": float, "z": float},
         "photo_scale": float,
     },
-    "polynomial": {"degree": int, "terms": dict, "coefficients": dict, "sigmas": dict, "evidence": list},
+    "polynomials": [{"degree": int, "terms": dict, "coefficients": dict, "sigmas": dict, "evidence": list}],
 }
 
 
@@ -521,7 +521,6 @@ def test_the_drift_found_is_the_slope_of_the_polynomial() -> None:
 def test_without_a_polynomial_there_is_no_block() -> None:
     document = solved(case("local").inputs, Settings(adjustment="similarity")).document
     assert document["adjustment"] == "similarity"
-    assert "polynomial" not in document
     assert "polynomials" not in document
     assert document["strips"][0]["scale_drift"]["found_ppm"] is None
 
@@ -529,7 +528,7 @@ def test_without_a_polynomial_there_is_no_block() -> None:
 def test_one_polynomial_for_each_strip() -> None:
     document = case("projected", 2).document
     assert [block["strip"] for block in document["polynomials"]] == [strip["id"] for strip in document["strips"]]
-    assert document["polynomial"] == document["polynomials"][0]
+    assert "polynomial" not in document
 
 
 # -------------------------------------------------------------------------------------------------- order, notes

@@ -92,7 +92,7 @@ def test_no_line_is_wider_than_the_page(frame: str, width: int) -> None:
 def test_an_incomplete_file_is_refused_in_words(key: str, strips: int) -> None:
     document = json.loads(to_json(case("projected", strips).document))
     del document[key]
-    needless = {"photostrip_result", "version", "polynomial", "misclosures", "residuals", "parallaxes", "polynomials"}
+    needless = {"photostrip_result", "version", "misclosures", "residuals", "parallaxes", "polynomials"}
     needless |= {"findings", "precision"}  # results of older versions have none
     if key in needless or (key == "ties" and strips == 1):
         require_complete(document, "result.json")

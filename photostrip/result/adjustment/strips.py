@@ -129,9 +129,10 @@ def _by_axis(values: Sequence[Plain]) -> Document:
     return dict(zip(AXES, values, strict=True))
 
 
-def polynomials_of(result: Result) -> list[Document]:
-    """Return the list ``polynomials``: the correction of every strip that has one."""
-    return [_polynomial(strip.strip.id, strip.polynomial) for strip in result.flights if strip.polynomial is not None]
+def polynomials_of(result: Result) -> Document:
+    """Return the list ``polynomials`` under its key: the correction of every strip that has one; empty without any."""
+    found = [_polynomial(strip.strip.id, strip.polynomial) for strip in result.flights if strip.polynomial is not None]
+    return {"polynomials": found} if found else {}
 
 
 def _polynomial(strip: str, found: Polynomial) -> Document:
