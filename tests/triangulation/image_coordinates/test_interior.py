@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Marks = Mapping[str, Floats]
 
-DATA = Path(__file__).parents[1] / "data" / "interior"
+DATA = Path(__file__).parents[2] / "data" / "interior"
 MICROMETRE = 1e-3  # mm
 NANOMETRE = 1e-6
 PICOMETRE = 1e-9

@@ -21,7 +21,7 @@ from photostrip.triangulation.image_coordinates.corrections import Bending, Refi
 
 Floats = NDArray[np.float64]
 
-DATA = Path(__file__).parents[1] / "data" / "interior"
+DATA = Path(__file__).parents[2] / "data" / "interior"
 MICROMETRE = 1e-3  # mm
 PICOMETRE = 1e-9
 FOCAL = 153.0

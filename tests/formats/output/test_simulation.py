@@ -277,7 +277,7 @@ def test_numbers_have_fixed_decimals() -> None:
 def test_the_same_specification_gives_the_same_bytes() -> None:
     code = (
         "import hashlib\n"
-        "from tests.simulate.test_files import TINY, VARIANTS\n"
+        "from tests.formats.output.test_simulation import TINY, VARIANTS\n"
         "from photostrip.formats.output.simulation import project_files\n"
         "from photostrip.simulate import simulate\n"
         "for spec in (TINY, *VARIANTS.values()):\n"
