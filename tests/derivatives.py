@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from photostrip.geodesy.local_frame import IntermediateFrame
     from photostrip.pipeline import Inputs, Result
-    from photostrip.triangulation.error_propagation.derivatives import Rows
+    from photostrip.triangulation.error_propagation.derivatives import ErrorRows
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
     Floats = NDArray[np.float64]
@@ -51,7 +51,7 @@ def errors_of(result: Result, number: int = 0) -> Propagation:
     return propagation(result.strips[number], result.refined.observations, result.frames)
 
 
-def written_out(rows: Rows, errors: StripErrors) -> Floats:
+def written_out(rows: ErrorRows, errors: StripErrors) -> Floats:
     """Derivatives of things by all image coordinates in units of their sigmas, shape (n, d, images * 2)."""
     images, models = errors.images, errors.models
     count = len(images.row)
@@ -60,15 +60,15 @@ def written_out(rows: Rows, errors: StripErrors) -> Floats:
         for slot in range(3):
             model = images.photo[image] - 2 + slot
             if 0 <= model < models:
-                units[model, :, image] = images.units[image, slot]
+                units[model, :, image] = images.components[image, slot]
     flat = units.reshape(models + 3, 6, -1)
     steps = np.einsum("kab,kbc->kac", errors.steps, flat[:models])
     frames = np.concatenate([np.zeros((1, 7, count * 2)), np.cumsum(steps, axis=0)])
-    result = np.einsum("nda,nac->ndc", rows.frame, frames[rows.first])
-    for slot in range(rows.core.shape[1]):
-        result += np.einsum("nda,nac->ndc", rows.core[:, slot], flat[np.minimum(rows.first + slot, models)])
+    result = np.einsum("nda,nac->ndc", rows.by_similarity, frames[rows.first])
+    for slot in range(rows.by_component.shape[1]):
+        result += np.einsum("nda,nac->ndc", rows.by_component[:, slot], flat[np.minimum(rows.first + slot, models)])
     split: Floats = result.reshape(*result.shape[:2], count, 2)
-    for item, image, own in zip(rows.item, rows.image, rows.own, strict=True):
+    for item, image, own in zip(rows.item, rows.image, rows.by_image, strict=True):
         split[item, :, image] += own
     return split.reshape(*split.shape[:2], -1)
 

@@ -18,7 +18,7 @@ from photostrip.triangulation.covariance_adjustment import system as strip_syste
 from photostrip.triangulation.covariance_adjustment.conditions import centers_of
 from photostrip.triangulation.error_propagation import control_errors, strip_errors
 from photostrip.triangulation.error_propagation.covariances import image_variance
-from photostrip.triangulation.error_propagation.derivatives import ELEMENTS, UNITS, Rows
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ELEMENTS, ErrorRows
 from photostrip.triangulation.resection import resection as exterior
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ class CovarianceAdjustment:
         place = np.empty(len(self.control.point), np.intp)
         rows = np.flatnonzero(wanted.kind == strip_conditions.CONTROL)
         place[wanted.source[rows]] = rows
-        things = self.errors.points.taken(points)
+        things = self.errors.points.take(points)
         return prediction.by_conditions(self.errors, wanted, self.local, self.system, things, place[coordinates])
 
 
@@ -179,7 +179,7 @@ class _Pass:
 
 
 def _first(given: _Given, formed: tuple[Orientation, FormedStrip, AbsoluteOrientation], factor: float) -> _Pass:
-    errors = strip_errors.strip_errors(
+    errors = strip_errors.differentiate_strip(
         formed[0], formed[1], formed[2].similarity, given.position, given.observations.sigma
     )
     return _solved(given, formed, errors, np.zeros((len(errors.images.row), 2)), factor)
@@ -203,7 +203,7 @@ def _next(given: _Given, before: _Pass, factor: float, *, fresh: bool) -> _Pass:
     if fresh:
         position, sigma = given.position, given.observations.sigma
         formed = replace(formed, model_xyz=np.where(np.isnan(before.formed.model_xyz), np.nan, formed.model_xyz))
-        errors = strip_errors.strip_errors(orientation, formed, oriented.similarity, position, sigma)
+        errors = strip_errors.differentiate_strip(orientation, formed, oriented.similarity, position, sigma)
         return _solved(given, (orientation, formed, oriented), errors, images, factor)
     found, wanted = before.control, before.conditions
     control = oriented.misclosures[found.point, found.axis]
@@ -234,7 +234,7 @@ def _solved(
     at_control = oriented.similarity(strip.xyz)[rows]
     found = control_errors.misclosures(errors.points, targets.turned(at_control), rows, targets.axes(at_control))
     misclosures = oriented.misclosures[found.point, found.axis]
-    length = float(np.linalg.norm(errors.pairs.reach, axis=1).mean())
+    length = float(np.linalg.norm(errors.pairs.base, axis=1).mean())
     local = strip_conditions.Local.about(centers_of(errors)[:-1], length)
     wanted = strip_conditions.conditions(
         errors, (orientation, strip), (found, misclosures), local, distances=given.settings.distances
@@ -246,12 +246,12 @@ def _solved(
     return _Pass(orientation, strip, oriented, images, errors, found, wanted, local, length, solved)
 
 
-def photo_rows(errors: strip_errors.StripErrors) -> Rows:
+def photo_rows(errors: strip_errors.StripErrors) -> ErrorRows:
     """Rows of derivatives of the photos in the chain: each moves with the model on its right, the last with its own.
 
     Returns
     -------
-    Rows
+    ErrorRows
         Centre and small rotation of each photo, d = 6.
     """
     models = errors.models
@@ -259,12 +259,12 @@ def photo_rows(errors: strip_errors.StripErrors) -> Rows:
     frame = np.zeros((models + 1, 6, SIMILARITY_PARAMETERS))
     frame[:, :3] = similarity_derivatives(centers, np.zeros(3))
     frame[:, 3:, 3:6] = np.eye(3)
-    core = np.zeros((models + 1, 1, 6, UNITS))
-    core[-1, 0, :3, ELEMENTS] = errors.pairs.base[-1]
-    core[-1, 0, 3:, ELEMENTS] = errors.pairs.turn[-1]
+    core = np.zeros((models + 1, 1, 6, COMPONENTS))
+    core[-1, 0, :3, ELEMENTS] = errors.pairs.base_by_elements[-1]
+    core[-1, 0, 3:, ELEMENTS] = errors.pairs.rotation_by_elements[-1]
     first = np.append(np.arange(models), models - 1)
     none = np.zeros(0, np.intp)
-    return Rows(first, frame, core, none, none, np.zeros((0, 6, 2)))
+    return ErrorRows(first, frame, core, none, none, np.zeros((0, 6, 2)))
 
 
 def resection(adjusted: CovarianceAdjustment, seen: tuple[Numbers, Floats, Floats], focal: float) -> exterior.Resection:

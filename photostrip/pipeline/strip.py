@@ -194,7 +194,7 @@ def _joint(
         return None
     place = {photo: number for number, photo in enumerate(strip.photos)}
     position = np.array([place.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo]
-    errors = strip_errors.strip_errors(
+    errors = strip_errors.differentiate_strip(
         screened.orientation, formed, orientation.similarity, position, observations.sigma
     )
     xyz = orientation.similarity(formed.xyz[rows])
@@ -202,7 +202,7 @@ def _joint(
     found = control_errors.misclosures(errors.points, targets.turned(xyz), rows, targets.axes(xyz))
     # image coordinates are taken as good as stated, or as bad as the pairs have proved
     factor = max(1.0, float(np.median(screened.scatter.by_pair)) ** 2 / (2 * sigma**2))
-    covariance = covariances.fitted(errors, found, np.eye(len(found.point)), factor).parameters * factor
+    covariance = covariances.of_parameters(errors, found, np.eye(len(found.point)), factor).parameters * factor
     moved = similarity_derivatives(xyz[found.point], errors.origin)
     design = np.einsum("wi,wij->wj", found.direction, moved)
     return control_significance.Joint(found.point, found.axis, design, covariance)

@@ -14,7 +14,7 @@ from photostrip.errors import Fault, InputError
 from photostrip.geometry.similarity import Similarity
 from photostrip.points import PhotoPoints
 from photostrip.simulate import Control, Flight, Ground, Image, Points, Spec, Terrain, simulate
-from photostrip.triangulation.error_propagation.strip_errors import StripErrors, strip_errors
+from photostrip.triangulation.error_propagation.strip_errors import StripErrors, differentiate_strip
 from photostrip.triangulation.relative_orientation import relative
 from photostrip.triangulation.strip_formation import formation
 
@@ -174,7 +174,7 @@ def _strip(
     station, row = _columns(geometry, centers, xyz)
     photos = simulation.strips[0][1]
     position = np.array([photos.index(photo) for photo in observations.photo_ids], np.intp)
-    errors = strip_errors(orientation, formed, similarity, position[observations.photo], observations.sigma)
+    errors = differentiate_strip(orientation, formed, similarity, position[observations.photo], observations.sigma)
     return IdealStrip(
         geometry, photos, observations, orientation, formed, similarity, xyz, centers, rotations, station, row, errors
     )

@@ -164,8 +164,8 @@ def _fitted(strip: IdealStrip, ground: _Fit, method: str) -> Accuracy:
     axes = targets.axes(xyz[numbers])
     found = control_errors.misclosures(strip.errors.points, control, numbers, axes)
     shift = targets.intermediate.intermediate_from_cartesian(strip.errors.origin[None])[0]
-    fit = control_errors.correction(found, weight, xyz[numbers], terms, shift)
-    parameters = covariances.fitted(strip.errors, found, fit.operator)
+    fit = control_errors.fit_operator(found, weight, xyz[numbers], terms, shift)
+    parameters = covariances.of_parameters(strip.errors, found, fit.operator)
     influence = fit.influence(xyz)
     covariance = covariances.covariances(strip.errors, strip.errors.points, parameters, influence)
     share = np.einsum("wi,wit,tw->w", found.direction, influence[numbers[found.point]], fit.operator)
@@ -206,7 +206,7 @@ def _predicted(strip: IdealStrip, ground: _Fit) -> Accuracy:
     numbers, errors = ground.numbers, strip.errors
     axes = np.broadcast_to(np.eye(3), (len(numbers), 3, 3))
     found = control_errors.misclosures(errors.points, ground.control, numbers, axes)
-    length = float(np.linalg.norm(errors.pairs.reach, axis=1).mean())
+    length = float(np.linalg.norm(errors.pairs.base, axis=1).mean())
     local = conditions.Local.about(conditions.centers_of(errors)[:-1], length)
     given = np.zeros(len(found.point))
     wanted = conditions.conditions(errors, (strip.orientation, strip.formed), (found, given), local)

@@ -13,7 +13,7 @@ from photostrip.statistics import chi2_quantile
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.error_propagation import control_errors
 from photostrip.triangulation.error_propagation.covariances import A_POSTERIORI, A_PRIORI, LEVEL, CheckTest
-from photostrip.triangulation.error_propagation.derivatives import Rows
+from photostrip.triangulation.error_propagation.derivatives import ErrorRows
 from photostrip.triangulation.gross_errors.control import control_significance
 from photostrip.triangulation.independent_models import model_errors, perspective_centers
 from photostrip.triangulation.polynomial.terms import POWERS
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from photostrip.geodesy.local_frame import IntermediateFrame
     from photostrip.pipeline.models.model_results import LinkedStrip
     from photostrip.points import ControlPoints, PhotoPoints
-    from photostrip.triangulation.error_propagation.control_errors import Correction, Misclosures
+    from photostrip.triangulation.error_propagation.control_errors import FitOperator, Misclosures
     from photostrip.triangulation.independent_models.formation import FormedModels
     from photostrip.triangulation.independent_models.model_errors import ModelErrors
 
@@ -139,7 +139,7 @@ def joint(
 
 def _fit_to_control(
     strip: LinkedStrip, found: ModelErrors, frames: Sequence[GroundFrame]
-) -> tuple[Misclosures, Correction]:
+) -> tuple[Misclosures, FitOperator]:
     """Misclosures at the control and the operator of the fit, with the weights that were in force."""
     targets = absolute_orientation.Targets(strip.control, frames, strip.intermediate)
     xyz = strip.absolute.similarity(strip.formed.xyz[strip.control_rows])
@@ -147,7 +147,7 @@ def _fit_to_control(
     seen = _misclosures(control, targets.axes(xyz), xyz, found.origin)
     terms = [axis.terms for axis in strip.polynomial.axes] if strip.polynomial else [(), (), ()]
     weight = absolute_orientation.weights(control, strip.precision)
-    return seen, control_errors.correction(seen, weight, xyz, terms, found.origin)
+    return seen, control_errors.fit_operator(seen, weight, xyz, terms, found.origin)
 
 
 def _misclosures(control: ControlPoints, axes: Floats, xyz: Floats, origin: Floats) -> Misclosures:
@@ -156,7 +156,7 @@ def _misclosures(control: ControlPoints, axes: Floats, xyz: Floats, origin: Floa
     direction = axes[point, axis]
     frame = direction[:, None] @ similarity_derivatives(xyz[point], origin)
     nothing = np.zeros(0, np.intp)
-    rows = Rows(nothing, frame, np.zeros((len(point), 0, 1, 0)), nothing, nothing, np.zeros((0, 1, 2)))
+    rows = ErrorRows(nothing, frame, np.zeros((len(point), 0, 1, 0)), nothing, nothing, np.zeros((0, 1, 2)))
     return control_errors.Misclosures(point, axis, direction, control.sigma[point, axis] ** 2, rows)
 
 
@@ -169,7 +169,7 @@ def _weights(seen: Misclosures, rows: Numbers, operator: Floats | None = None) -
     return rows, weights.transpose(1, 0, 2)
 
 
-def _influence(strip: LinkedStrip, fit: Correction) -> Floats:
+def _influence(strip: LinkedStrip, fit: FitOperator) -> Floats:
     """Displacement of points and centres by the parameters of the fit, shape (k, 3, t)."""
     formed = strip.formed
     nodes = strip.absolute.similarity(formed.node_xyz)
@@ -196,7 +196,7 @@ def _scaled_rows(xyz: Floats, above: Floats, terms: Sequence[tuple[str, ...]], u
 
 def _check(
     strip: LinkedStrip,
-    parts: tuple[ModelErrors, Misclosures, Correction, Floats],
+    parts: tuple[ModelErrors, Misclosures, FitOperator, Floats],
     checks: tuple[ControlPoints, Numbers],
     frames: Sequence[GroundFrame],
     factor: float,

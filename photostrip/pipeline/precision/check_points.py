@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.covariance_adjustment import prediction
 from photostrip.triangulation.error_propagation import control_errors, covariances
-from photostrip.triangulation.error_propagation.derivatives import Rows
+from photostrip.triangulation.error_propagation.derivatives import ErrorRows
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -81,8 +81,8 @@ def by_covariance(own: CovarianceAdjustment, given: Given) -> covariances.CheckT
     wanted = own.conditions
     taken = prediction.influence(own.errors, wanted, own.local, own.system, given.seen.rows)
     # the similarities of the models are unknowns of this adjustment, not errors
-    parts = (without_frame(wanted.rows), wanted.noise, taken)
-    return _tested(given, _joint(own.errors, without_frame(given.seen.rows), parts, own.factor))
+    parts = (wanted.rows.without_similarity(), wanted.noise, taken)
+    return _tested(given, _joint(own.errors, given.seen.rows.without_similarity(), parts, own.factor))
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,26 +119,9 @@ def _tested(given: Given, joint: Floats) -> covariances.CheckTest:
     return covariances.CheckTest(given.points, len(given.difference), squares)
 
 
-def without_frame(rows: Rows) -> Rows:
-    """Leave out the similarity of the first model."""
-    return replace(rows, frame=np.zeros_like(rows.frame))
-
-
-def _joint(errors: StripErrors, own: Rows, by: tuple[Rows, Floats, Floats], factor: float) -> Floats:
+def _joint(errors: StripErrors, own: ErrorRows, by: tuple[ErrorRows, Floats, Floats], factor: float) -> Floats:
     """Joint covariance of the errors at check coordinates: their own rows minus what is taken away by others."""
     rows, variance, taken = by
-    slots = max(rows.core.shape[1], own.core.shape[1])
-    core = np.zeros((len(rows.first) + len(own.first), slots, 1, own.core.shape[3]))
-    core[: len(rows.first), : rows.core.shape[1]] = rows.core
-    core[len(rows.first) :, : own.core.shape[1]] = own.core
-    both = Rows(
-        np.concatenate([rows.first, own.first]),
-        np.concatenate([rows.frame, own.frame]),
-        core,
-        np.concatenate([rows.item, own.item + len(rows.first)]),
-        np.concatenate([rows.image, own.image]),
-        np.concatenate([rows.own, own.own]),
-    )
     operator = np.concatenate([-taken, np.eye(len(own.first))], axis=1)
-    joint = factor * covariances.sums_of(errors, both, operator)
+    joint = factor * covariances.sums_of(errors, ErrorRows.joined([rows, own]), operator)
     return np.asarray(joint + (taken * variance) @ taken.T, float)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from photostrip.geodesy.crs import GroundFrame
     from photostrip.pipeline.results import StripResult
     from photostrip.points import PhotoPoints
-    from photostrip.triangulation.error_propagation.derivatives import Rows
+    from photostrip.triangulation.error_propagation.derivatives import ErrorRows
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -31,9 +31,9 @@ class Propagation:
 
     errors: strip_errors.StripErrors
     control: control_errors.Misclosures  # control coordinates that count
-    fit: control_errors.Correction
+    fit: control_errors.FitOperator
     influence: Floats  # (q, 3, t): points by the parameters of the fit
-    photos: Rows  # photos that could be oriented
+    photos: ErrorRows  # photos that could be oriented
     photo_influence: Floats  # (k, 6, t): the same of them
     oriented: Numbers  # (k,): their places in the strip
 
@@ -55,12 +55,20 @@ def propagation(strip: StripResult, observations: PhotoPoints, frames: Sequence[
     """
     position = measured(strip.strip, observations)
     similarity = strip.absolute.similarity
-    errors = strip_errors.strip_errors(strip.orientation, strip.formed, similarity, position, observations.sigma)
+    errors = strip_errors.differentiate_strip(strip.orientation, strip.formed, similarity, position, observations.sigma)
     xyz = similarity(strip.formed.xyz)
     found, fit = _fit_to_control(strip, errors, xyz, frames)
     influence = fit.influence(xyz)
-    rows = photo_errors.photo_rows(errors, sightings(strip, observations), strip.resection, influence)
-    return Propagation(errors, found, fit, influence, *rows)
+    photos = photo_errors.differentiate_photos(errors, sightings(strip, observations), strip.resection, influence)
+    return Propagation(
+        errors=errors,
+        control=found,
+        fit=fit,
+        influence=influence,
+        photos=photos.rows,
+        photo_influence=photos.influence,
+        oriented=photos.photos,
+    )
 
 
 def sightings(strip: StripResult, observations: PhotoPoints) -> photo_errors.Sightings:
@@ -73,7 +81,7 @@ def sightings(strip: StripResult, observations: PhotoPoints) -> photo_errors.Sig
 
 def _fit_to_control(
     strip: StripResult, errors: strip_errors.StripErrors, xyz: Floats, frames: Sequence[GroundFrame]
-) -> tuple[control_errors.Misclosures, control_errors.Correction]:
+) -> tuple[control_errors.Misclosures, control_errors.FitOperator]:
     """Misclosures at the control and the operator of the fit, with the weights that were in force."""
     targets = absolute_orientation.Targets(strip.control, frames, strip.intermediate)
     at_control = xyz[strip.control_rows]
@@ -81,4 +89,4 @@ def _fit_to_control(
     found = control_errors.misclosures(errors.points, control, strip.control_rows, targets.axes(at_control))
     terms = [axis.terms for axis in strip.polynomial.axes] if strip.polynomial else [(), (), ()]
     weight = absolute_orientation.weights(control, strip.precision)
-    return found, control_errors.correction(found, weight, at_control, terms, errors.origin)
+    return found, control_errors.fit_operator(found, weight, at_control, terms, errors.origin)

@@ -78,7 +78,7 @@ def of_strip(
     errors, operator = found.errors, found.fit.operator
     stated = float(np.median(observations.sigma[measured(strip.strip, observations) >= 0]))
     factor, basis = covariances.image_variance(strip.orientation, stated)
-    parameters = covariances.fitted(errors, found.control, operator, factor)
+    parameters = covariances.of_parameters(errors, found.control, operator, factor)
     points = covariances.covariances(errors, errors.points, parameters, found.influence) * factor
     photos = np.full((len(strip.strip.photos), 6, 6), np.nan)
     photos[found.oriented] = covariances.covariances(errors, found.photos, parameters, found.photo_influence) * factor

@@ -15,7 +15,7 @@ import numpy as np
 
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
-from photostrip.triangulation.error_propagation.derivatives import ELEMENTS, UNITS, Rows
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ELEMENTS, ErrorRows
 from photostrip.triangulation.error_propagation.strip_errors import scale_shares
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ class Local:
 class Conditions:
     """Conditions ``w = A y + H v + g``, in the order of the strip."""
 
-    rows: Rows  # H, d = 1; ``frame`` is A in the columns of the condition's own model
+    rows: ErrorRows  # H, d = 1; ``frame`` is A in the columns of the condition's own model
     following: Floats  # (n, 7): a in the columns of the next model
     value: Floats  # (n,): w, metres
     noise: Floats  # (n,): variance of g, metres^2
@@ -96,7 +96,7 @@ def conditions(
     Conditions
         Joints, control and distances, model by model.
     """
-    slots = errors.points.core.shape[1]
+    slots = errors.points.by_component.shape[1]
     parts = [_joints(errors, local, slots), _control(*control, local)]
     if distances:
         parts.append(_distances(errors, *strip, max(slots, 2)))
@@ -139,16 +139,16 @@ def _sorted(parts: Sequence[Conditions], slots: int) -> Conditions:
     place[order] = np.arange(len(order))
     item = place[np.concatenate([part.rows.item + start for part, start in zip(parts, count[:-1], strict=True)])]
     entry = np.argsort(item, kind="stable")
-    core = np.zeros((len(order), slots, 1, UNITS))
+    core = np.zeros((len(order), slots, 1, COMPONENTS))
     for part, start in zip(parts, count[:-1], strict=True):
-        core[start : start + len(part.value), : part.rows.core.shape[1]] = part.rows.core
-    rows = Rows(
+        core[start : start + len(part.value), : part.rows.by_component.shape[1]] = part.rows.by_component
+    rows = ErrorRows(
         np.concatenate([part.rows.first for part in parts])[order],
-        np.concatenate([part.rows.frame for part in parts])[order],
+        np.concatenate([part.rows.by_similarity for part in parts])[order],
         core[order],
         item[entry],
         np.concatenate([part.rows.image for part in parts])[entry],
-        np.concatenate([part.rows.own for part in parts])[entry],
+        np.concatenate([part.rows.by_image for part in parts])[entry],
     )
     columns = (
         np.concatenate([getattr(part, name) for part in parts])[order]
@@ -162,14 +162,14 @@ def _joints(errors: StripErrors, local: Local, slots: int) -> Conditions:
     joints = errors.models - 1
     count = joints * SIMILARITY_PARAMETERS
     carried = -local.from_common[1:] @ local.to_common[:-1]
-    core = np.zeros((joints, SIMILARITY_PARAMETERS, slots, 1, UNITS))
+    core = np.zeros((joints, SIMILARITY_PARAMETERS, slots, 1, COMPONENTS))
     core[:, :, 0, 0] = -local.from_common[1:] @ errors.steps[:-1]
     none = np.zeros(0, np.intp)
     number = np.repeat(np.arange(joints), SIMILARITY_PARAMETERS)
-    rows = Rows(
+    rows = ErrorRows(
         number,
         carried.reshape(count, 1, SIMILARITY_PARAMETERS),
-        core.reshape(count, slots, 1, UNITS),
+        core.reshape(count, slots, 1, COMPONENTS),
         none,
         none,
         np.zeros((0, 1, 2)),
@@ -182,8 +182,8 @@ def _joints(errors: StripErrors, local: Local, slots: int) -> Conditions:
 
 def _control(control: Misclosures, given: Floats, local: Local) -> Conditions:
     rows, count = control.rows, len(given)
-    frame = rows.frame @ local.to_common[rows.first]
-    placed = Rows(rows.first, frame, rows.core, rows.item, rows.image, rows.own)
+    frame = rows.by_similarity @ local.to_common[rows.first]
+    placed = ErrorRows(rows.first, frame, rows.by_component, rows.item, rows.image, rows.by_image)
     zero = np.zeros((count, SIMILARITY_PARAMETERS))
     return Conditions(placed, zero, given, control.variance, np.full(count, CONTROL), np.arange(count))
 
@@ -203,19 +203,19 @@ def _distances(errors: StripErrors, orientation: Orientation, formed: FormedStri
     last = np.append(number[1:] != number[:-1], np.ones(min(len(number), 1), bool))
     chosen = np.sort(chosen[order[~last]])
     joint, before, after = joined.joint[chosen], joined.before[chosen], joined.after[chosen]
-    arms = (pairs.arm[before] - pairs.reach[joint], pairs.arm[after])
+    arms = (pairs.point[before] - pairs.base[joint], pairs.point[after])
     lengths = [np.linalg.norm(arm, axis=1) for arm in arms]
     ray = (arms[0] + arms[1]) / (lengths[0] + lengths[1])[:, None]
     along = (ray / np.linalg.norm(ray, axis=1)[:, None])[:, None]
-    core = np.zeros((len(chosen), slots, 1, UNITS))
+    core = np.zeros((len(chosen), slots, 1, COMPONENTS))
     center = centers_of(errors)[joint + 1]
     place = similarity_derivatives(center + arms[0], np.zeros(3))
     core[:, 0] = along @ place @ errors.steps[joint]
-    core[:, 0, :, ELEMENTS] -= along @ pairs.deformation[before]
-    core[:, 1, :, ELEMENTS] += along @ pairs.deformation[after]
+    core[:, 0, :, ELEMENTS] -= along @ pairs.point_by_elements[before]
+    core[:, 1, :, ELEMENTS] += along @ pairs.point_by_elements[after]
     item, image, own = _own_of_distances(errors, orientation, (before, after), along)
     zero, count = np.zeros((len(chosen), 1, SIMILARITY_PARAMETERS)), len(chosen)
-    rows = Rows(joint, zero, core, item, image, own)
+    rows = ErrorRows(joint, zero, core, item, image, own)
     value = np.einsum("ni,ni->n", along[:, 0], arms[1] - arms[0])
     return Conditions(rows, zero[:, 0], value, np.zeros(count), np.full(count, DISTANCE), chosen)
 
@@ -224,7 +224,7 @@ def centers_of(errors: StripErrors) -> Floats:
     """Perspective centres of all photos, from the common origin, shape (p + 1, 3), metres."""
     # the step's scale column is minus the centre that joins its model to the next
     following = -errors.steps[:, :3, 5]
-    return np.concatenate([following[:1] - errors.pairs.reach[:1], following])
+    return np.concatenate([following[:1] - errors.pairs.base[:1], following])
 
 
 def _own_of_distances(
@@ -235,7 +235,7 @@ def _own_of_distances(
     lookup = np.full(int(images.row.max()) + 1, -1)
     lookup[images.row] = np.arange(len(images.row))
     before, after = rows
-    own_before, own_after = along @ pairs.own[before], along @ pairs.own[after]
+    own_before, own_after = along @ pairs.point_by_image[before], along @ pairs.point_by_image[after]
     image = np.column_stack(
         [
             lookup[orientation.rows[before, 0]],

@@ -19,14 +19,14 @@ from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.statistics import normal_quantile
 from photostrip.triangulation.covariance_adjustment.conditions import CONTROL, DISTANCE, Conditions, Local
 from photostrip.triangulation.covariance_adjustment.system import Padded, System, pad, products, same_images
-from photostrip.triangulation.error_propagation.covariances import local_covariances, own_with_units
+from photostrip.triangulation.error_propagation.covariances import images_with_components, local_covariances
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.error_propagation.derivatives import Rows
+    from photostrip.triangulation.error_propagation.derivatives import ErrorRows
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
     Floats = NDArray[np.float64]
@@ -76,13 +76,13 @@ class Tested:
 
 
 def predict(
-    errors: StripErrors, wanted: Conditions, local: Local, found: System, things: Sequence[Rows]
+    errors: StripErrors, wanted: Conditions, local: Local, found: System, things: Sequence[ErrorRows]
 ) -> tuple[list[Predicted], Floats]:
     """Predict the errors of things, and say how well they are known.
 
     Parameters
     ----------
-    things : sequence of Rows
+    things : sequence of ErrorRows
         Points, photos.
 
     Returns
@@ -91,9 +91,7 @@ def predict(
         Of the correlates of the conditions.
     """
     orders = [np.argsort(rows.first, kind="stable") for rows in things]
-    jobs = [
-        _Job.of(errors, wanted, local, found, rows.taken(order)) for rows, order in zip(things, orders, strict=True)
-    ]
+    jobs = [_Job.of(errors, wanted, local, found, rows.take(order)) for rows, order in zip(things, orders, strict=True)]
     layout = found.layout
     cofactors = np.zeros(len(layout.block))
     ends = np.searchsorted(layout.block, np.arange(layout.blocks + 1))
@@ -111,7 +109,7 @@ def predict(
 
 def _predicted(errors: StripErrors, job: _Job, order: Numbers) -> Predicted:
     """Return what was found, in the order in which the things were given."""
-    covariance = local_covariances(errors, job.rows, own_with_units(errors, job.rows)) - job.quadratic
+    covariance = local_covariances(errors, job.rows, images_with_components(errors, job.rows)) - job.quadratic
     back = np.argsort(order, kind="stable")
     return Predicted(job.error[back], covariance[back])
 
@@ -134,7 +132,7 @@ def _visit(jobs: Sequence[_Job], number: int, window: Sequence[tuple[Floats, Flo
 class _Job:
     """Things to be predicted, block by block; results are filled in."""
 
-    rows: Rows  # the things, ordered by their first models
+    rows: ErrorRows  # the things, ordered by their first models
     padded: Padded
     frame: Floats  # (n, d, 7): by the unknowns of the first model
     # things and conditions that use the same image points, and their products; ordered by things
@@ -144,9 +142,9 @@ class _Job:
     quadratic: Floats
 
     @classmethod
-    def of(cls, errors: StripErrors, wanted: Conditions, local: Local, found: System, rows: Rows) -> _Job:
+    def of(cls, errors: StripErrors, wanted: Conditions, local: Local, found: System, rows: ErrorRows) -> _Job:
         """Prepare things that are ordered by their first models."""
-        n, size = rows.frame.shape[:2]
+        n, size = rows.by_similarity.shape[:2]
         counts = np.bincount(rows.first, minlength=errors.models)
         rank = np.arange(n) - (np.cumsum(counts) - counts)[rows.first]
         padded = pad(errors, rows, rank, found.padded.core.shape[2])
@@ -155,7 +153,7 @@ class _Job:
         return cls(
             rows,
             padded,
-            rows.frame @ local.to_common[rows.first],
+            rows.by_similarity @ local.to_common[rows.first],
             (thing[order], condition[order], value[order, :, 0]),
             np.zeros((n, size)),
             np.zeros((n, size, size)),
@@ -166,7 +164,7 @@ class _Job:
 
         Returns the first thing of the block, the first after it, and an array of three blocks of rows.
         """
-        layout, size = found.layout, self.rows.frame.shape[1]
+        layout, size = found.layout, self.rows.by_similarity.shape[1]
         low, high = np.searchsorted(self.rows.first, [number * layout.width, (number + 1) * layout.width]).tolist()
         mixed = np.zeros((3, layout.height, (high - low) * size))
         if low < high:
@@ -180,7 +178,7 @@ class _Job:
 
     def visit(self, number: int, around: Floats, found: System) -> None:
         """Finish the things of one block, given the inverse of it and its neighbours."""
-        layout, size = found.layout, self.rows.frame.shape[1]
+        layout, size = found.layout, self.rows.by_similarity.shape[1]
         low, high, mixed = self.columns(number, found)
         if low == high:
             return
@@ -194,7 +192,7 @@ class _Job:
 
     def _with_conditions(self, mixed: Floats, number: int, low: int, found: System) -> None:
         """Fill in the covariances with conditions around, and the coefficients of the unknowns."""
-        layout, size, models = found.layout, self.rows.frame.shape[1], len(found.layout.start)
+        layout, size, models = found.layout, self.rows.by_similarity.shape[1], len(found.layout.start)
         mine = np.arange(number * layout.width, min((number + 1) * layout.width, models))
         ends = np.searchsorted(self.rows.first, [*mine, mine[-1] + 1])
         for apart in range(-layout.width, layout.width + 1):
@@ -215,12 +213,12 @@ class _Job:
             mixed[1, top : top + SIMILARITY_PARAMETERS, left:right] = frame.T
 
 
-def influence(errors: StripErrors, wanted: Conditions, local: Local, found: System, rows: Rows) -> Floats:
+def influence(errors: StripErrors, wanted: Conditions, local: Local, found: System, rows: ErrorRows) -> Floats:
     """Predicted errors of a few things by the misclosures of all conditions.
 
     Parameters
     ----------
-    rows : Rows
+    rows : ErrorRows
         The things, d = 1, in any order.
 
     Returns
@@ -229,7 +227,7 @@ def influence(errors: StripErrors, wanted: Conditions, local: Local, found: Syst
         One row for each thing.
     """
     order = np.argsort(rows.first, kind="stable")
-    job = _Job.of(errors, wanted, local, found, rows.taken(order))
+    job = _Job.of(errors, wanted, local, found, rows.take(order))
     layout = found.layout
     right = np.zeros((layout.blocks + 2, layout.height, len(order)))
     for number in range(layout.blocks):
@@ -240,13 +238,13 @@ def influence(errors: StripErrors, wanted: Conditions, local: Local, found: Syst
 
 
 def by_conditions(
-    errors: StripErrors, wanted: Conditions, local: Local, found: System, rows: Rows, chosen: Numbers
+    errors: StripErrors, wanted: Conditions, local: Local, found: System, rows: ErrorRows, chosen: Numbers
 ) -> Floats:
     """Predicted errors of many things by the misclosures of some conditions.
 
     Parameters
     ----------
-    rows : Rows
+    rows : ErrorRows
         n things of d coordinates, in any order.
     chosen : ndarray of int, shape (c,)
         The conditions that are asked about.
@@ -256,13 +254,13 @@ def by_conditions(
     ndarray, shape (n, d, c)
         What is subtracted from each thing, by each misclosure.
     """
-    layout, size = found.layout, rows.frame.shape[1]
+    layout, size = found.layout, rows.by_similarity.shape[1]
     right = np.zeros((layout.blocks, layout.height, len(chosen)))
     right[layout.block[chosen], layout.position[chosen], np.arange(len(chosen))] = 1.0
     solved = np.zeros((layout.blocks + 2, layout.height, len(chosen)))
     solved[1:-1] = found.factors.solve(right)
     order = np.argsort(rows.first, kind="stable")
-    job = _Job.of(errors, wanted, local, found, rows.taken(order))
+    job = _Job.of(errors, wanted, local, found, rows.take(order))
     result = np.zeros((len(order), size, len(chosen)))
     for number in range(layout.blocks):
         low, high, mixed = job.columns(number, found)

@@ -17,7 +17,7 @@ import numpy as np
 
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.triangulation.error_propagation.covariances import by_images
-from photostrip.triangulation.error_propagation.derivatives import REACH, SPAN, UNITS, Rows
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, REACH, SPAN, ErrorRows
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-def without_frame(rows: Rows) -> Rows:
+def without_frame(rows: ErrorRows) -> ErrorRows:
     """Leave out the similarity of the first model, which is an unknown of the adjustment and no error."""
-    return replace(rows, frame=np.zeros_like(rows.frame))
+    return replace(rows, by_similarity=np.zeros_like(rows.by_similarity))
 
 
 def image_errors(errors: StripErrors, wanted: Conditions, found: System) -> Floats:
@@ -46,7 +46,7 @@ def image_errors(errors: StripErrors, wanted: Conditions, found: System) -> Floa
     return by_images(errors, without_frame(wanted.rows), correlates)
 
 
-def displacements(errors: StripErrors, rows: Rows, images: Floats) -> Floats:
+def displacements(errors: StripErrors, rows: ErrorRows, images: Floats) -> Floats:
     """Return what errors of image coordinates do to things, their first models held fast.
 
     Parameters
@@ -59,16 +59,16 @@ def displacements(errors: StripErrors, rows: Rows, images: Floats) -> Floats:
     ndarray, shape (n, d)
         Displacements.
     """
-    units = np.zeros((errors.models + rows.core.shape[1], UNITS))
+    units = np.zeros((errors.models + rows.by_component.shape[1], COMPONENTS))
     for slot in range(SPAN):
         model = errors.images.photo - REACH + slot
         inside = np.flatnonzero((model >= 0) & (model < errors.models))
-        moved = errors.images.units[inside, slot] @ images[inside, :, None]
+        moved = errors.images.components[inside, slot] @ images[inside, :, None]
         np.add.at(units, model[inside], moved[:, :, 0])
-    result = np.zeros(rows.frame.shape[:2])
-    for slot in range(rows.core.shape[1]):
-        result += (rows.core[:, slot] @ units[rows.first + slot, :, None])[:, :, 0]
-    np.add.at(result, rows.item, (rows.own @ images[rows.image, :, None])[:, :, 0])
+    result = np.zeros(rows.by_similarity.shape[:2])
+    for slot in range(rows.by_component.shape[1]):
+        result += (rows.by_component[:, slot] @ units[rows.first + slot, :, None])[:, :, 0]
+    np.add.at(result, rows.item, (rows.by_image @ images[rows.image, :, None])[:, :, 0])
     return result
 
 

@@ -15,8 +15,8 @@ import numpy as np
 
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.triangulation.covariance_adjustment import block_tridiagonal
-from photostrip.triangulation.error_propagation.covariances import own_with_units
-from photostrip.triangulation.error_propagation.derivatives import REACH, UNITS, Rows
+from photostrip.triangulation.error_propagation.covariances import images_with_components
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, REACH, ErrorRows
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -30,14 +30,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Padded:
-    """Rows with d = 1 model by model, empty places 0."""
+    """ErrorRows with d = 1 model by model, empty places 0."""
 
     core: Floats  # (p, r, s, 6): coefficients of units
     own: Floats  # (p, r, s + 4, 6): covariances of their own image coordinates with units
     whole: Floats  # (p, r, s + 4, 6): covariances of the whole rows, without similarities, with units
 
 
-def pad(errors: StripErrors, rows: Rows, rank: Numbers, slots: int) -> Padded:
+def pad(errors: StripErrors, rows: ErrorRows, rank: Numbers, slots: int) -> Padded:
     """Put rows into places of their first models; a row of d coordinates takes d places.
 
     Parameters
@@ -47,20 +47,20 @@ def pad(errors: StripErrors, rows: Rows, rank: Numbers, slots: int) -> Padded:
     slots : int
         Models over which anything reaches.
     """
-    models, size, have = errors.models, rows.frame.shape[1], rows.core.shape[1]
+    models, size, have = errors.models, rows.by_similarity.shape[1], rows.by_component.shape[1]
     places = max(int(rank.max(initial=0)) + 1, 1) * size
-    core = np.zeros((models, places, slots, UNITS))
-    own = np.zeros((models, places, slots + 2 * REACH, UNITS))
+    core = np.zeros((models, places, slots, COMPONENTS))
+    own = np.zeros((models, places, slots + 2 * REACH, COMPONENTS))
     at = rank[:, None] * size + np.arange(size)
-    core[rows.first[:, None], at, :have] = rows.core.transpose(0, 2, 1, 3)
-    own[rows.first[:, None], at, : have + 2 * REACH] = own_with_units(errors, rows).transpose(0, 2, 1, 3)
-    return Padded(core, own, own + _with_units(errors.covariances, core))
+    core[rows.first[:, None], at, :have] = rows.by_component.transpose(0, 2, 1, 3)
+    own[rows.first[:, None], at, : have + 2 * REACH] = images_with_components(errors, rows).transpose(0, 2, 1, 3)
+    return Padded(core, own, own + _with_units(errors.component_covariances, core))
 
 
 def _with_units(covariances: Floats, core: Floats) -> Floats:
     """Covariances of sums of units with the units from two models before to two after."""
     models, places, slots, _ = core.shape
-    result = np.zeros((models, places, slots + 2 * REACH, UNITS))
+    result = np.zeros((models, places, slots + 2 * REACH, COMPONENTS))
     for slot in range(slots):
         for apart in range(-REACH, REACH + 1):
             mine = np.arange(max(0, -apart - slot), max(models - slot - max(apart, 0), 0))
@@ -101,13 +101,13 @@ def products(a: Padded, b: Padded, models: Numbers, apart: int) -> Floats:
     return total
 
 
-def same_images(a: Rows, b: Rows) -> tuple[Numbers, Numbers, Floats]:
+def same_images(a: ErrorRows, b: ErrorRows) -> tuple[Numbers, Numbers, Floats]:
     """Products of image points that two sets of rows use by themselves.
 
     Parameters
     ----------
-    a, b : Rows
-        Rows with d and e coordinates.
+    a, b : ErrorRows
+        ErrorRows with d and e coordinates.
 
     Returns
     -------
@@ -124,7 +124,7 @@ def same_images(a: Rows, b: Rows) -> tuple[Numbers, Numbers, Floats]:
     counts = high - low
     mine = np.repeat(np.arange(len(a.image)), counts)
     theirs = order[np.arange(len(mine)) - np.repeat(np.cumsum(counts) - counts, counts) + low[mine]]
-    return a.item[mine], b.item[theirs], a.own[mine] @ b.own[theirs].transpose(0, 2, 1)
+    return a.item[mine], b.item[theirs], a.by_image[mine] @ b.by_image[theirs].transpose(0, 2, 1)
 
 
 # --------------------------------------------------------------------------------------------------------- layout
@@ -249,7 +249,7 @@ def system(errors: StripErrors, wanted: Conditions, factor: float) -> System:
     K = [Q A; A^T 0] with Q = H H^T + noise / factor.
     """
     rows = wanted.rows
-    slots = max(rows.core.shape[1], errors.points.core.shape[1], REACH)
+    slots = max(rows.by_component.shape[1], errors.points.by_component.shape[1], REACH)
     layout = Layout.of(rows.first, errors.models, min(slots, errors.models))
     padded = pad(errors, rows, layout.rank, slots)
     matrix = Matrix.zero(layout)
@@ -263,7 +263,7 @@ def system(errors: StripErrors, wanted: Conditions, factor: float) -> System:
     return replace(eliminated, solution=eliminated.solved_for(wanted.value))
 
 
-def _add_covariances(matrix: Matrix, layout: Layout, padded: Padded, rows: Rows) -> None:
+def _add_covariances(matrix: Matrix, layout: Layout, padded: Padded, rows: ErrorRows) -> None:
     """Add covariances of the conditions."""
     models = len(layout.start)
     number = np.full((models, padded.core.shape[1]), -1)
@@ -286,7 +286,7 @@ def _add_design(matrix: Matrix, layout: Layout, wanted: Conditions) -> None:
     first = wanted.rows.first
     linked = np.flatnonzero(np.abs(wanted.following).sum(axis=1) > 0)
     for condition, model, values in (
-        (np.arange(len(first)), first, wanted.rows.frame[:, 0]),
+        (np.arange(len(first)), first, wanted.rows.by_similarity[:, 0]),
         (linked, first[linked] + 1, wanted.following[linked]),
     ):
         for column in range(SIMILARITY_PARAMETERS):

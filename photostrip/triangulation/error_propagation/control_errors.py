@@ -4,7 +4,7 @@ Every control coordinate that counts gives one misclosure, along its own ground 
 in height only come in by the same rule as full ones. The operator holds the weights of the fit and the terms of the
 polynomials as they were used.
 
-Source: derived; [001] eq. 145-151 for the fit.
+Source: derived, docs/precision.md, eq. 5; [001] eq. 145-151 for the fit.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
-from photostrip.triangulation.error_propagation.derivatives import Rows
 from photostrip.triangulation.polynomial.terms import POWERS
 
 if TYPE_CHECKING:
@@ -24,6 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.points import ControlPoints
+    from photostrip.triangulation.error_propagation.derivatives import ErrorRows
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -37,12 +37,12 @@ class Misclosures:
     axis: Numbers  # (w,): 0, 1, 2: along its first, second, third ground axis
     direction: Floats  # (w, 3): that axis as a unit vector in the intermediate frame
     variance: Floats  # (w,): variance of the given coordinate, metres^2
-    rows: Rows  # error of the strip along the axis, d = 1
+    rows: ErrorRows  # error of the strip along the axis, d = 1
 
 
 @dataclass(frozen=True, eq=False)
-class Correction:
-    """Subtracted from the strip: ``X - Phi theta`` with ``theta = M w``, w the misclosures strip minus given."""
+class FitOperator:
+    """Subtracted from the strip (eq. 5): ``X - Phi theta``, ``theta = M w``, w the misclosures strip minus given."""
 
     operator: Floats  # (t, w): M: seven parameters of the similarity, then those of the polynomials
     terms: tuple[tuple[str, ...], ...]  # terms of the polynomials of X, Y, Z
@@ -52,18 +52,7 @@ class Correction:
     origin: Floats  # (3,): origin of the similarity
 
     def influence(self, xyz: Floats) -> Floats:
-        """Phi: displacement of points by the parameters.
-
-        Parameters
-        ----------
-        xyz : ndarray, shape (n, 3)
-            Points after the similarity, intermediate frame, metres.
-
-        Returns
-        -------
-        ndarray, shape (n, 3, t)
-            Derivatives.
-        """
+        """Phi: displacement of points (n, 3) after the similarity by the parameters, shape (n, 3, t)."""
         columns = self.polynomial_columns(xyz)
         result = np.zeros((len(xyz), 3, len(self.operator)))
         result[:, :, :SIMILARITY_PARAMETERS] = similarity_derivatives(xyz, self.origin)
@@ -82,8 +71,8 @@ class Correction:
         ]
 
 
-def misclosures(points: Rows, control: ControlPoints, control_rows: Numbers, axes: Floats) -> Misclosures:
-    """Rows of derivatives of the misclosures.
+def misclosures(points: ErrorRows, control: ControlPoints, control_rows: Numbers, axes: Floats) -> Misclosures:
+    """Rows of derivatives of the misclosures, in the order of the points, each with its coordinates that count.
 
     Parameters
     ----------
@@ -93,34 +82,22 @@ def misclosures(points: Rows, control: ControlPoints, control_rows: Numbers, axe
         Its rows in `points`.
     axes : ndarray, shape (c, 3, 3)
         Directions along which it is compared, rows, in the intermediate frame.
-
-    Returns
-    -------
-    Misclosures
-        In the order of the points, each with its coordinates that count.
     """
     point, axis = np.nonzero(control.use)
-    chosen, direction = control_rows[point], axes[point, axis]
-    starts = np.searchsorted(points.item, chosen)
-    counts = np.searchsorted(points.item, chosen, side="right") - starts
-    item = np.repeat(np.arange(len(point)), counts)
-    entry = np.arange(len(item)) - np.repeat(np.cumsum(counts) - counts, counts) + starts[item]
-    along = direction[:, None]
-    rows = Rows(
-        points.first[chosen],
-        along @ points.frame[chosen],
-        along[:, None] @ points.core[chosen],
-        item,
-        points.image[entry],
-        along[item] @ points.own[entry],
+    direction = axes[point, axis]
+    return Misclosures(
+        point=point,
+        axis=axis,
+        direction=direction,
+        variance=control.sigma[point, axis] ** 2,
+        rows=points.take(control_rows[point]).along(direction),
     )
-    return Misclosures(point, axis, direction, control.sigma[point, axis] ** 2, rows)
 
 
-def correction(
+def fit_operator(
     found: Misclosures, weight: Floats, xyz: Floats, terms: Sequence[tuple[str, ...]], origin: Floats
-) -> Correction:
-    """Operator of the similarity and the polynomials.
+) -> FitOperator:
+    """Operator of the similarity and the polynomials, M = [M_s; M_p (I - A M_s)], A the design of the similarity.
 
     Parameters
     ----------
@@ -133,23 +110,24 @@ def correction(
     origin : ndarray, shape (3,)
         Origin of the similarities.
     """
-    design, share = found.rows.frame[:, 0], np.sqrt(weight[found.point, found.axis])
+    design, share = found.rows.by_similarity[:, 0], np.sqrt(weight[found.point, found.axis])
     size = np.abs(design).max(axis=0)
     size = np.where(size > 0, size, 1.0)
     similarity = np.linalg.pinv(design / size * share[:, None]) * share / size[:, None]
     reach, breadth = (max(float(np.abs(xyz[:, k]).max()), 1e-6) for k in (0, 1))
-    result = Correction(similarity, tuple(terms), reach, breadth, origin)
+    result = FitOperator(similarity, tuple(terms), reach, breadth, origin)
     if not any(terms):
         return result
     after = _polynomials(found, weight, xyz, result)  # by misclosures that the similarity has left
     operator = np.concatenate([similarity, after - after @ design @ similarity])
-    return Correction(operator, result.terms, reach, breadth, origin)
+    return FitOperator(operator, result.terms, reach, breadth, origin)
 
 
-def _polynomials(found: Misclosures, weight: Floats, xyz: Floats, fit: Correction) -> Floats:
+def _polynomials(found: Misclosures, weight: Floats, xyz: Floats, fit: FitOperator) -> Floats:
     """Parameters of the polynomials by misclosures after the similarity.
 
-    Each axis of the intermediate frame has its own fit; a point that gives only some of its ground coordinates takes
+    (C^T W P C) theta = C^T W n w with C the columns of the terms, n the ground axes, P = sum n n^T of one point: each
+    axis of the intermediate frame has its own fit; a point that gives only some of its ground coordinates takes
     the others from the fit itself, so the residual that counts is its projection on the axes given.
     """
     columns = fit.polynomial_columns(xyz)

@@ -4,20 +4,20 @@ The error of a point is that of the formed strip minus what the fit to the contr
 errors of the same image coordinates and of the control. Everything is a sum over rows that reach over a few models;
 what runs through the whole strip comes from sums over all models before, in time and memory that grow with its length.
 
-Source: derived; see docs/precision.md.
+Source: derived; see docs/precision.md, eq. 4-6.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from photostrip.distributions import gamma_cdf
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.statistics import chi2_quantile
-from photostrip.triangulation.error_propagation.derivatives import REACH, SPAN, UNITS, Rows
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, REACH, SPAN, ErrorRows
 from photostrip.triangulation.relative_orientation.relative import MINIMUM_POINTS
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ class CheckTest:
 
     points: int
     coordinates: int  # their coordinates, the expectation of the sum of squares
-    squares: float  # e^T C^-1 e with the joint covariance C of the differences, that of the given coordinates included
+    squares: float  # e^T C^-1 e with the covariance C of the differences, that of the given coordinates included
 
     @property
     def probability(self) -> float:
@@ -50,19 +50,10 @@ class CheckTest:
 
 
 def image_variance(orientation: Orientation, sigma: float) -> tuple[float, str]:
-    """Variance factor of the image coordinates: 1 unless the y parallaxes contradict what is stated.
+    """Variance factor of the image coordinates, and its basis: 1 unless the y parallaxes contradict what is stated.
 
-    Parameters
-    ----------
-    sigma : float
-        Stated standard deviation of an image coordinate of weight one, mm.
-
-    Returns
-    -------
-    factor : float
-        Variance found over variance stated, or 1.
-    basis : str
-        ``"a-posteriori"`` or ``"a-priori"``.
+    A y parallax of weight one has twice the variance of an image coordinate (``sigma``, mm): f = q^T W q / (2 sigma^2
+    r).
     """
     redundancy = int((orientation.points_used - MINIMUM_POINTS).sum())
     squares = float((orientation.pairs.weight * orientation.parallax**2)[orientation.used].sum()) / (2 * sigma**2)
@@ -73,282 +64,237 @@ def image_variance(orientation: Orientation, sigma: float) -> tuple[float, str]:
 
 
 @dataclass(frozen=True, eq=False)
-class Chain:
+class SimilarityCovariances:
     """Covariances of the similarities of the models, relative to the first."""
 
-    frames: Floats  # (p + 1, 7, 7): of each model, and last of the last photo
-    ahead: Floats  # (p + 1, 2, 7, 6): of each with the units of its own model and of the next
+    similarities: Floats  # (p + 1, 7, 7): P, of each model, and last of the last photo
+    with_components: Floats  # (p + 1, 2, 7, 6): of each with the error components of its own model and of the next
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
-    """Covariances of the parameters fitted to the control."""
+class ParameterCovariances:
+    """Covariances of the t parameters fitted to the control."""
 
-    frames: Floats  # (p + 1, 7, t): with the similarities of the models
-    units: Floats  # (p, 6, t): with the units
+    similarities: Floats  # (p + 1, 7, t): with the similarities of the models
+    components: Floats  # (p, 6, t): with the error components
     images: Floats  # (n, 2, t): with the image coordinates
     parameters: Floats  # (t, t): among themselves
 
 
-def chain(errors: StripErrors) -> Chain:
-    """Add up the steps from model to model.
+def along_strip(errors: StripErrors) -> SimilarityCovariances:
+    """Add up the steps from model to model (eq. 4): they correlate over two models, not one.
 
-    Parameters
-    ----------
-    errors : StripErrors
-        Steps and covariances of the units.
-
-    Returns
-    -------
-    Chain
-        Covariances of the similarities.
-
-    Notes
-    -----
-    P(m+1) = P(m) + Q(m,m) + c + c^T, c = Q(m-1,m) + Q(m-2,m): steps correlate over two models, not one.
+    P(m+1) = P(m) + S Q(m,m) S^T + c + c^T, c = [S(m-1) Q(m-1,m) + S(m-2) Q(m-2,m)] S^T.
     """
     steps, models = errors.steps, errors.models
-    ahead = np.zeros((models + 1, 2, SIMILARITY_PARAMETERS, UNITS))
+    with_components = np.zeros((models + 1, 2, SIMILARITY_PARAMETERS, COMPONENTS))
     for apart in range(1, SPAN):
-        with_units = steps @ errors.covariances[:, apart]
-        for slot in range(apart):  # of the steps before model m, those of m - 1 and m - 2 reach units from m on
+        mixed = steps @ errors.component_covariances[:, apart]
+        for slot in range(apart):  # of the steps before model m, those of m - 1 and m - 2 reach components from m on
             before = apart - slot
-            ahead[before:, slot] += with_units[: models + 1 - before]
+            with_components[before:, slot] += mixed[: models + 1 - before]
     added = np.zeros((models + 1, SIMILARITY_PARAMETERS, SIMILARITY_PARAMETERS))
-    cross = ahead[:models, 0] @ steps.transpose(0, 2, 1)
-    added[1:] = steps @ errors.covariances[:, 0] @ steps.transpose(0, 2, 1) + cross + cross.transpose(0, 2, 1)
-    return Chain(np.cumsum(added, axis=0), ahead)
+    cross = with_components[:models, 0] @ steps.transpose(0, 2, 1)
+    added[1:] = steps @ errors.component_covariances[:, 0] @ steps.transpose(0, 2, 1) + cross + cross.transpose(0, 2, 1)
+    return SimilarityCovariances(np.cumsum(added, axis=0), with_components)
 
 
-def fitted(errors: StripErrors, found: Misclosures, operator: Floats, factor: float = 1.0) -> Fitted:
-    """Covariances of parameters that are fitted to the control.
+def of_parameters(
+    errors: StripErrors, found: Misclosures, operator: Floats, factor: float = 1.0
+) -> ParameterCovariances:
+    """Covariances of the parameters M w fitted to the control, for a variance factor of 1 of the image coordinates.
 
     Parameters
     ----------
     operator : ndarray, shape (t, w)
-        Parameters by misclosures.
+        M, parameters by misclosures.
     factor : float
         Variance factor of the image coordinates; that of the control is 1.
-
-    Returns
-    -------
-    Fitted
-        Covariances in units of the image coordinates' variance factor.
     """
-    steps, images = errors.steps, errors.images
-    core, units, near, own = _sums(errors, found.rows, operator)
-    with_images = _by_photo(errors, core, np.arange(len(images.row)))
-    with_images[near] += own
-    frames = np.zeros((errors.models + 1, SIMILARITY_PARAMETERS, len(operator)))
-    frames[1:] = np.cumsum(steps @ units, axis=0)
-    parameters = np.einsum("kit,kis->ts", core, units) + np.einsum("nit,nis->ts", own, with_images[near])
-    parameters += (operator * (found.variance / factor)) @ operator.T
-    return Fitted(frames, units, with_images, (parameters + parameters.T) / 2)
+    sums = _sums(errors, found.rows, operator)
+    with_images = _by_photo(errors, sums.by_component, np.arange(len(errors.images.row)))
+    with_images[sums.image] += sums.by_image
+    similarities = np.zeros((errors.models + 1, SIMILARITY_PARAMETERS, len(operator)))
+    similarities[1:] = np.cumsum(errors.steps @ sums.with_components, axis=0)
+    parameters = sums.products(with_images[sums.image]) + (operator * (found.variance / factor)) @ operator.T
+    return ParameterCovariances(similarities, sums.with_components, with_images, (parameters + parameters.T) / 2)
 
 
-def sums_of(errors: StripErrors, rows: Rows, operator: Floats) -> Floats:
-    """Covariances of sums of rows among themselves.
-
-    Parameters
-    ----------
-    operator : ndarray, shape (t, n)
-        What is summed.
-
-    Returns
-    -------
-    ndarray, shape (t, t)
-        Covariances, for a variance factor of 1 of the image coordinates.
-    """
-    core, units, near, own = _sums(errors, rows, operator)
-    with_images = own + _by_photo(errors, core, near)
-    found = np.einsum("kit,kis->ts", core, units) + np.einsum("nit,nis->ts", own, with_images)
+def sums_of(errors: StripErrors, rows: ErrorRows, operator: Floats) -> Floats:
+    """Covariances (t, t) of sums of rows, ``operator`` (t, n), for a variance factor of 1 of the image coordinates."""
+    sums = _sums(errors, rows, operator)
+    found = sums.products(sums.by_image + _by_photo(errors, sums.by_component, sums.image))
     return np.asarray((found + found.T) / 2, float)
 
 
-def by_images(errors: StripErrors, rows: Rows, weights: Floats) -> Floats:
-    """Coefficients of the image coordinates in a weighted sum of rows.
-
-    Parameters
-    ----------
-    weights : ndarray, shape (n,)
-        Weights of the rows.
-
-    Returns
-    -------
-    ndarray, shape (k, 2)
-        In the order of ``errors.images``, for coordinates in units of their standard deviations.
-    """
-    core = _summed_units(errors, rows, weights[:, None])
-    result = _by_photo(errors, core, np.arange(len(errors.images.row)))[:, :, 0]
-    np.add.at(result, rows.image, rows.own[:, 0] * weights[rows.item][:, None])
+def by_images(errors: StripErrors, rows: ErrorRows, weights: Floats) -> Floats:
+    """Coefficients (k, 2) of all image coordinates in a weighted sum of rows with d = 1."""
+    by_component = _summed_components(errors, rows, weights[:, None])
+    result = _by_photo(errors, by_component, np.arange(len(errors.images.row)))[:, :, 0]
+    np.add.at(result, rows.image, rows.by_image[:, 0] * weights[rows.item][:, None])
     return result
 
 
-def _sums(errors: StripErrors, rows: Rows, operator: Floats) -> tuple[Floats, Floats, Numbers, Floats]:
-    """Sum rows: coefficients of units, covariances with units; image points of their own and coefficients."""
+class _Sums(NamedTuple):
+    """Sums of rows with d = 1."""
+
+    by_component: Floats  # (p, 6, t)
+    with_components: Floats  # (p, 6, t): covariances with the components
+    image: Numbers  # (e,): image points that enter directly
+    by_image: Floats  # (e, 2, t)
+
+    def products(self, with_images: Floats) -> Floats:
+        """Covariances (t, t) of the sums, given those with the image coordinates (e, 2, t) that enter directly."""
+        found = np.einsum("kit,kis->ts", self.by_component, self.with_components)
+        return np.asarray(found + np.einsum("nit,nis->ts", self.by_image, with_images), float)
+
+
+def _sums(errors: StripErrors, rows: ErrorRows, operator: Floats) -> _Sums:
     images = errors.images
-    core = _summed_units(errors, rows, operator.T)
-    near, entry = np.unique(rows.image, return_inverse=True)
-    own = np.zeros((len(near), 2, len(operator)))
-    np.add.at(own, entry, rows.own[:, 0, :, None] * operator.T[rows.item][:, None, :])
-    units = _times_covariances(errors, core)
+    by_component = _summed_components(errors, rows, operator.T)
+    image, entry = np.unique(rows.image, return_inverse=True)
+    by_image = np.zeros((len(image), 2, len(operator)))
+    np.add.at(by_image, entry, rows.by_image[:, 0, :, None] * operator.T[rows.item][:, None, :])
+    with_components = _times_covariances(errors, by_component)
     for slot in range(SPAN):
-        model = images.photo[near] - REACH + slot
+        model = images.photo[image] - REACH + slot
         inside = (model >= 0) & (model < errors.models)
-        np.add.at(units, model[inside], images.units[near[inside], slot] @ own[inside])
-    return core, units, near, own
+        np.add.at(with_components, model[inside], images.components[image[inside], slot] @ by_image[inside])
+    return _Sums(by_component, with_components, image, by_image)
 
 
-def _summed_units(errors: StripErrors, rows: Rows, weights: Floats) -> Floats:
-    """Coefficients of the units in weighted sums of rows with d = 1, shape (p, 6, t)."""
+def _summed_components(errors: StripErrors, rows: ErrorRows, weights: Floats) -> Floats:
+    """Coefficients of the components in weighted sums of rows with d = 1, shape (p, 6, t)."""
     models, count = errors.models, weights.shape[1]
     by_first = np.zeros((models + 1, SIMILARITY_PARAMETERS, count))
-    np.add.at(by_first, rows.first, rows.frame[:, 0, :, None] * weights[:, None, :])
+    np.add.at(by_first, rows.first, rows.by_similarity[:, 0, :, None] * weights[:, None, :])
     after = np.cumsum(by_first[::-1], axis=0)[::-1][1:]  # rows whose first model comes after each model
-    core: Floats = errors.steps.transpose(0, 2, 1) @ after
-    for slot in range(rows.core.shape[1]):
+    result: Floats = errors.steps.transpose(0, 2, 1) @ after
+    for slot in range(rows.by_component.shape[1]):
         model = rows.first + slot
         inside = model < models
-        values = rows.core[inside, slot, 0, :, None] * weights[inside, None, :]
-        np.add.at(core, model[inside], values)
-    return core
-
-
-def _by_photo(errors: StripErrors, core: Floats, images: Numbers) -> Floats:
-    """Image coordinates' coefficients in sums of units, shape (n, 2, t)."""
-    padded = np.concatenate([np.zeros((REACH, *core.shape[1:])), core, np.zeros((1, *core.shape[1:]))])
-    photo = errors.images.photo[images]
-    result = np.zeros((len(photo), 2, core.shape[2]))
-    for slot in range(SPAN):
-        result += errors.images.units[images, slot].transpose(0, 2, 1) @ padded[photo + slot]
+        values = rows.by_component[inside, slot, 0, :, None] * weights[inside, None, :]
+        np.add.at(result, model[inside], values)
     return result
 
 
-def _times_covariances(errors: StripErrors, core: Floats) -> Floats:
-    """Covariances of the units with sums of units, shape (p, 6, t)."""
-    result: Floats = errors.covariances[:, 0] @ core
+def _by_photo(errors: StripErrors, by_component: Floats, images: Numbers) -> Floats:
+    """Coefficients of image coordinates in sums of components, shape (n, 2, t)."""
+    none = np.zeros((REACH, *by_component.shape[1:]))
+    padded = np.concatenate([none, by_component, none[:1]])
+    photo = errors.images.photo[images]
+    result = np.zeros((len(photo), 2, by_component.shape[2]))
+    for slot in range(SPAN):
+        result += errors.images.components[images, slot].transpose(0, 2, 1) @ padded[photo + slot]
+    return result
+
+
+def _times_covariances(errors: StripErrors, by_component: Floats) -> Floats:
+    """Covariances of the components with sums of components, shape (p, 6, t)."""
+    result: Floats = errors.component_covariances[:, 0] @ by_component
     for apart in range(1, min(SPAN, errors.models)):
-        mixed = errors.covariances[:-apart, apart]
-        result[:-apart] += mixed @ core[apart:]
-        result[apart:] += mixed.transpose(0, 2, 1) @ core[:-apart]
+        mixed = errors.component_covariances[:-apart, apart]
+        result[:-apart] += mixed @ by_component[apart:]
+        result[apart:] += mixed.transpose(0, 2, 1) @ by_component[:-apart]
     return result
 
 
 # ---------------------------------------------------------------------------------------------------- covariances
 
 
-def covariances(errors: StripErrors, rows: Rows, fit: Fitted, influence: Floats) -> Floats:
-    """Covariances of corrected points, or of anything that has rows.
+def covariances(errors: StripErrors, rows: ErrorRows, fit: ParameterCovariances, influence: Floats) -> Floats:
+    """Covariances (n, d, d) of corrected points or photos, for a variance factor of 1 of the image coordinates.
 
-    Parameters
-    ----------
-    rows : Rows
-        What is asked for, n things of d coordinates.
-    influence : ndarray, shape (n, d, t)
-        What each parameter subtracts.
-
-    Returns
-    -------
-    ndarray, shape (n, d, d)
-        Covariances, for a variance factor of 1 of the image coordinates.
-
-    Notes
-    -----
-    Cov = S - C Phi^T - Phi C^T + Phi Sigma Phi^T with S of the formed strip, C with the parameters.
+    ``influence`` (n, d, t) is Phi, what each fitted parameter subtracts (eq. 6): Cov = S - C Phi^T - Phi C^T +
+    Phi Sigma Phi^T with S of the formed strip, C with the parameters.
     """
-    base = chain(errors)
-    size = rows.frame.shape[1]
+    along = along_strip(errors)
+    size = rows.by_similarity.shape[1]
     result = np.empty((len(rows.first), size, size))
     for start, stop in _slices(rows):
         part, phi = rows.part(start, stop), influence[start:stop]
-        formed = _formed(errors, part, base)
+        formed = _formed(errors, part, along)
         mixed = _with_parameters(part, fit) @ phi.transpose(0, 2, 1)
         result[start:stop] = formed - mixed - mixed.transpose(0, 2, 1) + phi @ fit.parameters @ phi.transpose(0, 2, 1)
     return result
 
 
-def _slices(rows: Rows) -> list[tuple[int, int]]:
-    """Cut many things into parts of bounded memory."""
+def _slices(rows: ErrorRows) -> list[tuple[int, int]]:
+    """Cut many rows into parts of bounded memory."""
     count = len(rows.first)
-    size = max(1, int(ENTRIES * 3 / rows.frame.shape[1] * count / max(len(rows.item), 1)))
+    size = max(1, int(ENTRIES * 3 / rows.by_similarity.shape[1] * count / max(len(rows.item), 1)))
     return [(start, min(start + size, count)) for start in range(0, count, size)]
 
 
-def _formed(errors: StripErrors, rows: Rows, base: Chain) -> Floats:
-    """Covariances in the formed strip, relative to the similarity of its first model."""
-    slots = rows.core.shape[1]
-    with_units = own_with_units(errors, rows)
-    local = local_covariances(errors, rows, with_units)
-    first, ahead = rows.first, base.ahead[rows.first]
-    shared = ahead[:, 0] @ rows.core[:, 0].transpose(0, 2, 1)
-    if slots > 1:
-        shared += ahead[:, 1] @ rows.core[:, 1].transpose(0, 2, 1)
+def _formed(errors: StripErrors, rows: ErrorRows, along: SimilarityCovariances) -> Floats:
+    """S = F P F^T + m + m^T + local, m = F times the covariances of y(first) with components and image coordinates."""
+    with_components = images_with_components(errors, rows)
+    local = local_covariances(errors, rows, with_components)
+    first, ahead = rows.first, along.with_components[rows.first]
+    shared = ahead[:, 0] @ rows.by_component[:, 0].transpose(0, 2, 1)
+    if rows.by_component.shape[1] > 1:
+        shared += ahead[:, 1] @ rows.by_component[:, 1].transpose(0, 2, 1)
     for back in range(1, SPAN):
         inside = np.flatnonzero(first >= back)
         steps = errors.steps[first[inside] - back]
-        shared[inside] += steps @ with_units[inside, REACH - back].transpose(0, 2, 1)
-    moved = rows.frame @ shared
-    return np.asarray(
-        rows.frame @ base.frames[first] @ rows.frame.transpose(0, 2, 1) + moved + moved.transpose(0, 2, 1) + local,
-        float,
-    )
+        shared[inside] += steps @ with_components[inside, REACH - back].transpose(0, 2, 1)
+    moved = rows.by_similarity @ shared
+    of_similarity = rows.by_similarity @ along.similarities[first] @ rows.by_similarity.transpose(0, 2, 1)
+    return np.asarray(of_similarity + moved + moved.transpose(0, 2, 1) + local, float)
 
 
-def own_with_units(errors: StripErrors, rows: Rows) -> Floats:
-    """Covariances of the rows' own image coordinates with units.
-
-    Parameters
-    ----------
-    rows : Rows
-        n things of d coordinates, reaching over s models.
+def images_with_components(errors: StripErrors, rows: ErrorRows) -> Floats:
+    """Covariances of the image coordinates that enter rows directly with components of models near by.
 
     Returns
     -------
     ndarray, shape (n, s + 2 + 2, d, 6)
-        With the units of the models ``first - 2`` to ``first + s + 1``.
+        With the components of the models ``first - 2`` to ``first + s + 1``.
     """
-    n, slots, size, _ = rows.core.shape
-    result = np.zeros((n, slots + 2 * REACH, size, UNITS))
+    n, slots, size, _ = rows.by_component.shape
+    result = np.zeros((n, slots + 2 * REACH, size, COMPONENTS))
     if not len(rows.item):
         return result
     photo = errors.images.photo[rows.image]
     order = np.lexsort((photo, rows.item))
     item, photo = rows.item[order], photo[order]
     new = np.flatnonzero(np.concatenate([[True], (item[1:] != item[:-1]) | (photo[1:] != photo[:-1])]))
-    units = errors.images.units[rows.image[order]].reshape(len(order), SPAN * UNITS, 2).transpose(0, 2, 1)
-    by_photo = np.add.reduceat(rows.own[order] @ units, new, axis=0).reshape(len(new), size, SPAN, UNITS)
-    thing, place = item[new], photo[new] - rows.first[item[new]]
+    components = errors.images.components[rows.image[order]].reshape(len(order), SPAN * COMPONENTS, 2)
+    products = rows.by_image[order] @ components.transpose(0, 2, 1)
+    by_photo = np.add.reduceat(products, new, axis=0).reshape(len(new), size, SPAN, COMPONENTS)
+    row, place = item[new], photo[new] - rows.first[item[new]]
     for slot in range(SPAN):
         inside = (place + slot >= 0) & (place + slot < slots + 2 * REACH)
-        result[thing[inside], place[inside] + slot] += by_photo[inside, :, slot]
+        result[row[inside], place[inside] + slot] += by_photo[inside, :, slot]
     return result
 
 
-def local_covariances(errors: StripErrors, rows: Rows, with_units: Floats) -> Floats:
-    """Covariances of the rows without the similarity of their first model."""
-    n, slots, size, _ = rows.core.shape
+def local_covariances(errors: StripErrors, rows: ErrorRows, with_components: Floats) -> Floats:
+    """Covariances of the rows without the similarity of their first model, shape (n, d, d)."""
+    n, slots, size, _ = rows.by_component.shape
+    by = rows.by_component
     result = np.zeros((n, size, size))
     for slot in range(slots):
-        mixed = with_units[:, slot + REACH] @ rows.core[:, slot].transpose(0, 2, 1)
+        mixed = with_components[:, slot + REACH] @ by[:, slot].transpose(0, 2, 1)
         model = np.minimum(rows.first + slot, errors.models - 1)
         for apart in range(min(SPAN, slots - slot)):
-            term = rows.core[:, slot] @ errors.covariances[model, apart] @ rows.core[:, slot + apart].transpose(0, 2, 1)
+            term = by[:, slot] @ errors.component_covariances[model, apart] @ by[:, slot + apart].transpose(0, 2, 1)
             mixed += term / 2 if apart == 0 else term
         result += mixed + mixed.transpose(0, 2, 1)
     if len(rows.item):
         present, starts = np.unique(rows.item, return_index=True)
-        result[present] += np.add.reduceat(rows.own @ rows.own.transpose(0, 2, 1), starts, axis=0)
+        result[present] += np.add.reduceat(rows.by_image @ rows.by_image.transpose(0, 2, 1), starts, axis=0)
     return result
 
 
-def _with_parameters(rows: Rows, fit: Fitted) -> Floats:
-    """Covariances of the rows with the fitted parameters, shape (n, d, t)."""
-    result: Floats = rows.frame @ fit.frames[rows.first]
-    for slot in range(rows.core.shape[1]):
+def _with_parameters(rows: ErrorRows, fit: ParameterCovariances) -> Floats:
+    """C: covariances of the rows with the fitted parameters, shape (n, d, t)."""
+    result: Floats = rows.by_similarity @ fit.similarities[rows.first]
+    for slot in range(rows.by_component.shape[1]):
         model = rows.first + slot
-        inside = np.flatnonzero(model < len(fit.units))
-        result[inside] += rows.core[inside, slot] @ fit.units[model[inside]]
+        inside = np.flatnonzero(model < len(fit.components))
+        result[inside] += rows.by_component[inside, slot] @ fit.components[model[inside]]
     if len(rows.item):
         present, starts = np.unique(rows.item, return_index=True)
-        result[present] += np.add.reduceat(rows.own @ fit.images[rows.image], starts, axis=0)
+        result[present] += np.add.reduceat(rows.by_image @ fit.images[rows.image], starts, axis=0)
     return result

@@ -1,76 +1,127 @@
-"""Sparse rows of derivatives by the image coordinates, and what their columns are.
+"""Sparse rows of derivatives by the image coordinates, and the error components through which most of them go.
 
-Source: derived; see docs/precision.md.
+Source: derived; see docs/precision.md, eq. 1-4.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
 
-UNITS = 6
-ELEMENTS, SCALE = slice(0, 5), 5  # units of a model
-REACH = 2  # models between which units share image coordinates
-SPAN = REACH + 1  # photos on which the image coordinates of a unit lie
+COMPONENTS = 6  # of the error of a model: five elements of its pair, logarithm of the scale that it hands on
+ELEMENTS, SCALE = slice(0, 5), 5
+REACH = 2  # models between which error components share image coordinates: pairs share a photo, a scale transfer three
+SPAN = REACH + 1  # photos on which the image coordinates of an error component lie
 
 
 @dataclass(frozen=True, eq=False)
-class Images:
-    """Image points that take part, ordered by photo, and how units depend on them."""
+class ImagePoints:
+    """Image points that take part, ordered by photo, and how the error components depend on them."""
 
     row: Numbers  # (n,): row in the table of image points
     photo: Numbers  # (n,): place of its photo in the strip, ascending
     sigma: Floats  # (n, 2): stated standard deviations of x and y, mm
-    # (n, 3, 6, 2): units of the models photo - 2, photo - 1 and photo by x and y in units of their standard deviations
-    units: Floats
+    # (n, 3, 6, 2): components of the models photo - 2, photo - 1 and photo by x and y, in their standard deviations
+    components: Floats
+
+    def rows_of(self, rows: Numbers) -> Numbers:
+        """Places here of rows in the table of image points."""
+        lookup = np.full(int(self.row.max()) + 1, -1)
+        lookup[self.row] = np.arange(len(self.row))
+        return np.asarray(lookup[rows], np.intp)
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
-    """Errors of things with d coordinates as rows of derivatives, sparse.
+class ErrorRows:
+    """Errors of n points, photos or coordinates, of d numbers each, as sparse rows of derivatives.
 
-    The error is ``frame xi + sum_s core[s] u[first + s] + sum own l`` with xi the similarity of model ``first``, u the
-    units of the models and l the errors of image coordinates in units of their standard deviations.
+    The error is ``by_similarity y(first) + sum_s by_component[s] u(first + s) + sum by_image v``   # eq. 3
+    with y the similarity of model ``first``, u the error components of the models and v the errors of image coordinates
+    in units of their standard deviations.
     """
 
-    first: Numbers  # (n,): model whose similarity moves the thing as a whole
-    frame: Floats  # (n, d, 7): coefficients of that similarity
-    core: Floats  # (n, s, d, 6): coefficients of the units of the models from ``first`` on
-    item: Numbers  # (e,): thing of each image point that enters by itself, ascending
-    image: Numbers  # (e,): that image point, a row of ``Images``
-    own: Floats  # (e, d, 2): its coefficients
+    first: Numbers  # (n,): model whose similarity moves the whole
+    by_similarity: Floats  # (n, d, 7)
+    by_component: Floats  # (n, s, d, 6): by the components of the models from ``first`` on
+    item: Numbers  # (e,): row to which each image point belongs that enters directly, ascending
+    image: Numbers  # (e,): that image point, a row of ``ImagePoints``
+    by_image: Floats  # (e, d, 2)
 
-    def taken(self, order: Numbers) -> Rows:
-        """Return the rows of some things, or of all in another order."""
-        back = np.full(len(self.first), -1)
-        back[order] = np.arange(len(order))
-        item = back[self.item]
-        entry = np.argsort(item, kind="stable")[int((item < 0).sum()) :]
-        return Rows(
-            self.first[order],
-            self.frame[order],
-            self.core[order],
-            item[entry],
-            self.image[entry],
-            self.own[entry],
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """Rows of several tables one after the other."""
+        slots = max(part.by_component.shape[1] for part in parts)
+        starts = np.cumsum([0, *(len(part.first) for part in parts)])
+        size = parts[0].by_similarity.shape[1]
+        by_component = np.zeros((int(starts[-1]), slots, size, COMPONENTS))
+        for part, start in zip(parts, starts[:-1], strict=True):
+            by_component[start : start + len(part.first), : part.by_component.shape[1]] = part.by_component
+        return cls(
+            first=np.concatenate([part.first for part in parts]),
+            by_similarity=np.concatenate([part.by_similarity for part in parts]),
+            by_component=by_component,
+            item=np.concatenate([part.item + start for part, start in zip(parts, starts[:-1], strict=True)]),
+            image=np.concatenate([part.image for part in parts]),
+            by_image=np.concatenate([part.by_image for part in parts]),
         )
 
-    def part(self, start: int, stop: int) -> Rows:
-        """Return the rows of the things from start to stop."""
+    def take(self, rows: Numbers) -> Self:
+        """Select rows, in any order."""
+        item, entry = ranges(*self.entries(rows))
+        return replace(
+            self,
+            first=self.first[rows],
+            by_similarity=self.by_similarity[rows],
+            by_component=self.by_component[rows],
+            item=item,
+            image=self.image[entry],
+            by_image=self.by_image[entry],
+        )
+
+    def part(self, start: int, stop: int) -> Self:
+        """Rows from start to stop, without copying."""
         low, high = np.searchsorted(self.item, [start, stop])
-        return Rows(
-            self.first[start:stop],
-            self.frame[start:stop],
-            self.core[start:stop],
-            self.item[low:high] - start,
-            self.image[low:high],
-            self.own[low:high],
+        return replace(
+            self,
+            first=self.first[start:stop],
+            by_similarity=self.by_similarity[start:stop],
+            by_component=self.by_component[start:stop],
+            item=self.item[low:high] - start,
+            image=self.image[low:high],
+            by_image=self.by_image[low:high],
         )
+
+    def along(self, direction: Floats) -> Self:
+        """Errors along one direction (n, d) of each row: d = 1."""
+        unit = direction[:, None]
+        return replace(
+            self,
+            by_similarity=unit @ self.by_similarity,
+            by_component=unit[:, None] @ self.by_component,
+            by_image=unit[self.item] @ self.by_image,
+        )
+
+    def without_similarity(self) -> Self:
+        """Leave out the similarity of the first model, where that is an unknown and no error."""
+        return replace(self, by_similarity=np.zeros_like(self.by_similarity))
+
+    def entries(self, rows: Numbers) -> tuple[Numbers, Numbers]:
+        """First and last + 1 of the image points that belong to rows."""
+        return np.searchsorted(self.item, rows), np.searchsorted(self.item, rows, side="right")
+
+
+def ranges(start: Numbers, stop: Numbers) -> tuple[Numbers, Numbers]:
+    """Write ranges out one after the other: number of the range, and every index from its start to its stop."""
+    counts = stop - start
+    number = np.repeat(np.arange(len(counts)), counts)
+    return number, np.arange(len(number)) - np.repeat(np.cumsum(counts) - counts, counts) + start[number]

@@ -1,16 +1,15 @@
 """Errors inside pairs: what errors of the image coordinates do to the elements, the base and the points of a model.
 
 All pairs of a strip go in one batch of flat columns. Derivatives are those of the operations as they run: the weighted
-least squares of the y parallaxes (``relative``) and the intersection with the mean Y of
-both rays (``intersection``).
+least squares of the y parallaxes (``relative``) and the intersection with the mean Y of both rays (``intersection``).
 
-Source: derived; [001] eq. 126-138 for the operations.
+Source: derived, docs/precision.md, eq. 1; [001] eq. 126-138 for the operations.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -30,56 +29,68 @@ LEFT, RIGHT = slice(0, 2), slice(2, 5)  # elements that turn the left and the ri
 
 @dataclass(frozen=True, eq=False)
 class PairErrors:
-    """Derivatives of what pairs give, by image coordinates and by elements, in the frame of the ground."""
+    """Derivatives of p pairs with m points, in the frame of the ground, the left photo of each pair held fast.
 
-    # (m, 5, 4): elements of the row's pair by x and y of the left and of the right image point, radians per mm; 0 for
-    # rows that took no part
-    elements: Floats
-    base: Floats  # (p, 3, 5): base vector by elements, the left photo held fast, metres per radian
-    turn: Floats  # (p, 3, 5): small rotation of the right photo by elements, the left photo held fast
-    deformation: Floats  # (m, 3, 5): model point by elements, the left photo held fast, metres per radian
-    own: Floats  # (m, 3, 4): model point by its own image coordinates, the elements held fast, metres per mm
-    arm: Floats  # (m, 3): model point from the left perspective centre, metres
-    reach: Floats  # (p, 3): right from left perspective centre, metres
+    Image coordinates are x and y of the left, then of the right image point.
+    """
+
+    elements_by_image: Floats  # (m, 5, 4): elements of the row's pair, radians per mm; 0 for rows that took no part
+    base_by_elements: Floats  # (p, 3, 5): metres per radian
+    rotation_by_elements: Floats  # (p, 3, 5): small rotation of the right photo
+    point_by_elements: Floats  # (m, 3, 5): metres per radian
+    point_by_image: Floats  # (m, 3, 4): the elements held fast, metres per mm
+    point: Floats  # (m, 3): model point from the left perspective centre, metres
+    base: Floats  # (p, 3): right from left perspective centre, metres
 
 
-def differentiate(orientation: Orientation, rotations: Floats, scale: Floats) -> PairErrors:
+def differentiate_pairs(orientation: Orientation, rotations: Floats, scale: Floats) -> PairErrors:
     """Differentiate all pairs of a strip.
 
-    Parameters
-    ----------
-    rotations : ndarray, shape (p, 3, 3)
-        Left photo of each pair to the frame of the ground.
-    scale : ndarray, shape (p,)
-        Length of each base, metres.
-
-    Returns
-    -------
-    PairErrors
-        The derivatives. Rows whose rays do not meet hold numbers without meaning; they take part in nothing.
+    ``rotations`` (p, 3, 3) bring the left photo of each pair to the frame of the ground, ``scale`` (p,) is the length
+    of each base in metres. Rows whose rays do not meet hold numbers without meaning; they take part in nothing.
     """
     pairs = orientation.pairs
     al1, ka1, al2, om2, ka2 = orientation.elements.T
     zero = np.zeros_like(al1)
-    photos = (from_alpha_omega_kappa(al1, 0.0, ka1), from_alpha_omega_kappa(al2, om2, ka2))
-    left_rates = angle_rates(np.column_stack([al1, zero, ka1]), SYSTEM)[:, :, [0, 2]]  # omega1 is 0 by definition
-    right_rates = angle_rates(np.column_stack([al2, om2, ka2]), SYSTEM)
-    to_ground = rotations @ photos[0].transpose(0, 2, 1) * scale[:, None, None]
-    turn = np.concatenate([-left_rates, right_rates], axis=2)
-    with np.errstate(all="ignore"):
-        point, by_elements, own = _points(orientation, photos, (left_rates, right_rates))
-    ahead = np.zeros((pairs.size, 3, 5))
-    ahead[:, :, LEFT] = -_crossed(left_rates, np.array([1.0, 0.0, 0.0]))  # the left photo is held, the base turns
-    frame = to_ground[pairs.pair]
-    return PairErrors(
-        _elements(orientation, photos),
-        to_ground @ ahead,
-        to_ground @ turn / scale[:, None, None],
-        frame @ by_elements,
-        frame @ own,
-        np.einsum("mij,mj->mi", frame, point),
-        to_ground[:, :, 0],
+    left = _Turns(
+        from_alpha_omega_kappa(al1, 0.0, ka1),
+        angle_rates(np.column_stack([al1, zero, ka1]), SYSTEM)[:, :, [0, 2]],  # omega1 is 0 by definition
     )
+    right = _Turns(
+        from_alpha_omega_kappa(al2, om2, ka2),
+        angle_rates(np.column_stack([al2, om2, ka2]), SYSTEM),
+    )
+    to_ground = rotations @ left.rotation.transpose(0, 2, 1) * scale[:, None, None]
+    turn = np.concatenate([-left.rates, right.rates], axis=2)
+    with np.errstate(all="ignore"):
+        points = _points(orientation, left, right)
+    base = np.zeros((pairs.size, 3, 5))
+    base[:, :, LEFT] = -_crossed(left.rates, np.array([1.0, 0.0, 0.0]))  # the left photo is held, the base turns
+    of_row = to_ground[pairs.pair]
+    return PairErrors(
+        elements_by_image=_elements(orientation, left, right),
+        base_by_elements=to_ground @ base,
+        rotation_by_elements=to_ground @ turn / scale[:, None, None],
+        point_by_elements=of_row @ points.by_elements,
+        point_by_image=of_row @ points.by_image,
+        point=np.einsum("mij,mj->mi", of_row, points.point),
+        base=to_ground[:, :, 0],
+    )
+
+
+class _Turns(NamedTuple):
+    """One photo of every pair against its base."""
+
+    rotation: Floats  # (p, 3, 3)
+    rates: Floats  # (p, 3, k): small rotation by the photo's angles among the elements
+
+
+class _Points(NamedTuple):
+    """Model points in the base frame with base 1, the left photo held."""
+
+    point: Floats  # (m, 3)
+    by_elements: Floats  # (m, 3, 5)
+    by_image: Floats  # (m, 3, 4)
 
 
 def _crossed(axes: Floats, vectors: Floats) -> Floats:
@@ -87,24 +98,24 @@ def _crossed(axes: Floats, vectors: Floats) -> Floats:
     return np.asarray(np.cross(axes, vectors[..., :, None], axisa=-2, axisb=-2, axisc=-2), float)
 
 
-def _elements(orientation: Orientation, photos: tuple[Floats, Floats]) -> Floats:
-    """Elements by image coordinates: de = -(J^T W J)^-1 J^T W B v."""
+def _elements(orientation: Orientation, left: _Turns, right: _Turns) -> Floats:
+    """Elements by image coordinates, shape (m, 5, 4): de = -(J^T W J)^-1 J^T W B v (eq. 1)."""
     pairs = orientation.pairs
     with np.errstate(all="ignore"):
         _, jacobian = relative.linearised(orientation.elements, pairs)
         cofactors = np.linalg.inv(relative.normal_matrices(jacobian, pairs))
-        by_image = _parallax_by_image(orientation.elements, pairs, photos)
+        by_image = _parallax_by_image(orientation.elements, pairs, left, right)
         share = np.einsum("mij,jm->mi", cofactors[pairs.pair], jacobian * pairs.weight)
         found = -share[:, :, None] * by_image[:, None, :]
     return np.where(orientation.used[:, None, None], found, 0.0)
 
 
-def _parallax_by_image(elements: Floats, pairs: Pairs, photos: tuple[Floats, Floats]) -> Floats:
-    """Y parallax q by (x1, y1, x2, y2), shape (m, 4), without unit."""
-    left, right = relative.rays(elements, pairs)
+def _parallax_by_image(elements: Floats, pairs: Pairs, left: _Turns, right: _Turns) -> Floats:
+    """B: y parallax q by (x1, y1, x2, y2), shape (m, 4), without unit."""
+    rays = relative.rays(elements, pairs)
     result = np.empty((len(pairs.pair), 4))
-    for columns, sign, ray, photo in ((slice(0, 2), 1.0, left, photos[0]), (slice(2, 4), -1.0, right, photos[1])):
-        turned = photo[pairs.pair][:, :, :2]
+    for columns, sign, ray, photo in ((slice(0, 2), 1.0, rays[0], left), (slice(2, 4), -1.0, rays[1], right)):
+        turned = photo.rotation[pairs.pair][:, :, :2]
         result[:, columns] = sign * _levelled(ray, turned, pairs.focal)[:, 1]
     return result
 
@@ -116,10 +127,8 @@ def _levelled(ray: Floats, change: Floats, focal: float) -> Floats:
     return found
 
 
-def _points(
-    orientation: Orientation, photos: tuple[Floats, Floats], rates: tuple[Floats, Floats]
-) -> tuple[Floats, Floats, Floats]:
-    """Model points in the base frame with base 1, by elements (the left photo held) and by their own coordinates."""
+def _points(orientation: Orientation, left: _Turns, right: _Turns) -> _Points:
+    """Differentiate N = 1 / (x1 - x2), X = N x1, Y = N (y1 + y2) / 2, Z = -N f of image coordinates made level."""
     pairs = orientation.pairs
     both = relative.rays(orientation.elements, pairs)
     level = [-pairs.focal * ray[:2] / ray[2] for ray in both]
@@ -131,11 +140,11 @@ def _points(
     by_level[1, :, :, 0] = factor[:, None] * point
     by_level[0, :, 0, 0] += factor
     by_level[:, :, 1, 1] = factor / 2
-    by_elements, own = np.empty((len(factor), 3, 5)), np.empty((len(factor), 3, 4))
-    for side, (columns, ray, photo, rate) in enumerate(zip((LEFT, RIGHT), both, photos, rates, strict=True)):
-        turned = _crossed(rate[pairs.pair], ray.T)
+    by_elements, by_image = np.empty((len(factor), 3, 5)), np.empty((len(factor), 3, 4))
+    for side, (columns, ray, photo) in enumerate(zip((LEFT, RIGHT), both, (left, right), strict=True)):
+        turned = _crossed(photo.rates[pairs.pair], ray.T)
         by_elements[:, :, columns] = by_level[side] @ _levelled(ray, turned, pairs.focal)
-        image = photo[pairs.pair][:, :, :2]
-        own[:, :, 2 * side : 2 * side + 2] = by_level[side] @ _levelled(ray, image, pairs.focal)
-    by_elements[:, :, LEFT] -= _crossed(rates[0][pairs.pair], point)  # seen from the left photo, which is held
-    return point, by_elements, own
+        image = photo.rotation[pairs.pair][:, :, :2]
+        by_image[:, :, 2 * side : 2 * side + 2] = by_level[side] @ _levelled(ray, image, pairs.focal)
+    by_elements[:, :, LEFT] -= _crossed(left.rates[pairs.pair], point)  # in the frame of the left photo, which is held
+    return _Points(point, by_elements, by_image)

@@ -1,16 +1,16 @@
 """Errors of photos that are oriented on their adjusted points, as rows of derivatives like those of the points.
 
-Source: derived; see docs/precision.md.
+Source: derived; see docs/precision.md, eq. 3.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from photostrip.triangulation.error_propagation.derivatives import UNITS, Rows
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ErrorRows, ranges
 from photostrip.triangulation.resection import resection as exterior
 
 if TYPE_CHECKING:
@@ -33,50 +33,61 @@ class Sightings:
     xyz: Floats  # (e, 3): adjusted point, metres
     focal: float  # principal distance, mm
 
+    def take(self, rows: Numbers | NDArray[np.bool_]) -> Sightings:
+        """Select some."""
+        return Sightings(self.photo[rows], self.point[rows], self.image[rows], self.xyz[rows], self.focal)
 
-def photo_rows(
-    errors: StripErrors, seen: Sightings, resection: Resection, influence: Floats
-) -> tuple[Rows, Floats, Numbers]:
-    """Rows of derivatives of the photos: centre, then small rotation, in the frame of the ground.
 
-    Parameters
-    ----------
-    seen : Sightings
-        What the photos were oriented on.
-    influence : ndarray, shape (q, 3, t)
-        What the parameters fitted to the control take away from the points.
+@dataclass(frozen=True, eq=False)
+class PhotoErrors:
+    """Errors of the k photos that were oriented: centre, then small rotation, in the frame of the ground."""
 
-    Returns
-    -------
-    rows : Rows
-        One for each photo that was oriented, d = 6.
-    influence : ndarray, shape (k, 6, t)
-        What the parameters take away from it.
-    photos : ndarray of int, shape (k,)
-        Places of these photos in the strip.
+    rows: ErrorRows  # d = 6
+    influence: Floats  # (k, 6, t): what the parameters fitted to the control take away
+    photos: Numbers  # (k,): places in the strip
+
+
+def differentiate_photos(
+    errors: StripErrors, sightings: Sightings, resection: Resection, point_influence: Floats
+) -> PhotoErrors:
+    """Differentiate the resections; ``point_influence`` (q, 3, t) is what the fit takes away from the points.
+
+    The points carry the photo with them, and its measurements move it once more: do = sum by_point dX + by_image dl.
     """
-    chosen = resection.solved[seen.photo]
-    seen = Sightings(seen.photo[chosen], seen.point[chosen], seen.image[chosen], seen.xyz[chosen], seen.focal)
-    photos, starts, item = np.unique(seen.photo, return_index=True, return_inverse=True)
-    by_image, by_point = _resected(seen, resection, starts, item)
-    points = errors.points
-    first = np.minimum.reduceat(points.first[seen.point], starts)
-    moved = by_point @ points.frame[seen.point]
-    rows = Rows(
-        first,
-        np.add.reduceat(moved, starts, axis=0),
-        _core(errors, seen, (first, item), by_point, moved),
-        *_own(errors, seen, item, by_image, by_point),
+    sightings = sightings.take(resection.solved[sightings.photo])
+    photos, starts, item = np.unique(sightings.photo, return_index=True, return_inverse=True)
+    by = _resected(sightings, resection, starts, item)
+    points, images = errors.points, errors.images
+    moved = by.point @ points.by_similarity[sightings.point]
+    first = np.minimum.reduceat(points.first[sightings.point], starts)
+    sighting, entry = ranges(*points.entries(sightings.point))
+    image, by_image = points.image[entry], by.point[sighting] @ points.by_image[entry]
+    once_more = np.flatnonzero(image == images.rows_of(sightings.image)[sighting])
+    by_image[once_more] += by.image[sighting[once_more]] * images.sigma[image[once_more]][:, None, :]
+    rows = ErrorRows(
+        first=first,
+        by_similarity=np.add.reduceat(moved, starts, axis=0),
+        by_component=_by_component(errors, sightings, first, item, by.point, moved),
+        item=item[sighting],
+        image=image,
+        by_image=by_image,
     )
-    return rows, np.add.reduceat(by_point @ influence[seen.point], starts, axis=0), photos
+    return PhotoErrors(rows, np.add.reduceat(by.point @ point_influence[sightings.point], starts, axis=0), photos)
 
 
-def _resected(seen: Sightings, resection: Resection, starts: Numbers, item: Numbers) -> tuple[Floats, Floats]:
-    """Orientation by image coordinates (e, 6, 2) and by points (e, 6, 3): do = N^-1 A^T (dl + A_S dX)."""
-    rotations = resection.rotations[seen.photo]
-    count = len(seen.photo)
-    arm = seen.xyz - resection.centers[seen.photo]
-    by_x, by_y, _ = exterior.partials(arm, rotations, np.full(count, seen.focal), np.ones(count))
+class _Resected(NamedTuple):
+    """Derivatives of a photo's orientation by what it was oriented on."""
+
+    image: Floats  # (e, 6, 2)
+    point: Floats  # (e, 6, 3)
+
+
+def _resected(sightings: Sightings, resection: Resection, starts: Numbers, item: Numbers) -> _Resected:
+    """Orientation by image coordinates and by points: do = N^-1 A^T (dl + A_S dX), N = A^T A of one photo."""
+    rotations = resection.rotations[sightings.photo]
+    count = len(sightings.photo)
+    arm = sightings.xyz - resection.centers[sightings.photo]
+    by_x, by_y, _ = exterior.partials(arm, rotations, np.full(count, sightings.focal), np.ones(count))
     design = np.stack([by_x.T, by_y.T], axis=1)
     distance = np.linalg.norm(arm, axis=1).mean()
     unit = np.array([distance] * 3 + [1.0] * 3)  # so that shifts and rotations are of one size
@@ -85,29 +96,28 @@ def _resected(seen: Sightings, resection: Resection, starts: Numbers, item: Numb
     turn = np.zeros((count, 6, 6))
     turn[:, :3, :3] = turn[:, 3:, 3:] = rotations
     by_image = turn @ (unit[:, None] * (np.linalg.inv(normal)[item] @ scaled.transpose(0, 2, 1)))
-    return by_image, by_image @ design[:, :, :3] @ rotations.transpose(0, 2, 1)
+    return _Resected(by_image, by_image @ design[:, :, :3] @ rotations.transpose(0, 2, 1))
 
 
-def _core(
-    errors: StripErrors, seen: Sightings, place: tuple[Numbers, Numbers], by_point: Floats, moved: Floats
+def _by_component(
+    errors: StripErrors, sightings: Sightings, first: Numbers, item: Numbers, by_point: Floats, moved: Floats
 ) -> Floats:
-    """Coefficients of units: what the points have, and the steps from the photo's first model to the points'."""
-    first, item = place
+    """Coefficients of components: what the points have, and the steps from the photo's first model to the points'."""
     points, steps = errors.points, errors.steps
-    shift = points.first[seen.point] - first[item]
-    slots = points.core.shape[1]
-    core = np.zeros((len(first), int(shift.max()) + slots, by_point.shape[1], UNITS))
+    shift = points.first[sightings.point] - first[item]
+    slots = points.by_component.shape[1]
+    result = np.zeros((len(first), int(shift.max()) + slots, by_point.shape[1], COMPONENTS))
     for ahead in range(int(shift.max()) + 1):
         chosen = np.flatnonzero(shift == ahead)
         for slot in range(slots):
-            values = by_point[chosen] @ points.core[seen.point[chosen], slot]
-            _add_by_item(core[:, ahead + slot], item[chosen], values)
+            values = by_point[chosen] @ points.by_component[sightings.point[chosen], slot]
+            _add_by_item(result[:, ahead + slot], item[chosen], values)
         beyond = np.flatnonzero(shift > ahead)
         if len(beyond):
             present, starts = np.unique(item[beyond], return_index=True)
             sums = np.add.reduceat(moved[beyond], starts, axis=0)
-            core[present, ahead] += sums @ steps[first[present] + ahead]
-    return core
+            result[present, ahead] += sums @ steps[first[present] + ahead]
+    return result
 
 
 def _add_by_item(target: Floats, item: Numbers, values: Floats) -> None:
@@ -115,21 +125,3 @@ def _add_by_item(target: Floats, item: Numbers, values: Floats) -> None:
     if len(item):
         present, starts = np.unique(item, return_index=True)
         target[present] += np.add.reduceat(values, starts, axis=0)
-
-
-def _own(
-    errors: StripErrors, seen: Sightings, item: Numbers, by_image: Floats, by_point: Floats
-) -> tuple[Numbers, Numbers, Floats]:
-    """Image points by themselves: those that made the photo's points, and those on the photo once more."""
-    points, images = errors.points, errors.images
-    lookup = np.full(int(images.row.max()) + 1, -1)
-    lookup[images.row] = np.arange(len(images.row))
-    starts = np.searchsorted(points.item, seen.point)
-    counts = np.searchsorted(points.item, seen.point, side="right") - starts
-    entry = np.repeat(np.arange(len(item)), counts)
-    source = np.arange(len(entry)) - np.repeat(np.cumsum(counts) - counts, counts) + starts[entry]
-    own = by_point[entry] @ points.own[source]
-    image = points.image[source]
-    here = np.flatnonzero(image == lookup[seen.image][entry])
-    own[here] += by_image[entry[here]] * images.sigma[image[here]][:, None, :]
-    return item[entry], image, own

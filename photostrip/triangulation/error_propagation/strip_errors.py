@@ -1,16 +1,16 @@
 """Errors of the formed strip: sparse rows of derivatives by the image coordinates, one for every step and point.
 
-The error of a model is an infinitesimal similarity (shift, rotation, scale) plus its deformation. From model to
-model the similarities differ by *steps*. All of them hang on six numbers for each model, its *units*: the errors of
-the five elements of its pair, and of the logarithm of the scale handed on to the next model. Every row is kept as
-coefficients of a similarity, of a few units, and of a few image coordinates; the covariances among units and image
-coordinates are exact products of their own rows. Units of models i and k have image coordinates in common when
-|i - k| <= 2: pairs share a photo, a scale transfer uses three.
+The error of a model is an infinitesimal similarity (shift, rotation, scale) plus its deformation. From model to model
+the similarities differ by *steps* (eq. 2). All of them hang on six *error components* of each model: the errors of the
+five elements of its pair, and of the logarithm of the scale handed on to the next model. Every row is kept as
+coefficients of a similarity, of a few components, and of a few image coordinates (eq. 3); the covariances among
+components and image coordinates are exact products of their rows. Components of models i and k have image coordinates
+in common when |i - k| <= 2: pairs share a photo, a scale transfer uses three.
 
-All coordinates refer to the frame of the ground after the plain similarity; image coordinates count in units of their
-stated standard deviation.
+All coordinates refer to the frame of the ground after the plain similarity; image coordinates count in their stated
+standard deviations.
 
-Source: derived; see docs/precision.md.
+Source: derived; see docs/precision.md, eq. 2 and 3.
 """
 
 from __future__ import annotations
@@ -23,7 +23,15 @@ import numpy as np
 from photostrip.geometry.rotation import cross_matrix
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 from photostrip.triangulation.error_propagation import pair_errors
-from photostrip.triangulation.error_propagation.derivatives import ELEMENTS, REACH, SCALE, SPAN, UNITS, Images, Rows
+from photostrip.triangulation.error_propagation.derivatives import (
+    COMPONENTS,
+    ELEMENTS,
+    REACH,
+    SCALE,
+    SPAN,
+    ErrorRows,
+    ImagePoints,
+)
 from photostrip.triangulation.error_propagation.non_neighbour_errors import with_bridges
 
 if TYPE_CHECKING:
@@ -42,13 +50,12 @@ if TYPE_CHECKING:
 class StripErrors:
     """Everything that covariances of a strip are made of."""
 
-    images: Images
-    # (p, 7, 6): step from the similarity of each model to the next by the model's units; after the last model that of
-    # the last photo
+    images: ImagePoints
+    # (p, 7, 6): step from the similarity of each model to the next by the model's error components; after the last
+    # model that of the last photo
     steps: Floats
-    # (p, 3, 6, 6): covariances of the units of each model with those of itself, the next and the one after
-    covariances: Floats
-    points: Rows
+    component_covariances: Floats  # (p, 3, 6, 6): Q, of each model with itself, the next and the one after
+    points: ErrorRows
     pairs: PairErrors
     origin: Floats  # (3,): common origin of all similarities
 
@@ -58,7 +65,21 @@ class StripErrors:
         return len(self.steps)
 
 
-def strip_errors(
+@dataclass(frozen=True, eq=False)
+class PlacedStrip:
+    """A formed strip after its similarity, coordinates from the common origin, and what its rows are made of."""
+
+    orientation: Orientation
+    formed: FormedStrip
+    xyz: Floats  # (q, 3)
+    centers: Floats  # (p + 1, 3)
+    rotations: Floats  # (p + 1, 3, 3)
+    pairs: PairErrors
+    images: ImagePoints
+    steps: Floats  # (p, 7, 6)
+
+
+def differentiate_strip(
     orientation: Orientation, formed: FormedStrip, similarity: Similarity, position: Numbers, sigma: Floats
 ) -> StripErrors:
     """Rows of derivatives of a formed strip.
@@ -71,118 +92,117 @@ def strip_errors(
         Place in the strip of the photo of every image point in the observations.
     sigma : ndarray, shape (k, 2)
         Standard deviations of all image points in the observations, mm.
-
-    Returns
-    -------
-    StripErrors
-        Units, steps and rows of the points.
     """
-    rotations = similarity.rotation @ formed.rotations[:-1]
-    derivatives = pair_errors.differentiate(orientation, rotations, similarity.scale * formed.scale)
+    rotations = similarity.rotation @ formed.rotations
+    pairs = pair_errors.differentiate_pairs(orientation, rotations[:-1], similarity.scale * formed.scale)
     centers = similarity(formed.centers)
     origin = centers.mean(axis=0)
-    images, place = _images(orientation, position, sigma)
-    units = _units(orientation, formed, derivatives, images, place)
-    images = Images(images.row, images.photo, images.sigma, units * images.sigma[:, None, None, :])
-    steps = _steps(derivatives, centers[1:] - origin)
-    points = _point_rows(orientation, formed, derivatives, similarity(formed.xyz) - origin, (images, place, steps))
+    strip = PlacedStrip(
+        orientation=orientation,
+        formed=formed,
+        xyz=similarity(formed.xyz) - origin,
+        centers=centers - origin,
+        rotations=rotations,
+        pairs=pairs,
+        images=_image_points(orientation, formed, pairs, position, sigma),
+        steps=_steps(pairs, centers[1:] - origin),
+    )
+    points = _point_rows(strip)
     if len(formed.bridging):
-        photos = (centers - origin, similarity.rotation @ formed.rotations)
-        points = with_bridges(points, (orientation, formed), (images, place), photos, steps)
-    return StripErrors(images, steps, _unit_covariances(images, len(steps)), points, derivatives, origin)
+        points = with_bridges(points, strip)
+    covariances = _component_covariances(strip.images, len(strip.steps))
+    return StripErrors(strip.images, strip.steps, covariances, points, pairs, origin)
 
 
-def _images(orientation: Orientation, position: Numbers, sigma: Floats) -> tuple[Images, Numbers]:
-    """Image points of the pairs' table by photo, and the place of each pair's two points among them."""
-    rows = np.unique(orientation.rows)
-    rows = rows[np.argsort(position[rows], kind="stable")]
-    lookup = np.full(len(position), -1)
-    lookup[rows] = np.arange(len(rows))
-    return Images(rows, position[rows], sigma[rows], np.zeros((0, 3, 6, 2))), lookup[orientation.rows]
+def scale_shares(orientation: Orientation, formed: FormedStrip, pairs: PairErrors) -> tuple[Floats, Floats]:
+    """Differentiate the logarithm of the scale handed on by the pass points, seen from the common centre.
 
-
-def scale_shares(orientation: Orientation, formed: FormedStrip, derivatives: PairErrors) -> tuple[Floats, Floats]:
-    """Share of every pass point in the logarithm of the scale handed on, by its vectors from the common centre.
+    The scale k is the weighted mean of the ratios r = |b| / |a| of the vectors before and after: d ln k = sum p r
+    (b . db / |b|^2 - a . da / |a|^2) / sum p r. The shares of ``after`` come without their sign.
 
     Returns
     -------
     before, after : ndarray, shape (t, 3)
-        Derivatives by the point in the model before and after the joint, 1/metres, for the used rows of the junctions
-        and 0 for others.
+        By the point in the model before and after the junction, 1/metres; 0 for pass points that are not used.
     """
     joined = formed.junctions
     shares = np.where(joined.used, joined.weight * joined.ratio, 0.0)
     shares = shares / np.bincount(joined.joint, shares, max(orientation.pairs.size - 1, 1))[joined.joint]
-    vectors = (derivatives.arm[joined.before] - derivatives.reach[joined.joint], derivatives.arm[joined.after])
+    vectors = (pairs.point[joined.before] - pairs.base[joined.joint], pairs.point[joined.after])
     before, after = (shares[:, None] * u / (u**2).sum(axis=1)[:, None] for u in vectors)
     return before, after
 
 
-def _units(
-    orientation: Orientation, formed: FormedStrip, derivatives: PairErrors, images: Images, place: Numbers
-) -> Floats:
-    """Units by image coordinates in mm, shape (n, 3, 6, 2)."""
-    units = np.zeros((len(images.row), 3, UNITS, 2))
-    units[place[:, 0], 2, ELEMENTS] = derivatives.elements[:, :, :2]
-    units[place[:, 1], 1, ELEMENTS] = derivatives.elements[:, :, 2:]
+def _image_points(
+    orientation: Orientation, formed: FormedStrip, pairs: PairErrors, position: Numbers, sigma: Floats
+) -> ImagePoints:
+    """Image points of the pairs, ordered by photo, with the error components that depend on them.
+
+    A point on photo i enters the elements of the models i - 1 and i directly, and the scale of the models i - 2 to i:
+    by its own ray, and by the elements of both models of a junction.
+    """
+    row = np.unique(orientation.rows)
+    row = row[np.argsort(position[row], kind="stable")]
+    components = np.zeros((len(row), SPAN, COMPONENTS, 2))
+    images = ImagePoints(row, position[row], sigma[row], components)
+    place = images.rows_of(orientation.rows)
+    components[place[:, 0], 2, ELEMENTS] = pairs.elements_by_image[:, :, :2]
+    components[place[:, 1], 1, ELEMENTS] = pairs.elements_by_image[:, :, 2:]
     joined, models = formed.junctions, orientation.pairs.size
-    before, after = scale_shares(orientation, formed, derivatives)
-    near, far = (np.zeros((models, 5)) for _ in range(2))
-    by_pair = np.einsum("ti,tij->tj", before, derivatives.deformation[joined.before] - derivatives.base[joined.joint])
-    by_next = -np.einsum("ti,tij->tj", after, derivatives.deformation[joined.after])
-    np.add.at(near, joined.joint, by_pair)
-    np.add.at(far, joined.joint, by_next)
-    own_before = np.einsum("ti,tij->tj", before, derivatives.own[joined.before])
-    own_after = np.einsum("ti,tij->tj", after, derivatives.own[joined.after])
-    units[place[joined.before, 0], 2, SCALE] += own_before[:, :2]
-    units[place[joined.before, 1], 1, SCALE] += own_before[:, 2:] - own_after[:, :2]
-    units[place[joined.after, 1], 0, SCALE] -= own_after[:, 2:]
+    before, after = scale_shares(orientation, formed, pairs)
+    scale_by_elements, scale_by_next = (np.zeros((models, 5)) for _ in range(2))  # elements of a model, of the next
+    center_to_point = pairs.point_by_elements[joined.before] - pairs.base_by_elements[joined.joint]
+    np.add.at(scale_by_elements, joined.joint, np.einsum("ti,tij->tj", before, center_to_point))
+    np.add.at(scale_by_next, joined.joint, -np.einsum("ti,tij->tj", after, pairs.point_by_elements[joined.after]))
+    by_before = np.einsum("ti,tij->tj", before, pairs.point_by_image[joined.before])
+    by_after = np.einsum("ti,tij->tj", after, pairs.point_by_image[joined.after])
+    components[place[joined.before, 0], 2, SCALE] += by_before[:, :2]
+    components[place[joined.before, 1], 1, SCALE] += by_before[:, 2:] - by_after[:, :2]
+    components[place[joined.after, 1], 0, SCALE] -= by_after[:, 2:]
     photo = images.photo
-    padded_near, padded_far = (np.concatenate([a, np.zeros((SPAN, 5))]) for a in (near, far))  # no model: no share
-    units[:, 2, SCALE] += np.einsum("ni,nij->nj", padded_near[photo], units[:, 2, ELEMENTS])
-    units[:, 1, SCALE] += np.einsum("ni,nij->nj", padded_near[photo - 1], units[:, 1, ELEMENTS])
-    units[:, 1, SCALE] += np.einsum("ni,nij->nj", padded_far[photo - 1], units[:, 2, ELEMENTS])
-    units[:, 0, SCALE] += np.einsum("ni,nij->nj", padded_far[photo - 2], units[:, 1, ELEMENTS])
-    return units
+    none = np.zeros((SPAN, 5))  # beyond the ends there is no model and no share
+    mine, following = (np.concatenate([shares, none]) for shares in (scale_by_elements, scale_by_next))
+    for slot, shares, model, elements in (
+        (2, mine, photo, 2),
+        (1, mine, photo - 1, 1),
+        (1, following, photo - 1, 2),
+        (0, following, photo - 2, 1),
+    ):
+        components[:, slot, SCALE] += np.einsum("ni,nij->nj", shares[model], components[:, elements, ELEMENTS])
+    components *= images.sigma[:, None, None, :]
+    return images
 
 
-def _steps(derivatives: PairErrors, next_centers: Floats) -> Floats:
-    """Derive steps by units: t = dB - theta x (S - O) - mu (S - O), theta, mu; S the centre that joins the models."""
-    steps = np.zeros((len(next_centers), SIMILARITY_PARAMETERS, UNITS))
-    steps[:, :3, ELEMENTS] = derivatives.base + cross_matrix(next_centers) @ derivatives.turn
+def _steps(pairs: PairErrors, next_centers: Floats) -> Floats:
+    """Derive steps by components: t = dB - theta x (S - O) - mu (S - O), theta, mu; S the centre joining the models."""
+    steps = np.zeros((len(next_centers), SIMILARITY_PARAMETERS, COMPONENTS))
+    steps[:, :3, ELEMENTS] = pairs.base_by_elements + cross_matrix(next_centers) @ pairs.rotation_by_elements
     steps[:, :3, SCALE] = -next_centers
-    steps[:, 3:6, ELEMENTS] = derivatives.turn
+    steps[:, 3:6, ELEMENTS] = pairs.rotation_by_elements
     steps[:, 6, SCALE] = 1.0
     return steps
 
 
-def _unit_covariances(images: Images, models: int) -> Floats:
-    """Exact products of the units' rows: (p, 3, 6, 6), with the own model, the next and the one after."""
+def _component_covariances(images: ImagePoints, models: int) -> Floats:
+    """Q(m, m + apart) = sum over common image points of their rows' products, shape (p, 3, 6, 6)."""
     photos = models + 1
     counts = np.bincount(images.photo, minlength=photos)
     rank = np.arange(len(images.photo)) - np.concatenate([[0], np.cumsum(counts)])[images.photo]
-    padded = np.zeros((photos, int(counts.max()), 2, SPAN * UNITS))
-    padded[images.photo, rank] = images.units.transpose(0, 3, 1, 2).reshape(len(rank), 2, -1)
-    flat = padded.reshape(photos, -1, SPAN * UNITS)
-    gram = (flat.transpose(0, 2, 1) @ flat).reshape(photos, SPAN, UNITS, SPAN, UNITS)
-    result = np.zeros((models, SPAN, UNITS, UNITS))
+    padded = np.zeros((photos, int(counts.max()), 2, SPAN * COMPONENTS))
+    padded[images.photo, rank] = images.components.transpose(0, 3, 1, 2).reshape(len(rank), 2, -1)
+    flat = padded.reshape(photos, -1, SPAN * COMPONENTS)
+    gram = (flat.transpose(0, 2, 1) @ flat).reshape(photos, SPAN, COMPONENTS, SPAN, COMPONENTS)
+    result = np.zeros((models, SPAN, COMPONENTS, COMPONENTS))
     for apart in range(SPAN):
         for slot in range(SPAN - apart):  # the earlier model is photo - 2 + slot
-            shift = REACH - slot
-            seen = gram[shift:, slot, :, slot + apart]
-            result[: len(seen), apart] += seen[:models]
+            of_photo = gram[REACH - slot :, slot, :, slot + apart]
+            result[: len(of_photo), apart] += of_photo[:models]
     return result
 
 
-def _point_rows(
-    orientation: Orientation,
-    formed: FormedStrip,
-    derivatives: PairErrors,
-    arm: Floats,
-    parts: tuple[Images, Numbers, Floats],
-) -> Rows:
-    """Rows of the points: means over their models, each seen from the first of them."""
-    images, place, steps = parts
+def _point_rows(strip: PlacedStrip) -> ErrorRows:
+    """Rows of the points: means over their k models, each brought back over the steps to the first of them (eq. 3)."""
+    orientation, formed, pairs, steps = strip.orientation, strip.formed, strip.pairs, strip.steps
     rows = np.flatnonzero(orientation.used & np.isfinite(formed.model_xyz).all(axis=1))
     item = np.searchsorted(formed.point, orientation.point[rows])
     model, count = orientation.pairs.pair[rows], len(formed.point)
@@ -193,20 +213,28 @@ def _point_rows(
     slot = model - first[item]
     slots = int(slot.max()) + 1
     share = 1 / formed.models[item]
-    core = np.zeros((count, slots, 3, UNITS))
-    core[item, slot, :, ELEMENTS] = share[:, None, None] * derivatives.deformation[rows]
+    by_component = np.zeros((count, slots, 3, COMPONENTS))
+    by_component[item, slot, :, ELEMENTS] = share[:, None, None] * pairs.point_by_elements[rows]
     held = np.zeros((count, slots + 1))
     held[item, slot] = share
     beyond = np.cumsum(held[:, ::-1], axis=1)[:, ::-1][:, 1:]  # share of the models after each slot
-    frame = similarity_derivatives(arm, np.zeros(3))
+    by_similarity = similarity_derivatives(strip.xyz, np.zeros(3))
     for s in range(slots):
         moved = np.flatnonzero(beyond[:, s] > 0)
-        core[moved, s] += beyond[moved, s, None, None] * (frame[moved] @ steps[first[moved] + s])
-    own = np.zeros((len(images.row), 3, 2))
-    point_of = np.full(len(images.row), -1)
+        by_component[moved, s] += beyond[moved, s, None, None] * (by_similarity[moved] @ steps[first[moved] + s])
+    place = strip.images.rows_of(orientation.rows)
+    by_image = np.zeros((len(strip.images.row), 3, 2))
+    point_of = np.full(len(strip.images.row), -1)
     for side, columns in ((0, slice(0, 2)), (1, slice(2, 4))):
-        own[place[rows, side]] += share[:, None, None] * derivatives.own[rows][:, :, columns]
+        by_image[place[rows, side]] += share[:, None, None] * pairs.point_by_image[rows][:, :, columns]
         point_of[place[rows, side]] = item
     entries = np.flatnonzero(point_of >= 0)
     entries = entries[np.argsort(point_of[entries], kind="stable")]
-    return Rows(first, frame, core, point_of[entries], entries, own[entries] * images.sigma[entries][:, None, :])
+    return ErrorRows(
+        first=first,
+        by_similarity=by_similarity,
+        by_component=by_component,
+        item=point_of[entries],
+        image=entries,
+        by_image=by_image[entries] * strip.images.sigma[entries][:, None, :],
+    )

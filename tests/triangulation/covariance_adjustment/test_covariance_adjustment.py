@@ -27,7 +27,7 @@ from tests.derivatives import UNSCREENED, errors_of, spec, without_noise, writte
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.error_propagation.derivatives import Rows
+    from photostrip.triangulation.error_propagation.derivatives import ErrorRows
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
     Floats = NDArray[np.float64]
@@ -56,8 +56,8 @@ def prepared(result: Result, *, distances: bool) -> Prepared:
     return found.errors, wanted, local
 
 
-def without_frame(rows: Rows) -> Rows:
-    return replace(rows, frame=np.zeros_like(rows.frame))
+def without_frame(rows: ErrorRows) -> ErrorRows:
+    return replace(rows, by_similarity=np.zeros_like(rows.by_similarity))
 
 
 @pytest.mark.parametrize("distances", [False, True])
@@ -78,7 +78,7 @@ def test_the_band_gives_what_the_whole_matrix_gives(photos: int, lap: float, *, 
     by_images = written_out(without_frame(wanted.rows), errors)[:, 0]
     design = np.zeros((len(wanted.value), 7 * (n + 1)))
     for row, model in enumerate(wanted.rows.first.tolist()):
-        design[row, 7 * model : 7 * model + 7] = wanted.rows.frame[row, 0]
+        design[row, 7 * model : 7 * model + 7] = wanted.rows.by_similarity[row, 0]
         design[row, 7 * model + 7 : 7 * model + 14] = wanted.following[row]
     design = design[:, : 7 * n]
     corner = np.zeros((7 * n, 7 * n))
@@ -91,12 +91,12 @@ def test_the_band_gives_what_the_whole_matrix_gives(photos: int, lap: float, *, 
     assert images.ravel() == pytest.approx(expected, abs=1e-8 * np.abs(expected).max())
     for rows, seen in zip(things, predicted, strict=True):
         own = written_out(without_frame(rows), errors)
-        size = rows.frame.shape[1]
+        size = rows.by_similarity.shape[1]
         for thing in range(len(rows.first)):
             column = np.zeros((len(whole), size))
             column[: len(by_images)] = by_images @ own[thing].T
             start = len(by_images) + 7 * rows.first[thing]
-            column[start : start + 7] = (rows.frame[thing] @ local.to_common[rows.first[thing]]).T
+            column[start : start + 7] = (rows.by_similarity[thing] @ local.to_common[rows.first[thing]]).T
             assert seen.error[thing] == pytest.approx(column.T @ solution, abs=1e-9)
             moved = relinearisation.displacements(errors, rows, images)[thing]
             assert moved == pytest.approx(own[thing] @ images.ravel(), abs=1e-9)

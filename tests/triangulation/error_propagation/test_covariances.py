@@ -89,7 +89,7 @@ def test_sums_along_the_strip_equal_the_whole_matrices(photos: int, lap: float, 
     result = triangulate(without_noise(spec(photos, lap, bands=min(4, photos))), settings(adjustment))
     found = errors_of(result)
     factor = 1.7
-    fit = precision.fitted(found.errors, found.control, found.fit.operator, factor)
+    fit = precision.of_parameters(found.errors, found.control, found.fit.operator, factor)
     misclosures = written_out(found.control.rows, found.errors)[:, 0]
     for rows, influence in (
         (found.errors.points, found.influence),
@@ -128,10 +128,10 @@ def test_a_photo_goes_where_all_its_points_go() -> None:
     result = triangulate(without_noise(spec(6)), settings("similarity"))
     found = errors_of(result)
     centers = result.strips[0].resection.centers - found.errors.origin
-    assert found.photos.frame[:, :3, :3] == pytest.approx(np.broadcast_to(np.eye(3), (6, 3, 3)), abs=1e-9)
-    assert found.photos.frame[:, :3, 6] == pytest.approx(centers, abs=1e-6)
-    assert found.photos.frame[:, 3:, 3:6] == pytest.approx(np.broadcast_to(np.eye(3), (6, 3, 3)), abs=1e-9)
-    assert found.photos.frame[:, 3:, [0, 1, 2, 6]] == pytest.approx(0.0, abs=1e-9)
+    assert found.photos.by_similarity[:, :3, :3] == pytest.approx(np.broadcast_to(np.eye(3), (6, 3, 3)), abs=1e-9)
+    assert found.photos.by_similarity[:, :3, 6] == pytest.approx(centers, abs=1e-6)
+    assert found.photos.by_similarity[:, 3:, 3:6] == pytest.approx(np.broadcast_to(np.eye(3), (6, 3, 3)), abs=1e-9)
+    assert found.photos.by_similarity[:, 3:, [0, 1, 2, 6]] == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.parametrize("adjustment", ["similarity", "covariance"])
