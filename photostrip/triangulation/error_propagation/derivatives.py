@@ -15,6 +15,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from photostrip.triangulation.error_propagation.pair_errors import PairErrors
+    from photostrip.triangulation.relative_orientation.relative import Orientation
+    from photostrip.triangulation.strip_formation.formation import FormedStrip
+
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
 
@@ -118,6 +122,20 @@ class ErrorRows:
     def entries(self, rows: Numbers) -> tuple[Numbers, Numbers]:
         """First and last + 1 of the image points that belong to rows."""
         return np.searchsorted(self.item, rows), np.searchsorted(self.item, rows, side="right")
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedStrip:
+    """A formed strip after its similarity, coordinates from the common origin, and what its rows are made of."""
+
+    orientation: Orientation
+    formed: FormedStrip
+    xyz: Floats  # (q, 3)
+    centers: Floats  # (p + 1, 3)
+    rotations: Floats  # (p + 1, 3, 3)
+    pairs: PairErrors
+    images: ImagePoints
+    steps: Floats  # (p, 7, 6)
 
 
 def ranges(start: Numbers, stop: Numbers) -> tuple[Numbers, Numbers]:

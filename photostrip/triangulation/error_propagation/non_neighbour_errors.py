@@ -16,7 +16,7 @@ from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, E
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.error_propagation.strip_errors import PlacedStrip
+    from photostrip.triangulation.error_propagation.derivatives import PlacedStrip
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]

@@ -31,6 +31,7 @@ from photostrip.triangulation.error_propagation.derivatives import (
     SPAN,
     ErrorRows,
     ImagePoints,
+    PlacedStrip,
 )
 from photostrip.triangulation.error_propagation.non_neighbour_errors import with_bridges
 
@@ -63,20 +64,6 @@ class StripErrors:
     def models(self) -> int:
         """Number of models."""
         return len(self.steps)
-
-
-@dataclass(frozen=True, eq=False)
-class PlacedStrip:
-    """A formed strip after its similarity, coordinates from the common origin, and what its rows are made of."""
-
-    orientation: Orientation
-    formed: FormedStrip
-    xyz: Floats  # (q, 3)
-    centers: Floats  # (p + 1, 3)
-    rotations: Floats  # (p + 1, 3, 3)
-    pairs: PairErrors
-    images: ImagePoints
-    steps: Floats  # (p, 7, 6)
 
 
 def differentiate_strip(
