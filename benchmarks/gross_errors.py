@@ -160,7 +160,7 @@ def supported(result: Result, wrong_rows: set[tuple[str, str]]) -> bool:
             return False
         joined = strip.formed.junctions
         right = np.array(good)[joined.before] & np.array(good)[joined.after]
-        if (np.bincount(joined.joint[right], minlength=len(joined.factor)) < PASS_POINTS).any():
+        if (np.bincount(joined.junction[right], minlength=len(joined.factor)) < PASS_POINTS).any():
             return False
     return True
 

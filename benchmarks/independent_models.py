@@ -30,8 +30,9 @@ from photostrip.points import ModelPoints, PhotoPoints  # noqa: E402
 from photostrip.simulate import Control, Flight, Image, Models, Points, Simulation, Spec, simulate  # noqa: E402
 from photostrip.triangulation.independent_models import link_screening  # noqa: E402
 from photostrip.triangulation.polynomial import correction  # noqa: E402
-from photostrip.triangulation.relative_orientation import relative  # noqa: E402
-from photostrip.triangulation.strip_formation import formation  # noqa: E402
+from photostrip.triangulation.relative_orientation.orientation import orient_unchecked  # noqa: E402
+from photostrip.triangulation.relative_orientation.pairs import collect_pairs  # noqa: E402
+from photostrip.triangulation.strip_formation.strip import model_points  # noqa: E402
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -59,19 +60,19 @@ def spec_of(photos: int, seed: int, models: Models | None = None) -> Spec:
 def models_of_images(simulation: Simulation, rng: np.random.Generator) -> Inputs:
     """Independent models made of image coordinates: each pair by itself, in any system."""
     (name, photos), observations = simulation.strips[0], simulation.observations
-    pairs, point, _ = relative.collect_pairs(observations, photos, simulation.camera.principal_distance)
-    oriented, _ = relative.attempt(pairs, point, _)
-    vectors, _, sound = formation.model_points(oriented)
+    pairs = collect_pairs(observations, photos, simulation.camera.principal_distance)
+    oriented, _ = orient_unchecked(pairs)
+    stereo = model_points(oriented)
     base, _ = oriented.relative
     points = len(observations.point_ids)
     model, node, xyz = [], [], []
     for k in range(len(photos) - 1):
-        rows = np.flatnonzero((oriented.pairs.pair == k) & sound)
-        here = BASE * np.concatenate([vectors[rows], [np.zeros(3)], [base[k]]])
+        rows = np.flatnonzero((oriented.pairs.pair == k) & stereo.sound)
+        here = BASE * np.concatenate([stereo.vectors[rows], [np.zeros(3)], [base[k]]])
         turn, scale, shift = from_vector(rng.normal(0, 1.5, 3)), np.exp(rng.normal(0, 0.2)), rng.normal(0, 300, 3)
         xyz.append(scale * here @ turn.T + shift)
         model += [k] * len(here)
-        node += [*point[rows].tolist(), points + k, points + k + 1]
+        node += [*pairs.point[rows].tolist(), points + k, points + k + 1]
     names = tuple(f"M{k + 1}" for k in range(len(photos) - 1))
     sigma = np.tile(np.array(PLOTTED).max() / 1000, (len(node), 3))  # in axes that lie any way
     table = ModelPoints(

@@ -61,8 +61,10 @@ from photostrip.simulate import Flight, Ground, Image, Spec, simulate  # noqa: E
 from photostrip.simulate.spec import FILM  # noqa: E402
 from photostrip.triangulation.bundle.solve import solve  # noqa: E402
 from photostrip.triangulation.polynomial import correction  # noqa: E402
-from photostrip.triangulation.relative_orientation import relative, six_points  # noqa: E402
-from photostrip.triangulation.strip_formation import formation  # noqa: E402
+from photostrip.triangulation.relative_orientation import six_points  # noqa: E402
+from photostrip.triangulation.relative_orientation.orientation import RelativeSettings, orient_unchecked  # noqa: E402
+from photostrip.triangulation.relative_orientation.pairs import Pairs  # noqa: E402
+from photostrip.triangulation.strip_formation.strip import model_points  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -173,7 +175,7 @@ def measured(
 def run_settings(method: str) -> Settings:
     """Give settings of a run by one of the methods, without a search for gross errors."""
     return Settings(
-        relative=relative.Settings(screening="none"),
+        relative=RelativeSettings(screening="none"),
         polynomial=correction.Settings(DEGREES.get(method, "auto")),
         adjustment="polynomial" if method in DEGREES else method,
     )
@@ -321,9 +323,18 @@ def measured_models(spec: ModelSpec, places: Floats, count: int) -> Floats:
     left = np.tile(every, (count, 1)) + spec.image_sigma * rng.normal(size=(count * n, 2))
     right = np.tile(every - (spec.base, 0.0), (count, 1)) + spec.image_sigma * rng.normal(size=(count * n, 2))
     weight = np.tile(np.arange(n) < len(six), count).astype(float)
-    pairs = relative.Pairs(np.arange(count) * n, np.repeat(np.arange(count), n), left, right, weight, spec.focal)
-    oriented, _ = relative.attempt(pairs, np.tile(np.arange(n), count), np.zeros((count * n, 2), np.intp))
-    vectors, _, _ = formation.model_points(oriented)
+    pairs = Pairs(
+        starts=np.arange(count) * n,
+        pair=np.repeat(np.arange(count), n),
+        left=left,
+        right=right,
+        weight=weight,
+        focal=spec.focal,
+        point=np.tile(np.arange(n), count),
+        rows=np.zeros((count * n, 2), np.intp),
+    )
+    oriented, _ = orient_unchecked(pairs)
+    vectors = model_points(oriented).vectors
     direction, _ = six_points.dependent_pair(oriented.elements)
     model = vectors.reshape(count, n, 3) * (spec.base / direction[:, :1])[:, :, None]
     error = (model - np.column_stack([every, np.full(n, -spec.focal)]))[:, len(six) :]

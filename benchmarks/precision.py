@@ -40,7 +40,7 @@ from photostrip.simulate.simulation import simulate  # noqa: E402
 from photostrip.simulate.spec import FILM, Control, Flight, Image, Points, Spec, Terrain  # noqa: E402
 from photostrip.triangulation.covariance_adjustment import conditions  # noqa: E402
 from photostrip.triangulation.polynomial import correction  # noqa: E402
-from photostrip.triangulation.relative_orientation import relative  # noqa: E402
+from photostrip.triangulation.relative_orientation.orientation import RelativeSettings  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -145,7 +145,7 @@ def settings(method: str, *, screening: str = "none", precision: bool = True) ->
     return Settings(
         adjustment=adjustments.get(method, "polynomial"),
         covariance=conditions.Settings(distances=method != ALONE),
-        relative=relative.Settings(screening=screening),
+        relative=RelativeSettings(screening=screening),
         polynomial=correction.Settings(degree),
         precision=precision,
     )

@@ -26,9 +26,13 @@ from photostrip.simulate.spec import Flight, GrossError, Points, Spec  # noqa: E
 from photostrip.statistics import chi2_quantile  # noqa: E402
 from photostrip.triangulation.gross_errors.pairs import deletion, screening  # noqa: E402
 from photostrip.triangulation.gross_errors.rays import settling  # noqa: E402
-from photostrip.triangulation.relative_orientation import relative  # noqa: E402
-from photostrip.triangulation.relative_orientation.relative import Pairs, Settings  # noqa: E402
-from photostrip.triangulation.strip_formation import formation, scale_ratios  # noqa: E402
+from photostrip.triangulation.relative_orientation.orientation import RelativeSettings, orient_unchecked  # noqa: E402
+from photostrip.triangulation.relative_orientation.pairs import Pairs, collect_pairs  # noqa: E402
+from photostrip.triangulation.relative_orientation.solution import linearised_parallaxes  # noqa: E402
+from photostrip.triangulation.strip_formation import scale_ratios  # noqa: E402
+from photostrip.triangulation.strip_formation.scale_ratios import PassPoints  # noqa: E402
+from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings  # noqa: E402
+from photostrip.triangulation.strip_formation.strip import form_from_pairs  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -44,7 +48,7 @@ FOCAL, SIDE, SCATTER = 100.0, 65.0, 6.0  # mm: principal distance, a = b of the 
 SIGMA_Q = 0.01  # mm, of a y parallax
 MODELS, COUNTS, SECOND = 34, (2, 2, 3, 3, 3, 3), 10  # models, points of the zones 1-6, models with a second error
 SIZES = (0.1, 0.2, 0.3, 0.4, 0.5)  # mm
-SOURCE_LIKE = Settings(screening="parallax+grubbs", grubbs_alpha=0.05, parallax_limit=0.20)
+SOURCE_LIKE = RelativeSettings(screening="parallax+grubbs", grubbs_alpha=0.05, parallax_limit=0.20)
 REPEATED = 15  # measurements of a time
 REFERENCE = "reference R3            51.9     41.7      6.4      1.1"
 POWER_BOUND = (
@@ -66,7 +70,17 @@ def standard_pairs(rng: np.random.Generator, models: int, counts: Sequence[int] 
         sides.append((-FOCAL * ray[..., :2] / ray[..., 2:]).reshape(-1, 2))
     sides[0][:, 1] += rng.normal(0, SIGMA_Q, models * n)
     number = np.repeat(np.arange(models), n)
-    return Pairs(np.arange(models) * n, number, sides[0], sides[1], np.ones(models * n), FOCAL)
+    rows = np.arange(models * n)
+    return Pairs(
+        starts=np.arange(models) * n,
+        pair=number,
+        left=sides[0],
+        right=sides[1],
+        weight=np.ones(models * n),
+        focal=FOCAL,
+        point=rows,
+        rows=np.column_stack([rows, rows]),
+    )
 
 
 def _rotations(angles: Floats) -> Floats:
@@ -88,10 +102,9 @@ def spoiled(pairs: Pairs, errors: Floats) -> Pairs:
     return replace(pairs, left=left)
 
 
-def screened(pairs: Pairs, settings: Settings) -> screening.Screened:
+def screened(pairs: Pairs, settings: RelativeSettings) -> screening.Screened:
     """Orient and screen pairs; photos have no names here."""
-    m = len(pairs.pair)
-    oriented, _ = relative.attempt(pairs, np.arange(m), np.zeros((m, 2), np.intp))
+    oriented, _ = orient_unchecked(pairs)
     return screening.examine(oriented, settings, SIGMA_Q / np.sqrt(2.0))
 
 
@@ -144,7 +157,7 @@ def published_experiment(repetitions: int, seed: int = 1) -> dict[str, Rates]:
     errors = experiment_errors(rng, repetitions)
     given = spoiled(pairs, errors)
     methods = {"parallax+grubbs": SOURCE_LIKE}
-    methods |= {name: Settings(screening=name) for name in ("tau", "robust", "deletion", "auto")}
+    methods |= {name: RelativeSettings(screening=name) for name in ("tau", "robust", "deletion", "auto")}
     return {name: rates(screened(given, settings), errors) for name, settings in methods.items()}
 
 
@@ -158,8 +171,8 @@ def decidable(pairs: Pairs, errors: Floats) -> Flags:
     that set fails the global test at 0.1 % in at least 60 % of cases, and loses against the right set in 99 %.
     """
     m = len(pairs.pair)
-    clean, _ = relative.attempt(pairs, np.arange(m), np.zeros((m, 2), np.intp))
-    _, jacobian = relative.linearised(clean.elements, pairs)
+    clean, _ = orient_unchecked(pairs)
+    _, jacobian = linearised_parallaxes(clean.elements, pairs)
     n = m // pairs.size
     design = jacobian.T.reshape(pairs.size, n, 5)
     q, _ = np.linalg.qr(design)
@@ -197,7 +210,7 @@ def masked_errors(models: int, seed: int = 2) -> list[str]:
         can = decidable(pairs, errors.ravel())
         row = f"{zone:4d}{points:8d}   {sizes[0]:+.1f} {sizes[1]:+.1f}{100 * can.mean():11.1f}"
         for method in ("parallax+grubbs", "tau", "auto"):
-            settings = SOURCE_LIKE if method == "parallax+grubbs" else Settings(screening=method)
+            settings = SOURCE_LIKE if method == "parallax+grubbs" else RelativeSettings(screening=method)
             out = ~screened(spoiled(pairs, errors.ravel()), settings).orientation.used.reshape(errors.shape)
             both = (out & (errors != 0)).sum(axis=1) == 2
             row += f"{100 * both[can].mean() if can.any() else float('nan'):12.1f}"
@@ -222,7 +235,7 @@ def many_errors(models: int, seed: int = 3) -> list[str]:
                 wrong = order < round(share * n)
                 sizes = np.exp(rng.uniform(np.log(low), np.log(high), wrong.shape)) * rng.choice([-1, 1], wrong.shape)
                 errors = np.where(wrong, sizes, 0.0)
-                result = screened(spoiled(pairs, errors.ravel()), Settings())
+                result = screened(spoiled(pairs, errors.ravel()), RelativeSettings())
                 out = ~result.orientation.used.reshape(wrong.shape)
                 found = 100 * (out & wrong).sum() / wrong.sum()
                 lost = 100 * (out & ~wrong).sum() / (~wrong).sum()
@@ -239,7 +252,7 @@ def clean_pairs(models: int, seed: int = 4) -> list[str]:
     pairs = standard_pairs(rng, models)
     lines = []
     for name in ("parallax+grubbs", "tau", "robust", "deletion", "auto"):
-        out = ~screened(pairs, Settings(screening=name)).orientation.used.reshape(models, -1)
+        out = ~screened(pairs, RelativeSettings(screening=name)).orientation.used.reshape(models, -1)
         lines.append(f"{name:16s}{100 * out.any(axis=1).mean():16.2f}{100 * out.mean():16.3f}")
     return lines
 
@@ -257,9 +270,9 @@ def times(pairs_of_strip: int = 999, points: int = 30, seed: int = 5) -> list[st
         best = [np.inf, np.inf]
         for _ in range(REPEATED):
             start = time.process_time()
-            oriented, _ = relative.attempt(given, np.arange(m), np.zeros((m, 2), np.intp))
+            oriented, _ = orient_unchecked(given)
             middle = time.process_time()
-            screening.examine(oriented, Settings(), SIGMA_Q / np.sqrt(2))
+            screening.examine(oriented, RelativeSettings(), SIGMA_Q / np.sqrt(2))
             best = [min(best[0], middle - start), min(best[1], time.process_time() - middle)]
         each = 1000 * best[1] / pairs_of_strip
         lines.append(f"{100 * share:10.0f}{best[0]:14.3f}{best[1]:14.3f}{best[1] / best[0]:9.2f}{each:15.2f}")
@@ -291,25 +304,25 @@ def stages(inputs: Inputs) -> Floats:
     (strip,), observations = inputs.strips, inputs.observations
     sigma, nothing = float(np.median(observations.sigma)), np.zeros(0, np.intp)
     begin = time.process_time()
-    pairs, point, rows = relative.collect_pairs(observations, strip.photos, strip.camera.principal_distance)
-    oriented, converged = relative.attempt(pairs, point, rows)
+    pairs = collect_pairs(observations, strip.photos, strip.camera.principal_distance)
+    oriented, converged = orient_unchecked(pairs)
     orient = time.process_time() - begin
     begin = time.process_time()
-    screened = screening.examine(oriented, Settings(), sigma, converged)
+    screened = screening.examine(oriented, RelativeSettings(), sigma, converged)
     search = time.process_time() - begin
     scatter = screened.scatter.by_pair
     begin = time.process_time()
-    formed = formation.form(screened.orientation, formation.Settings(), strip.photos, scatter)
+    formed = form_from_pairs(screened.orientation, StripFormationSettings(), strip.photos, scatter)
     form = time.process_time() - begin
     joined, joints = formed.junctions, pairs.size - 1
     begin = time.process_time()
-    places = (joined.joint, joined.before, joined.after)
+    places = PassPoints(joined.junction, joined.before, joined.after)
     spreads = scale_ratios.spreads(screened.orientation, formed.vectors, places, scatter)
-    scale_ratios.screen(joined.ratio, np.ones(len(joined.ratio)), spreads, joined.joint, joints)
+    scale_ratios.screen(joined.ratio, np.ones(len(joined.ratio)), spreads, joined.junction, joints)
     ratios = time.process_time() - begin
     measured = settling.Measured(observations, strip.photos, pairs.weight, scatter, sigma, nothing)
     begin = time.process_time()
-    settling.settle(screened.orientation, measured, formation.Settings(), readmit=True)
+    settling.settle(screened.orientation, measured, StripFormationSettings(), readmit=True)
     settle = time.process_time() - begin
     return np.array([orient, search, ratios, settle - form])
 

@@ -53,9 +53,10 @@ from photostrip.triangulation.gross_errors.pairs import screening  # noqa: E402
 from photostrip.triangulation.gross_errors.rays import strip_screening  # noqa: E402
 from photostrip.triangulation.image_coordinates import corrections  # noqa: E402
 from photostrip.triangulation.polynomial import correction  # noqa: E402
-from photostrip.triangulation.relative_orientation import relative  # noqa: E402
+from photostrip.triangulation.relative_orientation.orientation import orient_pairs  # noqa: E402
+from photostrip.triangulation.relative_orientation.pairs import collect_pairs  # noqa: E402
+from photostrip.triangulation.relative_orientation.solution import iterate_elements, start_values  # noqa: E402
 from photostrip.triangulation.resection import resection  # noqa: E402
-from photostrip.triangulation.strip_formation import formation  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -186,12 +187,16 @@ class Stopwatch:
 
 
 pipeline = import_module("photostrip.pipeline.run")  # the module; the package gives the function
+# functions imported by name are timed where they are called
+of_strips = import_module("photostrip.pipeline.strip")
+settling = import_module("photostrip.triangulation.gross_errors.rays.settling")
 STAGES = (
     ("image coordinates", corrections, "refine"),
-    ("collecting pairs", relative, "collect_pairs"),
-    ("relative orientation", relative, "attempt"),
+    ("collecting pairs", of_strips, "collect_pairs"),
+    ("relative orientation", of_strips, "orient_unchecked"),
     ("screening of pairs", screening, "examine"),
-    ("strip formation", formation, "form"),
+    ("strip formation", of_strips, "form_from_pairs"),
+    ("strip formation", settling, "form_from_pairs"),
     ("screening of the strip", strip_screening, "examine"),
     ("screening of control", control_screening, "screen"),
     ("absolute orientation", absolute_orientation, "orient"),
@@ -262,31 +267,23 @@ def pairs_in_one_batch(pairs: int, repeat: int) -> tuple[float, float, float]:
         )
     )
     strip = inputs_of(simulation).strips[0]
-    found, point, rows = relative.collect_pairs(simulation.observations, strip.photos, strip.camera.principal_distance)
+    found = collect_pairs(simulation.observations, strip.photos, strip.camera.principal_distance)
     kept = np.flatnonzero(np.arange(len(found.pair)) - found.starts[found.pair] < PAIR_POINTS)
-    batch = relative.Pairs(
-        np.searchsorted(found.pair[kept], np.arange(pairs)),
-        found.pair[kept],
-        found.left[kept],
-        found.right[kept],
-        found.weight[kept],
-        found.focal,
-    )
+    batch = found.without(~np.isin(np.arange(len(found.pair)), kept))
     if np.bincount(batch.pair).min() < PAIR_POINTS:
         raise RuntimeError("a pair has too few points")
     whole, inner = [], []
     for _ in range(repeat):
         start = time.process_time()
-        relative.orient(batch, point[kept], rows[kept], strip.photos)
+        orient_pairs(batch, strip.photos)
         whole.append(time.process_time() - start)
         start = time.process_time()
-        relative.iterate(relative.start_values(batch), batch)
+        iterate_elements(start_values(batch), batch)
         inner.append(time.process_time() - start)
     some = min(pairs, 50)
     start = time.process_time()
     for number in range(some):
-        one, of = batch.take(np.array([number]))
-        relative.orient(one, point[kept][of], rows[kept][of], strip.photos[number : number + 2])
+        orient_pairs(batch.take(np.array([number])), strip.photos[number : number + 2])
     alone = time.process_time() - start
     return 1e6 * min(whole) / pairs, 1e6 * min(inner) / pairs, 1e6 * alone / some
 

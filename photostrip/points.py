@@ -5,17 +5,20 @@ A point is a thing; its coordinates exist only in a frame. Mixing frames raises.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
+    from _typeshed import DataclassInstance
     from numpy.typing import ArrayLike, NDArray
+
+T = TypeVar("T", bound="DataclassInstance")
 
 
 class Frame(StrEnum):
@@ -50,6 +53,22 @@ def frozen(values: ArrayLike, dtype: type = float, shape: tuple[int, ...] | None
         array = array.view()
         array.flags.writeable = False
     return array
+
+
+def take_rows(table: T, rows: Sequence[int] | NDArray[np.intp] | NDArray[np.bool_], columns: Iterable[str]) -> T:
+    """Select rows of a frozen table of columns, by number or by flag.
+
+    Parameters
+    ----------
+    columns : iterable of str
+        Fields that hold a column, an array or a tuple; the others stay.
+    """
+    chosen: dict[str, Any] = {}
+    for name in columns:
+        column = getattr(table, name)
+        numbers = np.arange(len(column))[np.asarray(rows)] if len(column) else np.zeros(0, np.intp)
+        chosen[name] = tuple(column[i] for i in numbers) if isinstance(column, tuple) else column[numbers]
+    return replace(table, **chosen)
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,18 +174,8 @@ class ControlPoints:
         return len(self.ids)
 
     def take(self, rows: Sequence[int] | NDArray[np.intp] | NDArray[np.bool_]) -> ControlPoints:
-        """Return the points of some rows.
-
-        Parameters
-        ----------
-        rows : array of int or bool
-            Rows to keep, in their order.
-        """
-        numbers = np.arange(len(self))[np.asarray(rows)] if len(self) else np.zeros(0, np.intp)
-        ids = tuple(self.ids[i] for i in numbers)
-        return ControlPoints(
-            ids, self.enu[numbers], self.use[numbers], self.check[numbers], self.sigma[numbers], self.frame[numbers]
-        )
+        """Points of some rows, by number or by flag, in their order."""
+        return take_rows(self, rows, [column.name for column in fields(self)])
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from photostrip.pipeline import Settings, triangulate
 from photostrip.pipeline.precision.propagation import Propagation, propagation
 from photostrip.simulate.simulation import simulate
 from photostrip.simulate.spec import Control, Flight, Image, Points, Spec
-from photostrip.triangulation.relative_orientation import relative
+from photostrip.triangulation.relative_orientation.orientation import RelativeSettings
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-UNSCREENED = relative.Settings(screening="none")
+UNSCREENED = RelativeSettings(screening="none")
 SIGMA = 0.005  # mm
 
 

@@ -15,15 +15,15 @@ from photostrip.geodesy.local_frame import IntermediateFrame
 from photostrip.pipeline import Inputs, Strip
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.triangulation.absolute_orientation import Targets
-from photostrip.triangulation.relative_orientation import relative
-from photostrip.triangulation.relative_orientation.relative import Pairs
+from photostrip.triangulation.relative_orientation.orientation import orient_pairs
+from photostrip.triangulation.relative_orientation.pairs import Pairs, collect_pairs
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import ArrayLike, NDArray
 
-    from photostrip.triangulation.relative_orientation.relative import Orientation
+    from photostrip.triangulation.relative_orientation.orientation import Orientation
 
     Floats = NDArray[np.float64]
     Flags = NDArray[np.bool_]
@@ -76,9 +76,8 @@ class TruePairs:
 
     def orient(self) -> Orientation:
         """Orient all pairs; photos are called L0, R0, L1, ..."""
-        m = len(self.pairs.pair)
         names = [f"{number}" for number in range(self.pairs.size + 1)]
-        return relative.orient(self.pairs, np.arange(m), np.zeros((m, 2), int), names)
+        return orient_pairs(self.pairs, names)
 
     def errors(self, elements: Floats) -> Floats:
         """Largest error of base direction and rotation of each pair, radians."""
@@ -99,8 +98,16 @@ def relative_geometry(elements: Floats) -> tuple[Floats, Floats]:
 def batch(left: Floats, right: Floats, focal: float) -> Pairs:
     """Pairs of arrays of shape (p, n, 2), unit weights."""
     p, n = left.shape[:2]
+    rows = np.arange(p * n)
     return Pairs(
-        np.arange(p) * n, np.repeat(np.arange(p), n), left.reshape(-1, 2), right.reshape(-1, 2), np.ones(p * n), focal
+        starts=np.arange(p) * n,
+        pair=np.repeat(np.arange(p), n),
+        left=left.reshape(-1, 2),
+        right=right.reshape(-1, 2),
+        weight=np.ones(p * n),
+        focal=focal,
+        point=rows,
+        rows=np.column_stack([rows, rows]),
     )
 
 
@@ -163,8 +170,7 @@ class Flown:
 
     def oriented(self) -> Orientation:
         """Relative orientation of all pairs, nothing screened."""
-        pairs, point, rows = relative.collect_pairs(self.observations, self.photos, self.focal)
-        return relative.orient(pairs, point, rows, self.photos)
+        return orient_pairs(collect_pairs(self.observations, self.photos, self.focal), self.photos)
 
     def bands(self, *stations: int, rows: Sequence[int] = (-1, 0, 1)) -> tuple[str, ...]:
         """Names of the points of some rows across the strip at some photos."""

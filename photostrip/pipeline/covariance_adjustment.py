@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from photostrip.points import ControlPoints, PhotoPoints
     from photostrip.triangulation.absolute_orientation import AbsoluteOrientation, Targets
     from photostrip.triangulation.polynomial.correction import Polynomial
-    from photostrip.triangulation.relative_orientation.relative import Orientation
-    from photostrip.triangulation.strip_formation.formation import FormedStrip
+    from photostrip.triangulation.relative_orientation.orientation import Orientation
+    from photostrip.triangulation.strip_formation.strip import FormedStrip
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]

@@ -12,8 +12,8 @@ from photostrip.triangulation.image_coordinates import corrections as refinement
 from photostrip.triangulation.image_coordinates import interior
 from photostrip.triangulation.independent_models import link_screening
 from photostrip.triangulation.polynomial import correction as polynomial
-from photostrip.triangulation.relative_orientation import relative
-from photostrip.triangulation.strip_formation import formation
+from photostrip.triangulation.relative_orientation.orientation import RelativeSettings
+from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
 
 if TYPE_CHECKING:
     import numpy as np
@@ -117,8 +117,8 @@ class Settings:
     """What is to be done; every part stands beside the operation it steers."""
 
     adjustment: str = "polynomial"  # one of ``ADJUSTMENTS``
-    relative: relative.Settings = field(default_factory=relative.Settings)
-    formation: formation.Settings = field(default_factory=formation.Settings)
+    relative: RelativeSettings = field(default_factory=RelativeSettings)
+    formation: StripFormationSettings = field(default_factory=StripFormationSettings)
     links: link_screening.Settings = field(default_factory=link_screening.Settings)
     absolute: absolute.Settings = field(default_factory=absolute.Settings)
     polynomial: polynomial.Settings = field(default_factory=polynomial.Settings)

@@ -9,7 +9,7 @@ import numpy as np
 
 from photostrip.errors import Fault, InputError
 from photostrip.notes import Note
-from photostrip.triangulation.relative_orientation import relative
+from photostrip.triangulation.relative_orientation.orientation import RelativeSettings, orient_again
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,13 +18,12 @@ if TYPE_CHECKING:
 
     from photostrip.points import PhotoPoints
     from photostrip.triangulation.gross_errors.pairs.screening import Screened
-    from photostrip.triangulation.relative_orientation.relative import Pairs
 
     Numbers = NDArray[np.intp]
     Flags = NDArray[np.bool_]
 
 
-def require(settings: relative.Settings, observations: PhotoPoints) -> None:
+def require(settings: RelativeSettings, observations: PhotoPoints) -> None:
     """Refuse entries that name no measurement, and those that are to be kept and dropped.
 
     Raises
@@ -114,27 +113,6 @@ def touched(entries: Sequence[str], observations: PhotoPoints, rows: Numbers) ->
     return found
 
 
-def without(pairs: Pairs, point: Numbers, rows: Numbers, gone: Flags) -> tuple[Pairs, Numbers, Numbers]:
-    """Give pairs without some rows.
-
-    Parameters
-    ----------
-    pairs, point, rows
-        As ``relative.collect_pairs`` gives them.
-    gone : ndarray of bool, shape (m,)
-        Rows to leave out; each pair must keep one.
-    """
-    if not gone.any():
-        return pairs, point, rows
-    kept = ~gone
-    number = pairs.pair[kept]
-    starts = np.searchsorted(number, np.arange(pairs.size))
-    left = replace(
-        pairs, starts=starts, pair=number, left=pairs.left[kept], right=pairs.right[kept], weight=pairs.weight[kept]
-    )
-    return left, point[kept], rows[kept]
-
-
 def restored(screened: Screened, weight: NDArray[np.float64], kept: Flags) -> Screened:
     """Take rejected measurements back that the user keeps.
 
@@ -155,12 +133,12 @@ def restored(screened: Screened, weight: NDArray[np.float64], kept: Flags) -> Sc
     if not back.any():
         return screened
     restored_weight = np.where(back, weight, oriented.pairs.weight)
-    oriented = relative.refine(oriented, restored_weight, np.unique(oriented.pairs.pair[back]))
+    oriented = orient_again(oriented, restored_weight, np.unique(oriented.pairs.pair[back]))
     log = tuple(replace(each, readmitted=each.readmitted or bool(back[each.row])) for each in screened.rejections)
     return replace(screened, orientation=oriented, rejections=log)
 
 
-def notes(settings: relative.Settings, strip: str, photos: Sequence[str]) -> list[Note]:
+def notes(settings: RelativeSettings, strip: str, photos: Sequence[str]) -> list[Note]:
     """Say what the user has decided.
 
     Returns

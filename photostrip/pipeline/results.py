@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from photostrip.triangulation.gross_errors.rays import strip_screening
     from photostrip.triangulation.image_coordinates import corrections, interior
     from photostrip.triangulation.polynomial import correction as polynomial
-    from photostrip.triangulation.relative_orientation import relative
+    from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.resection import resection as exterior
-    from photostrip.triangulation.strip_formation import formation
+    from photostrip.triangulation.strip_formation.strip import FormedStrip
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -45,9 +45,9 @@ class StripResult:
     """Every stage of one strip, in order."""
 
     strip: Strip
-    orientation: relative.Orientation  # relative orientation of its pairs, after screening
+    orientation: Orientation  # relative orientation of its pairs, after screening
     rejections: tuple[screening.Rejection, ...]
-    formed: formation.FormedStrip
+    formed: FormedStrip
     precision: tuple[float, float]  # a-priori standard deviation of a point in plan and height from one model, metres
     intermediate: IntermediateFrame
     control: ControlPoints  # control that took part

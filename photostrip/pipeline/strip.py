@@ -21,9 +21,15 @@ from photostrip.triangulation.gross_errors.control import control_screening, con
 from photostrip.triangulation.gross_errors.pairs import screening
 from photostrip.triangulation.gross_errors.rays import settling, strip_screening
 from photostrip.triangulation.polynomial import correction as polynomial
-from photostrip.triangulation.relative_orientation import relative
+from photostrip.triangulation.relative_orientation.orientation import (
+    CONDITION_WARNING,
+    Orientation,
+    orient_unchecked,
+    refuse_unusable,
+)
+from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS, collect_pairs
 from photostrip.triangulation.resection import resection as exterior
-from photostrip.triangulation.strip_formation import formation
+from photostrip.triangulation.strip_formation.strip import FormedStrip, form_from_pairs
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -69,8 +75,8 @@ class Formed:
     strip: Strip
     sigma: float  # median standard deviation of its image coordinates, mm
     screened: screening.Screened  # the search for gross errors in its pairs
-    oriented: relative.Orientation  # relative orientation of the pairs, as the strip was formed
-    formed: formation.FormedStrip
+    oriented: Orientation  # relative orientation of the pairs, as the strip was formed
+    formed: FormedStrip
     contradictions: strip_screening.Verdict  # points whose rays contradict each other from model to model
 
 
@@ -95,14 +101,13 @@ def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> F
         When a pair or a joint cannot be determined; the strip is named.
     """
     sigma = _sigma(strip, observations)
-    pairs, point, pair_rows = relative.collect_pairs(observations, strip.photos, strip.camera.principal_distance)
-    dropped = overruling.touched(settings.relative.drop, observations, pair_rows)
-    pairs, point, pair_rows = overruling.without(pairs, point, pair_rows, dropped)
-    first, converged = relative.attempt(pairs, point, pair_rows)
+    pairs = collect_pairs(observations, strip.photos, strip.camera.principal_distance)
+    pairs = pairs.without(overruling.touched(settings.relative.drop, observations, pairs.rows))
+    first, converged = orient_unchecked(pairs)
     screened = screening.examine(first, settings.relative, sigma, converged)
-    kept = overruling.touched(settings.relative.keep, observations, pair_rows)
+    kept = overruling.touched(settings.relative.keep, observations, pairs.rows)
     screened = overruling.restored(screened, pairs.weight, kept)
-    relative.require(screened.orientation, screened.converged, strip.photos)
+    refuse_unusable(screened.orientation, screened.converged, strip.photos)
     screened, formed, contradictions = _form(strip, observations, screened, settings, pairs.weight)
     return Formed(strip, sigma, screened, screened.orientation, formed, contradictions)
 
@@ -182,7 +187,7 @@ def _joint(
     strip: Strip,
     observations: PhotoPoints,
     screened: screening.Screened,
-    formed: formation.FormedStrip,
+    formed: FormedStrip,
     given: tuple[ControlPoints, Numbers, Sequence[GroundFrame]],
     intermediate: IntermediateFrame,
     orientation: absolute_orientation.AbsoluteOrientation,
@@ -208,9 +213,7 @@ def _joint(
     return control_significance.Joint(found.point, found.axis, design, covariance)
 
 
-def _extent(
-    formed: formation.FormedStrip, orientation: absolute_orientation.AbsoluteOrientation
-) -> tuple[float, float]:
+def _extent(formed: FormedStrip, orientation: absolute_orientation.AbsoluteOrientation) -> tuple[float, float]:
     """Mean base and half width of the strip, metres."""
     centers, xyz = orientation.similarity(formed.centers), orientation.similarity(formed.xyz)
     spacing = float(np.linalg.norm(np.diff(centers, axis=0), axis=1).mean())
@@ -219,11 +222,11 @@ def _extent(
 
 def _form(
     strip: Strip, observations: PhotoPoints, screened: screening.Screened, settings: Settings, weight: Floats
-) -> tuple[screening.Screened, formation.FormedStrip, strip_screening.Verdict]:
+) -> tuple[screening.Screened, FormedStrip, strip_screening.Verdict]:
     """Form the strip, and let it decide what its pairs could not."""
     oriented, scatter = screened.orientation, screened.scatter.by_pair
     if settings.relative.screening == "none":
-        return screened, formation.form(oriented, settings.formation, strip.photos, scatter), strip_screening.Verdict()
+        return screened, form_from_pairs(oriented, settings.formation, strip.photos, scatter), strip_screening.Verdict()
     kept = overruling.rows(settings.relative.keep, observations)
     measured = settling.Measured(observations, strip.photos, weight, scatter, _sigma(strip, observations), kept)
     readmit = settings.relative.screening in screening.SEARCHES
@@ -240,7 +243,7 @@ def _sigma(strip: Strip, observations: PhotoPoints) -> float:
 
 
 def control_of(
-    formed: formation.FormedStrip | FormedModels, control: ControlPoints, point_ids: Sequence[str]
+    formed: FormedStrip | FormedModels, control: ControlPoints, point_ids: Sequence[str]
 ) -> tuple[ControlPoints, Numbers]:
     """Control points that have strip coordinates, and their rows there.
 
@@ -264,7 +267,7 @@ def control_of(
 
 def to_ground(
     strip: Strip | ModelStrip,
-    formed: formation.FormedStrip | FormedModels,
+    formed: FormedStrip | FormedModels,
     given: tuple[ControlPoints, Numbers],
     frames: Sequence[GroundFrame],
     spread_at: Callable[[float], tuple[float, float]],
@@ -361,9 +364,7 @@ def middle_frame(control: ControlPoints, frames: Sequence[GroundFrame]) -> Inter
     return IntermediateFrame.at_centre(cartesian, lat0, lon0, 0.0)
 
 
-def _precision(
-    formed: formation.FormedStrip, oriented: relative.Orientation, sigma: float, scale: float
-) -> tuple[float, float]:
+def _precision(formed: FormedStrip, oriented: Orientation, sigma: float, scale: float) -> tuple[float, float]:
     """A-priori standard deviation of a point of one model in plan and height, metres.
 
     Plan: that of an image coordinate at photo scale; height: that of an x parallax times the ratio of depth to base.
@@ -381,8 +382,8 @@ def _precision(
 def _orient_photos(
     strip: Strip,
     observations: PhotoPoints,
-    oriented: relative.Orientation,
-    formed: formation.FormedStrip,
+    oriented: Orientation,
+    formed: FormedStrip,
     adjusted: Floats,
     orientation: absolute_orientation.AbsoluteOrientation,
     own: covariance.CovarianceAdjustment | None,
@@ -422,7 +423,7 @@ def _depth(
     strip: Strip,
     observations: PhotoPoints,
     rows: Numbers,
-    formed: formation.FormedStrip,
+    formed: FormedStrip,
     adjusted: Floats,
     resection: exterior.Resection,
 ) -> float:
@@ -434,8 +435,8 @@ def _depth(
 
 def _notes(
     strip: Strip,
-    oriented: relative.Orientation,
-    formed: formation.FormedStrip,
+    oriented: Orientation,
+    formed: FormedStrip,
     orientation: absolute_orientation.AbsoluteOrientation,
     correction: polynomial.Polynomial | None,
     adjusted: Floats,
@@ -452,14 +453,14 @@ def _notes(
     )
 
 
-def _pair_notes(strip: Strip, oriented: relative.Orientation) -> list[Note]:
+def _pair_notes(strip: Strip, oriented: Orientation) -> list[Note]:
     notes = []
     for number, count in enumerate(oriented.points_used):
         names = strip.photos[number : number + 2]
-        if count == relative.MINIMUM_POINTS:
+        if count == MINIMUM_POINTS:
             text = f"photos {names[0]} and {names[1]} are oriented on 5 points: no check"
             notes.append(Note("no-check", text, strip=strip.id, photos=names))
-        if oriented.condition[number] > relative.CONDITION_WARNING:
+        if oriented.condition[number] > CONDITION_WARNING:
             text = (
                 f"photos {names[0]} and {names[1]}: weak relative orientation (condition number "
                 f"{oriented.condition[number]:.0f}); the points stand in a narrow band"
@@ -505,11 +506,11 @@ def wrong_control_notes(strip: Strip | ModelStrip, wrong: Sequence[control_scree
     return notes
 
 
-def _joint_notes(strip: Strip, formed: formation.FormedStrip) -> list[Note]:
+def _joint_notes(strip: Strip, formed: FormedStrip) -> list[Note]:
     junctions = formed.junctions
-    count = np.bincount(junctions.joint, junctions.used, len(junctions.factor))
-    beyond = np.abs(np.log(junctions.ratio / junctions.factor[junctions.joint])) > junctions.limit
-    doubtful = np.unique(junctions.joint[junctions.used & beyond])
+    count = np.bincount(junctions.junction, junctions.used, len(junctions.factor))
+    beyond = np.abs(np.log(junctions.ratio / junctions.factor[junctions.junction])) > junctions.limit
+    doubtful = np.unique(junctions.junction[junctions.used & beyond])
     notes = [
         Note(
             "contradicting-joint",

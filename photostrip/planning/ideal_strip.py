@@ -15,16 +15,18 @@ from photostrip.geometry.similarity import Similarity
 from photostrip.points import PhotoPoints
 from photostrip.simulate import Control, Flight, Ground, Image, Points, Spec, Terrain, simulate
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors, differentiate_strip
-from photostrip.triangulation.relative_orientation import relative
-from photostrip.triangulation.strip_formation import formation
+from photostrip.triangulation.relative_orientation.orientation import orient_unchecked, refuse_unusable
+from photostrip.triangulation.relative_orientation.pairs import collect_pairs
+from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
+from photostrip.triangulation.strip_formation.strip import form_from_pairs
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.camera import Camera
     from photostrip.simulate import Simulation
-    from photostrip.triangulation.relative_orientation.relative import Orientation
-    from photostrip.triangulation.strip_formation.formation import FormedStrip
+    from photostrip.triangulation.relative_orientation.orientation import Orientation
+    from photostrip.triangulation.strip_formation.strip import FormedStrip
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -148,10 +150,10 @@ def ideal_strip(geometry: StripGeometry) -> IdealStrip:
         np.full(observed.sigma.shape, geometry.image_sigma),
     )
     photos = simulation.strips[0][1]
-    pairs, point, rows = relative.collect_pairs(observations, photos, geometry.camera.principal_distance)
-    orientation, converged = relative.attempt(pairs, point, rows)
-    relative.require(orientation, converged, photos)
-    formed = formation.form(orientation, formation.Settings(), photos)
+    pairs = collect_pairs(observations, photos, geometry.camera.principal_distance)
+    orientation, converged = orient_unchecked(pairs)
+    refuse_unusable(orientation, converged, photos)
+    formed = form_from_pairs(orientation, StripFormationSettings(), photos)
     middle = simulation.truth.centers.mean(axis=0)
     middle[2] = 0.0
     truth = simulation.truth.points.xyz - middle

@@ -11,15 +11,16 @@ import pytest
 
 from photostrip.geometry.rotation import angles, from_alpha_omega_kappa, rotation_x, rotation_y, rotation_z
 from photostrip.geometry.similarity import Similarity
-from photostrip.triangulation.relative_orientation import relative
-from photostrip.triangulation.strip_formation import formation
+from photostrip.triangulation.relative_orientation.orientation import orient_pairs
+from photostrip.triangulation.relative_orientation.pairs import collect_pairs
 from photostrip.triangulation.strip_formation.intersection import intersect
+from photostrip.triangulation.strip_formation.strip import model_points
 from tests.strips import MICROMETRE, measured
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.relative_orientation.relative import Orientation
+    from photostrip.triangulation.relative_orientation.orientation import Orientation
 
     Floats = NDArray[np.float64]
 
@@ -47,9 +48,9 @@ def radians(text: str) -> float:
 def oriented(names: list[str], left: Floats, right: Floats, focal: float) -> Orientation:
     images = [dict(zip(names, xy, strict=True)) for xy in (left, right)]
     observations = measured(dict(zip((LEFT, RIGHT), images, strict=True)))
-    pairs, point, rows = relative.collect_pairs(observations, (LEFT, RIGHT), focal)
-    assert point.tolist() == list(range(len(names)))
-    return relative.orient(pairs, point, rows, (LEFT, RIGHT))
+    pairs = collect_pairs(observations, (LEFT, RIGHT), focal)
+    assert pairs.point.tolist() == list(range(len(names)))
+    return orient_pairs(pairs, (LEFT, RIGHT))
 
 
 # --------------------------------------------------------------------------------------------- variant 56
@@ -118,10 +119,10 @@ def test_relative_orientation_of_the_published_pair() -> None:
 def test_orienting_the_model_on_its_ground_gives_the_published_stations() -> None:
     variant = Variant()
     found = oriented(variant.names, variant.left, variant.right, F_VARIANT)
-    vectors, _, sound = formation.model_points(found)
-    assert sound.all()
+    models = model_points(found)
+    assert models.sound.all()
     direction, rotation = found.relative
-    similarity = Similarity.from_points(vectors, variant.ground)
+    similarity = Similarity.from_points(models.vectors, variant.ground)
     centers = similarity(np.array([[0.0, 0, 0], direction[0]]))
     assert np.abs(centers - variant.centers).max() < 0.02  # metres
     assert similarity.scale / (76.580 / direction[0, 0]) == pytest.approx(9.1395, abs=1e-4)  # metres per mm

@@ -38,8 +38,8 @@ from photostrip.simulate import (
     simulate,
 )
 from photostrip.triangulation.polynomial import correction
-from photostrip.triangulation.relative_orientation import relative
-from photostrip.triangulation.strip_formation import formation
+from photostrip.triangulation.relative_orientation.orientation import RelativeSettings
+from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -251,9 +251,9 @@ def test_no_adjustment_spoils_what_is_exact(adjustment: str, degree: str) -> Non
 @pytest.mark.parametrize(
     "asked",
     [
-        Settings(formation=formation.Settings("distances")),
-        Settings(relative=relative.Settings(screening="tau")),
-        Settings(relative=relative.Settings(screening="none")),
+        Settings(formation=StripFormationSettings("distances")),
+        Settings(relative=RelativeSettings(screening="tau")),
+        Settings(relative=RelativeSettings(screening="none")),
     ],
     ids=["distances", "tau", "no screening"],
 )
@@ -424,7 +424,7 @@ def test_image_noise_becomes_errors_of_its_size_no_more_and_no_less() -> None:
 def test_errors_are_proportional_to_the_noise(sigma_um: float) -> None:
     spec = strip_of(6, 3)
     spec = replace(spec, control=replace(spec.control, noise=EXACT_CONTROL, sigma=(1e-4, 1e-4, 1e-4)))
-    asked = Settings(adjustment="similarity", relative=relative.Settings(screening="none"))
+    asked = Settings(adjustment="similarity", relative=RelativeSettings(screening="none"))
     small, large = (
         recovered(replace(spec, image=Image(sigma_um=size)), asked).errors for size in (0.1 * sigma_um, sigma_um)
     )
@@ -434,7 +434,7 @@ def test_errors_are_proportional_to_the_noise(sigma_um: float) -> None:
 def test_relative_orientation_finds_the_noise() -> None:
     """Mean over many pairs of the estimated variance, with its own standard error."""
     spec = replace(strip_of(200, 20), seed=3)
-    strip = recovered(spec, Settings(relative=relative.Settings(screening="none"))).result.strips[0]
+    strip = recovered(spec, Settings(relative=RelativeSettings(screening="none"))).result.strips[0]
     redundancy = strip.orientation.points_used - 5
     variance = float((strip.orientation.sigma0**2 @ redundancy) / redundancy.sum()) / 0.005**2
     assert variance == pytest.approx(1.0, abs=3 * np.sqrt(2 / redundancy.sum()))

@@ -112,7 +112,7 @@ def largest_parallax(found: Result) -> tuple[str, float]:
 def ratio_spread(strip: StripResult) -> Floats:
     """Relative standard deviation of the scale ratios of all common points of each joint, rejected ones too."""
     joints = strip.formed.junctions
-    ratios = [joints.ratio[joints.joint == n] for n in range(len(joints.factor))]
+    ratios = [joints.ratio[joints.junction == n] for n in range(len(joints.factor))]
     return np.array([each.std(ddof=1) / each.mean() for each in ratios])
 
 
@@ -327,7 +327,7 @@ def test_without_the_outlier_the_first_lunar_pair_fits_like_the_others() -> None
 
 def test_lunar_models_are_joined_by_as_many_points_with_the_same_spread() -> None:
     strip = apollo(screening="none", free=False).strips[0]
-    assert np.bincount(strip.formed.junctions.joint).tolist() == [31, 43, 64]
+    assert np.bincount(strip.formed.junctions.junction).tolist() == [31, 43, 64]
     assert ratio_spread(strip) == pytest.approx([2.1e-3, 8.5e-4, 5.9e-4], rel=0.08)
 
 
@@ -463,7 +463,7 @@ def test_points_measured_by_hand_fit_better() -> None:
 
 def test_strasbourg_models_are_joined_by_as_many_points_with_the_same_spread() -> None:
     strip = strasbourg().strips[0]
-    assert np.bincount(strip.formed.junctions.joint).tolist() == [95]
+    assert np.bincount(strip.formed.junctions.junction).tolist() == [95]
     assert ratio_spread(strip) == pytest.approx([8.7e-4], rel=0.03)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from photostrip.errors import InputError
 from photostrip.pipeline import Result, Settings, triangulate
-from photostrip.triangulation.relative_orientation.relative import Settings as Relative
+from photostrip.triangulation.relative_orientation.orientation import RelativeSettings as Relative
 from tests.strips import Flown, control_points, fly, project
 
 WRONG = ("105", "p4_1")

@@ -300,7 +300,7 @@ def _strip(
     formed = strip.formed
     at = np.minimum(np.searchsorted(formed.point, number), len(formed.point) - 1)
     known = formed.point[at] == number
-    models = np.where(known, formed.models[at], 0)
+    models = np.where(known, formed.model_count[at], 0)
     shape = np.where(known[:, None], formed.xyz[at], np.nan)
     control_at = np.searchsorted(number, formed.point[strip.control_rows])
     focal = np.full(len(photos), strip.strip.camera.principal_distance)
@@ -310,7 +310,7 @@ def _strip(
     rms = np.sqrt(np.bincount(position[rows], (residuals**2).sum(axis=1), len(photos)) / counts)
     return replace(
         strip,
-        formed=replace(formed, point=number, xyz=shape, models=models),
+        formed=replace(formed, point=number, xyz=shape, model_count=models),
         control_rows=np.minimum(control_at, len(number) - 1),
         xyz=xyz,
         cartesian=cartesian,

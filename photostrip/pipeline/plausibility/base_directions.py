@@ -14,7 +14,8 @@ import numpy as np
 
 from photostrip.errors import PhotostripError
 from photostrip.pipeline.plausibility import evidence
-from photostrip.triangulation.relative_orientation import relative
+from photostrip.triangulation.relative_orientation.orientation import orient_unchecked, unusable_pairs
+from photostrip.triangulation.relative_orientation.pairs import collect_pairs
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -53,11 +54,11 @@ def closer_look(
         focal = strip.camera.principal_distance
         try:
             with np.errstate(all="ignore"):
-                pairs, point, rows = relative.collect_pairs(points[0], [one, other], focal)
-                if len(point) < LEAST_POINTS:
+                pairs = collect_pairs(points[0], [one, other], focal)
+                if len(pairs.pair) < LEAST_POINTS:
                     return None
-                oriented, converged = relative.attempt(pairs, point, rows)
-                doubtful = relative.doubtful(oriented, converged)
+                oriented, converged = orient_unchecked(pairs)
+                doubtful = unusable_pairs(oriented, converged)
         except (PhotostripError, ArithmeticError, ValueError):
             return None
         if doubtful[0] or not oriented.sigma0[0] < WORST * focal:

@@ -13,8 +13,9 @@ from photostrip.triangulation.gross_errors.pairs import screening
 from photostrip.triangulation.image_coordinates import corrections
 from photostrip.triangulation.plausibility.control.control_strip import Rays, Seen
 from photostrip.triangulation.plausibility.photos import mosaic
-from photostrip.triangulation.relative_orientation import relative
-from photostrip.triangulation.strip_formation import formation
+from photostrip.triangulation.relative_orientation.orientation import orient_unchecked, refuse_unusable
+from photostrip.triangulation.relative_orientation.pairs import collect_pairs
+from photostrip.triangulation.strip_formation.strip import form_from_pairs, mean_points, model_points
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
 
     from photostrip.pipeline.inputs import Settings, Strip
     from photostrip.points import ControlPoints, PhotoPoints
-    from photostrip.triangulation.relative_orientation.relative import Orientation
-    from photostrip.triangulation.strip_formation.formation import FormedStrip
+    from photostrip.triangulation.relative_orientation.orientation import Orientation
+    from photostrip.triangulation.strip_formation.strip import FormedStrip
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -71,21 +72,21 @@ class Formed:
         gone = np.asarray(~np.isfinite(strip.model_xyz).all(axis=1), bool)
         if not gone.any():
             return self
-        vectors, _, sound = formation.model_points(orientation)
+        models = model_points(orientation)
         pair = orientation.pairs.pair
-        back = strip.centers[pair] + strip.scale[pair, None] * np.einsum("mij,mj->mi", strip.rotations[pair], vectors)
+        turned = np.einsum("mij,mj->mi", strip.rotations[pair], models.vectors)
+        back = strip.centers[pair] + strip.scale[pair, None] * turned
         xyz = np.where(gone[:, None], back, strip.model_xyz)
-        point, mean, models = formation.mean_points(orientation.point, xyz, orientation.used & sound)
-        lost = np.flatnonzero(~np.isin(point, strip.point))
-        point = np.concatenate([strip.point, point[lost]])
-        mean, models = np.concatenate([strip.xyz, mean[lost]]), np.concatenate([strip.models, models[lost]])
+        mean = mean_points(orientation.point, xyz, orientation.used & models.sound)
+        lost = np.flatnonzero(~np.isin(mean.point, strip.point))
+        point = np.concatenate([strip.point, mean.point[lost]])
         order = np.argsort(point, kind="stable")
         whole = replace(
             strip,
             model_xyz=xyz,
             point=point[order],
-            xyz=mean[order],
-            models=models[order],
+            xyz=np.concatenate([strip.xyz, mean.xyz[lost]])[order],
+            model_count=np.concatenate([strip.model_count, mean.model_count[lost]])[order],
             home=np.zeros(0, np.intp),  # serves precision, which is not asked of evidence
         )
         return replace(self, formed=whole)
@@ -106,12 +107,12 @@ def form(strip: Strip, observations: PhotoPoints, settings: Settings) -> Formed 
     """
     sigma = _sigma(observations, strip)
     try:
-        pairs, point, rows = relative.collect_pairs(observations, strip.photos, strip.camera.principal_distance)
-        first, converged = relative.attempt(pairs, point, rows)
+        pairs = collect_pairs(observations, strip.photos, strip.camera.principal_distance)
+        first, converged = orient_unchecked(pairs)
         screened = screening.examine(first, settings.relative, sigma, converged)
-        relative.require(screened.orientation, screened.converged, strip.photos)
+        refuse_unusable(screened.orientation, screened.converged, strip.photos)
         scatter = screened.scatter.by_pair
-        formed = formation.form(screened.orientation, settings.formation, strip.photos, scatter)
+        formed = form_from_pairs(screened.orientation, settings.formation, strip.photos, scatter)
     except (PhotostripError, ArithmeticError, ValueError):
         return None
     return Formed(strip, screened.orientation, formed)

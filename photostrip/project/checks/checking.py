@@ -165,7 +165,7 @@ def _seen(observations: PhotoPoints) -> dict[str, set[int]]:
 
 def _pairs(project: Project) -> Iterator[Fault]:
     """Refuse neighbouring photos with too few common points for their relative orientation."""
-    from photostrip.triangulation.relative_orientation.relative import MINIMUM_POINTS
+    from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 
     seen = _seen(project.inputs.observations)
     for i, strip in enumerate(project.inputs.strips):

@@ -32,7 +32,7 @@ from photostrip.triangulation.image_coordinates.certificate import PLACES
 from photostrip.triangulation.independent_models.link_screening import METHODS as LINK_METHODS
 from photostrip.triangulation.plausibility import KINDS
 from photostrip.triangulation.polynomial.correction import DEGREES
-from photostrip.triangulation.strip_formation.formation import SCALE_TRANSFERS
+from photostrip.triangulation.strip_formation.scale_transfer import SCALE_TRANSFERS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

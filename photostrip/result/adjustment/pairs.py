@@ -10,7 +10,8 @@ import numpy as np
 from photostrip.result.numbers import DEGREES, EXACT, GROUND, Document, micrometres, natural, rounded, significant
 from photostrip.triangulation.gross_errors.control.control_screening import AXES
 from photostrip.triangulation.gross_errors.rays.strip_screening import BOTH, SEVERAL, TOLD
-from photostrip.triangulation.relative_orientation.relative import ELEMENTS, MINIMUM_POINTS
+from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
+from photostrip.triangulation.relative_orientation.solution import ELEMENTS
 from photostrip.triangulation.strip_formation.scale_ratios import depths
 
 if TYPE_CHECKING:
@@ -159,15 +160,15 @@ def junctions_of(result: Result) -> list[Document]:
 def _junctions(strip: StripResult, ids: Sequence[str]) -> list[Document]:
     photos, joined = strip.strip.photos, strip.formed.junctions
     joints = len(joined.factor)
-    count = np.bincount(joined.joint, joined.used, joints).astype(np.intp)
+    count = np.bincount(joined.junction, joined.used, joints).astype(np.intp)
     gap = discrepancies(strip)
     known = joined.used & ~np.isnan(gap[:, 0])  # points left out later, for their rays, have no place in the models
-    squares = np.column_stack([np.bincount(joined.joint[known], gap[known, axis] ** 2, joints) for axis in range(3)])
-    size = np.sqrt(squares / np.maximum(np.bincount(joined.joint[known], minlength=joints), 1)[:, None])
+    squares = np.column_stack([np.bincount(joined.junction[known], gap[known, axis] ** 2, joints) for axis in range(3)])
+    size = np.sqrt(squares / np.maximum(np.bincount(joined.junction[known], minlength=joints), 1)[:, None])
     metres, in_photo = rounded(size, GROUND), rounded(size / strip.scale_number * PPM, 1)
     left_out: dict[int, list[str]] = {}
     for row in np.flatnonzero(~joined.used).tolist():
-        left_out.setdefault(int(joined.joint[row]), []).append(ids[joined.point[row]])
+        left_out.setdefault(int(joined.junction[row]), []).append(ids[joined.point[row]])
     columns = zip(
         count.tolist(),
         significant(joined.factor, EXACT),
@@ -277,9 +278,9 @@ def _from_joints(strip: StripResult, ids: Sequence[str]) -> list[Document]:
     joined, zone = strip.formed.junctions, strip.screened.zone
     out = np.flatnonzero(~joined.used).tolist()
     rows = np.array(
-        sorted(out, key=lambda row: (int(joined.joint[row]), natural(ids[int(joined.point[row])]))), np.intp
+        sorted(out, key=lambda row: (int(joined.junction[row]), natural(ids[int(joined.point[row])]))), np.intp
     )
-    joint = joined.joint[rows]
+    joint = joined.junction[rows]
     base, _ = strip.orientation.relative
     deviation = joined.ratio[rows] / joined.factor[joint] - 1
     depth = depths(strip.formed.vectors[joined.after[rows]], base[joint + 1])
@@ -287,7 +288,7 @@ def _from_joints(strip: StripResult, ids: Sequence[str]) -> list[Document]:
     return [
         {
             "strip": strip.strip.id,
-            "photo": strip.strip.photos[joined.joint[row] + 1],
+            "photo": strip.strip.photos[joined.junction[row] + 1],
             "other_photo": None,
             "point": ids[joined.point[row]],
             "stage": "scale_transfer",

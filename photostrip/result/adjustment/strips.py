@@ -74,7 +74,7 @@ def _drift(strip: StripResult) -> Document:
     The scale is handed from model to model, so its error grows as a sum of independent ones.
     """
     joined, correction = strip.formed.junctions, strip.polynomial
-    count = np.bincount(joined.joint, joined.used, len(joined.factor))
+    count = np.bincount(joined.junction, joined.used, len(joined.factor))
     with np.errstate(invalid="ignore"):
         expected = np.sqrt((joined.spread**2 / count).sum()) * PPM
     found = None

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.pipeline import overruling
 from photostrip.triangulation import absolute_orientation
-from photostrip.triangulation.relative_orientation import relative
+from photostrip.triangulation.relative_orientation.pairs import collect_pairs
+from photostrip.triangulation.relative_orientation.solution import iterate_elements, solve_elements, start_values
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from photostrip.geometry.similarity import Similarity
     from photostrip.pipeline.models.model_results import LinkedStrip
     from photostrip.pipeline.results import Result, StripResult
-    from photostrip.triangulation.relative_orientation.relative import Pairs
+    from photostrip.triangulation.relative_orientation.pairs import Pairs
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -71,7 +71,7 @@ def pair_rounds(result: Result, strip: StripResult) -> list[list[PairRound]]:
     rounds = [[first] for first in _round(start, given)]
     changed = np.unique(given.pair[given.weight != final.pairs.weight])
     ends = np.array([each[-1].end for each in rounds])
-    for number, second in zip(changed.tolist(), _round(ends[changed], final.pairs.take(changed)[0]), strict=True):
+    for number, second in zip(changed.tolist(), _round(ends[changed], final.pairs.take(changed)), strict=True):
         rounds[number].append(second)
     return rounds
 
@@ -79,17 +79,16 @@ def pair_rounds(result: Result, strip: StripResult) -> list[list[PairRound]]:
 def _with_all_points(result: Result, strip: StripResult) -> Pairs:
     """Return the pairs of a strip as they were before any point was rejected."""
     photos, focal = strip.strip.photos, strip.strip.camera.principal_distance
-    pairs, point, rows = relative.collect_pairs(result.refined.observations, photos, focal)
-    taken = set(map(tuple, strip.orientation.rows.tolist()))
-    dropped = np.array([tuple(row) not in taken for row in rows.tolist()], bool)
-    return overruling.without(pairs, point, rows, dropped)[0]
+    pairs = collect_pairs(result.refined.observations, photos, focal)
+    kept = set(map(tuple, strip.orientation.rows.tolist()))
+    return pairs.without(np.array([tuple(row) not in kept for row in pairs.rows.tolist()], bool))
 
 
 def _starts(pairs: Pairs, wanted: Floats) -> Floats:
     """Start values; rounded elements for a pair that a run had to start from other azimuths."""
-    start = relative.start_values(pairs)
-    solved, *_ = relative.solve(pairs)
-    reached, *_ = relative.iterate(start, pairs)
+    start = start_values(pairs)
+    solved = solve_elements(pairs).elements
+    reached = iterate_elements(start, pairs).elements
     turned = np.abs(np.sin((reached - solved) / 2)).max(axis=1) > SAME
     start[turned] = np.round(np.where(np.isfinite(solved), solved, wanted)[turned], START_DIGITS)
     return start
@@ -105,7 +104,7 @@ def _round(start: Floats, pairs: Pairs) -> list[PairRound]:
 
     if not pairs.size:
         return []
-    ends, *_ = relative.iterate(start, pairs, watch)
+    ends = iterate_elements(start, pairs, watch).elements
     counts = pairs.sums((pairs.weight > 0).astype(float)).astype(int).tolist()
     return [PairRound(*each) for each in zip(counts, map(tuple, steps), ends, strict=True)]
 

@@ -10,7 +10,7 @@ from photostrip.geometry.rotation import alpha_omega_kappa
 from photostrip.result.numbers import rounded, significant
 from photostrip.result.trace.replay import pair_rounds, similarity_steps
 from photostrip.triangulation import absolute_orientation
-from photostrip.triangulation.relative_orientation import relative
+from photostrip.triangulation.relative_orientation.solution import ELEMENTS, base_rays
 from photostrip.triangulation.strip_formation.intersection import intersect
 
 if TYPE_CHECKING:
@@ -116,7 +116,7 @@ def _pairs(result: Result, strip: StripResult, factor: float) -> list[Document]:
 
 
 def _named(values: Floats, decimals: int) -> Document:
-    return dict(zip(relative.ELEMENTS, rounded(values, decimals), strict=True))
+    return dict(zip(ELEMENTS, rounded(values, decimals), strict=True))
 
 
 def _round(each: PairRound, factor: float) -> Document:
@@ -125,7 +125,7 @@ def _round(each: PairRound, factor: float) -> Document:
             "iteration": number,
             "elements": _named(step.elements * factor, ANGLE),
             "[wqq]": significant(step.squares, SQUARES),
-            "d": dict(zip(relative.ELEMENTS, significant(step.step * factor, STEP), strict=True)),
+            "d": dict(zip(ELEMENTS, significant(step.step * factor, STEP), strict=True)),
         }
         for number, step in enumerate(each.steps, 1)
     ]
@@ -151,8 +151,9 @@ def _rejected(result: Result, strip: StripResult, number: int) -> list[Document]
 def _points(result: Result, strip: StripResult, number: int) -> list[Document]:
     """Image coordinates, parallax, ray factor and strip coordinates of the points of a pair."""
     orientation, ids = strip.orientation, result.refined.observations.point_ids
-    pairs, rows = orientation.pairs.take(np.array([number]))
-    left, right = relative.rays(orientation.elements[[number]], pairs)
+    rows = orientation.pairs.rows_of(np.array([number]))
+    pairs = orientation.pairs.take(np.array([number]))
+    left, right = base_rays(orientation.elements[[number]], pairs)
     model = intersect(np.array([1.0, 0.0, 0.0]), left, right, pairs.focal)
     columns = (
         rounded(np.column_stack([pairs.left, pairs.right]), MILLIMETRES),
@@ -202,7 +203,7 @@ def _scale_transfer(result: Result, strip: StripResult) -> list[Document]:
     joints, photos = formed.junctions, strip.strip.photos
     found = []
     for joint, factor in enumerate(joints.factor.tolist()):
-        rows = np.flatnonzero(joints.joint == joint)
+        rows = np.flatnonzero(joints.junction == joint)
         center = formed.centers[joint + 1]
         before = np.linalg.norm(formed.model_xyz[joints.before[rows]] - center, axis=1)
         after = np.linalg.norm(formed.model_xyz[joints.after[rows]] - center, axis=1) / formed.scale[joint + 1]

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from photostrip.geometry.similarity import Similarity
     from photostrip.triangulation.error_propagation.control_errors import Misclosures
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
-    from photostrip.triangulation.relative_orientation.relative import Orientation
-    from photostrip.triangulation.strip_formation.formation import FormedStrip
+    from photostrip.triangulation.relative_orientation.orientation import Orientation
+    from photostrip.triangulation.strip_formation.strip import FormedStrip
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -123,7 +123,7 @@ def misclosures_at(wanted: Conditions, formed: FormedStrip, similarity: Similari
     result[is_control] = control[wanted.source[is_control]]
     rows = wanted.source[is_distance]
     joined = formed.junctions
-    center = formed.centers[joined.joint[rows] + 1]
+    center = formed.centers[joined.junction[rows] + 1]
     before, after = (formed.model_xyz[side[rows]] - center for side in (joined.before, joined.after))
     ray = before / np.linalg.norm(before, axis=1)[:, None] + after / np.linalg.norm(after, axis=1)[:, None]
     along = ((after - before) * ray).sum(axis=1) / np.linalg.norm(ray, axis=1)
@@ -198,11 +198,11 @@ def _distances(errors: StripErrors, orientation: Orientation, formed: FormedStri
     chosen = np.flatnonzero(joined.used)
     before_share, _ = scale_shares(orientation, formed, pairs)
     size = (before_share[chosen] ** 2).sum(axis=1)
-    order = np.lexsort((size, joined.joint[chosen]))
-    number = joined.joint[chosen][order]
+    order = np.lexsort((size, joined.junction[chosen]))
+    number = joined.junction[chosen][order]
     last = np.append(number[1:] != number[:-1], np.ones(min(len(number), 1), bool))
     chosen = np.sort(chosen[order[~last]])
-    joint, before, after = joined.joint[chosen], joined.before[chosen], joined.after[chosen]
+    joint, before, after = joined.junction[chosen], joined.before[chosen], joined.after[chosen]
     arms = (pairs.point[before] - pairs.base[joint], pairs.point[after])
     lengths = [np.linalg.norm(arm, axis=1) for arm in arms]
     ray = (arms[0] + arms[1]) / (lengths[0] + lengths[1])[:, None]

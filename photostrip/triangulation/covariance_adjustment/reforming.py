@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.triangulation.relative_orientation import relative
-from photostrip.triangulation.strip_formation import formation, non_neighbours
+from photostrip.triangulation.relative_orientation.solution import iterate_elements, y_parallaxes
+from photostrip.triangulation.strip_formation import non_neighbours
+from photostrip.triangulation.strip_formation.strip import model_points, place_models
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,8 +21,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.points import PhotoPoints
-    from photostrip.triangulation.relative_orientation.relative import Orientation
-    from photostrip.triangulation.strip_formation.formation import FormedStrip, Junctions
+    from photostrip.triangulation.relative_orientation.orientation import Orientation
+    from photostrip.triangulation.strip_formation.scale_transfer import Junctions
+    from photostrip.triangulation.strip_formation.strip import FormedStrip
 
     Floats = NDArray[np.float64]
 
@@ -43,8 +45,8 @@ def oriented_again(orientation: Orientation, xy: Floats) -> Orientation:
     """
     left, right = (xy[orientation.rows[:, side]] for side in (0, 1))
     pairs = replace(orientation.pairs, left=left, right=right)
-    elements, _, _ = relative.iterate(orientation.elements, pairs)
-    return replace(orientation, pairs=pairs, elements=elements, parallax=relative.parallaxes(elements, pairs))
+    elements = iterate_elements(orientation.elements, pairs).elements
+    return replace(orientation, pairs=pairs, elements=elements, parallax=y_parallaxes(elements, pairs))
 
 
 def formed_again(
@@ -66,10 +68,10 @@ def formed_again(
     FormedStrip
         The same points and joints; ``model_xyz`` holds the points that were left out, too.
     """
-    vectors, gap, _ = formation.model_points(orientation)
-    junctions = _joined(formed.junctions, orientation, vectors)
+    models = model_points(orientation)
+    junctions = _joined(formed.junctions, orientation, models.vectors)
     there = np.asarray(np.isfinite(formed.model_xyz).all(axis=1), bool)
-    again = formation.placed(orientation, vectors, gap, junctions, orientation.used & there)
+    again = place_models(orientation, models, junctions, orientation.used & there)
     if not len(formed.bridging):
         return again
     return non_neighbours.bridge(again, observations, photos, orientation.pairs.focal, formed.bridging)
@@ -78,8 +80,8 @@ def formed_again(
 def _joined(joined: Junctions, orientation: Orientation, vectors: Floats) -> Junctions:
     """Return the scale transfer with the same pass points and weights."""
     base, _ = orientation.relative
-    before = np.linalg.norm(vectors[joined.before] - base[joined.joint], axis=1)
+    before = np.linalg.norm(vectors[joined.before] - base[joined.junction], axis=1)
     ratio = before / np.linalg.norm(vectors[joined.after], axis=1)
-    total = np.bincount(joined.joint, joined.weight, len(joined.factor))
-    factor = np.bincount(joined.joint, joined.weight * ratio, len(joined.factor)) / total
+    total = np.bincount(joined.junction, joined.weight, len(joined.factor))
+    factor = np.bincount(joined.junction, joined.weight * ratio, len(joined.factor)) / total
     return replace(joined, ratio=ratio, factor=factor)

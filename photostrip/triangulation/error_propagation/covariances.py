@@ -18,14 +18,14 @@ from photostrip.distributions import gamma_cdf
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.statistics import chi2_quantile
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, REACH, SPAN, ErrorRows
-from photostrip.triangulation.relative_orientation.relative import MINIMUM_POINTS
+from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.triangulation.error_propagation.control_errors import Misclosures
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
-    from photostrip.triangulation.relative_orientation.relative import Orientation
+    from photostrip.triangulation.relative_orientation.orientation import Orientation
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]

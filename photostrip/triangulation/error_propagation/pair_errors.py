@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.geometry.rotation import angle_rates, from_alpha_omega_kappa
-from photostrip.triangulation.relative_orientation import relative
+from photostrip.triangulation.relative_orientation.solution import base_rays, linearised_parallaxes, normal_matrices
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.relative_orientation.relative import Orientation, Pairs
+    from photostrip.triangulation.relative_orientation.orientation import Orientation
+    from photostrip.triangulation.relative_orientation.pairs import Pairs
 
     Floats = NDArray[np.float64]
 
@@ -102,8 +103,8 @@ def _elements(orientation: Orientation, left: _Turns, right: _Turns) -> Floats:
     """Elements by image coordinates, shape (m, 5, 4): de = -(J^T W J)^-1 J^T W B v (eq. 1)."""
     pairs = orientation.pairs
     with np.errstate(all="ignore"):
-        _, jacobian = relative.linearised(orientation.elements, pairs)
-        cofactors = np.linalg.inv(relative.normal_matrices(jacobian, pairs))
+        _, jacobian = linearised_parallaxes(orientation.elements, pairs)
+        cofactors = np.linalg.inv(normal_matrices(jacobian, pairs))
         by_image = _parallax_by_image(orientation.elements, pairs, left, right)
         share = np.einsum("mij,jm->mi", cofactors[pairs.pair], jacobian * pairs.weight)
         found = -share[:, :, None] * by_image[:, None, :]
@@ -112,7 +113,7 @@ def _elements(orientation: Orientation, left: _Turns, right: _Turns) -> Floats:
 
 def _parallax_by_image(elements: Floats, pairs: Pairs, left: _Turns, right: _Turns) -> Floats:
     """B: y parallax q by (x1, y1, x2, y2), shape (m, 4), without unit."""
-    rays = relative.rays(elements, pairs)
+    rays = base_rays(elements, pairs)
     result = np.empty((len(pairs.pair), 4))
     for columns, sign, ray, photo in ((slice(0, 2), 1.0, rays[0], left), (slice(2, 4), -1.0, rays[1], right)):
         turned = photo.rotation[pairs.pair][:, :, :2]
@@ -130,7 +131,7 @@ def _levelled(ray: Floats, change: Floats, focal: float) -> Floats:
 def _points(orientation: Orientation, left: _Turns, right: _Turns) -> _Points:
     """Differentiate N = 1 / (x1 - x2), X = N x1, Y = N (y1 + y2) / 2, Z = -N f of image coordinates made level."""
     pairs = orientation.pairs
-    both = relative.rays(orientation.elements, pairs)
+    both = base_rays(orientation.elements, pairs)
     level = [-pairs.focal * ray[:2] / ray[2] for ray in both]
     factor = 1 / (level[0][0] - level[1][0])  # eq. 138 with the base along x
     middle = (level[0][1] + level[1][1]) / 2

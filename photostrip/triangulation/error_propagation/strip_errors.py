@@ -40,8 +40,8 @@ if TYPE_CHECKING:
 
     from photostrip.geometry.similarity import Similarity
     from photostrip.triangulation.error_propagation.pair_errors import PairErrors
-    from photostrip.triangulation.relative_orientation.relative import Orientation
-    from photostrip.triangulation.strip_formation.formation import FormedStrip
+    from photostrip.triangulation.relative_orientation.orientation import Orientation
+    from photostrip.triangulation.strip_formation.strip import FormedStrip
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -114,8 +114,8 @@ def scale_shares(orientation: Orientation, formed: FormedStrip, pairs: PairError
     """
     joined = formed.junctions
     shares = np.where(joined.used, joined.weight * joined.ratio, 0.0)
-    shares = shares / np.bincount(joined.joint, shares, max(orientation.pairs.size - 1, 1))[joined.joint]
-    vectors = (pairs.point[joined.before] - pairs.base[joined.joint], pairs.point[joined.after])
+    shares = shares / np.bincount(joined.junction, shares, max(orientation.pairs.size - 1, 1))[joined.junction]
+    vectors = (pairs.point[joined.before] - pairs.base[joined.junction], pairs.point[joined.after])
     before, after = (shares[:, None] * u / (u**2).sum(axis=1)[:, None] for u in vectors)
     return before, after
 
@@ -138,9 +138,9 @@ def _image_points(
     joined, models = formed.junctions, orientation.pairs.size
     before, after = scale_shares(orientation, formed, pairs)
     scale_by_elements, scale_by_next = (np.zeros((models, 5)) for _ in range(2))  # elements of a model, of the next
-    center_to_point = pairs.point_by_elements[joined.before] - pairs.base_by_elements[joined.joint]
-    np.add.at(scale_by_elements, joined.joint, np.einsum("ti,tij->tj", before, center_to_point))
-    np.add.at(scale_by_next, joined.joint, -np.einsum("ti,tij->tj", after, pairs.point_by_elements[joined.after]))
+    center_to_point = pairs.point_by_elements[joined.before] - pairs.base_by_elements[joined.junction]
+    np.add.at(scale_by_elements, joined.junction, np.einsum("ti,tij->tj", before, center_to_point))
+    np.add.at(scale_by_next, joined.junction, -np.einsum("ti,tij->tj", after, pairs.point_by_elements[joined.after]))
     by_before = np.einsum("ti,tij->tj", before, pairs.point_by_image[joined.before])
     by_after = np.einsum("ti,tij->tj", after, pairs.point_by_image[joined.after])
     components[place[joined.before, 0], 2, SCALE] += by_before[:, :2]
@@ -196,10 +196,10 @@ def _point_rows(strip: PlacedStrip) -> ErrorRows:
     first = np.full(count, len(steps))
     np.minimum.at(first, item, model)
     if len(formed.home):
-        first = np.where(formed.models == 0, formed.home, first)
+        first = np.where(formed.model_count == 0, formed.home, first)
     slot = model - first[item]
     slots = int(slot.max()) + 1
-    share = 1 / formed.models[item]
+    share = 1 / formed.model_count[item]
     by_component = np.zeros((count, slots, 3, COMPONENTS))
     by_component[item, slot, :, ELEMENTS] = share[:, None, None] * pairs.point_by_elements[rows]
     held = np.zeros((count, slots + 1))

@@ -1,1 +1,9 @@
-"""Relative orientation of all pairs of a strip: from image coordinates to five elements of each pair."""
+"""Relative orientation: from the image points of a strip to the five elements of each stereopair.
+
+Comes in: reduced image coordinates, photos in flight order. Goes out: an ``Orientation`` of all pairs, with standard
+deviations, redundancy numbers and residual y parallaxes. ``pairs`` collects the measurements, ``solution`` finds the
+elements by least squares, ``orientation`` says how good they are and refuses what cannot be used; ``robust`` starts in
+spite of gross errors; ``six_points`` is the closed form for the standard points.
+
+Source: [001] eq. 126-137 for elements and rays; [Hallert] for the standard points; the solution is derived.
+"""

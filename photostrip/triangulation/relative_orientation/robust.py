@@ -10,12 +10,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.triangulation.relative_orientation import relative
+from photostrip.triangulation.relative_orientation.solution import (
+    Linearised,
+    gauss_newton_steps,
+    in_front_of_cameras,
+    linearised_parallaxes,
+    reduced_angles,
+    y_parallaxes,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.relative_orientation.relative import Pairs
+    from photostrip.triangulation.relative_orientation.pairs import Pairs
 
     Floats = NDArray[np.float64]
 
@@ -23,7 +30,8 @@ NORMAL = 1.4826  # median of |x| to standard deviation, of a normal distribution
 ABSOLUTE_STEPS = 30
 WELSCH_STEPS = 15
 WELSCH = 2.985  # standard deviations; 95 % efficient without gross errors
-LONGEST = 0.3  # rad, of one step
+LONGEST_STEP = 0.3  # rad
+RIDGE = 1e-9  # relative, of the normal matrices
 AGREE = 4.0  # standard deviations
 FEW = 3  # points that may disagree before other elements are looked for
 MINIMAL = 5  # points of a set
@@ -99,7 +107,7 @@ def solve(start: Floats, pairs: Pairs, sigma: Floats, *, near: bool = False) -> 
     absolute = not near
     for step in range(ABSOLUTE_STEPS + WELSCH_STEPS):
         with np.errstate(all="ignore"):
-            q, jacobian = relative.linearised(elements, pairs)
+            q, jacobian = linearised_parallaxes(elements, pairs)
         q = np.where(np.isfinite(q), q, 1e6)
         jacobian = np.where(np.isfinite(jacobian), jacobian, 0.0)
         size = np.abs(q) * np.sqrt(given)
@@ -108,13 +116,13 @@ def solve(start: Floats, pairs: Pairs, sigma: Floats, *, near: bool = False) -> 
         else:
             scale = np.maximum(sigma, NORMAL * median_by_pair(size, pairs, given > 0))
             weight = given * np.exp(-((size / (WELSCH * scale[pairs.pair])) ** 2))
-        change = _step(q, jacobian, replace(pairs, weight=weight))
+        change, _ = gauss_newton_steps(Linearised(q, jacobian), replace(pairs, weight=weight), RIDGE, LONGEST_STEP)
         elements = elements + change
         still = np.abs(change).max() < SETTLED
         if still and not absolute:
             break
         absolute = absolute and not still and step + 1 < ABSOLUTE_STEPS
-    return (elements + np.pi) % (2 * np.pi) - np.pi, scale
+    return reduced_angles(elements), scale
 
 
 def consensus(elements: Floats, pairs: Pairs, sigma: Floats) -> Floats:
@@ -141,10 +149,10 @@ def consensus(elements: Floats, pairs: Pairs, sigma: Floats) -> Floats:
     todo = np.flatnonzero(pairs.sums((pairs.weight > 0).astype(float)) - before > FEW)
     if not len(todo):
         return elements
-    part, _ = pairs.take(todo)
+    part = pairs.take(todo)
     start = elements[todo].copy()
     with np.errstate(all="ignore"):
-        q, jacobian = relative.linearised(start, part)
+        q, jacobian = linearised_parallaxes(start, part)
     root = np.sqrt(part.weight) / sigma[todo][part.pair]
     for number in range(len(todo)):
         rows = np.flatnonzero((part.pair == number) & (part.weight > 0) & np.isfinite(q))
@@ -161,8 +169,8 @@ def consensus(elements: Floats, pairs: Pairs, sigma: Floats) -> Floats:
 def _agreeing(elements: Floats, pairs: Pairs, sigma: Floats) -> Floats:
     """Count the points of each pair that agree with its elements."""
     with np.errstate(all="ignore"):
-        size = np.abs(relative.parallaxes(elements, pairs)) * np.sqrt(pairs.weight) / sigma[pairs.pair]
-        good = (size <= AGREE) & (pairs.weight > 0) & relative.in_front(elements, pairs)
+        size = np.abs(y_parallaxes(elements, pairs)) * np.sqrt(pairs.weight) / sigma[pairs.pair]
+        good = (size <= AGREE) & (pairs.weight > 0) & in_front_of_cameras(elements, pairs)
     return pairs.sums(good.astype(float))
 
 
@@ -175,23 +183,9 @@ def _best_set(design: Floats, residual: Floats) -> Floats:
     matrix = design[draws]
     regular = np.abs(np.linalg.det(matrix / np.linalg.norm(design, axis=0))) > DEGENERATE
     steps = -np.linalg.solve(matrix[regular], residual[draws[regular]][:, :, None])[:, :, 0]
-    steps = steps[np.abs(steps).max(axis=1, initial=0.0) < LONGEST]
+    steps = steps[np.abs(steps).max(axis=1, initial=0.0) < LONGEST_STEP]
     if not len(steps):
         return np.zeros(5)
     left = np.sort(np.abs(residual + steps @ design.T), axis=1)
     best: Floats = steps[left[:, int(MOST * (n - 1))].argmin()]
     return best
-
-
-def _step(q: Floats, jacobian: Floats, pairs: Pairs) -> Floats:
-    """One Gauss-Newton step of all pairs, shortened when long."""
-    diagonal = np.arange(5)
-    normal = relative.normal_matrices(jacobian, pairs)
-    scale = 1 / np.sqrt(np.maximum(normal[:, diagonal, diagonal], 1e-300))
-    normal *= scale[:, :, None] * scale[:, None, :]
-    normal[:, diagonal, diagonal] += 1e-9
-    right = pairs.sums(jacobian * (pairs.weight * q)).T * scale
-    step = -np.linalg.solve(normal, right[:, :, None])[:, :, 0] * scale
-    largest = np.abs(step).max(axis=1)
-    step *= np.minimum(1.0, LONGEST / np.maximum(largest, LONGEST))[:, None]
-    return np.asarray(step, float)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.points import PhotoPoints
-    from photostrip.triangulation.strip_formation.formation import FormedStrip
+    from photostrip.triangulation.strip_formation.strip import FormedStrip
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -63,7 +63,7 @@ def bridge(
         formed,
         point=every[order],
         xyz=np.concatenate([formed.xyz, xyz[found]])[order],
-        models=np.concatenate([formed.models, np.zeros(len(found), np.intp)])[order],
+        model_count=np.concatenate([formed.model_count, np.zeros(len(found), np.intp)])[order],
         home=np.concatenate([np.full(len(formed.point), -1), at[found, 0]])[order],
         bridging=np.sort(rows[np.isin(observations.point[rows], numbers[found])]),
     )

@@ -2,7 +2,7 @@
 
 The ratio of a point's distances from the common centre follows from its x parallaxes in the two models. An error of the
 coordinate on the common photo changes both parallaxes, in opposite directions; errors of the two orientations
-deform the models and change all ratios of a joint in a pattern. Both are propagated for each point.
+deform the models and change all ratios of a junction in a pattern. Both are propagated for each point.
 
 Source: derived; see docs/sources.md.
 """
@@ -10,27 +10,29 @@ Source: derived; see docs/sources.md.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.statistics import normal_quantile
-from photostrip.triangulation.relative_orientation import relative
 from photostrip.triangulation.relative_orientation.robust import NORMAL
+from photostrip.triangulation.relative_orientation.solution import (
+    base_rays,
+    linearised_parallaxes,
+    normal_matrices,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.relative_orientation.relative import Orientation
+    from photostrip.triangulation.relative_orientation.orientation import Orientation
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
     Flags = NDArray[np.bool_]
 
-ALPHA = 0.001  # of rejecting a point of a joint without gross errors
+ALPHA = 0.001  # of rejecting a point of a junction without gross errors
 FEWEST = 3  # with two ratios nobody can tell which is wrong
 SMALLEST_SIGMA = 1e-3  # mm, of a y parallax, when the pairs' own residuals have to say it
 MEDIAN_SCATTER = 1.17  # sd of a standard deviation from the median of n residuals, times sqrt(n)
@@ -38,8 +40,17 @@ PROOF = 3.0  # of those, by which ratios must scatter more than propagated
 ROUNDS = 10
 
 
+class PassPoints(NamedTuple):
+    """Points that two neighbouring models have in common; junction i lies between models i and i+1, at photo i+1."""
+
+    junction: Numbers  # (t,): junction of each row, ascending
+    # before, after: (t,): rows of the point in the pairs' table, in the model before and after the junction
+    before: Numbers
+    after: Numbers
+
+
 def spreads(
-    orientation: Orientation, vectors: Floats, rows: Sequence[Numbers], sigma: Floats | None = None
+    orientation: Orientation, vectors: Floats, joined: PassPoints, sigma: Floats | None = None
 ) -> tuple[Floats, Floats]:
     """Propagate image coordinates and orientations into scale ratios.
 
@@ -47,8 +58,6 @@ def spreads(
     ----------
     vectors : ndarray, shape (m, 3)
         Model points, base length 1.
-    rows : sequence of ndarray of int, shape (t,)
-        Joint, row before and row after of every pass point.
     sigma : ndarray, shape (p,), optional
         Standard deviation of a y parallax of weight one in each pair, mm.
 
@@ -57,25 +66,25 @@ def spreads(
     single : ndarray, shape (t,)
         Relative standard deviation of each ratio by its own image coordinates.
     model : ndarray, shape (t,)
-        The same by the deformation of the two models, against the mean of the joint.
+        The same by the deformation of the two models, against the mean of the junction.
     """
-    joint, before, after = rows
+    junction, before, after = joined
     scatter = _scatter(orientation) if sigma is None else sigma
     base, _ = orientation.relative
-    depth_before, depth_after = depths(vectors[before], base[joint]), depths(vectors[after], base[joint + 1])
+    depth_before, depth_after = depths(vectors[before], base[junction]), depths(vectors[after], base[junction + 1])
     quality = np.minimum(orientation.pairs.weight[before], orientation.pairs.weight[after])
     # an image coordinate has half the variance of a parallax; that of the common photo acts on both distances
-    coordinate = (scatter[joint] ** 2 + scatter[joint + 1] ** 2) / 4 / quality
+    coordinate = (scatter[junction] ** 2 + scatter[junction + 1] ** 2) / 4 / quality
     factor = (depth_before + depth_after) ** 2 + depth_before**2 + depth_after**2
     single = np.sqrt(coordinate * factor) / orientation.pairs.focal
-    variance = np.zeros(len(joint))
-    if len(joint):
-        count = np.maximum(np.bincount(joint), 1)[:, None]
+    variance = np.zeros(len(junction))
+    if len(junction):
+        count = np.maximum(np.bincount(junction), 1)[:, None]
         weight = _turns(orientation)
-        for side, (row, model) in enumerate(((after, joint + 1), (before, joint))):
+        for side, (row, model) in enumerate(((after, junction + 1), (before, junction))):
             slope = _slopes(orientation, row, side)
-            mean = np.column_stack([np.bincount(joint, each) for each in slope.T]) / count
-            own = slope - mean[joint]
+            mean = np.column_stack([np.bincount(junction, each) for each in slope.T]) / count
+            own = slope - mean[junction]
             spread = (own[:, None, :] @ weight[model])[:, 0]
             variance += (spread * own).sum(axis=1) * scatter[model] ** 2
     return single, np.sqrt(np.maximum(variance, 0.0))
@@ -132,7 +141,7 @@ def _slopes(orientation: Orientation, rows: Numbers, side: int) -> Floats:
     f = pairs.focal
     slope = np.empty((len(rows), 6))
     with np.errstate(divide="ignore", invalid="ignore"):
-        sides = [-f * ray[:2] / ray[2] for ray in relative.rays(orientation.elements, pairs)]
+        sides = [-f * ray[:2] / ray[2] for ray in base_rays(orientation.elements, pairs)]
         inverse, middle = 1 / (sides[0][0] - sides[1][0]), (sides[0][1] + sides[1][1]) / 2
         squares = 1 / (sides[side][0] ** 2 + middle**2 + f**2)
         by_y = middle * squares / 2
@@ -150,15 +159,15 @@ def _cofactors(orientation: Orientation) -> Floats:
     weak = np.flatnonzero(np.isnan(orientation.cofactors[:, 0, 0]))
     if not len(weak):
         return orientation.cofactors
-    part, _ = relative.taken(orientation, weak)
-    _, jacobian = relative.linearised(part.elements, part.pairs)
+    part = orientation.take(weak)
+    _, jacobian = linearised_parallaxes(part.elements, part.pairs)
     cofactors = orientation.cofactors.copy()
-    cofactors[weak] = np.linalg.pinv(relative.normal_matrices(jacobian, part.pairs), hermitian=True)
+    cofactors[weak] = np.linalg.pinv(normal_matrices(jacobian, part.pairs), hermitian=True)
     return cofactors
 
 
 def screen(
-    ratio: Floats, weight: Floats, spread: tuple[Floats, Floats], joint: Numbers, joints: int
+    ratio: Floats, weight: Floats, spread: tuple[Floats, Floats], junction: Numbers, junctions: int
 ) -> tuple[Flags, Floats]:
     """Find the ratios that belong together.
 
@@ -168,8 +177,8 @@ def screen(
         Scale ratios and their weights in the mean.
     spread : tuple of ndarray, shape (t,)
         Relative standard deviations as ``spreads`` gives them.
-    joint : ndarray of int, shape (t,)
-        Joint of each ratio, ascending.
+    junction : ndarray of int, shape (t,)
+        Junction of each ratio, ascending.
 
     Returns
     -------
@@ -179,36 +188,36 @@ def screen(
         Largest relative deviation of each that still belongs.
     """
     size = np.hypot(*spread)
-    count = np.bincount(joint, minlength=joints)
+    count = np.bincount(junction, minlength=junctions)
     level = np.array([normal_quantile(1 - ALPHA / (2 * max(n, 1))) for n in range(int(count.max(initial=0)) + 1)])[
         count
     ]
     value = np.log(ratio)
-    center = _weighted_medians(value, weight, joint, joints)
-    own = NORMAL * _weighted_medians(np.abs(value - center[joint]) / size, np.ones(len(value)), joint, joints)
+    center = _weighted_medians(value, weight, junction, junctions)
+    own = NORMAL * _weighted_medians(np.abs(value - center[junction]) / size, np.ones(len(value)), junction, junctions)
     scale = np.maximum(1.0, own / (1 + PROOF * MEDIAN_SCATTER / np.sqrt(np.maximum(count, 1))))
-    limit = (level * scale)[joint] * size
-    few = (count < FEWEST)[joint]
-    used = few | (np.abs(value - center[joint]) <= limit)
+    limit = (level * scale)[junction] * size
+    few = (count < FEWEST)[junction]
+    used = few | (np.abs(value - center[junction]) <= limit)
     for _ in range(ROUNDS):
-        total = np.bincount(joint, weight * used, joints)
-        center = np.bincount(joint, weight * used * value, joints) / total
-        again = few | (np.abs(value - center[joint]) <= limit)
-        again |= (np.bincount(joint, again, joints) < 1)[joint]
+        total = np.bincount(junction, weight * used, junctions)
+        center = np.bincount(junction, weight * used * value, junctions) / total
+        again = few | (np.abs(value - center[junction]) <= limit)
+        again |= (np.bincount(junction, again, junctions) < 1)[junction]
         if (again == used).all():
             break
         used = again
     return used, limit
 
 
-def _weighted_medians(values: Floats, weight: Floats, joint: Numbers, joints: int) -> Floats:
-    """Weighted median of each joint; 0 for a joint without values."""
+def _weighted_medians(values: Floats, weight: Floats, junction: Numbers, junctions: int) -> Floats:
+    """Weighted median of each junction; 0 for a junction without values."""
     if not len(values):
-        return np.zeros(joints)
-    count = np.bincount(joint, minlength=joints)
-    place = np.arange(len(values)) - (np.cumsum(count) - count)[joint]
-    table, weights = np.full((2, joints, int(count.max())), np.inf)
-    table[joint, place], weights[joint, place] = values, weight
+        return np.zeros(junctions)
+    count = np.bincount(junction, minlength=junctions)
+    place = np.arange(len(values)) - (np.cumsum(count) - count)[junction]
+    table, weights = np.full((2, junctions, int(count.max())), np.inf)
+    table[junction, place], weights[junction, place] = values, weight
     order = np.argsort(table, axis=1)
     total = np.cumsum(np.take_along_axis(np.where(np.isfinite(table), weights, 0.0), order, axis=1), axis=1)
     middle = (total < total[:, -1:] / 2).sum(axis=1, keepdims=True)

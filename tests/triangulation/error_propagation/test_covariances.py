@@ -10,7 +10,7 @@ import pytest
 from photostrip.pipeline import Settings, triangulate
 from photostrip.triangulation.error_propagation import covariances as precision
 from photostrip.triangulation.polynomial import correction
-from photostrip.triangulation.strip_formation import formation
+from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
 from tests.derivatives import (
     UNSCREENED,
     differenced,
@@ -30,7 +30,7 @@ def settings(adjustment: str, transfer: str = "least_squares") -> Settings:
     return Settings(
         adjustment="similarity" if adjustment == "similarity" else "polynomial",
         relative=UNSCREENED,
-        formation=formation.Settings(transfer),
+        formation=StripFormationSettings(transfer),
         polynomial=correction.Settings(degree),
     )
 

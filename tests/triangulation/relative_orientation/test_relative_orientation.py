@@ -15,7 +15,18 @@ from scipy.spatial.transform import Rotation
 from photostrip.errors import EXIT_GEOMETRY, GeometryError
 from photostrip.pipeline import Settings, triangulate
 from photostrip.points import PhotoPoints
-from photostrip.triangulation.relative_orientation import relative
+from photostrip.triangulation.relative_orientation.orientation import assess_pairs, orient_again, orient_pairs
+from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS, collect_pairs
+from photostrip.triangulation.relative_orientation.solution import (
+    ITERATIONS,
+    base_rays,
+    in_front_of_cameras,
+    linearised_parallaxes,
+    normal_matrices,
+    solve_elements,
+    start_values,
+    y_parallaxes,
+)
 from photostrip.triangulation.strip_formation.intersection import intersect
 from tests.strips import (
     MICROMETRE,
@@ -38,7 +49,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from photostrip.triangulation.relative_orientation.relative import Orientation, Pairs
+    from photostrip.triangulation.relative_orientation.orientation import Orientation
+    from photostrip.triangulation.relative_orientation.pairs import Pairs
     from tests.vectors import Vector
 
     Floats = NDArray[np.float64]
@@ -61,8 +73,7 @@ def of_arrays(left: ArrayLike, right: ArrayLike) -> PhotoPoints:
 
 
 def orient(observations: PhotoPoints, focal: float) -> Orientation:
-    pairs, point, rows = relative.collect_pairs(observations, observations.photo_ids, focal)
-    return relative.orient(pairs, point, rows, observations.photo_ids)
+    return orient_pairs(collect_pairs(observations, observations.photo_ids, focal), observations.photo_ids)
 
 
 def refusal(observations: PhotoPoints, focal: float = 100.0) -> GeometryError:
@@ -75,7 +86,7 @@ def refusal(observations: PhotoPoints, focal: float = 100.0) -> GeometryError:
 
 
 def single(observations: PhotoPoints, focal: float) -> Pairs:
-    return relative.collect_pairs(observations, observations.photo_ids, focal)[0]
+    return collect_pairs(observations, observations.photo_ids, focal)
 
 
 # ------------------------------------------------------------------------------------------- published
@@ -87,16 +98,16 @@ def test_the_exact_examples_of_the_formula_book(example: Vector) -> None:
     found = orient(of_points(example.input["points"]), f)
     assert np.allclose(np.degrees(found.elements[0]), expected["elements_deg"], rtol=0, atol=tol["elements_deg"])
     assert np.abs(found.parallax).max() <= expected["max_abs_q_mm"] + tol["q_mm"]
-    start = np.degrees(relative.start_values(found.pairs)[0])
+    start = np.degrees(start_values(found.pairs)[0])
     assert np.allclose(start[[1, 4]], expected["kappa_start_deg"], rtol=0, atol=tol["elements_deg"])
     assert np.all(start[[0, 2, 3]] == 0)
     trial = np.radians([example.input["trial_elements_deg"]])
-    q, jacobian = relative.linearised(trial, found.pairs)
+    q, jacobian = linearised_parallaxes(trial, found.pairs)
     assert np.allclose(q, expected["q_at_trial"], rtol=0, atol=tol["q_mm"])
-    assert np.allclose(relative.parallaxes(trial, found.pairs), expected["q_at_trial"], rtol=0, atol=tol["q_mm"])
+    assert np.allclose(y_parallaxes(trial, found.pairs), expected["q_at_trial"], rtol=0, atol=tol["q_mm"])
     theirs = np.array(expected["jacobian_at_trial"])
     assert np.allclose(jacobian.T, theirs, rtol=tol["jacobian_rel"], atol=tol["jacobian_rel"] * np.abs(theirs).max())
-    left, right = relative.rays(found.elements, found.pairs)
+    left, right = base_rays(found.elements, found.pairs)
     model = intersect(np.array([1.0, 0, 0]), left, right, f)
     assert np.allclose(model.xyz, expected["model_points_unit_base"], rtol=0, atol=tol["model"])
 
@@ -117,8 +128,8 @@ def test_the_adjusted_examples_of_the_formula_book(example: Vector) -> None:
         assert expected["sigma0_mm"] is expected["sd_elements_arcsec"] is None
         assert np.isnan(found.sigma0).all()
         assert np.isnan(found.sigmas).all()
-    _, jacobian = relative.linearised(found.elements, found.pairs)
-    cofactors = np.linalg.inv(relative.normal_matrices(jacobian, found.pairs)[0])
+    _, jacobian = linearised_parallaxes(found.elements, found.pairs)
+    cofactors = np.linalg.inv(normal_matrices(jacobian, found.pairs)[0])
     largest = np.abs(expected["cofactor_rad2_per_mm2"]).max()
     assert np.allclose(cofactors, expected["cofactor_rad2_per_mm2"], rtol=0, atol=rel * largest)
     assert np.allclose(found.redundancy, expected["redundancy_numbers"], rtol=0, atol=rel)
@@ -131,14 +142,14 @@ def test_the_degenerate_examples_are_refused(example: Vector) -> None:
     assert example.expected["error"]
     error = refusal(observations, f)
     n = len(example.input["points"])
-    if n < relative.MINIMUM_POINTS:
+    if n < MINIMUM_POINTS:
         assert error.code == "too-few-common-points"
         assert f"{n} common points, at least 5 are necessary" in str(error)
     else:
         assert error.code == "points-on-a-line"
         assert "all common points lie on one line of the photo" in str(error)
     left, right = observations.xy[:n], observations.xy[n:]
-    _, jacobian = relative.linearised(np.zeros((1, 5)), batch(left[None], right[None], f))
+    _, jacobian = linearised_parallaxes(np.zeros((1, 5)), batch(left[None], right[None], f))
     assert np.linalg.matrix_rank(jacobian) == example.expected["rank_at_zero_elements"]
 
 
@@ -195,19 +206,19 @@ def test_the_essential_matrix_is_that_of_eight_points(seed: int) -> None:
 def test_derivatives_are_differences(seed: int, elements: tuple[float, ...]) -> None:
     pairs = true_pairs(np.random.default_rng(seed), tilt_deg=3.0, kappa_deg=5.0).pairs
     at, step = np.array([elements]), 1e-5
-    q, jacobian = relative.linearised(at, pairs)
-    assert np.array_equal(q, relative.parallaxes(at, pairs))
+    q, jacobian = linearised_parallaxes(at, pairs)
+    assert np.array_equal(q, y_parallaxes(at, pairs))
     for number in range(5):
         change = np.zeros(5)
         change[number] = step
-        difference = (relative.parallaxes(at + change, pairs) - relative.parallaxes(at - change, pairs)) / (2 * step)
+        difference = (y_parallaxes(at + change, pairs) - y_parallaxes(at - change, pairs)) / (2 * step)
         assert np.allclose(jacobian[number], difference, rtol=1e-5, atol=1e-5 * np.abs(jacobian[number]).max() + 1e-4)
 
 
 def test_the_row_at_zero_elements_is_the_printed_one() -> None:
     left = np.array([[3.0, -7.0], [70.0, 65.0], [68.0, -60.0], [5.0, 66.0], [40.0, 1.0]])
     right, f = left - [69.0, 0.3], 100.0
-    q, jacobian = relative.linearised(np.zeros((1, 5)), batch(left[None], right[None], f))
+    q, jacobian = linearised_parallaxes(np.zeros((1, 5)), batch(left[None], right[None], f))
     (x1, y1), (x2, y2) = left.T, right.T
     assert np.allclose(q, y1 - y2, rtol=0, atol=1e-12)
     assert np.allclose(jacobian, [x1 * y1 / f, x1, -x2 * y2 / f, -(f + y2**2 / f), -x2], rtol=0, atol=1e-12)
@@ -219,11 +230,11 @@ def test_the_row_at_zero_elements_is_the_printed_one() -> None:
 @pytest.mark.parametrize("tilt", [2.0, 5.0, 10.0])
 def test_pairs_of_any_kappa_come_back_to_the_truth(tilt: float) -> None:
     truth = true_pairs(np.random.default_rng(1), 1000, tilt_deg=tilt)
-    elements, converged, iterations = relative.solve(truth.pairs)
+    elements, converged, iterations = solve_elements(truth.pairs)
     assert converged.all()
     assert np.count_nonzero(truth.errors(elements) > 1e-10) == 0
-    assert iterations.max() <= relative.ITERATIONS
-    assert relative.in_front(elements, truth.pairs).all()
+    assert iterations.max() <= ITERATIONS
+    assert in_front_of_cameras(elements, truth.pairs).all()
     assert np.all(np.abs(elements) <= np.pi)
     assert np.all(np.abs(elements[:, 3]) < np.pi / 2)
 
@@ -259,10 +270,9 @@ def test_sigma0_and_sigmas_are_those_of_the_errors() -> None:
     noise = rng.normal(0, sigma, (2, n, 18, 2))
     noisy = batch(truth.pairs.left[None] + noise[0], truth.pairs.right[None] + noise[1], truth.pairs.focal)
     exact = truth.orient().elements[0]
-    elements, converged, steps = relative.solve(noisy)
+    elements, converged, steps = solve_elements(noisy)
     assert converged.all()
-    rows = np.arange(18 * n)
-    found = relative.assess(elements, noisy, rows, np.column_stack([rows, rows]), steps)
+    found = assess_pairs(elements, noisy, steps)
     # a mean of 400 variances of 13 degrees of freedom is known to 2 percent; the points of a tilted pair are not all at
     # the scale of the photo, hence a little more
     assert np.mean(found.sigma0**2) / sigma**2 == pytest.approx(1, abs=0.08)
@@ -277,8 +287,8 @@ def test_redundancy_numbers_sum_to_the_redundancy(seed: int) -> None:
     weight = rng.uniform(0.2, 3, 36)
     weight[[4, 17]] = 0
     pairs = replace(truth.pairs, weight=weight)
-    elements, _, steps = relative.solve(pairs)
-    found = relative.assess(elements, pairs, np.arange(36), np.zeros((36, 2), int), steps)
+    elements, _, steps = solve_elements(pairs)
+    found = assess_pairs(elements, pairs, steps)
     totals = [np.nansum(found.redundancy[pairs.pair == number]) for number in range(3)]
     assert np.allclose(totals, found.points_used - 5, rtol=0, atol=1e-8)
     assert np.isnan(found.redundancy[[4, 17]]).all()
@@ -332,11 +342,13 @@ def test_many_pairs_at_once_are_what_each_is_alone() -> None:
     truth = true_pairs(np.random.default_rng(3), 40, sigma=5 * MICROMETRE, tilt_deg=8.0)
     together = truth.orient()
     for number in (0, 17, 39):
-        part, rows = truth.pairs.take(np.array([number]))
-        elements, _, steps = relative.solve(part)
-        alone = relative.assess(elements, part, rows, np.zeros((12, 2), int), steps)
+        part = truth.pairs.take(np.array([number]))
+        elements, _, steps = solve_elements(part)
+        alone = assess_pairs(elements, part, steps)
         assert np.allclose(alone.elements[0], together.elements[number], rtol=0, atol=1e-13)
-        assert np.allclose(alone.parallax, together.parallax[rows], rtol=0, atol=1e-11)
+        assert np.allclose(
+            alone.parallax, together.parallax[together.pairs.rows_of(np.array([number]))], rtol=0, atol=1e-11
+        )
         assert alone.condition[0] == pytest.approx(together.condition[number], rel=1e-6)
 
 
@@ -345,8 +357,9 @@ def test_many_pairs_at_once_are_what_each_is_alone() -> None:
 
 def test_pairs_are_collected_in_flight_order() -> None:
     flown = fly(2, 4, extra=5)
-    pairs, point, rows = relative.collect_pairs(flown.observations, flown.photos, flown.focal)
+    pairs = collect_pairs(flown.observations, flown.photos, flown.focal)
     obs = flown.observations
+    point, rows = pairs.point, pairs.rows
     assert pairs.size == 3
     assert np.array_equal(obs.point[rows[:, 0]], point)
     assert np.array_equal(obs.point[rows[:, 1]], point)
@@ -366,11 +379,11 @@ def test_rows_in_any_order_and_other_photos_do_not_matter() -> None:
         obs.photo_ids, obs.point_ids, obs.photo[order], obs.point[order], obs.xy[order], obs.sigma[order]
     )
     whole = flown.oriented().elements
-    pairs, point, rows = relative.collect_pairs(shuffled, flown.photos, flown.focal)
-    assert np.allclose(relative.orient(pairs, point, rows, flown.photos).elements, whole, rtol=0, atol=1e-13)
+    pairs = collect_pairs(shuffled, flown.photos, flown.focal)
+    assert np.allclose(orient_pairs(pairs, flown.photos).elements, whole, rtol=0, atol=1e-13)
     middle = flown.photos[1:3]
-    pairs, point, rows = relative.collect_pairs(obs, middle, flown.focal)
-    assert np.allclose(relative.orient(pairs, point, rows, middle).elements, whole[1:2], rtol=0, atol=1e-13)
+    pairs = collect_pairs(obs, middle, flown.focal)
+    assert np.allclose(orient_pairs(pairs, middle).elements, whole[1:2], rtol=0, atol=1e-13)
 
 
 def test_weights_come_from_the_standard_deviations() -> None:
@@ -392,7 +405,7 @@ def test_a_point_of_no_weight_does_not_count() -> None:
     oriented = orient(of_arrays(bad, pairs.right), 153.0)
     weight = oriented.pairs.weight.copy()
     weight[4] = 0
-    without = relative.refine(oriented, weight, np.array([0]))
+    without = orient_again(oriented, weight, np.array([0]))
     rest = np.delete(np.arange(18), 4)
     alone = orient(of_arrays(pairs.left[rest], pairs.right[rest]), 153.0)
     assert np.allclose(without.elements, alone.elements, rtol=0, atol=1e-11)
@@ -418,7 +431,7 @@ def test_a_point_of_no_weight_does_not_count() -> None:
 def test_condition_numbers(left: list[list[float]], condition: float) -> None:
     found = orient(of_arrays(left, np.array(left, float) - [70, 0]), 100.0)
     assert found.condition[0] == pytest.approx(condition, rel=0.04)
-    _, jacobian = relative.linearised(found.elements, found.pairs)
+    _, jacobian = linearised_parallaxes(found.elements, found.pairs)
     columns = jacobian.T / np.linalg.norm(jacobian, axis=1)
     assert found.condition[0] == pytest.approx(np.linalg.cond(columns), rel=1e-6)
 
@@ -489,7 +502,7 @@ def test_the_pair_with_too_few_points_is_the_one_named() -> None:
     flown = fly(1, 6)
     wrong_order = (*flown.photos[:2], flown.photos[4], flown.photos[3], *flown.photos[5:])
     with pytest.raises(GeometryError, match="photos 102 and 105: 0 common points"):
-        relative.collect_pairs(flown.observations, wrong_order, flown.focal)
+        collect_pairs(flown.observations, wrong_order, flown.focal)
 
 
 def test_one_column_of_points() -> None:
@@ -560,7 +573,7 @@ def test_standard_points_lie_where_they_should() -> None:
 def test_large_tilts_come_back_too(tilt: float, share: float) -> None:
     for seed in range(3):
         truth = true_pairs(np.random.default_rng(seed), 1000, tilt_deg=tilt)
-        elements, converged, _ = relative.solve(truth.pairs)
+        elements, converged, _ = solve_elements(truth.pairs)
         right = truth.errors(elements) < 1e-9
         assert right.mean() >= share
         assert (

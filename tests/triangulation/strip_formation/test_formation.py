@@ -16,10 +16,21 @@ from photostrip.errors import EXIT_GEOMETRY, GeometryError
 from photostrip.geometry.rotation import alpha_omega_kappa, from_alpha_omega_kappa
 from photostrip.geometry.similarity import Similarity
 from photostrip.points import PhotoPoints
-from photostrip.triangulation.relative_orientation import relative
-from photostrip.triangulation.relative_orientation.relative import Orientation
-from photostrip.triangulation.strip_formation import formation
-from photostrip.triangulation.strip_formation.formation import SCALE_TRANSFERS, FormedStrip, Settings
+from photostrip.triangulation.relative_orientation.orientation import Orientation, orient_again, orient_pairs
+from photostrip.triangulation.relative_orientation.pairs import collect_pairs
+from photostrip.triangulation.strip_formation.scale_transfer import (
+    SCALE_TRANSFERS,
+    StripFormationSettings,
+    mean_ratios,
+    transfer_scale,
+)
+from photostrip.triangulation.strip_formation.strip import (
+    FormedStrip,
+    _refuse_vertical_base,
+    form_from_pairs,
+    hand_on_rotations,
+    mean_points,
+)
 from tests.strips import MICROMETRE, attitude, batch, fly, measured, photograph
 from tests.vectors import cases, section
 
@@ -36,7 +47,7 @@ CLOSURE = 1e-12  # base lengths
 
 
 def formed(flown: Flown, transfer: str = "least_squares") -> FormedStrip:
-    return formation.form(flown.oriented(), Settings(transfer), flown.photos)
+    return form_from_pairs(flown.oriented(), StripFormationSettings(transfer), flown.photos)
 
 
 def truth_in_strip(flown: Flown, strip: FormedStrip) -> tuple[Floats, Floats, Floats]:
@@ -75,9 +86,8 @@ def test_the_strip_of_the_formula_book(example: Vector, transfer: str) -> None:
     photos = {f"{number}": image for number, image in enumerate(example.input["photos"], start=1)}
     observations = measured(photos)
     names, tol = observations.photo_ids, example.tol
-    pairs, point, rows = relative.collect_pairs(observations, names, example.input["f"])
-    oriented = relative.orient(pairs, point, rows, names)
-    strip = formation.form(oriented, Settings(transfer), names)
+    oriented = orient_pairs(collect_pairs(observations, names, example.input["f"]), names)
+    strip = form_from_pairs(oriented, StripFormationSettings(transfer), names)
     first, base = attitude(example.input["eo1_deg"])[0], example.input["base"]
     bases = np.diff(strip.centers, axis=0) @ first.T
     for number, model in enumerate(example.expected["models"]):
@@ -110,7 +120,7 @@ def test_the_chain_of_the_formula_book(example: Vector) -> None:
     base_frame = from_alpha_omega_kappa(elements[0, 0], 0.0, elements[0, 1])
     assert np.allclose(base_frame, expected["A1p"], rtol=0, atol=tol)
     assert np.allclose(first @ base_frame.T, expected["A_tau_nu"], rtol=0, atol=tol)
-    second = first @ formation.hand_on(rotation)[1]
+    second = first @ hand_on_rotations(rotation)[1]
     assert np.allclose(second, expected["A2"], rtol=0, atol=tol)
     degrees = np.degrees(alpha_omega_kappa(second))
     assert np.allclose(degrees, expected["alpha2_omega2_kappa2_deg"], rtol=0, atol=tol * 10)
@@ -126,11 +136,19 @@ def oriented_as(elements: Floats, points: int = 6) -> Orientation:
     p = len(elements)
     nothing = np.zeros((p, points, 2))
     ones, numbers = np.ones(p), np.zeros(p, int)
-    pairs = batch(nothing, nothing, 100.0)
-    rows = np.column_stack([np.arange(p * points)] * 2)
+    pairs = replace(batch(nothing, nothing, 100.0), point=np.tile(np.arange(points), p))
     by_row = np.zeros(p * points)
-    point = np.tile(np.arange(points), p)
-    return Orientation(pairs, point, rows, elements, elements, ones, ones, numbers, by_row, by_row, np.zeros((p, 5, 5)))
+    return Orientation(
+        pairs=pairs,
+        elements=elements,
+        sigmas=elements,
+        sigma0=ones,
+        condition=ones,
+        iterations=numbers,
+        parallax=by_row,
+        redundancy=by_row,
+        cofactors=np.zeros((p, 5, 5)),
+    )
 
 
 @pytest.mark.parametrize("example", cases("scale_transfer"))
@@ -142,19 +160,18 @@ def test_the_scale_factors_of_the_formula_book(example: Vector) -> None:
     oriented = oriented_as(np.zeros((2, 5)), n)
     before = np.array(given_["tie_previous_model_strip_coords"]) - center + [1.0, 0, 0]  # from the left centre
     vectors = np.concatenate([before, after])
-    sound = np.ones(2 * n, bool)
-    joined = formation.transfer_scale(oriented, vectors, sound, Settings("distances"), ("1", "2", "3"))
+    joined = transfer_scale(oriented, vectors, StripFormationSettings("distances"), ("1", "2", "3"))
     assert np.allclose(joined.ratio, expected["k_each"], rtol=rel, atol=0)
     assert np.allclose(np.linalg.norm(after, axis=1) * joined.ratio, expected["D"], rtol=rel, atol=0)
     assert joined.factor[0] == pytest.approx(expected["k_mean"], rel=rel)
     assert joined.used.all()
     joint = np.zeros(n, int)
     weights = np.array(given_["weights"])
-    mean, spread = formation._factors(joined.ratio, weights, joint, 1, Settings())
+    mean, spread = mean_ratios(joined.ratio, weights, joint, 1)
     assert mean[0] == pytest.approx(expected["k_weighted"], rel=rel)
     assert spread[0] * mean[0] / np.sqrt(n) == pytest.approx(expected["sd_of_k_weighted"], rel=1e-9)
     squares = np.array(expected["D_prime"]) ** 2
-    mean_of_squares, _ = formation._factors(joined.ratio, squares, joint, 1, Settings())
+    mean_of_squares, _ = mean_ratios(joined.ratio, squares, joint, 1)
     assert mean_of_squares[0] == pytest.approx(expected["k_least_squares"], rel=rel)
     assert np.allclose(center + mean * given_["base_components"], expected["S_next"], rtol=rel, atol=0)
     assert np.allclose(center + mean * given_["new_point_increment"], expected["new_point"], rtol=rel, atol=0)
@@ -203,7 +220,7 @@ def test_base_angles_scale_and_bases_are_those_of_the_centres() -> None:
 
 def test_orientations_are_handed_on() -> None:
     turns = Rotation.random(6, random_state=1).as_matrix()
-    chain = formation.hand_on(turns)
+    chain = hand_on_rotations(turns)
     assert np.array_equal(chain[0], np.eye(3))
     for number, turn in enumerate(turns):
         assert np.allclose(chain[number].T @ chain[number + 1], turn, rtol=0, atol=1e-14)
@@ -230,8 +247,8 @@ def test_the_scale_of_the_ground_does_not_matter() -> None:
 def test_the_strip_flown_back_is_the_same_strip() -> None:
     flown = fly(6, 5, sigma=5 * MICROMETRE, extra=20)
     there = formed(flown)
-    pairs, point, rows = relative.collect_pairs(flown.observations, flown.photos[::-1], flown.focal)
-    back = formation.form(relative.orient(pairs, point, rows, flown.photos[::-1]), Settings(), flown.photos[::-1])
+    pairs = collect_pairs(flown.observations, flown.photos[::-1], flown.focal)
+    back = form_from_pairs(orient_pairs(pairs, flown.photos[::-1]), StripFormationSettings(), flown.photos[::-1])
     assert np.array_equal(there.point, back.point)
     similarity = Similarity.from_points(back.xyz, there.xyz)
     assert (
@@ -281,13 +298,13 @@ def test_a_wrong_pass_point_is_rejected_and_does_little_harm(transfer: str, extr
     wrong = np.flatnonzero(seen(flown, 3, "p2_1"))  # the third photo of the joint at photo 2
     xy[wrong, 0] += 1.0  # along the base: no y parallax tells
     found = formed(replace(flown, observations=replace(flown.observations, xy=xy)), transfer).junctions
-    rejected = {(int(found.joint[row]), int(found.point[row])) for row in np.flatnonzero(~found.used)}
+    rejected = {(int(found.junction[row]), int(found.point[row])) for row in np.flatnonzero(~found.used)}
     number = flown.at["p2_1"]
     assert (1, number) in rejected
     assert rejected <= {(1, number), (2, number)}
     assert strip.junctions.used.all()
     harm = np.abs(found.factor / strip.junctions.factor - 1)
-    share = 0.011 / np.bincount(found.joint, minlength=3)[1]  # of the scale, had it been left in the mean
+    share = 0.011 / np.bincount(found.junction, minlength=3)[1]  # of the scale, had it been left in the mean
     assert harm.max() < 0.25 * share
 
 
@@ -308,10 +325,10 @@ def test_points_of_one_and_of_many_models() -> None:
         on = np.sort(obs.photo[obs.point == number])
         models = int((np.diff(on) == 1).sum())
         if models:
-            assert strip.models[rows[number]] == models, name
+            assert strip.model_count[rows[number]] == models, name
         else:
             assert number not in rows, name
-    assert len(set(strip.models)) >= 3
+    assert len(set(strip.model_count)) >= 3
 
 
 def test_a_point_on_photos_one_and_three_only_has_no_coordinates() -> None:
@@ -330,7 +347,7 @@ def test_a_point_of_a_single_model_is_what_its_model_says() -> None:
     less = replace(flown, observations=only(flown.observations, ~seen(flown, 2, "p1_0")))
     strip = formed(less)
     row = int(np.flatnonzero(strip.point == flown.at["p1_0"])[0])
-    assert strip.models[row] == 1
+    assert strip.model_count[row] == 1
     oriented = less.oriented()
     inside = np.flatnonzero(oriented.point == flown.at["p1_0"])
     assert oriented.pairs.pair[inside].tolist() == [0]
@@ -343,7 +360,7 @@ def test_coordinates_are_means_over_the_models() -> None:
     for row, number in enumerate(strip.point):
         models = strip.model_xyz[oriented.point == number]
         assert np.allclose(strip.xyz[row], models.mean(axis=0), rtol=0, atol=1e-12)
-        assert strip.models[row] == len(models)
+        assert strip.model_count[row] == len(models)
 
 
 @given(st.lists(st.tuples(st.integers(0, 5), st.booleans()), max_size=20))
@@ -351,7 +368,7 @@ def test_means_by_hand(rows: list[tuple[int, bool]]) -> None:
     point = np.array([number for number, _ in rows], int)
     use = np.array([flag for _, flag in rows], bool)
     xyz = np.random.default_rng(1).normal(0, 1, (len(rows), 3))
-    numbers, mean, count = formation.mean_points(point, xyz, use)
+    numbers, mean, count = mean_points(point, xyz, use)
     assert numbers.tolist() == sorted(set(point[use]))
     for number, average, times in zip(numbers, mean, count, strict=True):
         own = xyz[use & (point == number)]
@@ -365,11 +382,11 @@ def test_a_rejected_point_joins_nothing_and_makes_no_mean() -> None:
     weight = oriented.pairs.weight.copy()
     out = (oriented.point == flown.at["p1_0"]) & (oriented.pairs.pair == 0)
     weight[out] = 0
-    without = relative.refine(oriented, weight, np.array([0]))
-    strip = formation.form(without, Settings(), flown.photos)
+    without = orient_again(oriented, weight, np.array([0]))
+    strip = form_from_pairs(without, StripFormationSettings(), flown.photos)
     row = int(np.flatnonzero(strip.point == flown.at["p1_0"])[0])
-    assert strip.models[row] == 1
-    at_first = strip.junctions.point[strip.junctions.joint == 0]
+    assert strip.model_count[row] == 1
+    at_first = strip.junctions.point[strip.junctions.junction == 0]
     assert flown.at["p1_0"] not in at_first
     assert np.isfinite(strip.model_xyz[out]).all()  # where it would be is still told
 
@@ -412,9 +429,9 @@ def test_a_base_along_the_view_is_refused() -> None:
     for name, height in (("1", 150.0), ("2", 170.0), ("3", 190.0)):
         xy = photograph(points, np.array([0.0, 0.0, height]), np.eye(3), 100.0)
         images[name] = {f"p{number}": image for number, image in enumerate(xy)}
-    pairs, point, rows = relative.collect_pairs(measured(images), ("1", "2", "3"), 100.0)
+    pairs = collect_pairs(measured(images), ("1", "2", "3"), 100.0)
     with pytest.raises(GeometryError) as caught:
-        relative.orient(pairs, point, rows, ("1", "2", "3"))
+        orient_pairs(pairs, ("1", "2", "3"))
     assert caught.value.photos == ("1", "2")
     assert caught.value.code in {"not-converged", "degenerate-pair"}
 
@@ -424,6 +441,6 @@ def test_the_steep_base_is_named() -> None:
     with pytest.raises(
         GeometryError, match="the base from photo 2 to 3 is parallel to the viewing direction"
     ) as caught:
-        formation._refuse_vertical_base(upright, ("1", "2", "3"))
+        _refuse_vertical_base(upright, ("1", "2", "3"))
     assert caught.value.code == "vertical-base"
     assert caught.value.photos == ("2", "3")

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.statistics import chi2_quantile, normal_quantile
-from photostrip.triangulation.relative_orientation import relative
+from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.relative_orientation.relative import Orientation
+    from photostrip.triangulation.relative_orientation.orientation import Orientation
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -54,7 +54,7 @@ def global_limits(count: Numbers) -> Floats:
     """
     return _by_number(
         count,
-        lambda n: chi2_quantile(CONFIDENCE, n - relative.MINIMUM_POINTS) if n > relative.MINIMUM_POINTS else np.inf,
+        lambda n: chi2_quantile(CONFIDENCE, n - MINIMUM_POINTS) if n > MINIMUM_POINTS else np.inf,
     )
 
 
@@ -97,7 +97,7 @@ def failing(orientation: Orientation, sigma: Floats) -> Flags:
         np.where(orientation.used, standardised(orientation, sigma), 0.0), orientation.pairs.starts
     )
     bad: Flags = ~(squares(orientation, sigma) <= global_limits(count)) | (largest > largest_limits(count))
-    return bad & (count > relative.MINIMUM_POINTS)
+    return bad & (count > MINIMUM_POINTS)
 
 
 def largest_limits(count: Numbers) -> Floats:

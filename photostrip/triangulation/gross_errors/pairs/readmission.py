@@ -10,12 +10,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.triangulation.gross_errors.pairs.pair_global_test import global_limits, squares
-from photostrip.triangulation.relative_orientation import relative
+from photostrip.triangulation.relative_orientation.orientation import orient_again
+from photostrip.triangulation.relative_orientation.solution import (
+    in_front_of_cameras,
+    linearised_parallaxes,
+    normal_matrices,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.relative_orientation.relative import Orientation
+    from photostrip.triangulation.relative_orientation.orientation import Orientation
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -41,7 +46,7 @@ def readmit(orientation: Orientation, rows: Numbers, given: Floats, sigma: Float
     if not len(rows):
         return orientation, np.zeros(0, np.intp)
     todo = np.unique(orientation.pairs.pair[rows])
-    result, place = relative.taken(orientation, todo)
+    result, place = orientation.take(todo), orientation.pairs.rows_of(todo)
     given, sigma = given[place], sigma[todo]
     pairs = result.pairs
     back: list[int] = []
@@ -51,7 +56,7 @@ def readmit(orientation: Orientation, rows: Numbers, given: Floats, sigma: Float
         value, growth = _predicted(result, waiting, given, sigma)
         total = squares(result, sigma)[number] + growth
         allowed = (value <= READMIT) & (total <= global_limits(result.points_used + 1)[number])
-        allowed &= relative.in_front(result.elements, pairs)[waiting]
+        allowed &= in_front_of_cameras(result.elements, pairs)[waiting]
         if not allowed.any():
             break
         order = np.lexsort((np.where(allowed, value, np.inf), number))
@@ -61,19 +66,19 @@ def readmit(orientation: Orientation, rows: Numbers, given: Floats, sigma: Float
         weight = result.pairs.weight.copy()
         weight[waiting[best]] = given[waiting[best]]
         back += waiting[best].tolist()
-        result = relative.refine(result, weight, np.unique(number[best]))
+        result = orient_again(result, weight, np.unique(number[best]))
         waiting = np.delete(waiting, best)
     if not back:
         return orientation, np.zeros(0, np.intp)
-    return relative.put_back(orientation, todo, place, result), place[np.array(back, np.intp)]
+    return orientation.with_pairs(todo, result), place[np.array(back, np.intp)]
 
 
 def _predicted(orientation: Orientation, rows: Numbers, given: Floats, sigma: Floats) -> tuple[Floats, Floats]:
     """Predicted residuals in units of their standard deviation, and what they would add to the sum of squares."""
     pairs = orientation.pairs
     with np.errstate(all="ignore"):
-        _, jacobian = relative.linearised(orientation.elements, pairs)
-    normal = relative.normal_matrices(jacobian, pairs)
+        _, jacobian = linearised_parallaxes(orientation.elements, pairs)
+    normal = normal_matrices(jacobian, pairs)
     cofactors = np.linalg.pinv(np.nan_to_num(normal), hermitian=True)[pairs.pair[rows]]
     part = jacobian[:, rows]
     spread = 1 / given[rows] + np.einsum("im,mij,jm->m", part, cofactors, part)

@@ -22,12 +22,18 @@ from photostrip.errors import InputError
 from photostrip.statistics import grubbs_limit, tau_limit
 from photostrip.triangulation.gross_errors.pairs import pair_global_test, readmission, screening_search
 from photostrip.triangulation.gross_errors.pairs.zones import Support, zones
-from photostrip.triangulation.relative_orientation import relative
+from photostrip.triangulation.relative_orientation.orientation import (
+    RelativeSettings,
+    orient_again,
+    unusable_pairs,
+)
+from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
+from photostrip.triangulation.relative_orientation.solution import base_rays, in_front_of_cameras, rays_meet_in_front
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.relative_orientation.relative import Orientation, Settings
+    from photostrip.triangulation.relative_orientation.orientation import Orientation
 
     Floats = NDArray[np.float64]
     Flags = NDArray[np.bool_]
@@ -94,14 +100,16 @@ class Screened:
         return np.where(self.orientation.used, size, np.nan)
 
 
-def screen(orientation: Orientation, settings: Settings, sigma: float) -> tuple[Orientation, tuple[Rejection, ...]]:
+def screen(
+    orientation: Orientation, settings: RelativeSettings, sigma: float
+) -> tuple[Orientation, tuple[Rejection, ...]]:
     """Reject points with gross errors from all pairs and orient those pairs again.
 
     Parameters
     ----------
     orientation : Orientation
         All pairs, oriented with all points.
-    settings : relative.Settings
+    settings : RelativeSettings
         Method, significance and limit.
     sigma : float
         A-priori standard deviation of an image coordinate in mm.
@@ -123,7 +131,7 @@ def screen(orientation: Orientation, settings: Settings, sigma: float) -> tuple[
 
 
 def examine(
-    orientation: Orientation, settings: Settings, sigma: float, converged: NDArray[np.bool_] | None = None
+    orientation: Orientation, settings: RelativeSettings, sigma: float, converged: NDArray[np.bool_] | None = None
 ) -> Screened:
     """Reject points with gross errors, and say what can and what cannot be seen in each pair.
 
@@ -131,7 +139,7 @@ def examine(
     ----------
     orientation : Orientation
         All pairs, oriented with all points; with ``auto`` and ``robust`` they need not make sense yet.
-    settings : relative.Settings
+    settings : RelativeSettings
         Method, significance and limit.
     sigma : float
         A-priori standard deviation of an image coordinate in mm.
@@ -153,9 +161,9 @@ def examine(
         raise InputError(msg)
     start, sets = SEARCHES.get(settings.screening, SEARCHES["auto"])
     sound = np.ones(orientation.pairs.size, bool) if converged is None else converged
-    rays = relative.rays(orientation.elements, orientation.pairs)
-    doubtful = relative.doubtful(orientation, sound, rays)
-    behind = ~relative.ahead(*rays)
+    rays = base_rays(orientation.elements, orientation.pairs)
+    doubtful = unusable_pairs(orientation, sound, rays)
+    behind = ~rays_meet_in_front(*rays)
     with np.errstate(all="ignore"):
         scatter, found = screening_search.search(orientation, sigma, start=start, sets=sets, doubtful=doubtful)
     if settings.screening in SEARCHES:
@@ -163,7 +171,8 @@ def examine(
         if doubtful.any():
             # a pair that was lost at first and now fits its points has converged after all; any other is refused
             sound = sound | (doubtful & ~pair_global_test.failing(result, scatter.by_pair))
-            result = relative.restored(result, orientation, np.flatnonzero(doubtful & relative.doubtful(result, sound)))
+            lost = np.flatnonzero(doubtful & unusable_pairs(result, sound))
+            result = result.with_pairs(lost, orientation.take(lost))
     else:
         result, log = _sequential(orientation, settings, sigma, behind)
     masked = pair_global_test.failing(result, scatter.by_pair)
@@ -186,7 +195,7 @@ def _readmitted(
 
 
 def _sequential(
-    orientation: Orientation, settings: Settings, sigma: float, behind: Flags
+    orientation: Orientation, settings: RelativeSettings, sigma: float, behind: Flags
 ) -> tuple[Orientation, list[Rejection]]:
     """Test single residuals, one stage after the other."""
     result, log = _drop_behind(orientation, behind)
@@ -231,7 +240,8 @@ def _completed(log: list[Rejection], result: Orientation) -> tuple[Rejection, ..
     if not log:
         return ()
     used = result.used
-    part, rows = relative.taken(result, np.unique(result.pairs.pair[[each.row for each in log]]))
+    numbers = np.unique(result.pairs.pair[[each.row for each in log]])
+    part, rows = result.take(numbers), result.pairs.rows_of(numbers)
     number = dict(zip(rows.tolist(), zones(part.elements, part.pairs).tolist(), strict=True))
     return tuple(
         replace(r, zone=number[r.row], size=float(result.parallax[r.row]), readmitted=bool(used[r.row])) for r in log
@@ -243,9 +253,9 @@ def _behind_now(before: Orientation, after: Orientation, behind: Flags) -> Flags
     changed = np.flatnonzero((before.elements != after.elements).any(axis=1))
     if not len(changed):
         return behind
-    part, rows = relative.taken(after, changed)
+    part = after.take(changed)
     result = behind.copy()
-    result[rows] = ~relative.in_front(part.elements, part.pairs)
+    result[after.pairs.rows_of(changed)] = ~in_front_of_cameras(part.elements, part.pairs)
     return result
 
 
@@ -255,7 +265,7 @@ def _drop_behind(orientation: Orientation, behind: Flags) -> tuple[Orientation, 
     rows = np.flatnonzero(behind & used)
     if not len(rows):
         return orientation, []
-    # with most of its points behind, the pair itself is wrong, and relative.require says so
+    # with most of its points behind, the pair itself is wrong, and refuse_unusable says so
     most = pairs.sums((~behind & used).astype(float)) > MOST_IN_FRONT * orientation.points_used
     rows = rows[most[pairs.pair[rows]]]
     if not len(rows):
@@ -267,7 +277,7 @@ def _drop_behind(orientation: Orientation, behind: Flags) -> tuple[Orientation, 
 def _without(orientation: Orientation, rows: NDArray[np.intp]) -> Orientation:
     weight = orientation.pairs.weight.copy()
     weight[rows] = 0.0
-    return relative.refine(orientation, weight, np.unique(orientation.pairs.pair[rows]))
+    return orient_again(orientation, weight, np.unique(orientation.pairs.pair[rows]))
 
 
 def _stage(orientation: Orientation, test: str, bound: float) -> tuple[Orientation, list[Rejection]]:
@@ -314,7 +324,7 @@ def _tau(orientation: Orientation, alpha: float) -> tuple[Floats, Floats]:
     """Studentised residual: each in units of its own standard deviation."""
     pairs = orientation.pairs
     count = orientation.points_used
-    unknowns = relative.MINIMUM_POINTS
+    unknowns = MINIMUM_POINTS
     tested = (count - unknowns >= 3) & (orientation.sigma0 > NEGLIGIBLE)
     limits = np.array(
         [tau_limit(int(n), unknowns, alpha) if ok else np.inf for n, ok in zip(count, tested, strict=True)]

@@ -22,12 +22,20 @@ from photostrip.triangulation.gross_errors.pairs.pair_global_test import (
     standardised,
 )
 from photostrip.triangulation.gross_errors.pairs.zones import EMPTY_ZONES, MINIMUM_LEFT, ZONES, Support
-from photostrip.triangulation.relative_orientation import relative, robust
+from photostrip.triangulation.relative_orientation import robust
+from photostrip.triangulation.relative_orientation.orientation import assess_pairs, orient_again
+from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
+from photostrip.triangulation.relative_orientation.solution import (
+    in_front_of_cameras,
+    linearised_parallaxes,
+    y_parallaxes,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.relative_orientation.relative import Orientation, Pairs
+    from photostrip.triangulation.relative_orientation.orientation import Orientation
+    from photostrip.triangulation.relative_orientation.pairs import Pairs
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -90,12 +98,12 @@ def robust_start(orientation: Orientation, todo: Numbers, sigma: Floats) -> tupl
     scale : ndarray, shape (t,)
         Scatter of the residuals, mm; see ``robust.solve``.
     """
-    part, _ = orientation.pairs.take(todo)
+    part = orientation.pairs.take(todo)
     elements, scale = robust.solve(robust.start_values(part), part, sigma[todo])
     share = _share(elements, part, scale)
     again = np.flatnonzero((share <= HALF) | (scale > GROSS * sigma[todo]))
     if len(again):
-        rest, _ = part.take(again)
+        rest = part.take(again)
         present = np.nan_to_num(orientation.elements[todo[again]])
         other, spread = robust.solve(present, rest, sigma[todo[again]])
         better = (spread < scale[again]) & (_share(other, rest, spread) > HALF)
@@ -107,8 +115,8 @@ def robust_start(orientation: Orientation, todo: Numbers, sigma: Floats) -> tupl
 def _share(elements: Floats, pairs: Pairs, scale: Floats) -> Floats:
     """Share of the points that lie in front and belong to the scatter."""
     with np.errstate(all="ignore"):
-        fits = np.abs(relative.parallaxes(elements, pairs)) * np.sqrt(pairs.weight) < GROSS * scale[pairs.pair]
-        good = fits & relative.in_front(elements, pairs) & (pairs.weight > 0)
+        fits = np.abs(y_parallaxes(elements, pairs)) * np.sqrt(pairs.weight) < GROSS * scale[pairs.pair]
+        good = fits & in_front_of_cameras(elements, pairs) & (pairs.weight > 0)
     share: Floats = pairs.sums(good.astype(float)) / np.maximum(pairs.sums((pairs.weight > 0).astype(float)), 1.0)
     return share
 
@@ -150,7 +158,7 @@ def search(
     todo = np.flatnonzero(failing(orientation, scatter.by_pair) | lost)
     if not len(todo):
         return scatter, _Log([], [], [], []).closed(orientation)
-    part, rows = relative.taken(orientation, todo)
+    part, rows = orientation.take(todo), orientation.pairs.rows_of(todo)
     passed = _Sizes.of(orientation)
     every = np.arange(len(todo))
     if sets and not lost.any():
@@ -187,9 +195,7 @@ def _mildly(part: Orientation, sigma: Floats) -> Deleted | None:
 
 def _whole(orientation: Orientation, todo: Numbers, rows: Numbers, found: Deleted) -> Deleted:
     """Put searched pairs back among all."""
-    return replace(
-        found, orientation=relative.put_back(orientation, todo, rows, found.orientation), rows=rows[found.rows]
-    )
+    return replace(found, orientation=orientation.with_pairs(todo, found.orientation), rows=rows[found.rows])
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,9 +222,9 @@ def _cleaned(seen: Orientation, todo: Numbers, scale: Floats) -> Orientation:
     limit[todo] = GROSS * scale
     with np.errstate(invalid="ignore"):
         inside = np.abs(seen.parallax) * np.sqrt(pairs.weight) <= limit[pairs.pair]
-    enough = pairs.sums((inside & seen.used).astype(float)) > relative.MINIMUM_POINTS
+    enough = pairs.sums((inside & seen.used).astype(float)) > MINIMUM_POINTS
     weight = np.where(inside | ~enough[pairs.pair], pairs.weight, 0.0)
-    return relative.refine(seen, weight, todo)
+    return orient_again(seen, weight, todo)
 
 
 def _left(given: Orientation, found: Deleted, cleaned: Orientation, sigma: Floats) -> _Sizes:
@@ -308,9 +314,9 @@ class _Log:
 
 def _seen_from(orientation: Orientation, elements: Floats, todo: Numbers) -> Orientation:
     """Residuals and redundancy of some pairs at given elements, which need not be those of least squares."""
-    part, rows = orientation.pairs.take(todo)
+    part, rows = orientation.pairs.take(todo), orientation.pairs.rows_of(todo)
     steps = np.zeros(len(todo), np.intp)
-    fresh = relative.assess(elements[todo], part, orientation.point[rows], orientation.rows[rows], steps)
+    fresh = assess_pairs(elements[todo], part, steps)
     parallax, redundancy = orientation.parallax.copy(), orientation.redundancy.copy()
     parallax[rows], redundancy[rows] = fresh.parallax, fresh.redundancy
     return replace(orientation, elements=elements, parallax=parallax, redundancy=redundancy)
@@ -319,7 +325,7 @@ def _seen_from(orientation: Orientation, elements: Floats, todo: Numbers) -> Ori
 def _delete_sets(orientation: Orientation, sigma: Floats, todo: Numbers, log: _Log) -> Orientation:
     """Minimum-deletion search in some pairs; those that no set of three explains stay as they are."""
     with np.errstate(all="ignore"):
-        _, jacobian = relative.linearised(orientation.elements, orientation.pairs)
+        _, jacobian = linearised_parallaxes(orientation.elements, orientation.pairs)
     support = Support.of(orientation)
     spare = support.spare(orientation.pairs.pair)
     count = orientation.points_used
@@ -334,7 +340,7 @@ def _delete_sets(orientation: Orientation, sigma: Floats, todo: Numbers, log: _L
                 changed.append(pair)
                 for row in rows.tolist():
                     log.add(row, "deletion", total, limit)
-    return relative.refine(orientation, weight, np.array(sorted(changed), np.intp)) if changed else orientation
+    return orient_again(orientation, weight, np.array(sorted(changed), np.intp)) if changed else orientation
 
 
 def _sets_of(
@@ -395,7 +401,7 @@ def _delete_worst(orientation: Orientation, sigma: Floats, todo: Numbers, log: _
             log.add(row, "residual", float(value[row]), float(limit[row]))
         weight = result.pairs.weight.copy()
         weight[rows] = 0.0
-        result = relative.refine(result, weight, changed)
+        result = orient_again(result, weight, changed)
 
 
 def _delete_beyond(orientation: Orientation, sigma: Floats, todo: Numbers, log: _Log) -> Orientation:
@@ -419,4 +425,4 @@ def _delete_beyond(orientation: Orientation, sigma: Floats, todo: Numbers, log: 
         counts[pair] = after
         weight[row] = 0.0
         log.add(row, "robust", float(size[row] / sigma[pair]), float(limit[pair] / sigma[pair]))
-    return relative.refine(orientation, weight, todo)
+    return orient_again(orientation, weight, todo)

@@ -18,12 +18,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.triangulation.relative_orientation import relative
+from photostrip.triangulation.relative_orientation.solution import base_rays
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.relative_orientation.relative import Orientation, Pairs
+    from photostrip.triangulation.relative_orientation.orientation import Orientation
+    from photostrip.triangulation.relative_orientation.pairs import Pairs
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -50,7 +51,7 @@ def zones(elements: Floats, pairs: Pairs) -> Numbers:
     ndarray of int, shape (m,)
         Numbers 1 to 6 of the nearest standard positions.
     """
-    left, right = relative.rays(elements, pairs)
+    left, right = base_rays(elements, pairs)
     x, y = -pairs.focal * left[:2] / left[2]
     parallax = x + pairs.focal * right[0] / right[2]
     used = pairs.weight > 0

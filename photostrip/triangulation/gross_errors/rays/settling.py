@@ -14,8 +14,9 @@ from photostrip.errors import GeometryError
 from photostrip.triangulation.gross_errors.pairs.zones import MINIMUM_LEFT
 from photostrip.triangulation.gross_errors.rays import strip_screening
 from photostrip.triangulation.gross_errors.rays.strip_screening import SEVERAL, Layout, Scene, Verdict
-from photostrip.triangulation.relative_orientation import relative
-from photostrip.triangulation.strip_formation import formation, non_neighbours
+from photostrip.triangulation.relative_orientation.orientation import orient_again
+from photostrip.triangulation.strip_formation import non_neighbours
+from photostrip.triangulation.strip_formation.strip import form_from_pairs, without_rows
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,8 +25,9 @@ if TYPE_CHECKING:
 
     from photostrip.points import PhotoPoints
     from photostrip.triangulation.gross_errors.pairs.screening import Rejection
-    from photostrip.triangulation.relative_orientation.relative import Orientation
-    from photostrip.triangulation.strip_formation.formation import FormedStrip
+    from photostrip.triangulation.relative_orientation.orientation import Orientation
+    from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
+    from photostrip.triangulation.strip_formation.strip import FormedStrip
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -48,7 +50,7 @@ class Measured:
 
 
 def settle(
-    oriented: Orientation, measured: Measured, settings: formation.Settings, *, readmit: bool
+    oriented: Orientation, measured: Measured, settings: StripFormationSettings, *, readmit: bool
 ) -> tuple[Orientation, FormedStrip, Verdict]:
     """Form a strip, leave out what its points contradict, take back what they confirm, and form it again.
 
@@ -77,7 +79,7 @@ def settle(
     verdict: Verdict | None = None
     aside = np.zeros(len(oriented.point), bool)
     moved: Flags | None = None
-    formed = formation.form(oriented, settings, measured.photos, measured.sigma)
+    formed = form_from_pairs(oriented, settings, measured.photos, measured.sigma)
     for _ in range(PASSES):
         scene = Scene(oriented, formed, measured.observations, layout, measured.sigma, measured.stated)
         suspected = np.union1d(suspected, strip_screening.suspects(scene)).astype(np.intp)
@@ -91,7 +93,7 @@ def settle(
         except GeometryError:
             break  # nothing would join two models: what joined them before stays
         aside, moved = outside, _moved(before, (oriented, formed))
-    formed, verdict = formation.without(formed, oriented, aside), verdict or Verdict()
+    formed, verdict = without_rows(formed, oriented, aside), verdict or Verdict()
     return oriented, _bridged(formed, oriented, measured, verdict), verdict
 
 
@@ -100,7 +102,7 @@ def _formed_again(
     used: Flags,
     asides: tuple[Flags, Flags],
     measured: Measured,
-    settings: formation.Settings,
+    settings: StripFormationSettings,
 ) -> tuple[Orientation, FormedStrip]:
     """Orient the pairs whose points changed, and form the strip from there."""
     oriented, formed = before
@@ -110,9 +112,9 @@ def _formed_again(
     touched = np.zeros(oriented.pairs.size, bool)
     touched[changed] = touched[pair[aside != outside]] = True
     if len(changed):
-        oriented = relative.refine(oriented, np.where(used, measured.weight, 0.0), changed)
+        oriented = orient_again(oriented, np.where(used, measured.weight, 0.0), changed)
     earlier = formed, touched
-    return oriented, formation.form(oriented, settings, measured.photos, measured.sigma, outside, earlier)
+    return oriented, form_from_pairs(oriented, settings, measured.photos, measured.sigma, outside, earlier)
 
 
 def _moved(before: tuple[Orientation, FormedStrip], after: tuple[Orientation, FormedStrip]) -> Flags:

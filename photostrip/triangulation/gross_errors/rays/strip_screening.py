@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from photostrip.triangulation.gross_errors.rays.window_adjustment import Solved
     from photostrip.triangulation.gross_errors.rays.window_points import Group
     from photostrip.triangulation.gross_errors.rays.windows import Rays
-    from photostrip.triangulation.relative_orientation.relative import Orientation
-    from photostrip.triangulation.strip_formation.formation import FormedStrip
+    from photostrip.triangulation.relative_orientation.orientation import Orientation
+    from photostrip.triangulation.strip_formation.strip import FormedStrip
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]

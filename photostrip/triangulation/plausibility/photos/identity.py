@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
     from photostrip.notes import Finding
     from photostrip.points import PhotoPoints
-    from photostrip.triangulation.relative_orientation.relative import Orientation
-    from photostrip.triangulation.strip_formation.formation import FormedStrip
+    from photostrip.triangulation.relative_orientation.orientation import Orientation
+    from photostrip.triangulation.strip_formation.strip import FormedStrip
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]

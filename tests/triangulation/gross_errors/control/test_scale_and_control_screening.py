@@ -13,8 +13,12 @@ from photostrip.pipeline import Settings, triangulate
 from photostrip.pipeline.strip import adjust_strip
 from photostrip.result.document import document_of
 from photostrip.triangulation.gross_errors.control import control_screening
-from photostrip.triangulation.relative_orientation import relative
-from photostrip.triangulation.strip_formation import formation, scale_ratios
+from photostrip.triangulation.relative_orientation.orientation import orient_again
+from photostrip.triangulation.relative_orientation.solution import linearised_parallaxes
+from photostrip.triangulation.strip_formation import scale_ratios
+from photostrip.triangulation.strip_formation.scale_ratios import PassPoints
+from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
+from photostrip.triangulation.strip_formation.strip import form_from_pairs, model_points
 from tests.strips import LOCAL, MICROMETRE, control_points, fly, project
 
 if TYPE_CHECKING:
@@ -22,7 +26,7 @@ if TYPE_CHECKING:
 
     from photostrip.pipeline import Result
     from photostrip.points import ControlPoints
-    from photostrip.triangulation.relative_orientation.relative import Orientation
+    from photostrip.triangulation.relative_orientation.orientation import Orientation
     from tests.strips import Flown
 
     Floats = NDArray[np.float64]
@@ -56,18 +60,18 @@ def test_scale_ratios_scatter_as_propagated() -> None:
         strip = flown(seed)
         oriented = strip.oriented()
         sigma = np.full(oriented.pairs.size, np.sqrt(2) * SIGMA)
-        joined = formation.form(oriented, formation.Settings(), strip.photos, sigma).junctions
-        vectors, _, _ = formation.model_points(oriented)
-        rows = (joined.joint, joined.before, joined.after)
+        joined = form_from_pairs(oriented, StripFormationSettings(), strip.photos, sigma).junctions
+        vectors = model_points(oriented).vectors
+        rows = PassPoints(joined.junction, joined.before, joined.after)
         single, model = scale_ratios.spreads(oriented, vectors, rows, sigma)
-        values.append((joined.ratio / joined.factor[joined.joint] - 1) / np.hypot(single, model))
+        values.append((joined.ratio / joined.factor[joined.junction] - 1) / np.hypot(single, model))
     # the mean of a joint takes its part away, the points take part in their own orientation
     assert 0.75 < np.concatenate(values).std() < 1.05
 
 
 def distances(oriented: Orientation, rows: Numbers) -> tuple[Floats, Floats]:
     """Logarithms of the distances of points from both centres of their model."""
-    vectors, _, _ = formation.model_points(oriented)
+    vectors = model_points(oriented).vectors
     base, _ = oriented.relative
     right = vectors[rows] - base[oriented.pairs.pair[rows]]
     return np.log(np.linalg.norm(vectors[rows], axis=1)), np.log(np.linalg.norm(right, axis=1))
@@ -76,9 +80,9 @@ def distances(oriented: Orientation, rows: Numbers) -> tuple[Floats, Floats]:
 def test_the_spread_by_the_models_is_that_of_differences() -> None:
     strip = flown(3)
     oriented = strip.oriented()
-    vectors, _, _ = formation.model_points(oriented)
-    joined = formation.form(oriented, formation.Settings(), strip.photos).junctions
-    rows = (joined.joint, joined.before, joined.after)
+    vectors = model_points(oriented).vectors
+    joined = form_from_pairs(oriented, StripFormationSettings(), strip.photos).junctions
+    rows = PassPoints(joined.junction, joined.before, joined.after)
     sigma = np.full(oriented.pairs.size, 0.007)
     slopes = []
     for side, row in ((1, joined.before), (0, joined.after)):
@@ -90,12 +94,12 @@ def test_the_spread_by_the_models_is_that_of_differences() -> None:
             )
             columns.append((up - down) / 2e-6)
         slopes.append(np.column_stack(columns))
-    variance = np.zeros(len(joined.joint))
+    variance = np.zeros(len(joined.junction))
     for joint in range(oriented.pairs.size - 1):
-        here = joined.joint == joint
+        here = joined.junction == joint
         for slope, model in zip(slopes, (joint, joint + 1), strict=True):
             own = slope[here] - slope[here].mean(axis=0)
-            _, jacobian = relative.linearised(oriented.elements, oriented.pairs)
+            _, jacobian = linearised_parallaxes(oriented.elements, oriented.pairs)
             part = jacobian[:, oriented.pairs.pair == model]
             variance[here] += np.diag(own @ np.linalg.inv(part @ part.T) @ own.T) * sigma[model] ** 2
     _, model_spread = scale_ratios.spreads(oriented, vectors, rows, sigma)
@@ -106,16 +110,16 @@ def test_a_strip_formed_again_in_part_is_the_strip_formed_anew() -> None:
     strip = flown(4)
     oriented = strip.oriented()
     sigma = np.full(oriented.pairs.size, np.sqrt(2) * SIGMA)
-    before = formation.form(oriented, formation.Settings(), strip.photos, sigma)
+    before = form_from_pairs(oriented, StripFormationSettings(), strip.photos, sigma)
     weight = oriented.pairs.weight.copy()
     weight[np.flatnonzero(oriented.pairs.pair == 5)[[1, 4]]] = 0.0
     changed = np.arange(oriented.pairs.size) == 5
-    again = relative.refine(oriented, weight, np.flatnonzero(changed))
-    whole = formation.form(again, formation.Settings(), strip.photos, sigma)
-    part = formation.form(again, formation.Settings(), strip.photos, sigma, earlier=(before, changed))
-    for name in ("centers", "rotations", "scale", "model_xyz", "gap", "point", "xyz", "models"):
+    again = orient_again(oriented, weight, np.flatnonzero(changed))
+    whole = form_from_pairs(again, StripFormationSettings(), strip.photos, sigma)
+    part = form_from_pairs(again, StripFormationSettings(), strip.photos, sigma, earlier=(before, changed))
+    for name in ("centers", "rotations", "scale", "model_xyz", "gap", "point", "xyz", "model_count"):
         assert np.array_equal(getattr(part, name), getattr(whole, name), equal_nan=True)
-    for name in ("joint", "before", "after", "point", "ratio", "used", "limit", "factor", "spread", "weight"):
+    for name in ("junction", "before", "after", "point", "ratio", "used", "limit", "factor", "spread", "weight"):
         assert np.array_equal(getattr(part.junctions, name), getattr(whole.junctions, name))
     assert not np.array_equal(whole.xyz, before.xyz)
 

@@ -12,13 +12,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from photostrip.triangulation.gross_errors.pairs import deletion, readmission, screening
-from photostrip.triangulation.relative_orientation import relative, robust
-from photostrip.triangulation.relative_orientation.relative import Pairs, Settings
-from tests.strips import MICROMETRE, TruePairs, true_pairs
+from photostrip.triangulation.relative_orientation import robust
+from photostrip.triangulation.relative_orientation.orientation import RelativeSettings, orient_again, orient_unchecked
+from tests.strips import MICROMETRE, TruePairs, batch, true_pairs
 from tests.vectors import Vector, cases
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from photostrip.triangulation.relative_orientation.pairs import Pairs
 
     Floats = NDArray[np.float64]
 
@@ -32,10 +34,9 @@ def spoiled(flown: TruePairs, errors: Floats) -> Pairs:
     return replace(flown.pairs, left=left)
 
 
-def examined(pairs: Pairs, settings: Settings | None = None, sigma: float = SIGMA) -> screening.Screened:
-    m = len(pairs.pair)
-    oriented, converged = relative.attempt(pairs, np.arange(m), np.zeros((m, 2), int))
-    return screening.examine(oriented, settings or Settings(), sigma, converged)
+def examined(pairs: Pairs, settings: RelativeSettings | None = None, sigma: float = SIGMA) -> screening.Screened:
+    oriented, converged = orient_unchecked(pairs)
+    return screening.examine(oriented, settings or RelativeSettings(), sigma, converged)
 
 
 def level(seed: int, pairs: int, counts: tuple[int, ...] = (2, 2, 3, 3, 3, 3), sigma: float = SIGMA) -> TruePairs:
@@ -90,11 +91,10 @@ def test_points_that_may_not_go_do_not_go() -> None:
 def test_the_printed_pairs_lose_the_points_of_the_minimum_deletion(vector: Vector) -> None:
     points = vector.input["points"]
     left, right = (np.array([[p[f"x{k}"], p[f"y{k}"]] for p in points]) for k in (1, 2))
-    n = len(points)
-    pairs = Pairs(np.zeros(1, int), np.zeros(n, int), left, right, np.ones(n), vector.input["f"])
+    pairs = batch(left[None], right[None], vector.input["f"])
     sigma = vector.input["sigma_q_apriori_mm"] / np.sqrt(2)
     expected = vector.expected["minimum_deletion_global_test"]
-    found = examined(pairs, Settings(screening="auto"), sigma)
+    found = examined(pairs, RelativeSettings(screening="auto"), sigma)
     names = [points[row]["id"] for row in np.flatnonzero(~found.orientation.used)]
     assert names == sorted(expected["rejected"])
     if "elements_deg" in expected:
@@ -130,7 +130,7 @@ def test_two_equal_errors_in_a_corner_zone_come_out_although_the_third_point_loo
     assert out[:, 6:8].all()
     assert out.sum() <= 102
     assert {r.zone for r in found.rejections if not r.readmitted} == {3}
-    by_tau = ~examined(pairs, Settings(screening="tau")).orientation.used.reshape(50, 18)
+    by_tau = ~examined(pairs, RelativeSettings(screening="tau")).orientation.used.reshape(50, 18)
     assert not by_tau[:, 6:8].all(axis=1).any()
 
 
@@ -169,7 +169,7 @@ def test_a_good_point_that_a_wrong_one_made_look_bad_is_taken_back() -> None:
     oriented = flown.orient()
     weight = oriented.pairs.weight.copy()
     weight[[0, 7]] = 0.0
-    less = relative.refine(oriented, weight, np.array([0]))
+    less = orient_again(oriented, weight, np.array([0]))
     sigma = np.array([np.sqrt(2) * SIGMA])
     result, back = readmission.readmit(less, np.array([0, 7]), flown.pairs.weight, sigma)
     assert sorted(back.tolist()) == [0, 7]
@@ -209,7 +209,7 @@ def test_redundancy_and_detectable_errors_of_standard_points_are_those_of_the_li
     flown = true_pairs(
         np.random.default_rng(16), 200, counts=(1,) * 6, tilt_deg=0.0, kappa_deg=0.0, relief=0.0, sigma=SIGMA
     )
-    found = examined(flown.pairs, Settings(screening="none"))
+    found = examined(flown.pairs, RelativeSettings(screening="none"))
     redundancy = found.orientation.redundancy.reshape(200, 6).mean(axis=0)
     assert redundancy == pytest.approx([1 / 3, 1 / 3, 1 / 12, 1 / 12, 1 / 12, 1 / 12], abs=0.03)
     size = 4.13 * np.sqrt(2) * SIGMA / np.sqrt(found.orientation.redundancy)

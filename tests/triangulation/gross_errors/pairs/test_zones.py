@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,14 +35,7 @@ def test_a_rejected_point_has_a_zone_and_moves_no_other() -> None:
     oriented = flown.orient()
     weight = oriented.pairs.weight.copy()
     weight[0] = 0.0
-    without = type(oriented.pairs)(
-        oriented.pairs.starts,
-        oriented.pairs.pair,
-        oriented.pairs.left,
-        oriented.pairs.right,
-        weight,
-        oriented.pairs.focal,
-    )
+    without = replace(oriented.pairs, weight=weight)
     assert zones(oriented.elements, without).tolist() == zone_of((2,) * 6).tolist()
 
 

@@ -1,0 +1,129 @@
+"""Stereopairs of a strip: the points that neighbouring photos have in common.
+
+The measurements of all pairs stand in flat columns ordered by pair; sums over a pair are segment sums, so that a
+thousand pairs cost little more than one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import GeometryError
+from photostrip.points import take_rows
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.points import PhotoPoints
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+    Flags = NDArray[np.bool_]
+
+MINIMUM_POINTS = 5  # as many as elements
+BY_ROW = ("pair", "left", "right", "weight", "point", "rows")
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """What is measured in stereopairs: flat columns, ordered by pair."""
+
+    starts: Numbers  # (p,): first row of each pair
+    pair: Numbers  # (m,): pair of each row
+    # left, right: (m, 2): image coordinates in mm, reduced to the principal point
+    left: Floats
+    right: Floats
+    weight: Floats  # (m,): weight of the y parallax; 0 takes a point out
+    focal: float  # principal distance in mm
+    point: Numbers  # (m,): point of each row
+    rows: Numbers  # (m, 2): rows of the measurements on the left and right photo in the table of image points
+
+    @property
+    def size(self) -> int:
+        """Number of pairs."""
+        return len(self.starts)
+
+    def rows_of(self, numbers: Numbers) -> Numbers:
+        """Rows of some pairs, ascending."""
+        wanted = np.zeros(self.size, bool)
+        wanted[numbers] = True
+        return np.flatnonzero(wanted[self.pair])
+
+    def take(self, numbers: Numbers) -> Pairs:
+        """Take some of the pairs, given by ascending numbers; they are renumbered from 0."""
+        part = take_rows(self, self.rows_of(numbers), BY_ROW)
+        pair = np.searchsorted(numbers, part.pair)
+        return replace(part, pair=pair, starts=np.searchsorted(pair, np.arange(len(numbers))))
+
+    def without(self, gone: Flags) -> Pairs:
+        """Leave out rows; each pair must keep one."""
+        left = take_rows(self, ~gone, BY_ROW)
+        return replace(left, starts=np.searchsorted(left.pair, np.arange(self.size)))
+
+    def sums(self, values: Floats) -> Floats:
+        """Sum columns over each pair: values by row, shape (..., m), become sums by pair, shape (..., p)."""
+        total: Floats = np.add.reduceat(values, self.starts, axis=-1)
+        return total
+
+
+def collect_pairs(observations: PhotoPoints, photos: Sequence[str], focal: float) -> Pairs:
+    """Points measured on neighbouring photos of a strip, as pairs.
+
+    Parameters
+    ----------
+    observations : PhotoPoints
+        Image points, reduced to the principal point.
+    photos : sequence of str
+        Photos of the strip in flight order; pair i is made of photos i and i+1.
+    focal : float
+        Principal distance in mm.
+
+    Returns
+    -------
+    Pairs
+        Measurements; weights are 1 where both sigmas are the strip's median.
+
+    Raises
+    ------
+    GeometryError
+        When a pair has fewer than five common points.
+    """
+    place = {photo: number for number, photo in enumerate(photos)}
+    order_of = np.array([place.get(photo, -1) for photo in observations.photo_ids], np.intp)
+    position = order_of[observations.photo]
+    inside = np.flatnonzero(position >= 0)
+    order = inside[np.lexsort((position[inside], observations.point[inside]))]
+    point, position = observations.point[order], position[order]
+    both = np.flatnonzero((point[1:] == point[:-1]) & (position[1:] == position[:-1] + 1))
+    both = both[np.argsort(position[both], kind="stable")]
+    rows = np.column_stack([order[both], order[both + 1]])
+    pair = position[both]
+    counts = np.bincount(pair, minlength=len(photos) - 1)
+    _require_points(counts, photos)
+    variance = (observations.sigma**2).mean(axis=1)
+    return Pairs(
+        starts=np.concatenate([[0], np.cumsum(counts)[:-1]]),
+        pair=pair,
+        left=observations.xy[rows[:, 0]],
+        right=observations.xy[rows[:, 1]],
+        weight=2 * np.median(variance[inside]) / variance[rows].sum(axis=1),
+        focal=focal,
+        point=observations.point[rows[:, 0]],
+        rows=rows,
+    )
+
+
+def _require_points(counts: Numbers, photos: Sequence[str]) -> None:
+    for number in np.flatnonzero(counts < MINIMUM_POINTS).tolist():
+        names = photos[number : number + 2]
+        msg = (
+            f"relative orientation of photos {names[0]} and {names[1]}: {counts[number]} common points, "
+            f"at least {MINIMUM_POINTS} are necessary (12 are recommended); measure more points or correct the order "
+            "of the photos"
+        )
+        raise GeometryError(msg, photos=names, code="too-few-common-points")

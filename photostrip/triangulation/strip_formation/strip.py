@@ -1,0 +1,222 @@
+"""Forming the strip: orientation handed on from photo to photo, models of one scale put one behind the other.
+
+Every photo takes its orientation from its left neighbour, so that all models are parallel to the frame of the
+first photo; only their scales are free ("partially dependent models").
+
+Source: [001] eq. 125-141.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from photostrip.errors import GeometryError
+from photostrip.geometry.rotation import from_alpha_omega_kappa
+from photostrip.triangulation.relative_orientation.solution import base_rays
+from photostrip.triangulation.strip_formation.intersection import intersect
+from photostrip.triangulation.strip_formation.scale_transfer import Junctions, transfer_scale
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.triangulation.relative_orientation.orientation import Orientation
+    from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+    Flags = NDArray[np.bool_]
+
+STEEPEST_BASE = 1e-6  # cosine of the base inclination
+
+
+class StereoModels(NamedTuple):
+    """Points of every model, each in the frame of its left photo."""
+
+    vectors: Floats  # (m, 3): from the left perspective centre, base length 1; NaN where rays do not meet in front
+    gap: Floats  # (m,): Y gap of the two rays at photo scale, mm
+
+    @property
+    def sound(self) -> Flags:
+        """Whether the rays of each row meet."""
+        return np.isfinite(self.vectors[:, 0])
+
+
+@dataclass(frozen=True, eq=False)
+class FormedStrip:
+    """A strip in the frame and scale of its first model."""
+
+    centers: Floats  # (n, 3): perspective centres
+    rotations: Floats  # (n, 3, 3): photo to strip
+    scale: Floats  # (n-1,): scale factor k of each model
+    # base_direction, base_inclination: (n-1,): tau and nu of each base in radians
+    base_direction: Floats
+    base_inclination: Floats
+    # (m, 3): strip coordinates of every row of the pairs' table, from its own model; NaN where rays do not meet
+    model_xyz: Floats
+    # vectors, gap: as in ``StereoModels``
+    vectors: Floats
+    gap: Floats
+    point: Numbers  # (q,): numbers of the points of the strip, ascending
+    xyz: Floats  # (q, 3): strip coordinates, mean over the models that hold the point
+    model_count: Numbers  # (q,): number of those models
+    junctions: Junctions
+    # (b,): rows of the observations that place points without a model: of photos that are not neighbours
+    bridging: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))
+    # (q,): model with which such a point moves, -1 for all others; empty when there is none
+    home: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))
+
+    @property
+    def ends(self) -> Floats:
+        """Centres of the first and the last photo, shape (2, 3)."""
+        return self.centers[[0, -1]]
+
+
+def form_from_pairs(
+    orientation: Orientation,
+    settings: StripFormationSettings,
+    photos: Sequence[str],
+    sigma: Floats | None = None,
+    doubtful: Flags | None = None,
+    earlier: tuple[FormedStrip, Flags] | None = None,
+) -> FormedStrip:
+    """Form the strip from its oriented pairs, in the frame of the first photo.
+
+    Parameters
+    ----------
+    orientation : Orientation
+        Oriented pairs in flight order.
+    sigma : ndarray, shape (p,), optional
+        Standard deviation of a y parallax of weight one in each pair, mm; by default from the pairs' own residuals.
+    doubtful : ndarray of bool, shape (m,), optional
+        Rows whose points are in doubt: they join models only where a junction has no other.
+    earlier : tuple of FormedStrip and ndarray of bool, shape (p,), optional
+        The strip as it was formed before some of its pairs changed, and which: only their junctions are made anew.
+
+    Raises
+    ------
+    GeometryError
+        When a junction is broken or a base is parallel to the strip's Z axis.
+    """
+    if earlier is None:
+        models = model_points(orientation)
+        junctions = transfer_scale(orientation, models.vectors, settings, photos, sigma, doubtful)
+    else:
+        before, changed = earlier
+        models = _renewed_models(orientation, before, np.flatnonzero(changed))
+        renewed = np.asarray(changed[:-1] | changed[1:], bool)
+        fresh = transfer_scale(orientation, models.vectors, settings, photos, sigma, doubtful, renewed)
+        junctions = before.junctions.with_new(fresh, renewed)
+    formed = place_models(orientation, models, junctions, orientation.used & models.sound)
+    _refuse_vertical_base(np.diff(formed.centers, axis=0) / formed.scale[:, None], photos)
+    return formed
+
+
+def model_points(orientation: Orientation) -> StereoModels:
+    """Points of every model in the frame of its left photo, base length 1."""
+    pairs = orientation.pairs
+    left, right = base_rays(orientation.elements, pairs)
+    # In the base frame the x parallax is the whole parallax at any kappa; along the strip's X it may vanish.
+    found = intersect(np.array([1.0, 0.0, 0.0]), left, right, pairs.focal)
+    al1, ka1 = orientation.elements[:, 0], orientation.elements[:, 1]
+    to_base = from_alpha_omega_kappa(al1, 0.0, ka1)
+    vectors = np.einsum("mji,mj->mi", to_base[pairs.pair], found.xyz)
+    return StereoModels(vectors, found.gap / found.ray_factor)
+
+
+def _renewed_models(orientation: Orientation, formed: FormedStrip, changed: Numbers) -> StereoModels:
+    """Points of all models, computed again for those that changed."""
+    rows = orientation.pairs.rows_of(changed)
+    vectors, gap = formed.vectors.copy(), formed.gap.copy()
+    vectors[rows], gap[rows] = model_points(orientation.take(changed))
+    return StereoModels(vectors, gap)
+
+
+def hand_on_rotations(rotations: Floats) -> Floats:
+    """Rotations of all photos to the strip, each from its left neighbour: A2 = A1 R with R = A1'^T A2'.
+
+    Parameters
+    ----------
+    rotations : ndarray, shape (p, 3, 3)
+        Right photo to left photo, of every pair.
+
+    Returns
+    -------
+    ndarray, shape (p + 1, 3, 3)
+        Photo to strip; the first photo is the frame.
+
+    Notes
+    -----
+    Source: [001] eq. 131-134.
+    """
+    chain = np.empty((len(rotations) + 1, 3, 3))
+    chain[0] = np.eye(3)
+    for number, rotation in enumerate(rotations):
+        chain[number + 1] = chain[number] @ rotation  # eq. 131
+    return chain
+
+
+def place_models(orientation: Orientation, models: StereoModels, junctions: Junctions, use: Flags) -> FormedStrip:
+    """Put oriented models of known scales one behind the other; `use`, shape (m,), says which rows make points."""
+    base, rotation = orientation.relative
+    rotations = hand_on_rotations(rotation)
+    scale = np.concatenate([[1.0], np.cumprod(junctions.factor)])
+    bases = scale[:, None] * np.einsum("pij,pj->pi", rotations[:-1], base)
+    centers = np.concatenate([np.zeros((1, 3)), np.cumsum(bases, axis=0)])  # eq. 136
+    pair = orientation.pairs.pair
+    xyz = centers[pair] + scale[pair, None] * np.einsum("mij,mj->mi", rotations[pair], models.vectors)
+    mean = mean_points(orientation.point, xyz, use)
+    return FormedStrip(
+        centers=centers,
+        rotations=rotations,
+        scale=scale,
+        base_direction=np.arctan2(bases[:, 1], bases[:, 0]),  # eq. 128-130
+        base_inclination=np.arcsin(np.clip(bases[:, 2] / scale, -1, 1)),
+        model_xyz=xyz,
+        vectors=models.vectors,
+        gap=models.gap,
+        point=mean.point,
+        xyz=mean.xyz,
+        model_count=mean.model_count,
+        junctions=junctions,
+    )
+
+
+def without_rows(formed: FormedStrip, orientation: Orientation, left_out: Flags) -> FormedStrip:
+    """Leave out rows of the pairs' table: points become the means over fewer models, or are gone."""
+    if not left_out.any():
+        return formed
+    model_xyz = np.where(left_out[:, None], np.nan, formed.model_xyz)
+    use = orientation.used & np.isfinite(model_xyz).all(axis=1)
+    mean = mean_points(orientation.point, model_xyz, use)
+    return replace(formed, model_xyz=model_xyz, point=mean.point, xyz=mean.xyz, model_count=mean.model_count)
+
+
+def _refuse_vertical_base(directions: Floats, photos: Sequence[str]) -> None:
+    steep = np.flatnonzero(np.hypot(directions[:, 0], directions[:, 1]) < STEEPEST_BASE)
+    for number in steep.tolist():
+        names = photos[number : number + 2]
+        msg = f"the base from photo {names[0]} to {names[1]} is parallel to the viewing direction"
+        raise GeometryError(msg, photos=names, code="vertical-base")
+
+
+class MeanPoints(NamedTuple):
+    """Points that stand in several models."""
+
+    point: Numbers  # (q,): points with at least one row, ascending
+    xyz: Floats  # (q, 3): their mean coordinates
+    model_count: Numbers  # (q,): rows that made each mean
+
+
+def mean_points(point: Numbers, xyz: Floats, use: Flags) -> MeanPoints:
+    """Mean coordinates of points out of the rows that count; `point` and `xyz` are those of each row."""
+    rows = np.flatnonzero(use)
+    of_row = point[rows]
+    count = np.bincount(of_row)
+    numbers = np.flatnonzero(count).astype(np.intp)
+    sums = np.column_stack([np.bincount(of_row, xyz[rows, axis]) for axis in range(3)])
+    return MeanPoints(numbers, sums[numbers] / count[numbers, None], count[numbers])
