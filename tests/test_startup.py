@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 import photostrip
+from photostrip.cli import command_table as table
 from photostrip.cli import main as cli
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.threads import THREAD_VARIABLES, limit_threads
@@ -41,7 +42,7 @@ def add_command(monkeypatch: pytest.MonkeyPatch, function: Callable[..., int | N
     module = ModuleType("probe_module")
     module.__dict__["probe"] = function
     monkeypatch.setitem(sys.modules, "probe_module", module)
-    monkeypatch.setitem(cli.COMMANDS, "probe", cli.Entry("probe_module", "Try the wrapper.", "photostrip probe"))
+    monkeypatch.setitem(table.COMMANDS, "probe", table.Entry("probe_module", "Try the wrapper.", "photostrip probe"))
 
 
 def failing(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
@@ -64,7 +65,7 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
 def test_help_lists_every_command(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(arguments) == 0
     out = capsys.readouterr().out
-    for name, entry in cli.COMMANDS.items():
+    for name, entry in table.COMMANDS.items():
         assert f"  {name}" in out
         assert entry.help in out
     assert "Example:" in out
@@ -75,7 +76,7 @@ def test_no_command_shows_the_help_and_is_wrong_usage(capsys: pytest.CaptureFixt
     assert cli.main([]) == 2
     captured = capsys.readouterr()
     assert captured.out == ""
-    assert captured.err == cli.usage()
+    assert captured.err == table.usage()
 
 
 def test_python_m_photostrip_is_the_same_command() -> None:
@@ -96,19 +97,19 @@ def test_the_probe_of_loaded_packages_can_see_one() -> None:
 # ---------------------------------------------------------------------------------------------------- the table
 
 
-@pytest.mark.parametrize("name", cli.COMMANDS)
+@pytest.mark.parametrize("name", table.COMMANDS)
 def test_every_command_explains_itself_without_loading_the_mathematics(name: str) -> None:
     code = f"from photostrip.cli.main import main\nassert main([{name!r}, '--help']) == 0"
     assert loaded_after(code, ("numpy", "scipy", "pyproj", "pydantic")) == set()
 
 
-@pytest.mark.parametrize("name", cli.COMMANDS)
+@pytest.mark.parametrize("name", table.COMMANDS)
 def test_the_help_of_every_command_is_plain_and_has_an_example(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main([name, "--help"]) == 0
     out = capsys.readouterr().out
     assert f"photostrip {name}" in out
-    assert f"Example:\n    {cli.COMMANDS[name].example}\n" in out
-    assert cli.COMMANDS[name].example.startswith(f"photostrip {name} ")
+    assert f"Example:\n    {table.COMMANDS[name].example}\n" in out
+    assert table.COMMANDS[name].example.startswith(f"photostrip {name} ")
     assert "\x1b" not in out
 
 

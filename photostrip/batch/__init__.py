@@ -1,10 +1,10 @@
-"""Many projects: each computed in a process of its own crew, each result written whole or not at all.
+"""Many projects: each computed in a process of its own pool, each result written whole or not at all.
 
 One walk again::
 
     arguments -> projects and the names of their results (selection)
        -> unchanged since last time? (records, folder)
-       -> tasks -> workers: processes here (crew, worker) or on other machines (cluster, remote)
+       -> tasks -> workers: processes here (pool, worker) or on other machines (cluster, remote)
        -> answers: files and one line of the summary (work, tasks) -> written by this process alone (folder)
        -> summary (run)
 

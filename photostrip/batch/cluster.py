@@ -19,13 +19,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
-from photostrip.batch.crew import TICK, ignored
-from photostrip.batch.folder import program
-from photostrip.batch.packing import pack
-from photostrip.batch.remote import compute
+from photostrip.batch.cluster_worker import compute
+from photostrip.batch.evaluation import evaluate
+from photostrip.batch.local_pool import TICK, ignored
+from photostrip.batch.parcel import pack
+from photostrip.batch.result_folder import program
 from photostrip.batch.tasks import BROKEN, Answer, failure
-from photostrip.batch.work import evaluate
-from photostrip.batch.worker import WORK
+from photostrip.batch.worker_process import WORK
 from photostrip.errors import Fault, InputError
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ class Cluster:
         self._done: queue.SimpleQueue[str] = queue.SimpleQueue()
 
     def answers(self, tasks: Iterator[Task | None], stopped: Callable[[], bool]) -> Iterator[Answer]:
-        """Compute tasks; see ``crew.Executor``."""
+        """Compute tasks; see ``local_pool.Executor``."""
         more, looking = True, False
         try:
             while not stopped():

@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from types import FrameType
 
-    from photostrip.batch.crew import Executor
-    from photostrip.batch.folder import Folder
-    from photostrip.batch.selection import Chosen
+    from photostrip.batch.local_pool import Executor
+    from photostrip.batch.result_folder import ResultFolder
+    from photostrip.batch.selection import ChosenProject
 
     Document = dict[str, Any]
 
@@ -83,14 +83,19 @@ class Run:
 
     Parameters
     ----------
-    folder : Folder, optional
+    folder : ResultFolder, optional
         Where results go; None: nowhere.
     force : bool
         Whether to compute what is unchanged, too, and to replace results of other projects.
     """
 
     def __init__(
-        self, projects: Sequence[Chosen], overrides: Sequence[str] = (), folder: Folder | None = None, *, force: bool
+        self,
+        projects: Sequence[ChosenProject],
+        overrides: Sequence[str] = (),
+        folder: ResultFolder | None = None,
+        *,
+        force: bool,
     ) -> None:
         self.projects, self.overrides, self.folder, self.force = projects, tuple(overrides), folder, force
         self.batch = Batch([named(not_run(), chosen, written=folder is not None) for chosen in projects])
@@ -121,7 +126,7 @@ class Run:
                 self._note(chosen, settled, None, watch)
                 yield None
 
-    def _settled(self, chosen: Chosen) -> Document | None:
+    def _settled(self, chosen: ChosenProject) -> Document | None:
         """Return the line of the summary of a project that need not, or must not, be computed."""
         if self.folder is None or self.force:
             return None
@@ -147,13 +152,13 @@ class Run:
                 outcome = failure(UNWRITTEN, unwritten(error, place) if isinstance(error, OSError) else error)
         self._note(chosen, outcome, answer, watch)
 
-    def _note(self, chosen: Chosen, outcome: Document, answer: Answer | None, watch: Watch) -> None:
+    def _note(self, chosen: ChosenProject, outcome: Document, answer: Answer | None, watch: Watch) -> None:
         line = named(outcome, chosen, written=self.folder is not None)
         self.batch.outcomes[chosen.number] = line
         watch.finished(line, answer)
 
 
-def named(outcome: Document, chosen: Chosen, *, written: bool) -> Document:
+def named(outcome: Document, chosen: ChosenProject, *, written: bool) -> Document:
     """Put the names of a project before its line of the summary.
 
     Parameters

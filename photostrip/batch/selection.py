@@ -23,7 +23,7 @@ LARGEST_LIST = 100 * MEGABYTE
 
 
 @dataclass(frozen=True, slots=True)
-class Chosen:
+class ChosenProject:
     """A project of the batch."""
 
     number: int
@@ -31,7 +31,7 @@ class Chosen:
     output: str  # folder of its result below that of the batch, with slashes
 
 
-def choose(arguments: Sequence[str]) -> list[Chosen]:
+def choose(arguments: Sequence[str]) -> list[ChosenProject]:
     """Find the projects that the user names.
 
     Parameters
@@ -42,7 +42,7 @@ def choose(arguments: Sequence[str]) -> list[Chosen]:
 
     Returns
     -------
-    list of Chosen
+    list of ChosenProject
         Every project once, in the order of the arguments.
 
     Raises
@@ -60,7 +60,7 @@ def choose(arguments: Sequence[str]) -> list[Chosen]:
     if faults:
         raise InputError(faults)
     projects = list(found.values())
-    return [Chosen(n, *pair) for n, pair in enumerate(zip(projects, output_names(projects), strict=True))]
+    return [ChosenProject(n, *pair) for n, pair in enumerate(zip(projects, output_names(projects), strict=True))]
 
 
 def _listed(arguments: Iterable[str], faults: list[Fault]) -> Iterator[str]:

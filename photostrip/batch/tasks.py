@@ -9,7 +9,7 @@ from photostrip.errors import EXIT_GEOMETRY, EXIT_INPUT, EXIT_INTERNAL, EXIT_TOL
 from photostrip.report.page.messages import findings_of, line_of
 
 if TYPE_CHECKING:
-    from photostrip.batch.packing import Parcel
+    from photostrip.batch.parcel import Parcel
     from photostrip.errors import GeometryError
 
 Document = dict[str, Any]

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from photostrip import __version__
-from photostrip.cli.main import COMMANDS, usage
-from photostrip.cli.whole import whole_program
+from photostrip.cli.command_table import COMMANDS, usage
+from photostrip.cli.whole_program import whole_program
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

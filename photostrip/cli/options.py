@@ -6,12 +6,12 @@ from typing import Annotated
 
 import typer
 
-from photostrip.cli.showing import Format
+from photostrip.cli.stdout import Format
 
 
 def _keys(incomplete: str) -> list[str]:
     """Complete the key of an assignment."""
-    from photostrip.cli.commands.completion import keys
+    from photostrip.cli.completion import keys
 
     return keys(incomplete)
 

@@ -21,8 +21,8 @@ Form = Literal["text", "md", "json", "csv"]
 @contextmanager
 def told(form: Form) -> Iterator[None]:
     """Tell failures in the form that was asked for: as JSON on stdout, else as lines on stderr."""
-    from photostrip.cli.showing import Format
-    from photostrip.cli.talking import failures_as
+    from photostrip.cli.failures import failures_as
+    from photostrip.cli.stdout import Format
 
     with failures_as(Format.JSON if form == "json" else Format.TEXT):
         yield

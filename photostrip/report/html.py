@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from photostrip.errors import Fault, InputError
 from photostrip.report.page.parts import Facts, Table, Words
-from photostrip.report.pictures.plots_strip import strip_pictures
+from photostrip.report.pictures.strip import strip_pictures
 from photostrip.report.sections.document import sections_of, title_of
 
 if TYPE_CHECKING:

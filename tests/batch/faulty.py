@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from photostrip.batch import work
+from photostrip.batch import evaluation
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -49,4 +49,4 @@ def evaluate(task: Task) -> Answer:
     if folder.name == "unlucky" and not (folder / "killed").exists():  # killed by somebody else, once
         (folder / "killed").touch()
         os.kill(os.getpid(), signal.SIGKILL)
-    return work.evaluate(task)
+    return evaluation.evaluate(task)

@@ -8,7 +8,7 @@ import sys
 from functools import cache
 from typing import TYPE_CHECKING
 
-from photostrip.batch.work import evaluate
+from photostrip.batch.evaluation import evaluate
 from photostrip.formats.output.simulation import project_files
 from photostrip.formats.text.writing import write_files
 from photostrip.simulate.simulation import simulate
@@ -75,7 +75,7 @@ def tree(folder: Path) -> dict[str, bytes]:
 
 
 class Alone:
-    """Stands in for the crew: does the same work in this process, where a test need not wait for others to start."""
+    """Stands in for the pool: does the same work in this process, where a test need not wait for others to start."""
 
     def __init__(self, jobs: int, limits: Limits, begun: Callable[[Task], None]) -> None:
         assert jobs > 0

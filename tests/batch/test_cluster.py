@@ -17,12 +17,12 @@ import numpy as np
 import pytest
 
 from photostrip.batch import cluster as clusters
-from photostrip.batch.folder import opened, program
-from photostrip.batch.packing import pack
+from photostrip.batch.evaluation import evaluate
+from photostrip.batch.parcel import pack
+from photostrip.batch.result_folder import opened, program
 from photostrip.batch.run import Run, Stop
 from photostrip.batch.selection import choose
 from photostrip.batch.tasks import Limits, Task
-from photostrip.batch.work import evaluate
 from photostrip.cli.main import main
 from photostrip.errors import InputError
 from tests.batch.faulty import WORK

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from photostrip.batch.run import named
-from photostrip.batch.selection import Chosen
+from photostrip.batch.selection import ChosenProject
 from photostrip.batch.tasks import EXIT_CODES, failure, not_run
 from photostrip.errors import Fault, InputError
 from photostrip.formats.output.batch import parsed_record, record_text, summary_csv, summary_json
@@ -43,7 +43,9 @@ def good(**changes: Any) -> dict[str, Any]:  # noqa: ANN401 (any value of a line
 
 
 def lines(*outcomes: dict[str, Any]) -> list[dict[str, Any]]:
-    return [named(each, Chosen(n, f"strip {n}.yaml", f"strip {n}"), written=True) for n, each in enumerate(outcomes)]
+    return [
+        named(each, ChosenProject(n, f"strip {n}.yaml", f"strip {n}"), written=True) for n, each in enumerate(outcomes)
+    ]
 
 
 FAULTY = failure("faulty", InputError([Fault("no <such> photo & \x01", "photo", "a.csv", 3), Fault("empty", "key")]))

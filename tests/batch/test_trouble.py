@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from photostrip.batch.folder import opened
-from photostrip.cli import batching
+from photostrip.batch.result_folder import opened
+from photostrip.cli import batch_command
 from photostrip.cli.main import main
 from photostrip.errors import InputError
 from tests.batch.projects import Alone, command, environment, tree, write_projects
@@ -28,7 +28,7 @@ PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH = 24, 1, 2
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     write_projects(tmp_path / "strips", 5)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(batching, "Crew", Alone)
+    monkeypatch.setattr(batch_command, "LocalPool", Alone)
     return tmp_path
 
 
@@ -154,7 +154,7 @@ def test_a_second_batch_on_the_same_folder_is_refused(here: Path, capsys: pytest
 
 
 def test_the_lock_dies_with_its_process(here: Path) -> None:
-    code = "import os, pathlib\nfrom photostrip.batch.folder import opened\n"
+    code = "import os, pathlib\nfrom photostrip.batch.result_folder import opened\n"
     code += "with opened(pathlib.Path('out')): os.kill(os.getpid(), 9)"
     with subprocess.Popen([command()[0], "-c", code], cwd=here, env=environment()) as process:
         assert process.wait() == -9

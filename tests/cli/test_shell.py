@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from photostrip.cli.commands.completion import keys
-from photostrip.cli.main import COMMANDS, main
+from photostrip.cli.command_table import COMMANDS
+from photostrip.cli.completion import keys
+from photostrip.cli.main import main
 from photostrip.cli.manual import manual_pages
 from tests.cli.helps import FOLDER
 from tests.source_tree import ROOT

@@ -20,7 +20,7 @@ from photostrip.report import sections_of
 from photostrip.report.html import to_html
 from photostrip.report.page.parts import Facts, Table, Words
 from photostrip.report.pictures.plan_view import plan_of
-from photostrip.report.pictures.plots_strip import LONGEST, strip_pictures
+from photostrip.report.pictures.strip import LONGEST, strip_pictures
 from photostrip.report.pictures.svg import Axis, nice
 from tests.reports import saved
 from tests.results import FRAMES, case, spec, write_project

@@ -15,7 +15,7 @@ from photostrip.report import chosen_sections, require_complete, sections_of, ti
 from photostrip.report.page.layout import cells
 from photostrip.report.page.parts import Column, Facts, Section, Table, Words
 from photostrip.report.page.text import to_markdown, to_text
-from photostrip.report.sections.strip_sections import ALL_SHOWN, WORST_SHOWN
+from photostrip.report.sections.strip import ALL_SHOWN, WORST_SHOWN
 from tests.reports import FOLDER, SNAPSHOTS, fresh, saved
 from tests.results import FRAMES, case
 

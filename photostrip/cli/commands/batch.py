@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from photostrip.cli.options import Assignments, Quiet, Verbose, Width
-from photostrip.cli.showing import BatchFormat
+from photostrip.cli.stdout import BatchFormat
 
 
 def batch(  # noqa: PLR0913, PLR0917 (an argument for each option)
@@ -52,7 +52,7 @@ def batch(  # noqa: PLR0913, PLR0917 (an argument for each option)
     project, the highest: 0, 1, 2, 3 or 70.
     """
     from photostrip.batch.tasks import Limits
-    from photostrip.cli.batching import Asked, run_asked
+    from photostrip.cli.batch_command import BatchOptions, run_batch
     from photostrip.errors import Fault, InputError
 
     if depfile is not None and output is None:
@@ -65,5 +65,14 @@ def batch(  # noqa: PLR0913, PLR0917 (an argument for each option)
         message = "photostrip batch needs a POSIX system (Linux, macOS, WSL)"
         raise InputError(Fault(message, "not-available", fix="call photostrip run for each project")) from None
     limits = Limits(timeout, memory)
-    asked = Asked(projects, output, jobs, executor, tuple(assignments or ()), limits, force=force, depfile=depfile)
-    return run_asked(asked, form, width, quiet=quiet, verbose=verbose)
+    options = BatchOptions(
+        projects=projects,
+        output=output,
+        jobs=jobs,
+        executor=executor,
+        overrides=tuple(assignments or ()),
+        limits=limits,
+        force=force,
+        depfile=depfile,
+    )
+    return run_batch(options, form, width, quiet=quiet, verbose=verbose)

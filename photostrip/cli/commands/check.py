@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from photostrip.cli.options import Assignments, Quiet, Shape, Verbose, Width
-from photostrip.cli.showing import Format
+from photostrip.cli.stdout import Format
 
 
 def check(
@@ -26,14 +26,14 @@ def check(
     and back, the standard deviation of every control coordinate and where it stands, and what became of every row of
     every table; and mistakes that the data themselves show. The exit code is 2 when any project has a fault.
     """
-    from photostrip.cli.checking import print_checked
-    from photostrip.cli.talking import no_collector
+    from photostrip.cli.check_output import print_checked
+    from photostrip.cli.garbage import without_garbage_collection
     from photostrip.errors import EXIT_DONE, EXIT_INPUT
     from photostrip.project.checks.checking import check_project
     from photostrip.report.page.progress import progress
 
     found = []
-    with no_collector(), progress(sys.stderr, len(projects), quiet=quiet) as waiting:
+    with without_garbage_collection(), progress(sys.stderr, len(projects), quiet=quiet) as waiting:
         for project in projects:
             waiting.at(f"checking {project}")
             found.append(check_project(project, assignments or []))

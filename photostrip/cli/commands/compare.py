@@ -3,29 +3,18 @@
 from __future__ import annotations
 
 import sys
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from photostrip.cli.options import Quiet, Verbose, Width
-from photostrip.cli.showing import Format
+from photostrip.cli.stdout import CompareFormat, Format, print_json, print_sections
 
 if TYPE_CHECKING:
     from photostrip.compare import Tolerances
 
 BASELINE = "baseline.json"
-
-
-class CompareFormat(StrEnum):
-    """Forms in which a comparison is printed."""
-
-    TEXT = "text"
-    JSON = "json"
-    MD = "md"
-    JUNIT = "junit"
-    GITHUB = "github"
 
 
 def compare(
@@ -50,7 +39,7 @@ def compare(
     choices, rejected measurements and findings as sets. The exit code is 1 when they differ, 2 when they cannot be
     compared: other frames, another format, no result. With --update it is 0.
     """
-    from photostrip.cli.talking import failures_as
+    from photostrip.cli.failures import failures_as
     from photostrip.compare import Tolerances, compare_results
     from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE
     from photostrip.project.tolerance_profile import load_tolerances
@@ -115,7 +104,7 @@ def _update(document: dict[str, Any], file: str, place: Path, allowed: Tolerance
     from photostrip.errors import InputError
     from photostrip.formats.output.result_files import to_json
     from photostrip.formats.text.writing import write_text
-    from photostrip.report.commands.compare_sections import headline
+    from photostrip.report.commands.compare import headline
 
     compare_results(document, document, allowed, (file, file))  # refuses one that could never be compared
     text = f"wrote {place}"
@@ -135,29 +124,21 @@ def _print(
     found: dict[str, Any], place: Path, form: CompareFormat, width: int | None, *, quiet: bool, verbose: bool
 ) -> None:
     """Print a comparison on stdout."""
-    from photostrip.report.commands import compare_findings
-    from photostrip.report.commands.compare_sections import compare_sections, compare_title
-    from photostrip.report.page import console, layout, text
+    from photostrip.formats.output.result_lines import line_finder
+    from photostrip.report.commands.compare import compare_sections, compare_title
+    from photostrip.report.commands.compare_findings import compare_cases, compare_findings
+    from photostrip.report.page.junit import to_junit
+    from photostrip.report.page.messages import annotated
 
-    ascii_only = not console.speaks_unicode(sys.stdout)
-    if form is CompareFormat.JSON:
-        from photostrip.formats.output.result_files import to_json
-
-        sys.stdout.write(to_json(found, ascii_only=ascii_only))
-    elif form is CompareFormat.JUNIT:
-        from photostrip.report.page.junit import to_junit
-
-        sys.stdout.write(to_junit(f"photostrip compare {found['name']}", compare_findings.compare_cases(found)))
-    elif form is CompareFormat.GITHUB:
-        from photostrip.formats.output.result_lines import line_finder
-        from photostrip.report.page.messages import annotated
-
-        lines = line_finder(place.read_text(encoding="utf-8"))
-        sys.stdout.write(annotated(compare_findings.compare_findings(found, lines)))
-    else:
-        title, sections = compare_title(found), compare_sections(found, quiet=quiet, everything=verbose)
-        if form is CompareFormat.TEXT:
-            console.print_report("" if quiet else title, sections, sys.stdout, width)
-        else:
-            page = text.to_markdown("" if quiet else title, sections)
-            sys.stdout.write(layout.plain_ascii(page) if ascii_only else page)
+    match form:
+        case CompareFormat.JSON:
+            print_json(found)
+        case CompareFormat.JUNIT:
+            sys.stdout.write(to_junit(f"photostrip compare {found['name']}", compare_cases(found)))
+        case CompareFormat.GITHUB:
+            lines = line_finder(place.read_text(encoding="utf-8"))
+            sys.stdout.write(annotated(compare_findings(found, lines)))
+        case CompareFormat.TEXT | CompareFormat.MD:
+            sections = compare_sections(found, quiet=quiet, everything=verbose)
+            title = "" if quiet else compare_title(found)
+            print_sections(title, sections, width, markdown=form is CompareFormat.MD)

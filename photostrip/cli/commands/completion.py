@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import sys
 from enum import StrEnum
 from typing import Annotated
 
 import typer
 
-VARIABLE = "_PHOTOSTRIP_COMPLETE"  # set by the script of the shell when it asks
+from photostrip.cli.completion import answer
 
 
 class Shell(StrEnum):
@@ -30,65 +28,3 @@ def completion(
     fish write the script to ~/.config/fish/completions/photostrip.fish.
     """
     return answer(f"source_{shell}")
-
-
-def answer(instruction: str) -> int:
-    """Answer a shell.
-
-    Parameters
-    ----------
-    instruction : str
-        ``source_bash`` for its script, ``complete_bash`` for what can stand at the cursor, which the shell's script
-        describes in variables of its own.
-    """
-    from photostrip.cli.whole import whole_program
-
-    os.environ[VARIABLE] = instruction
-    try:
-        whole_program(completing=True)(args=[], prog_name="photostrip", standalone_mode=False)
-    except SystemExit as stop:
-        return stop.code if isinstance(stop.code, int) else 0
-    finally:
-        del os.environ[VARIABLE]
-        sys.stdout.flush()
-    return 0
-
-
-def keys(incomplete: str) -> list[str]:
-    """Return the keys that an assignment of ``--set`` may begin with.
-
-    Returns
-    -------
-    list of str
-        Keys of the project file, each with ``=`` behind it.
-    """
-    from photostrip.project.yaml.schema import json_schema
-
-    schema = json_schema()
-    return [f"{path}=" for path in _paths(schema, schema) if path.startswith(incomplete)]
-
-
-def _paths(schema: dict[str, object], part: object, path: str = "") -> list[str]:
-    """Return the paths of all single values below a part of the schema; lists and the names of users are left out."""
-    part = _resolved(schema, part)
-    properties = part.get("properties")
-    if isinstance(properties, dict):
-        return [
-            each for name, inner in properties.items() for each in _paths(schema, inner, f"{path}.{name}".strip("."))
-        ]
-    leaf = path and part.get("type") not in {"array", "object"}
-    return [path] if leaf else []
-
-
-def _resolved(schema: dict[str, object], part: object) -> dict[str, object]:
-    """Follow a reference of the schema, also where None is allowed beside it."""
-    found = part if isinstance(part, dict) else {}
-    for choice in found.get("anyOf", ()):
-        if "$ref" in choice:
-            found = choice
-    if "$ref" in found:
-        target: object = schema
-        for step in str(found["$ref"]).removeprefix("#/").split("/"):
-            target = target[step] if isinstance(target, dict) else {}
-        return _resolved(schema, target)
-    return found

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from photostrip.cli.showing import Format
+from photostrip.cli.stdout import Format
 
 
 def info(

@@ -280,7 +280,7 @@ def camera(
 
 
 def _is_picture(output: Path | None) -> bool:
-    from photostrip.report.pictures.plots_plans import check_picture, is_picture
+    from photostrip.report.pictures.plans import check_picture, is_picture
 
     if output is None:
         return False
@@ -325,7 +325,7 @@ def deliver(document: Document, form: Form, output: Path | None, drawn: Document
     picture = _is_picture(output)
     if output is not None:
         from photostrip.formats.text.writing import write_text
-        from photostrip.report.pictures.plots_plans import plan_picture
+        from photostrip.report.pictures.plans import plan_picture
 
         write_text(output, plan_picture(drawn, output.suffix) if picture else _rendered(document, output))
     if output is None or not quiet:

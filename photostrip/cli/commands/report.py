@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from photostrip.cli.options import Quiet, Verbose, Width
-from photostrip.cli.showing import Format, show
+from photostrip.cli.stdout import Format, form_of, print_result, report_text
 
 HTML = ".html"
 
@@ -30,7 +30,6 @@ def report(
     It is the report that `photostrip run` printed. FILE may end in .txt, .md, .html or .json. The exit code does not
     depend on the tolerances: the report of a failed result is a report.
     """
-    from photostrip.cli.showing import form_of, rendered
     from photostrip.formats.output.result_files import read_result
     from photostrip.formats.text.writing import write_text
     from photostrip.report import require_complete
@@ -39,7 +38,7 @@ def report(
     document = read_result(file)
     require_complete(document, file)
     if output is None:
-        show(document, form or Format.TEXT, width, quiet=quiet, verbose=verbose)
+        print_result(document, form or Format.TEXT, width, quiet=quiet, verbose=verbose)
         return
     if form is None and output.suffix.lower() == HTML:
         from photostrip.report.html import check_html, to_html
@@ -47,4 +46,4 @@ def report(
         check_html("--output")
         write_text(output, to_html(document, everything=verbose))
         return
-    write_text(output, rendered(document, form or form_of(output), width, quiet=quiet, verbose=verbose))
+    write_text(output, report_text(document, form or form_of(output), width, quiet=quiet, verbose=verbose))

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from photostrip.cli.options import Assignments, Quiet, Shape, Verbose, Width
-from photostrip.cli.showing import Format, form_of, show, traced
+from photostrip.cli.stdout import Format, form_of, print_result, trace_text
 
 
 def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
@@ -41,63 +41,58 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
     the project is not kept. A bundle adjustment adds reliability.csv. With --compare-methods and -o, each method gets a
     folder of its own in DIR.
     """
-    from photostrip.cli.talking import Talk, failures_as, no_collector
+    from photostrip.cli.failures import failures_as
+    from photostrip.cli.garbage import without_garbage_collection
+    from photostrip.cli.method_comparison import compare_methods
+    from photostrip.cli.stderr import Messages
     from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE
     from photostrip.formats.output.result_files import result_files
     from photostrip.formats.text.writing import make_rule, write_files, write_text
     from photostrip.pipeline import triangulate
     from photostrip.project.loading import load_project
+    from photostrip.report.html import check_html, to_html
     from photostrip.report.page.progress import progress
     from photostrip.result.document import document_of
 
-    _require_folder(output, depfile=depfile, html=html)
-    if trace is not None:
-        form_of(trace, "--trace")  # before anything is computed
-    talk = Talk(quiet=quiet, verbose=verbose)
+    _refuse_contradictions(output, depfile=depfile, trace=trace, methods=methods, html=html)
+    messages = Messages(quiet=quiet, verbose=verbose)
     if methods:
-        from photostrip.cli.methods import compare_methods
-
-        if depfile is not None or trace is not None or html:
-            message = "a comparison of methods has no --depfile, no --trace and no --html"
-            raise typer.BadParameter(message, param_hint="--compare-methods")
-        return compare_methods(project, assignments or [], output, form, width, talk, quiet=quiet)
-    with failures_as(form), no_collector(), progress(sys.stderr, quiet=quiet) as waiting:
+        return compare_methods(project, assignments or [], output, form, width, messages, quiet=quiet)
+    with failures_as(form), without_garbage_collection(), progress(sys.stderr, quiet=quiet) as waiting:
         if html:
-            from photostrip.report.html import check_html
-
             check_html()
         waiting.at(f"reading {project}")
         loaded = load_project(project, assignments or [])
-        talk.step(f"read {len(loaded.files)} files, {len(loaded.inputs.observations)} image points")
+        messages.step(f"read {len(loaded.files)} files, {len(loaded.inputs.observations)} image points")
         waiting.at(f"adjusting {sum(len(strip.photos) for strip in loaded.inputs.strips)} photos")
         with loaded.places():
             result = loaded.result(triangulate(loaded.inputs, loaded.settings, directory=loaded.directory))
-        talk.step(f"adjusted {len(result.points.number)} points")
+        messages.step(f"adjusted {len(result.points.number)} points")
         document = document_of(result, loaded.remarks)
         waiting.at("writing the result")
         if trace is not None:
-            write_text(trace, traced(result, form_of(trace, "--trace")))
+            write_text(trace, trace_text(result, form_of(trace, "--trace")))
+        if depfile is not None and output is not None:  # before the result: it must not be the newer of the two
+            write_text(depfile, make_rule(output / "result.json", loaded.files_read(result)))
         if output is not None:
-            if depfile is not None:  # before the result: it must not be the newer of the two
-                write_text(depfile, make_rule(output / "result.json", loaded.files_read(result)))
-            files = _page(document, everything=verbose) if html else {}
-            files |= result_files(document, loaded.resolved)
+            pages = {"report.html": to_html(document, everything=verbose)} if html else {}
+            files = pages | result_files(document, loaded.resolved)
             write_files(output, files)
-            talk.say(f"wrote {len(files)} files to {output}")
-    show(document, form, width, quiet=quiet, verbose=verbose)
+            messages.say(f"wrote {len(files)} files to {output}")
+    print_result(document, form, width, quiet=quiet, verbose=verbose)
     return EXIT_TOLERANCE if document["status"] == "failed" else EXIT_DONE
 
 
-def _require_folder(output: Path | None, *, depfile: Path | None, html: bool) -> None:
-    """Refuse what makes no sense without a folder, and HTML that cannot be written."""
+def _refuse_contradictions(
+    output: Path | None, *, depfile: Path | None, trace: Path | None, methods: bool, html: bool
+) -> None:
+    """Refuse options that make no sense together, before anything is computed."""
     if output is None and depfile is not None:
         raise typer.BadParameter("a rule for make needs a target: give --output as well", param_hint="--depfile")
     if output is None and html:
         raise typer.BadParameter("report.html needs a folder: give --output as well", param_hint="--html")
-
-
-def _page(document: dict[str, Any], *, everything: bool) -> dict[str, str]:
-    """Give report.html."""
-    from photostrip.report.html import to_html
-
-    return {"report.html": to_html(document, everything=everything)}
+    if trace is not None:
+        form_of(trace, "--trace")
+    if methods and (depfile is not None or trace is not None or html):
+        message = "a comparison of methods has no --depfile, no --trace and no --html"
+        raise typer.BadParameter(message, param_hint="--compare-methods")

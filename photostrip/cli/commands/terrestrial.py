@@ -84,7 +84,7 @@ def displacement(  # noqa: PLR0913, PLR0917 (an argument for each option)
     with told(form):
         from photostrip.formats.output.terrestrial_displacements import displacement_document, displacements_csv
         from photostrip.report.commands.terrestrial_displacements import displacement_report
-        from photostrip.report.pictures.plots_terrestrial import check_plot
+        from photostrip.report.pictures.terrestrial import check_plot
         from photostrip.terrestrial.epochs import monitor
 
         if plot is not None:
@@ -164,7 +164,7 @@ def _write(
     from photostrip.formats.output.result_files import to_json
     from photostrip.formats.output.terrestrial_displacements import cameras_csv, displacements_csv
     from photostrip.formats.text.writing import make_rule, write_files, write_text
-    from photostrip.report.pictures.plots_terrestrial import displacement_plot
+    from photostrip.report.pictures.terrestrial import displacement_plot
 
     if output is not None:
         files = {"displacements.csv": displacements_csv(document), "cameras.csv": cameras_csv(document)}

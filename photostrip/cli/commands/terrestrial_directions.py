@@ -176,7 +176,7 @@ def accuracy(  # noqa: PLR0913, PLR0917 (an argument for each option)
         def document(chosen: Phototheodolite, net: Net) -> dict[str, Any]:
             return required_accuracy(chosen, (radians, rotation, angles), sigma, net, as_printed=as_printed)
 
-        from photostrip.report.pictures.plots_terrestrial import accuracy_plot
+        from photostrip.report.pictures.terrestrial import accuracy_plot
 
         _over_the_photo(options, (step, level), document, (plot, accuracy_plot), form)
 
@@ -228,7 +228,7 @@ def theodolite(  # noqa: PLR0913, PLR0917 (an argument for each option)
         def document(chosen: Phototheodolite, net: Net) -> dict[str, Any]:
             return theodolite_accuracy(chosen, (radians, rotation, angles), measured, wanted, net)
 
-        from photostrip.report.pictures.plots_terrestrial import theodolite_plot
+        from photostrip.report.pictures.terrestrial import theodolite_plot
 
         _over_the_photo(options, (step, omega == 0 and kappa == 0), document, (plot, theodolite_plot), form)
 
@@ -243,7 +243,7 @@ def _over_the_photo(
     """Compute a table over the photo and print it; draw it on a finer one."""
     from photostrip.project.terrestrial import terrestrial_ranges as ranges
     from photostrip.project.terrestrial.terrestrial_options import chosen_camera
-    from photostrip.report.pictures.plots_terrestrial import FINE, check_plot
+    from photostrip.report.pictures.terrestrial import FINE, check_plot
     from photostrip.terrestrial.accuracy import grid
 
     plot, draw = picture

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from photostrip.report.commands.compare_sections import NAMES, allowed_words, place
+from photostrip.report.commands.compare import NAMES, allowed_words, place
 from photostrip.report.page.figures import short, unit
 from photostrip.report.page.junit import Case
 

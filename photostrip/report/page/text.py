@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from photostrip.report.page.layout import USUAL, lay_out
+from photostrip.report.page.layout import USUAL, lay_out, plain_ascii
 from photostrip.report.page.parts import Facts, Table, Words
 
 if TYPE_CHECKING:
@@ -21,13 +21,14 @@ def to_text(title: str, sections: Iterable[Section], width: int = USUAL, *, asci
     return "".join(f"{line.text}\n" for line in lines)
 
 
-def to_markdown(title: str, sections: Iterable[Section]) -> str:
+def to_markdown(title: str, sections: Iterable[Section], *, ascii_only: bool = False) -> str:
     """Return a report as Markdown, all columns of all tables shown."""
     blocks = [f"# {_safe(title)}"] if title else []
     for section in sections:
         blocks += [f"## {_safe(section.title)}"] if section.title else []
         blocks += ["\n".join(_block(part)) for part in section.parts]
-    return "\n\n".join(blocks) + "\n"
+    page = "\n\n".join(blocks) + "\n"
+    return plain_ascii(page) if ascii_only else page
 
 
 def _safe(text: str) -> str:

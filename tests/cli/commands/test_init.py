@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from photostrip import __version__
-from photostrip.cli.main import COMMANDS, main
+from photostrip.cli.command_table import COMMANDS
+from photostrip.cli.main import main
 from photostrip.project.checks.checking import check_project
 from photostrip.project.simulation_spec import SimulationFile
 from photostrip.project.template import template_files

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from photostrip.report.page.parts import Facts, Table
-from photostrip.report.sections.decision_sections import WEIGHTS_SHOWN, decisions_section, weights_section
+from photostrip.report.sections.decisions import WEIGHTS_SHOWN, decisions_section, weights_section
 from tests.results import case
 
 

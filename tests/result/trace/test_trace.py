@@ -12,7 +12,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from photostrip.cli.main import main
-from photostrip.report.commands.trace_sections import trace_sections, trace_title
+from photostrip.report.commands.trace import trace_sections, trace_title
 from photostrip.report.page.text import to_text
 from photostrip.result.trace.trace import SYMBOLS, trace_of
 from photostrip.simulate.spec import GrossError

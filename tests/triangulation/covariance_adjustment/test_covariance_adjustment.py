@@ -12,7 +12,7 @@ import pytest
 from photostrip.pipeline import Inputs, Result, Settings, StripResult, triangulate
 from photostrip.pipeline import covariance_adjustment as pipeline_covariance
 from photostrip.pipeline.strip import adjust_formed, form_strip
-from photostrip.report.sections.document import project_section
+from photostrip.report.sections.project import project_section
 from photostrip.result.document import document_of
 from photostrip.triangulation.covariance_adjustment import (
     block_tridiagonal,

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from photostrip.notes import before
 from photostrip.report.page.figures import counted, listed, metres, micrometres, ratio, signed, unit
 from photostrip.report.page.parts import DASH, Column, Facts, Part, Section, Table, Words
-from photostrip.report.sections.model_sections import scale_word
-from photostrip.report.sections.strip_sections import WORST_SHOWN, worst_first
+from photostrip.report.sections.models import scale_word
+from photostrip.report.sections.strip import WORST_SHOWN, worst_first
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""What runs inside a worker of a cluster: a crew of one for each thread, with the limits and habits of a local batch.
+"""What runs inside a worker of a cluster: a pool of one for each thread, with the limits and habits of a local batch.
 
 The cluster's own process never computes. A project that crashes, hangs or eats memory ends a process below it, and the
 cluster keeps its worker.
@@ -10,16 +10,16 @@ import os
 import threading
 from typing import TYPE_CHECKING
 
-from photostrip.batch.crew import Crew
-from photostrip.batch.folder import program
+from photostrip.batch.local_pool import LocalPool
+from photostrip.batch.result_folder import program
 from photostrip.batch.tasks import Limits
-from photostrip.batch.worker import WORK, share_of_memory
+from photostrip.batch.worker_process import WORK, share_of_memory
 from photostrip.errors import PhotostripError
 
 if TYPE_CHECKING:
     from photostrip.batch.tasks import Answer, Task
 
-_idle: dict[tuple[Limits, str], list[Crew]] = {}
+_idle: dict[tuple[Limits, str], list[LocalPool]] = {}
 _lock = threading.Lock()
 
 
@@ -34,24 +34,24 @@ def compute(task: Task, limits: Limits, work: str = WORK) -> tuple[Answer, dict[
     Returns
     -------
     program : dict of str to str
-        What computed it, as ``folder.program`` gives it.
+        What computed it, as ``result_folder.program`` gives it.
     """
     key = limits, work
     with _lock:
         waiting = _idle.setdefault(key, [])
-        crew = waiting.pop() if waiting else _new(limits, work)
+        pool = waiting.pop() if waiting else _new(limits, work)
     try:
-        answers = list(crew.answers(iter([task]), lambda: False))
+        answers = list(pool.answers(iter([task]), lambda: False))
     except BaseException:
-        crew.close()
+        pool.close()
         raise
     with _lock:
-        waiting.append(crew)
-    if len(answers) != 1:  # cannot be: a crew answers every task once
+        waiting.append(pool)
+    if len(answers) != 1:  # cannot be: a pool answers every task once
         raise PhotostripError(f"{len(answers)} answers to one task")
     return answers[0], program()
 
 
-def _new(limits: Limits, work: str) -> Crew:
+def _new(limits: Limits, work: str) -> LocalPool:
     megabytes = limits.megabytes or share_of_memory(os.cpu_count() or 1)
-    return Crew(1, Limits(limits.seconds, megabytes), work)
+    return LocalPool(1, Limits(limits.seconds, megabytes), work)

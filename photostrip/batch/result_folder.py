@@ -23,7 +23,7 @@ from photostrip.formats.text.writing import write_files
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from photostrip.batch.selection import Chosen
+    from photostrip.batch.selection import ChosenProject
     from photostrip.batch.tasks import Answer
 
     Document = dict[str, Any]
@@ -53,13 +53,13 @@ def program() -> dict[str, str]:
     return own | {name: version(name) for name in LIBRARIES}
 
 
-class Folder:
+class ResultFolder:
     """The folder of a batch; make it with ``opened``."""
 
     def __init__(self, path: Path, overrides: Sequence[str] = ()) -> None:
         self.path, self.overrides = path, list(overrides)
 
-    def unchanged(self, chosen: Chosen) -> Document | None:
+    def unchanged(self, chosen: ChosenProject) -> Document | None:
         """Return the line of the summary of a result that can be trusted.
 
         Returns
@@ -82,7 +82,7 @@ class Folder:
         outcome: Document = record["outcome"]
         return outcome
 
-    def files_of(self, chosen: Chosen) -> list[str]:
+    def files_of(self, chosen: ChosenProject) -> list[str]:
         """Return the files that the result of a project was made from; none when there is no result."""
         record = self._record(self.path / chosen.output)
         if record is None or record["project"] != self._name(chosen):
@@ -90,7 +90,7 @@ class Folder:
         folder = os.path.split(chosen.project)[0]
         return [_back(name, folder) for name, content in record["inputs"].items() if content is not None]
 
-    def refused(self, chosen: Chosen) -> Fault | None:
+    def refused(self, chosen: ChosenProject) -> Fault | None:
         """Say whether a project must not be written where it would go: the result of another one stands there.
 
         Returns
@@ -108,7 +108,7 @@ class Folder:
         message = f"its result would replace that of another project, {record['project']} as seen from there"
         return Fault(message, "output-taken", str(there), fix="choose another folder with -o, or use --force")
 
-    def write(self, chosen: Chosen, answer: Answer) -> None:
+    def write(self, chosen: ChosenProject, answer: Answer) -> None:
         """Write a result, the record last.
 
         Raises
@@ -141,7 +141,7 @@ class Folder:
         for name in SUMMARIES:
             (self.path / name).unlink(missing_ok=True)
 
-    def _name(self, chosen: Chosen) -> str:
+    def _name(self, chosen: ChosenProject) -> str:
         """Path of a project as seen from its result."""
         return os.path.relpath(chosen.project, self.path / chosen.output).replace(os.sep, "/")
 
@@ -154,7 +154,7 @@ class Folder:
 
 
 @contextmanager
-def opened(path: Path, overrides: Sequence[str] = ()) -> Iterator[Folder]:
+def opened(path: Path, overrides: Sequence[str] = ()) -> Iterator[ResultFolder]:
     """Take a folder for one batch.
 
     The lock is the system's: it is gone with the process that holds it, however that ends.
@@ -166,7 +166,7 @@ def opened(path: Path, overrides: Sequence[str] = ()) -> Iterator[Folder]:
 
     Yields
     ------
-    Folder
+    ResultFolder
         The folder, without the summary of an earlier batch.
 
     Raises
@@ -186,7 +186,7 @@ def opened(path: Path, overrides: Sequence[str] = ()) -> Iterator[Folder]:
             message = "another batch is writing into this folder"
             fix = "wait for its end, or choose another folder with -o"
             raise InputError(Fault(message, "batch-running", str(path), fix=fix)) from None
-        folder = Folder(path, overrides)
+        folder = ResultFolder(path, overrides)
         folder.forget_summaries()
         yield folder
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING
 
-from photostrip.cli.showing import Format
-from photostrip.cli.talking import Talk, failures_as, no_collector
+from photostrip.cli.failures import failures_as
+from photostrip.cli.garbage import without_garbage_collection
+from photostrip.cli.stdout import Format, print_json, print_sections
 from photostrip.errors import EXIT_DONE, GeometryError, InputError
-from photostrip.formats.output.result_files import result_files, to_json
+from photostrip.formats.output.result_files import result_files
 from photostrip.formats.text.writing import write_files
 from photostrip.pipeline import ADJUSTMENTS, triangulate
 from photostrip.project.loading import load_project
 from photostrip.report.commands.methods import methods_sections
-from photostrip.report.page import console, layout, text
 from photostrip.report.page.progress import progress
 from photostrip.result.document import document_of
 from photostrip.result.methods import methods_document
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from photostrip.cli.stderr import Messages
     from photostrip.errors import PhotostripError
     from photostrip.result.numbers import Document
 
@@ -32,7 +33,7 @@ def compare_methods(
     output: Path | None,
     form: Format,
     width: int | None,
-    talk: Talk,
+    messages: Messages,
     *,
     quiet: bool,
 ) -> int:
@@ -50,7 +51,7 @@ def compare_methods(
     """
     found: dict[str, Document | PhotostripError] = {}
     name = ""
-    with failures_as(form), no_collector(), progress(sys.stderr, quiet=quiet) as waiting:
+    with failures_as(form), without_garbage_collection(), progress(sys.stderr, quiet=quiet) as waiting:
         for adjustment in ADJUSTMENTS:
             waiting.at(f"adjusting: {adjustment}")
             loaded = load_project(project, [*assignments, f"processing.adjustment={adjustment}"])
@@ -64,22 +65,14 @@ def compare_methods(
             found[adjustment] = document = document_of(result, loaded.remarks)
             if output is not None:
                 write_files(output / adjustment, result_files(document, loaded.resolved))
-                talk.say(f"wrote the result of {adjustment} to {output / adjustment}")
+                messages.say(f"wrote the result of {adjustment} to {output / adjustment}")
         failures = [each for each in found.values() if not isinstance(each, dict)]
         if len(failures) == len(found):
             raise failures[0]
-    _print(methods_document(name, found), form, width)
-    return EXIT_DONE
-
-
-def _print(document: Document, form: Format, width: int | None) -> None:
-    """Print the comparison on stdout."""
+    document = methods_document(name, found)
     if form is Format.JSON:
-        sys.stdout.write(to_json(document, ascii_only=not console.speaks_unicode(sys.stdout)))
-        return
-    title, sections = f"Methods: {document['name']}", methods_sections(document)
-    if form is Format.TEXT:
-        console.print_report(title, sections, sys.stdout, width)
-        return
-    page = text.to_markdown(title, sections)
-    sys.stdout.write(page if console.speaks_unicode(sys.stdout) else layout.plain_ascii(page))
+        print_json(document)
+    else:
+        title = f"Methods: {document['name']}"
+        print_sections(title, methods_sections(document), width, markdown=form is not Format.TEXT)
+    return EXIT_DONE

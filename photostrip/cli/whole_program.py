@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from photostrip.cli.main import COMMANDS
+from photostrip.cli.command_table import COMMANDS
 
 
 def whole_program(*, completing: bool = False) -> typer.Typer:

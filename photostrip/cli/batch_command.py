@@ -1,4 +1,4 @@
-"""How ``photostrip batch`` puts its parts together, and what it says meanwhile and in the end."""
+"""``photostrip batch`` at work: who computes, what is said on stderr meanwhile, the summary, the exit code."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from photostrip.batch.crew import Crew
-from photostrip.batch.folder import opened
+from photostrip.batch.local_pool import LocalPool
+from photostrip.batch.result_folder import opened
 from photostrip.batch.run import Run, Stop, on_signals
 from photostrip.batch.selection import choose
-from photostrip.cli.showing import BatchFormat, Format
-from photostrip.cli.talking import as_fault, failures_as
+from photostrip.cli.failures import as_fault, failures_as
+from photostrip.cli.stdout import BatchFormat, Format, ascii_only, print_sections
 from photostrip.errors import InputError, PhotostripError
 from photostrip.formats.output import batch as formats
 from photostrip.formats.text.writing import make_rule, write_text
 from photostrip.report.commands.batch import batch_junit, batch_sections, outcome_line
-from photostrip.report.page import console, layout, messages, text
+from photostrip.report.page import messages, text
 from photostrip.report.page.figures import counted
 from photostrip.report.page.progress import batch_table
 
@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from photostrip.batch.crew import Executor
-    from photostrip.batch.folder import Folder
+    from photostrip.batch.local_pool import Executor
+    from photostrip.batch.result_folder import ResultFolder
     from photostrip.batch.run import Batch
     from photostrip.batch.tasks import Answer, Limits, Task
     from photostrip.report.page.progress import BatchTable
@@ -38,8 +38,8 @@ EXIT_SIGNAL = 128  # plus its number, as a shell reports it
 
 
 @dataclass(frozen=True)
-class Asked:
-    """What the user asked for; see the options of the command."""
+class BatchOptions:
+    """The options of the command."""
 
     projects: list[str]
     output: Path | None
@@ -52,28 +52,28 @@ class Asked:
 
 
 def cores() -> int:
-    """Return the number of cores that this process may use."""
+    """Count the cores that this process may use."""
     try:
         return len(os.sched_getaffinity(0))
     except AttributeError:  # not on every system
         return os.cpu_count() or 1
 
 
-def run_asked(asked: Asked, form: BatchFormat, width: int | None, *, quiet: bool, verbose: bool) -> int:
+def run_batch(options: BatchOptions, form: BatchFormat, width: int | None, *, quiet: bool, verbose: bool) -> int:
     """Run a batch and print its summary."""
     stop, folder = Stop(), None
     with ExitStack() as stack:
         stack.enter_context(on_signals(stop))
         with failures_as(Format(form.value) if form.value in set(Format) else Format.TEXT):
-            projects = choose(asked.projects)
-            if asked.output is not None:
-                folder = stack.enter_context(opened(asked.output, asked.overrides))
+            projects = choose(options.projects)
+            if options.output is not None:
+                folder = stack.enter_context(opened(options.output, options.overrides))
         table = stack.enter_context(batch_table(sys.stderr, len(projects), quiet=quiet))
-        run = Run(projects, asked.overrides, folder, force=asked.force)
+        run = Run(projects, options.overrides, folder, force=options.force)
         trouble: list[PhotostripError] = []
         try:
-            with executor_of(asked, len(projects), table) as executor:
-                run.go(executor, Talking(table, len(projects), quiet=quiet, verbose=verbose), stop)
+            with executor_of(options, len(projects), table) as executor:
+                run.go(executor, BatchMessages(table, len(projects), quiet=quiet, verbose=verbose), stop)
         except PhotostripError as error:  # nobody computes: the cluster is gone, or no process starts
             trouble.append(error)
         finally:
@@ -81,41 +81,38 @@ def run_asked(asked: Asked, form: BatchFormat, width: int | None, *, quiet: bool
             code = max((run.batch.exit_code, *(each.exit_code for each in trouble)))
             code = EXIT_SIGNAL + stop.signal if stop.signal else code
             if folder is not None:
-                trouble += summed_up(run.batch, code, folder)
-    show(run.batch.outcomes, code, form, width, quiet=quiet, verbose=verbose)
-    if asked.depfile is not None and asked.output is not None:
-        write_text(asked.depfile, make_rule(asked.output / "summary.json", run.files_read()))
-    _close(run.batch, stop, quiet=quiet)
+                trouble += write_summaries(run.batch, code, folder)
+    print_summary(run.batch.outcomes, code, form, width, quiet=quiet, verbose=verbose)
+    if options.depfile is not None and options.output is not None:
+        write_text(options.depfile, make_rule(options.output / "summary.json", run.files_read()))
+    _say_end(run.batch, stop, quiet=quiet)
     for each in trouble:
         raise each
     return code
 
 
 @contextmanager
-def executor_of(asked: Asked, number: int, table: BatchTable) -> Iterator[Executor]:
+def executor_of(options: BatchOptions, number: int, table: BatchTable) -> Iterator[Executor]:
     """Return the executor that the user asked for."""
-    jobs = min(asked.jobs or cores(), number)
+    jobs = min(options.jobs or cores(), number)
 
     def begun(task: Task) -> None:
         table.begun(task.project)
 
-    if asked.executor == "local":
-        with Crew(jobs, asked.limits, begun=begun) as crew:
-            yield crew
+    if options.executor == "local":
+        with LocalPool(jobs, options.limits, begun=begun) as pool:
+            yield pool
         return
     from photostrip.batch.cluster import cluster
 
-    with cluster(asked.executor.removeprefix("dask:"), jobs, asked.limits, begun, say=table.say) as found:
+    with cluster(options.executor.removeprefix("dask:"), jobs, options.limits, begun, say=table.say) as found:
         yield found
 
 
-class Talking:
+class BatchMessages:
     """What is said on stderr while a batch runs: a line for each project, or on a terminal for each failure.
 
-    Parameters
-    ----------
-    quiet, verbose : bool
-        Whether to say nothing, or also where internal errors happened.
+    Verbose messages say also where internal errors happened.
     """
 
     def __init__(self, table: BatchTable, total: int, *, quiet: bool, verbose: bool) -> None:
@@ -133,7 +130,7 @@ class Talking:
         self.table.say(f"{count}  {outcome_line(outcome)}{how}\n{trace}".rstrip("\n"))
 
 
-def summed_up(batch: Batch, code: int, folder: Folder) -> list[InputError]:
+def write_summaries(batch: Batch, code: int, folder: ResultFolder) -> list[InputError]:
     """Write the files of the summary; give what went wrong, which must not hide what became of the projects."""
     try:
         folder.write_summaries(
@@ -151,29 +148,26 @@ def summed_up(batch: Batch, code: int, folder: Folder) -> list[InputError]:
     return []
 
 
-def show(
+def print_summary(
     outcomes: list[Document], code: int, form: BatchFormat, width: int | None, *, quiet: bool, verbose: bool
 ) -> None:
     """Print the summary on stdout."""
-    ascii_only = not console.speaks_unicode(sys.stdout)
-    sections = batch_sections(outcomes, quiet=quiet, everything=verbose)
     match form:
-        case BatchFormat.TEXT:
-            console.print_report("", sections, sys.stdout, width)
         case BatchFormat.CSV:
             sys.stdout.write(formats.summary_csv(outcomes))
         case BatchFormat.JSON:
-            sys.stdout.write(formats.summary_json(outcomes, code, ascii_only=ascii_only))
+            sys.stdout.write(formats.summary_json(outcomes, code, ascii_only=ascii_only()))
         case BatchFormat.JUNIT:
             sys.stdout.write(batch_junit(outcomes))
         case BatchFormat.GITHUB:
             sys.stdout.write(messages.annotated(finding for each in outcomes for finding in each["findings"]))
-        case BatchFormat.MD:
-            page = text.to_markdown("Summary of the batch", sections)
-            sys.stdout.write(layout.plain_ascii(page) if ascii_only else page)
+        case BatchFormat.TEXT | BatchFormat.MD:
+            sections = batch_sections(outcomes, quiet=quiet, everything=verbose)
+            markdown = form is BatchFormat.MD
+            print_sections("Summary of the batch" if markdown else "", sections, width, markdown=markdown)
 
 
-def _close(batch: Batch, stop: Stop, *, quiet: bool) -> None:
+def _say_end(batch: Batch, stop: Stop, *, quiet: bool) -> None:
     """Say on stderr what was computed, and why the batch ended before its end."""
     waiting = sum(each["status"] == "not run" for each in batch.outcomes)
     if stop.signal:

@@ -7,9 +7,9 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from photostrip import __version__
-from photostrip.cli.showing import Format
-from photostrip.report.commands.check_sections import check_sections, verdict
-from photostrip.report.page import console, messages
+from photostrip.cli.stdout import Format, ascii_only, print_sections
+from photostrip.report.commands.check import check_sections, verdict
+from photostrip.report.page import messages
 from photostrip.report.page.text import to_markdown
 
 if TYPE_CHECKING:
@@ -21,15 +21,9 @@ SCHEMA = 1
 
 
 def print_checked(found: Sequence[Checked], form: Format, width: int | None, *, quiet: bool, verbose: bool) -> None:
-    """Print what was found in some projects on stdout.
-
-    Parameters
-    ----------
-    found : sequence of Checked
-        Projects in the order in which the user named them.
-    """
+    """Print what was found in some projects, in the order in which the user named them."""
     if form is Format.JSON:
-        text = json.dumps(document_of(found), ensure_ascii=not console.speaks_unicode(sys.stdout), indent=1)
+        text = json.dumps(document_of(found), ensure_ascii=ascii_only(), indent=1)
         sys.stdout.write(f"{text}\n")
     elif form is Format.GITHUB:
         sys.stdout.write(messages.annotated(finding for each in found for finding in findings_of(each)))
@@ -45,7 +39,7 @@ def print_checked(found: Sequence[Checked], form: Format, width: int | None, *, 
 
 def findings_of(checked: Checked) -> list[dict[str, Any]]:
     """Give faults, findings and notes as plain values."""
-    return [messages.finding_of(told) for told in checked.told]
+    return [messages.finding_of(each) for each in checked.told]
 
 
 def document_of(found: Sequence[Checked]) -> dict[str, Any]:
@@ -77,4 +71,4 @@ def _print_one(checked: Checked, form: Format, width: int | None, *, quiet: bool
     sys.stdout.write("".join(f"{line}\n" for line in (head, *lines)))
     if sections:
         sys.stdout.write("\n")
-        console.print_report("", sections, sys.stdout, width)
+        print_sections("", sections, width, markdown=False)

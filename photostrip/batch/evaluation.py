@@ -8,7 +8,7 @@ import traceback
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from photostrip.batch.packing import unpack_grids
+from photostrip.batch.parcel import unpack_grids
 from photostrip.batch.tasks import BROKEN, FAULTY, WEAK, Answer, failure, out_of_memory, outcome_of
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.output.result_files import result_files

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from photostrip.batch.crew import Crew, cause_of
+from photostrip.batch.evaluation import evaluate
+from photostrip.batch.local_pool import LocalPool, cause_of
 from photostrip.batch.tasks import Answer, Limits, Task, failure
-from photostrip.batch.work import evaluate
-from photostrip.batch.worker import Worker, share_of_memory
+from photostrip.batch.worker_process import WorkerProcess, share_of_memory
 from photostrip.errors import Fault, InputError, PhotostripError
 from tests.batch.faulty import WORK
 from tests.batch.projects import write_projects
@@ -46,9 +46,9 @@ FAULTS = {
 def test_every_fault_takes_only_its_own_project_along(tmp_path: Path) -> None:
     names = ["good1", *(name for fault in FAULTS for name in (fault, f"after-{fault}"))]
     tasks = tasks_of(tmp_path, names)
-    with Crew(2, Limits(seconds=8.0, megabytes=500.0), WORK) as crew:
-        answers = list(crew.answers(iter(tasks), never))
-        assert len({worker.pid for worker in crew.workers}) == len(crew.workers) <= 2
+    with LocalPool(2, Limits(seconds=8.0, megabytes=500.0), WORK) as pool:
+        answers = list(pool.answers(iter(tasks), never))
+        assert len({worker.pid for worker in pool.workers}) == len(pool.workers) <= 2
     assert sorted(answer.number for answer in answers) == list(range(len(tasks)))  # one for each, none twice
     outcomes = {names[answer.number]: answer for answer in answers}
     for name, answer in outcomes.items():
@@ -64,19 +64,19 @@ def test_every_fault_takes_only_its_own_project_along(tmp_path: Path) -> None:
 def test_a_worker_that_has_grown_is_replaced(tmp_path: Path) -> None:
     tasks = tasks_of(tmp_path, ["good1", "grow", "good2"])
     seen = []
-    with Crew(1, Limits(megabytes=400.0), WORK, begun=lambda _: seen.append(crew.workers[0].pid)) as crew:
-        answers = list(crew.answers(iter(tasks), never))
+    with LocalPool(1, Limits(megabytes=400.0), WORK, begun=lambda _: seen.append(pool.workers[0].pid)) as pool:
+        answers = list(pool.answers(iter(tasks), never))
     assert [answer.outcome["status"] for answer in answers] == ["good"] * 3
     assert seen[0] == seen[1] != seen[2]
     assert answers[1].megabytes > 200.0
 
 
-def test_workers_are_gone_when_the_crew_is(tmp_path: Path) -> None:
+def test_workers_are_gone_when_the_pool_is(tmp_path: Path) -> None:
     (task,) = tasks_of(tmp_path, ["sleep"])
     stop: list[bool] = []
-    with Crew(1, work=WORK, begun=lambda _: stop.append(True)) as crew:
-        assert list(crew.answers(iter([task]), lambda: bool(stop))) == []
-        pids = [worker.pid for worker in crew.workers]
+    with LocalPool(1, work=WORK, begun=lambda _: stop.append(True)) as pool:
+        assert list(pool.answers(iter([task]), lambda: bool(stop))) == []
+        pids = [worker.pid for worker in pool.workers]
         assert all(_alive(pid) for pid in pids)
     assert pids
     assert not any(_alive(pid) for pid in pids)
@@ -91,20 +91,26 @@ def _alive(pid: int) -> bool:
 
 
 def test_workers_that_do_not_start_are_an_error_not_a_loop(tmp_path: Path) -> None:
-    with Crew(1, work="tests.batch.faulty:nothing") as crew, pytest.raises(PhotostripError, match="no worker") as told:
-        list(crew.answers(iter(tasks_of(tmp_path, ["good1"])), never))
+    with (
+        LocalPool(1, work="tests.batch.faulty:nothing") as pool,
+        pytest.raises(PhotostripError, match="no worker") as told,
+    ):
+        list(pool.answers(iter(tasks_of(tmp_path, ["good1"])), never))
     assert "has no attribute 'nothing'" in str(told.value)
 
 
 def test_too_little_memory_for_anything_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(Worker, "fate", lambda worker: worker.end() and 71)
-    with Crew(1, Limits(megabytes=3.0), work="tests.batch.faulty:nothing") as crew, pytest.raises(InputError) as told:
-        list(crew.answers(iter(tasks_of(tmp_path, ["good1"])), never))
+    monkeypatch.setattr(WorkerProcess, "fate", lambda worker: worker.end() and 71)
+    with (
+        LocalPool(1, Limits(megabytes=3.0), work="tests.batch.faulty:nothing") as pool,
+        pytest.raises(InputError) as told,
+    ):
+        list(pool.answers(iter(tasks_of(tmp_path, ["good1"])), never))
     assert "no process of the batch starts with 3 MB" in str(told.value)
 
 
 def test_workers_compute_with_one_thread(tmp_path: Path) -> None:
-    worker = Worker(1000.0)
+    worker = WorkerProcess(1000.0)
     try:
         assert worker.hear() == "ready"
         environ = (f"/proc/{worker.pid}/environ", "rb")
@@ -144,7 +150,7 @@ def test_an_internal_error_is_told_with_its_place(tmp_path: Path, monkeypatch: p
         raise ZeroDivisionError("by zero")
 
     (task,) = tasks_of(tmp_path, ["good1"])
-    monkeypatch.setattr("photostrip.batch.work.triangulate", broken)
+    monkeypatch.setattr("photostrip.batch.evaluation.triangulate", broken)
     answer = evaluate(task)
     assert answer.outcome["status"] == "crashed"
     assert answer.outcome["exit_code"] == 70
@@ -176,7 +182,7 @@ def test_out_of_memory_in_the_work_is_told(tmp_path: Path, monkeypatch: pytest.M
     def greedy(*_: object, **__: object) -> None:
         raise MemoryError
 
-    monkeypatch.setattr("photostrip.batch.work.load_project", greedy)
+    monkeypatch.setattr("photostrip.batch.evaluation.load_project", greedy)
     assert evaluate(Task(0, str(tmp_path))).outcome["status"] == "memory"
 
 

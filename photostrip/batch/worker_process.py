@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from photostrip.batch.tasks import Answer, Task
 
-WORK = "photostrip.batch.work:evaluate"  # what a worker does with a task
+WORK = "photostrip.batch.evaluation:evaluate"  # what a worker does with a task
 READY = "ready"
 MEGABYTE = 1_000_000
 COLLECTED_EVERY = 20  # projects; a collection takes 3 % of a short strip
@@ -39,14 +39,14 @@ NO_MEMORY_WORDS = ("memory allocation of ", "bad_alloc", "Memory allocation stil
 # The interpreter of a worker finds the same modules as that of its parent, wherever the parent has them from.
 START = (
     "import sys; sys.path[:] = sys.argv[1].split('\\n'); "
-    "from photostrip.batch.worker import serve; serve(int(sys.argv[2]), float(sys.argv[3]), sys.argv[4])"
+    "from photostrip.batch.worker_process import serve; serve(int(sys.argv[2]), float(sys.argv[3]), sys.argv[4])"
 )
 
 
 # --------------------------------------------------------------------------------------- on the parent's side
 
 
-class Worker:
+class WorkerProcess:
     """A worker as its parent sees it.
 
     Parameters

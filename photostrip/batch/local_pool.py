@@ -1,4 +1,4 @@
-"""The crew: some workers on this machine, one project each at a time, and what is done when one of them fails.
+"""The pool: some workers on this machine, one project each at a time, and what is done when one of them fails.
 
 A worker that dies takes only its own project along. That project is tried once more, because the worker may have been
 killed by somebody else; if it kills the second worker, too, it is told as the cause.
@@ -13,7 +13,7 @@ from multiprocessing.connection import wait
 from typing import TYPE_CHECKING, Protocol
 
 from photostrip.batch.tasks import BROKEN, TIMEOUT, Answer, Limits, failure, out_of_memory
-from photostrip.batch.worker import NO_MEMORY, READY, WORK, Worker, share_of_memory
+from photostrip.batch.worker_process import NO_MEMORY, READY, WORK, WorkerProcess, share_of_memory
 from photostrip.errors import Fault, InputError, PhotostripError
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ FALSE_STARTS = 3
 
 
 class Executor(Protocol):
-    """Who computes: a crew on this machine, or a cluster."""
+    """Who computes: a pool on this machine, or a cluster."""
 
     def answers(self, tasks: Iterator[Task | None], stopped: Callable[[], bool]) -> Iterator[Answer]:
         """Compute tasks.
@@ -47,7 +47,7 @@ def ignored(_: Task) -> None:
     """Take no notice of a task that begins."""
 
 
-class Crew:
+class LocalPool:
     """Workers on this machine."""
 
     def __init__(
@@ -59,7 +59,7 @@ class Crew:
     ) -> None:
         self.jobs, self.limits, self.work, self.begun = jobs, limits or Limits(), work, begun
         self.megabytes = self.limits.megabytes or share_of_memory(jobs)
-        self.workers: list[Worker] = []
+        self.workers: list[WorkerProcess] = []
         self._again: deque[Task] = deque()
         self._tries: dict[int, int] = {}
         self._false_starts = 0
@@ -111,7 +111,7 @@ class Crew:
             self.begun(task)
         starting = sum(not worker.ready for worker in self.workers)
         for _ in range(min(len(queue) - starting, self.jobs - len(self.workers))):
-            self.workers.append(Worker(self.megabytes, self.work))
+            self.workers.append(WorkerProcess(self.megabytes, self.work))
 
     def _heard(self, patience: float) -> Iterator[Answer]:
         """Take what the workers have sent, and end those that take too long."""
@@ -129,7 +129,7 @@ class Crew:
             yield from self._taken(worker, said)
         yield from self._overdue()
 
-    def _taken(self, worker: Worker, answer: Answer) -> Iterator[Answer]:
+    def _taken(self, worker: WorkerProcess, answer: Answer) -> Iterator[Answer]:
         """Take an answer; a worker that has grown is replaced."""
         worker.task = None
         worker.number_done += 1
@@ -151,7 +151,7 @@ class Crew:
                 fault = Fault(f"took longer than {limit:g} s", "timeout", fix="give it more time with --timeout")
                 yield self._gave_up(task, TIMEOUT, fault, limit)
 
-    def _buried(self, worker: Worker) -> Iterator[Answer]:
+    def _buried(self, worker: WorkerProcess) -> Iterator[Answer]:
         """Say what a worker died of, or let its project be tried once more."""
         code, task = worker.fate(), worker.task
         self.workers.remove(worker)
@@ -175,7 +175,7 @@ class Crew:
         self._tries.pop(task.number, None)
         return Answer(task.number, failure(status, fault), seconds=seconds, trace=trace)
 
-    def _dismiss(self, worker: Worker) -> None:
+    def _dismiss(self, worker: WorkerProcess) -> None:
         worker.end()
         self.workers.remove(worker)
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photostrip.errors import Fault, InputError
-from photostrip.report.pictures.plots_plan_strip import strip_figure
-from photostrip.report.pictures.plots_terrestrial import INSTALL, styled
+from photostrip.report.pictures.plan_strip import strip_figure
+from photostrip.report.pictures.terrestrial import INSTALL, styled
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from photostrip.report.page.figures import counted, fixed, ratio, signed
 from photostrip.report.page.parts import Column, Facts, Part, Section, Table, Words
-from photostrip.report.sections.strip_sections import worst_first
+from photostrip.report.sections.strip import worst_first
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

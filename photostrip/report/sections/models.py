@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from photostrip.report.page.figures import counted, fixed, metres, micrometres, percent, ratio
 from photostrip.report.page.parts import DASH, Column, Facts, Section, Table, Words
-from photostrip.report.sections.strip_sections import DIRECTIONS, worst_first
+from photostrip.report.sections.strip import DIRECTIONS, worst_first
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

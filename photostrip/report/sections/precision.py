@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from photostrip.report.page.figures import counted, fixed, metres, micrometres, ratio
 from photostrip.report.page.parts import Column, Facts, Section, Table, Words
-from photostrip.report.sections.strip_sections import ALL_SHOWN
+from photostrip.report.sections.strip import ALL_SHOWN
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

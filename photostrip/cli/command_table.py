@@ -1,0 +1,119 @@
+"""Every command: the module in which it stands, what ``--help`` says of it, an example.
+
+Nothing is imported here: ``photostrip --help`` answers from this table alone.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Entry(NamedTuple):
+    """Where a command stands and what ``--help`` says of it.
+
+    ``module`` holds a function, or a ``typer.Typer`` with subcommands, of the command's own name.
+    """
+
+    module: str
+    help: str
+    example: str
+
+
+COMMANDS = {
+    "init": Entry(
+        "photostrip.cli.commands.init",
+        "Write a commented project file and the headers of its tables.",
+        "photostrip init strip-a",
+    ),
+    "check": Entry(
+        "photostrip.cli.commands.check",
+        "Check projects without adjusting them, and name all faults.",
+        "photostrip check project.yaml",
+    ),
+    "run": Entry(
+        "photostrip.cli.commands.run",
+        "Adjust the strips of a project and report the accuracy.",
+        "photostrip run project.yaml -o result",
+    ),
+    "batch": Entry(
+        "photostrip.cli.commands.batch",
+        "Adjust many projects, on all cores or many machines.",
+        "photostrip batch strips/* -o results -j 4",
+    ),
+    "report": Entry(
+        "photostrip.cli.commands.report",
+        "Print the accuracy report of a saved result again.",
+        "photostrip report result/result.json",
+    ),
+    "compare": Entry(
+        "photostrip.cli.commands.compare",
+        "Compare a result with a baseline, within tolerances.",
+        "photostrip compare result baseline.json --tol exact.yaml",
+    ),
+    "simulate": Entry(
+        "photostrip.cli.commands.simulate",
+        "Write a synthetic project with known truth, ready to run.",
+        "photostrip simulate strip.yaml -o simulated",
+    ),
+    "plan": Entry(
+        "photostrip.cli.commands.plan",
+        "Expected accuracy and design, before any photo is taken.",
+        "photostrip plan model --overlap 60 --control corners",
+    ),
+    "terrestrial": Entry(
+        "photostrip.cli.commands.terrestrial",
+        "Directions of a phototheodolite, displacements between epochs.",
+        "photostrip terrestrial displacement survey.yaml -o result",
+    ),
+    "schema": Entry(
+        "photostrip.cli.commands.schema",
+        "Print the JSON Schema of the project file, for editors.",
+        "photostrip schema -o photostrip.schema.json",
+    ),
+    "completion": Entry(
+        "photostrip.cli.commands.completion",
+        "Print the script that makes a shell complete commands.",
+        "photostrip completion bash >> ~/.bashrc",
+    ),
+    "man": Entry(
+        "photostrip.cli.commands.man",
+        "Print a manual page, or write all of them.",
+        "photostrip man -o ~/.local/share/man/man1",
+    ),
+    "info": Entry(
+        "photostrip.cli.commands.info",
+        "Print versions and formats, and how to get what is missing.",
+        "photostrip info --format json",
+    ),
+}
+
+
+def usage() -> str:
+    """Return the text of ``photostrip --help``."""
+    width = max(map(len, COMMANDS))
+    commands = "\n".join(f"  {name:<{width}}  {entry.help}" for name, entry in COMMANDS.items())
+    return f"""\
+Usage: photostrip [--debug] COMMAND [ARGUMENTS]...
+
+Analytical strip phototriangulation: from measured image coordinates to
+adjusted ground coordinates.
+
+Commands:
+{commands}
+
+Options:
+  --version   Print the version and exit.
+  --debug     Print the traceback of an error.
+  -h, --help  Print this text and exit; after a command, its help.
+
+Environment: PHOTOSTRIP_FORMAT, PHOTOSTRIP_WIDTH, PHOTOSTRIP_QUIET,
+PHOTOSTRIP_VERBOSE and PHOTOSTRIP_DEBUG stand in for the options of these names;
+NO_COLOR forbids colours.
+
+Example:
+  {COMMANDS["run"].example}
+
+Exit codes: 0 done; 1 done, but a tolerance or a comparison failed; 2 wrong
+usage, project file or data; 3 the geometry is too weak; 70 an internal error
+(a bug).
+"""

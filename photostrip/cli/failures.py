@@ -1,0 +1,96 @@
+"""What happens when something goes wrong: every failure becomes a message and an exit code.
+
+``exit_code_of`` decides the code; ``failures_as`` prints the failure as JSON or annotations where these were asked for.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+import typer
+
+from photostrip.cli.stdout import Format, ascii_only
+from photostrip.errors import EXIT_INPUT, EXIT_INTERNAL, Fault, GeometryError, InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+EXIT_INTERRUPTED = 130  # 128 + SIGINT, as a shell reports it
+EXIT_BROKEN_PIPE = 141  # 128 + SIGPIPE
+
+
+def exit_code_of(error: BaseException, *, debug: bool) -> int:
+    """Say on stderr what went wrong, and return the exit code for it."""
+    if isinstance(error, BrokenPipeError):
+        # what is still in the buffer has no reader; without this the interpreter complains when it ends
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_BROKEN_PIPE
+    if debug:
+        import traceback
+
+        traceback.print_exception(error)
+    match error:
+        case KeyboardInterrupt():
+            messages, code = ["interrupted"], EXIT_INTERRUPTED
+        case InputError():
+            messages, code = [str(fault) for fault in error.faults], error.exit_code
+        case GeometryError():
+            messages, code = [str(error)], error.exit_code
+        case OSError():
+            place = f"{error.filename}: " if error.filename else ""
+            messages, code = [f"{place}{error.strerror or error}"], EXIT_INPUT
+        case _:
+            hint = "" if debug else "; --debug shows where"
+            sys.stderr.write(f"internal error (a bug): {type(error).__name__}: {error}{hint}\n")
+            return EXIT_INTERNAL
+    for message in messages:
+        sys.stderr.write(f"error: {message}\n")
+    if isinstance(error, InputError | GeometryError) and error.findings:
+        from photostrip.report.page.messages import finding_of, line_of
+
+        sys.stderr.writelines(f"{line_of(finding_of(each))}\n" for each in error.findings)
+    return code
+
+
+def as_fault(error: OSError) -> InputError:
+    """Return what the system refused (a full disk, a folder that must not be written to) as a fault like all others."""
+    fix = "make room, or choose another place with -o"
+    return InputError(Fault(str(error.strerror or error).lower(), "system", str(error.filename or ""), fix=fix))
+
+
+@contextmanager
+def failures_as(form: Format) -> Iterator[None]:
+    """Print failures in the form that was asked for: as JSON or annotations on stdout, else as lines on stderr.
+
+    Parameters
+    ----------
+    form : Format
+        What the user asked for. The exit code is the same whatever it is.
+
+    Raises
+    ------
+    typer.Exit
+        With the exit code, after the failure was printed.
+    """
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except (InputError, GeometryError, OSError) as error:
+        if form not in {Format.JSON, Format.GITHUB}:
+            raise
+        from photostrip.report.page import messages
+
+        failure = as_fault(error) if isinstance(error, OSError) else error
+        findings = messages.findings_of(failure)
+        if form is Format.GITHUB:
+            sys.stdout.write(messages.annotated(findings))
+        else:
+            document = messages.as_document(findings, failure.exit_code)
+            text = json.dumps(document, ensure_ascii=ascii_only(), indent=1)
+            sys.stdout.write(f"{text}\n")
+        raise typer.Exit(failure.exit_code) from error

@@ -1,0 +1,158 @@
+"""What the commands print on stdout, and the forms in which they do."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from enum import StrEnum
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
+
+    from photostrip.pipeline import Result
+    from photostrip.report.page.parts import Section
+
+    Document = dict[str, Any]
+
+
+class Format(StrEnum):
+    """Forms in which a report is printed."""
+
+    TEXT = "text"
+    JSON = "json"
+    MD = "md"
+    GITHUB = "github"
+
+
+class BatchFormat(StrEnum):
+    """Forms in which the summary of a batch is printed."""
+
+    TEXT = "text"
+    CSV = "csv"
+    JSON = "json"
+    JUNIT = "junit"
+    MD = "md"
+    GITHUB = "github"
+
+
+class CompareFormat(StrEnum):
+    """Forms in which a comparison is printed."""
+
+    TEXT = "text"
+    JSON = "json"
+    MD = "md"
+    JUNIT = "junit"
+    GITHUB = "github"
+
+
+ENDINGS = {".txt": Format.TEXT, ".json": Format.JSON, ".md": Format.MD}
+
+
+def ascii_only() -> bool:
+    """Whether stdout can show ASCII letters only."""
+    from photostrip.report.page import console
+
+    return not console.speaks_unicode(sys.stdout)
+
+
+def print_json(document: Document) -> None:
+    """Print a document as result.json is written."""
+    from photostrip.formats.output.result_files import to_json
+
+    sys.stdout.write(to_json(document, ascii_only=ascii_only()))
+
+
+def print_sections(title: str, sections: Iterable[Section], width: int | None = None, *, markdown: bool) -> None:
+    """Print sections as Markdown, or as text: in colours and as wide as the terminal, where there is one."""
+    from photostrip.report.page import console, text
+
+    if markdown:
+        sys.stdout.write(text.to_markdown(title, sections, ascii_only=ascii_only()))
+    else:
+        console.print_report(title, sections, sys.stdout, width)
+
+
+def print_result(document: Document, form: Format, width: int | None, *, quiet: bool, verbose: bool) -> None:
+    """Print the report of a result; JSON is the content of result.json, GITHUB its notes as annotations."""
+    if form is Format.TEXT:
+        print_sections(*_report(document, quiet=quiet, verbose=verbose), width, markdown=False)
+    else:
+        text = report_text(document, form, width, quiet=quiet, verbose=verbose, ascii_letters=ascii_only())
+        sys.stdout.write(text)
+
+
+def report_text(
+    document: Document,
+    form: Format,
+    width: int | None = None,
+    *,
+    quiet: bool = False,
+    verbose: bool = False,
+    ascii_letters: bool = False,
+) -> str:
+    """Return the report of a result as text, without colours.
+
+    Parameters
+    ----------
+    ascii_letters : bool
+        Whether the text may have ASCII letters only.
+    """
+    from photostrip.report.page import layout, text
+
+    if form is Format.JSON:
+        from photostrip.formats.output.result_files import to_json
+
+        return to_json(document, ascii_only=ascii_letters)
+    if form is Format.GITHUB:
+        from photostrip.report.page.messages import annotated, result_findings
+
+        return annotated(result_findings(document))
+    title, sections = _report(document, quiet=quiet, verbose=verbose)
+    if form is Format.MD:
+        return text.to_markdown(title, sections, ascii_only=ascii_letters)
+    return text.to_text(title, sections, width or layout.USUAL, ascii_only=ascii_letters)
+
+
+def _report(document: Document, *, quiet: bool, verbose: bool) -> tuple[str, tuple[Section, ...]]:
+    """Return title and sections; of a quiet report the verdict alone."""
+    from photostrip.report import chosen_sections, title_of
+
+    return "" if quiet else title_of(document), chosen_sections(document, quiet=quiet, everything=verbose)
+
+
+def trace_text(result: Result, form: Format) -> str:
+    """Return the trace of a run: every stage and iteration."""
+    from photostrip.report.commands.trace import trace_sections, trace_title
+    from photostrip.report.page import layout, text
+    from photostrip.result.trace.trace import trace_of
+
+    if result.bundle is not None:  # what has stages to be traced is the strip method that started it
+        result = replace(result, strips=result.bundle.start.strips, frames=(*result.frames, result.output))
+    document = trace_of(result)
+    if form is Format.JSON:
+        from photostrip.formats.output.result_files import to_json
+
+        return to_json(document)
+    title, sections = trace_title(document), trace_sections(document)
+    if form is Format.MD:
+        return text.to_markdown(title, sections)
+    return text.to_text(title, sections, layout.WIDEST)
+
+
+def form_of(path: Path, option: str = "--output") -> Format:
+    """Return the format that the ending of a file name asks for; text for a name without one.
+
+    Raises
+    ------
+    typer.BadParameter
+        For another ending.
+    """
+    if path.suffix.lower() not in {*ENDINGS, ""}:
+        known = ", ".join(ENDINGS)
+        message = f"no report is written as '{path.suffix}': the name may end in {known}, or give --format"
+        raise typer.BadParameter(message, param_hint=option)
+    return ENDINGS.get(path.suffix.lower(), Format.TEXT)

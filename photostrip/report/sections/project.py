@@ -1,0 +1,162 @@
+"""What was asked for and corrected, and how much there is of everything."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from photostrip.report.page.figures import counted, fixed, metres, micrometres
+from photostrip.report.page.parts import Column, Facts, Section, Table
+from photostrip.report.sections.models import measured, of_models, project_rows, scale_word
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+Document = dict[str, Any]
+
+
+def project_section(document: Document) -> Section:
+    """Project: what was asked for, and what its numbers mean."""
+    meaning = document["conventions"]
+    scale, models = scale_word(document), of_models(document)
+    rows = [
+        ("adjustment", _adjustment(document)),
+        ("ground frame", document["frame"]["description"]),
+        ("differences", meaning["dx, dy, dz"]),
+        (f"at {scale} scale", f"metres divided by the denominator of the {scale} scale, in micrometres (µm)"),
+        ("rotations", f"{meaning['angles']}; {meaning['rotation']}"),
+        *((f"camera {camera['id']}", _camera(camera)) for camera in document["cameras"]),
+        *_corrections(document["corrections"])[1 if models else 0 :],
+        *(project_rows(document) if models else _of_photos(document["settings"])),
+    ]
+    return Section("Project", (Facts(tuple(rows)),))
+
+
+def _of_photos(settings: Document) -> list[tuple[str, str]]:
+    """Say how photos are made a strip."""
+    transfer = settings["formation"]["scale_transfer"].replace("_", " ")
+    return [("screening", _screening(settings["relative"])), ("scale transfer", transfer)]
+
+
+def _adjustment(document: Document) -> str:
+    if document["adjustment"] == "covariance":
+        alone = document["settings"].get("covariance", {}).get("distances") is False
+        return "with the covariance of the strip itself" + (", control alone" if alone else "")
+    if document["adjustment"] != "polynomial":
+        return str(document["adjustment"])
+    return f"polynomial, degree {document['settings']['polynomial']['degree']}"
+
+
+def _camera(camera: Document) -> str:
+    x0, y0 = camera["principal_point_mm"]
+    text = f"principal distance {camera['principal_distance_mm']:g} mm, principal point {x0:g}, {y0:g} mm"
+    if camera["format_mm"]:
+        text += ", format {:g} x {:g} mm".format(*camera["format_mm"])
+    return f"{text}, {'distortion ' + camera['distortion'] if camera['distortion'] else 'no distortion'}"
+
+
+def _corrections(corrections: Document) -> list[tuple[str, str]]:
+    effects = (("principal_point", "principal point"), ("distortion", "lens distortion"), ("refraction", "refraction"))
+    image = [f"{name} {_effect(corrections[key])}" for key, name in effects]
+    curvature = corrections["earth_curvature"]
+    size = f", up to {metres(curvature['largest'])} m in height" if curvature["largest"] else ""
+    if "largest_um" in curvature:
+        size = f", up to {micrometres(curvature['largest_um'])} µm"
+    interior = corrections["interior"]
+    rows = [("image corrections", ", ".join(image)), ("Earth curvature", f"{curvature['treatment']}{size}")]
+    return [*([("fiducial marks", _interior(interior))] if interior else []), *rows]
+
+
+def _effect(effect: Document) -> str:
+    return f"up to {micrometres(effect['largest_um'])} µm" if effect["applied"] else "none"
+
+
+def _interior(interior: Document) -> str:
+    text = f"{' and '.join(interior['transforms'])} transformation of {counted(interior['photos'], 'photo')}"
+    if interior["largest_um"] is not None:
+        text += (
+            f"; residuals rms {micrometres(interior['rms_um'])} µm, largest {micrometres(interior['largest_um'])} µm, "
+            f"at mark {interior['largest_mark']} of photo {interior['largest_photo']}"
+        )
+    if interior.get("interpolated"):
+        text += "; interpolated to the points"
+    return text
+
+
+def _screening(settings: Document) -> str:
+    method, limit = settings["screening"], settings["parallax_limit"]
+    if method not in {"parallax+grubbs", "tau"}:
+        return str(method)
+    text = f"{method}, level {settings['grubbs_alpha']:g}"
+    if method == "parallax+grubbs":
+        text += f", y parallax up to {'4 of its standard deviations' if limit is None else f'{limit * 1000:g} µm'}"
+    return text
+
+
+def counts_section(document: Document) -> Section:
+    """How much there is of everything."""
+    counts, strips = document["counts"], document["strips"]
+    by_role = (
+        f"{counts['points']}: {counts['new_points']} new, {counts['control_points']} control "
+        f"({counts['control_plan']} in plan, {counts['control_height']} in height), {counts['check_points']} check"
+    )
+    rows = [
+        ("photos", f"{counts['photos']} in {counted(counts['strips'], 'strip')}, {counted(counts['models'], 'model')}"),
+        ("points", by_role),
+        *(
+            measured(document)
+            if of_models(document)
+            else (
+                ("image points", f"{counts['image_points']} measured, {counts['image_points_used']} used"),
+                ("rejected", _rejections(counts)),
+            )
+        ),
+        ("without coordinates", counted(counts["not_determined"], "point")),
+    ]
+    if len(strips) == 1:
+        rows.append((f"{scale_word(document)} scale", _scale(strips[0])))
+        return Section("Counts", (Facts(tuple(rows)),))
+    return Section("Counts", (Facts(tuple(rows)), _strips(strips)))
+
+
+def _rejections(counts: Document) -> str:
+    text = "{rejected_in_pairs} in pairs, {rejected_in_scale_transfer} in scale transfers".format(**counts)
+    if "rejected_in_bundle" in counts:
+        return f"{counts['rejected_in_bundle']} in the bundle adjustment; while the strips were formed {text}"
+    points = counts["rejected_for_rays"]
+    return f"{text}, {counted(points, 'point')} with rays that contradict each other" if points else text
+
+
+def _scale(strip: Document) -> str:
+    return (
+        f"1:{strip['photo_scale'] or strip['model_scale']:.0f}, flying height {fixed(strip['flying_height'], 0)} m "
+        f"above ground, base {fixed(strip['base'], 0)} m, azimuth {strip['azimuth_deg']:.1f} deg"
+    )
+
+
+def _strips(strips: Sequence[Document]) -> Table:
+    columns = (
+        Column("strip", left=True),
+        Column("photos"),
+        Column("points"),
+        Column("scale 1:"),
+        Column("height", "m"),
+        Column("base", "m"),
+        Column("azimuth", "deg"),
+        Column("σ0", "µm"),
+        Column("image rms", "µm", rank=1),
+    )
+    rows = tuple(
+        (
+            s["id"],
+            str(s["photos"]),
+            str(s["points"]),
+            f"{s['photo_scale'] or s['model_scale']:.0f}",
+            fixed(s["flying_height"], 0),
+            fixed(s["base"], 0),
+            f"{s['azimuth_deg']:.1f}",
+            micrometres(s["sigma0_um"]),
+            micrometres(s["image_rms_um"]),
+        )
+        for s in strips
+    )
+    return Table(columns, rows)

@@ -1,0 +1,72 @@
+"""Whether a result can be used, in a sentence; what to look at; the tolerances."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from photostrip.report.page.figures import counted, fixed, short, unit
+from photostrip.report.page.parts import Column, Part, Section, Table, Words
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+Document = dict[str, Any]
+
+HEADLINES = {
+    "good": "GOOD: nothing calls for a second look.",
+    "look": "LOOK at {number} before you use this:",
+    "failed": "FAILED: {failed}.",
+}
+LOOK_SHOWN = 10
+
+
+def headline(document: Document) -> str:
+    """Say in one sentence whether the result can be used."""
+    tolerances = document["tolerances"]
+    failed = sum(not each["passed"] for each in tolerances)
+    number = counted(len(document["verdict"]["look_at"]), "thing")
+    reasons = [f"{failed} of {counted(len(tolerances), 'tolerance')} not kept"] if failed else []
+    wrong = sum(each["severity"] == "error" and not each["accepted"] for each in document.get("findings", []))
+    if wrong:
+        reasons.append(f"the data contradict themselves, {counted(wrong, 'finding')}")
+    return HEADLINES[document["status"]].format(number=number, failed="; ".join(reasons))
+
+
+def accuracy(document: Document) -> Words:
+    """Return the sentence on what is left at the check points, or at the control."""
+    text = document["verdict"]["accuracy"]
+    return Words(f"{text[0].upper()}{text[1:]}.")
+
+
+def verdict_section(document: Document, *, everything: bool = False) -> Section:
+    """Whether the result can be used, and what to look at."""
+    look_at = document["verdict"]["look_at"]
+    shown = look_at if everything else look_at[:LOOK_SHOWN]
+    parts: list[Part] = [Words(headline(document), document["status"]), accuracy(document)]
+    parts += [Words(text, "", f"{number}.") for number, text in enumerate(shown, 1)]
+    if len(look_at) > len(shown):
+        parts.append(Words(f"{len(look_at) - len(shown)} more in `verdict` of result.json"))
+    if document["tolerances"]:
+        parts.append(_tolerances(document["tolerances"]))
+    return Section("Verdict", tuple(parts))
+
+
+def _tolerances(tolerances: Sequence[Document]) -> Table:
+    columns = (
+        Column("tolerance", left=True),
+        Column("found"),
+        Column("allowed"),
+        Column("", left=True),
+        Column("", left=True),
+    )
+    rows = tuple(
+        (
+            each["name"],
+            fixed(each["value"], 2 if each["unit"] == "um" else 4),
+            short(each["limit"], 6),
+            unit(each["unit"]),
+            "kept" if each["passed"] else "NOT KEPT",
+        )
+        for each in tolerances
+    )
+    return Table(columns, rows)
