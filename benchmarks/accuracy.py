@@ -176,7 +176,7 @@ def run(task: Task) -> Outcome:
         wanted = replace(
             settings,
             adjustment="similarity" if simple else "polynomial",
-            polynomial=correction.Settings(AUTO if simple else choice),
+            polynomial=correction.PolynomialSettings(AUTO if simple else choice),
         )
         result = triangulate(inputs, wanted)
         squares[choice] = mean_squares(simulation, result, result.points.cartesian)

@@ -126,7 +126,7 @@ def precision(repetitions: int) -> None:
         for degree in ("", "1", "2"):
             settings = Settings(
                 "polynomial" if degree else "similarity",
-                polynomial=correction.Settings(degree or "auto"),
+                polynomial=correction.PolynomialSettings(degree or "auto"),
                 links=link_screening.Settings("none"),
             )
             ratios = scatter(models, settings, repetitions)

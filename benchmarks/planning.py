@@ -176,7 +176,7 @@ def run_settings(method: str) -> Settings:
     """Give settings of a run by one of the methods, without a search for gross errors."""
     return Settings(
         relative=RelativeSettings(screening="none"),
-        polynomial=correction.Settings(DEGREES.get(method, "auto")),
+        polynomial=correction.PolynomialSettings(DEGREES.get(method, "auto")),
         adjustment="polynomial" if method in DEGREES else method,
     )
 

@@ -146,7 +146,7 @@ def settings(method: str, *, screening: str = "none", precision: bool = True) ->
         adjustment=adjustments.get(method, "polynomial"),
         covariance=conditions.Settings(distances=method != ALONE),
         relative=RelativeSettings(screening=screening),
-        polynomial=correction.Settings(degree),
+        polynomial=correction.PolynomialSettings(degree),
         precision=precision,
     )
 

@@ -120,12 +120,12 @@ class Settings:
     relative: RelativeSettings = field(default_factory=RelativeSettings)
     formation: StripFormationSettings = field(default_factory=StripFormationSettings)
     links: link_screening.Settings = field(default_factory=link_screening.Settings)
-    absolute: absolute.Settings = field(default_factory=absolute.Settings)
-    polynomial: polynomial.Settings = field(default_factory=polynomial.Settings)
+    absolute: absolute.AbsoluteSettings = field(default_factory=absolute.AbsoluteSettings)
+    polynomial: polynomial.PolynomialSettings = field(default_factory=polynomial.PolynomialSettings)
     covariance: conditions.Settings = field(default_factory=conditions.Settings)
     bundle: bundle.Settings = field(default_factory=bundle.Settings)
-    interior: interior.Settings = field(default_factory=interior.Settings)
-    refinement: refinement.Settings = field(default_factory=refinement.Settings)
+    interior: interior.InteriorSettings = field(default_factory=interior.InteriorSettings)
+    refinement: refinement.ImageCorrectionSettings = field(default_factory=refinement.ImageCorrectionSettings)
     precision: bool = True  # whether standard deviations and covariances of points and photos are computed
     # angle_system, angle_unit: system (``geometry.rotation.SYSTEMS``) and unit (``"deg"``, ``"gon"``, ``"rad"``) of
     # exported angles

@@ -160,7 +160,7 @@ def _fitted(strip: IdealStrip, ground: _Fit, method: str) -> Accuracy:
     terms: list[tuple[str, ...]] = [(), (), ()]
     if method in DEGREES:
         problem = correction.Problem(xyz[numbers], targets, weight, strip.geometry.base, _breadth(xyz))
-        terms = [axis.terms for axis in correction.fit(problem, correction.Settings(DEGREES[method])).axes]
+        terms = [axis.terms for axis in correction.fit(problem, correction.PolynomialSettings(DEGREES[method])).axes]
     axes = targets.axes(xyz[numbers])
     found = control_errors.misclosures(strip.errors.points, control, numbers, axes)
     shift = targets.intermediate.intermediate_from_cartesian(strip.errors.origin[None])[0]

@@ -42,7 +42,7 @@ PLAN, HEIGHT = slice(0, 2), 2
 
 
 @dataclass(frozen=True)
-class Settings:
+class AbsoluteSettings:
     """How the Earth's shape enters."""
 
     # ``"auto"`` or ``"none"``: the frames carry it (``local`` is truly Cartesian); ``"model"``: eq. 153, for plane map

@@ -48,7 +48,7 @@ def run(name: str, frame: str, adjustment: str, degree: str = "auto") -> Result:
     control = control_points(given, check=list(check))
     strip = Strip("A", Camera("camera", example.input["f"]), observations.photo_ids)
     spec = GEOGRAPHIC if frame == "geographic" else GEOCENTRIC
-    settings = Settings(adjustment=adjustment, polynomial=correction.Settings(degree))
+    settings = Settings(adjustment=adjustment, polynomial=correction.PolynomialSettings(degree))
     return triangulate(Inputs(name, (strip,), observations, control, (spec,)), settings)
 
 

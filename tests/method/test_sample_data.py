@@ -383,7 +383,11 @@ def on_a_plane(radius: float | None = None) -> tuple[Floats, Floats, Result]:
     inputs = given.inputs
     plane = FrameSpec("local", ("east", "north", "up"))
     inputs = replace(inputs, control=replace(inputs.control, enu=ground), frames=(plane,), output=None)
-    curvature = absolute_orientation.Settings() if radius is None else absolute_orientation.Settings("model", radius)
+    curvature = (
+        absolute_orientation.AbsoluteSettings()
+        if radius is None
+        else absolute_orientation.AbsoluteSettings("model", radius)
+    )
     found = triangulate(inputs, replace(with_settings(APOLLO), absolute=curvature))
     return ground, found.control_differences, found
 

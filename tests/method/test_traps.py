@@ -28,11 +28,13 @@ if TYPE_CHECKING:
 CUBIC = ("1", "X", "Y", "XY", "X^2", "X^3")
 SIMILARITY = Settings(adjustment="similarity")
 LOCAL = FrameSpec("local", ("east", "north", "up"))
-PLANE_MAP = replace(Settings(), absolute=absolute_orientation.Settings(earth_curvature="model"))  # curvature by eq. 153
+PLANE_MAP = replace(
+    Settings(), absolute=absolute_orientation.AbsoluteSettings(earth_curvature="model")
+)  # curvature by eq. 153
 
 
 def degree(asked: str) -> Settings:
-    return Settings(polynomial=correction.Settings(asked))
+    return Settings(polynomial=correction.PolynomialSettings(asked))
 
 
 def errors(simulation: Simulation, result: Result) -> Floats:
@@ -130,7 +132,7 @@ def east_west_strip() -> tuple[Simulation, StripResult, Result]:
     xy = inputs.observations.xy
     radius = np.hypot(*xy.T)[:, None]
     bad = replace(inputs, observations=replace(inputs.observations, xy=xy * (1 + 2e-8 * radius**2)))  # 20 um at 100 mm
-    result = triangulate(bad, replace(SIMILARITY, polynomial=correction.Settings("3")))
+    result = triangulate(bad, replace(SIMILARITY, polynomial=correction.PolynomialSettings("3")))
     return done, result.strips[0], result
 
 
@@ -142,7 +144,7 @@ def corrected_in(azimuth: float, strip: StripResult, result: Result) -> tuple[Fl
     weight = absolute_orientation.weights(strip.control, strip.precision)
     breadth = float(np.quantile(np.abs(xyz[:, 1]), 0.95))
     problem = correction.Problem(xyz[strip.control_rows], targets, weight, spacing=850.0, breadth=breadth)
-    found = correction.fit(problem, correction.Settings("3"))
+    found = correction.fit(problem, correction.PolynomialSettings("3"))
     return frame.cartesian_from_intermediate(found(xyz)), found
 
 

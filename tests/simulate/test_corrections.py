@@ -55,10 +55,10 @@ def ideal(done: Simulation) -> Floats:
 def corrected(done: Simulation, *, transform: str = "affine", camera: Camera = LENS, refraction: bool = True) -> Floats:
     cameras = dict.fromkeys(done.truth.photo_ids, camera)
     assert done.fiducials is not None
-    oriented = interior.orient(done.fiducials, cameras, interior.Settings(transform))
+    oriented = interior.orient(done.fiducials, cameras, interior.InteriorSettings(transform))
     photo = interior.transform(done.observations, oriented)
     flying, ground = (float(xyz[:, 2].mean()) for xyz in (done.truth.centers_ground, done.truth.ground.xyz))
-    settings = corrections.Settings(refraction=refraction, flying_height=flying, ground_height=ground)
+    settings = corrections.ImageCorrectionSettings(refraction=refraction, flying_height=flying, ground_height=ground)
     return corrections.refine(photo, cameras, settings).observations.xy
 
 

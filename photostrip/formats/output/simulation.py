@@ -83,7 +83,7 @@ def _inputs_of_models(simulation: Simulation, points: ModelPoints) -> Inputs:
 
 def settings_of(simulation: Simulation) -> Settings:
     """Return the settings that the written project has: defaults, and refraction when it was simulated."""
-    return Settings(refinement=corrections.Settings(refraction=simulation.spec.refraction))
+    return Settings(refinement=corrections.ImageCorrectionSettings(refraction=simulation.spec.refraction))
 
 
 # ------------------------------------------------------------------------------------------------- as files

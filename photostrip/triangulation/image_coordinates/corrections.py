@@ -48,7 +48,7 @@ ITERATIONS = 20
 
 
 @dataclass(frozen=True)
-class Settings:
+class ImageCorrectionSettings:
     """Which corrections are applied."""
 
     # principal_point, distortion: reduce to the principal point of the camera; take out its lens distortion
@@ -106,7 +106,7 @@ class Refined:
 def refine(
     observations: PhotoPoints,
     camera_of_photo: Mapping[str, Camera],
-    settings: Settings,
+    settings: ImageCorrectionSettings,
     *,
     flying_height: float | None = None,
     ground_height: float | None = None,
@@ -309,7 +309,7 @@ def _density(height_km: float) -> float:
     return _pressure(height_km) / (1 - LAPSE * min(height_km, TROPOPAUSE))
 
 
-def _bending(settings: Settings, flying_height: float | None, ground_height: float | None) -> Bending:
+def _bending(settings: ImageCorrectionSettings, flying_height: float | None, ground_height: float | None) -> Bending:
     if not settings.needs_heights:
         return NOTHING_BENT
     flying = flying_height if settings.flying_height is None else settings.flying_height

@@ -48,7 +48,7 @@ SHOWN = 5  # ids in a sentence
 
 
 @dataclass(frozen=True)
-class Settings:
+class InteriorSettings:
     """How photo coordinates are formed from measured fiducial marks."""
 
     # ``"conformal"`` (two marks or more), ``"affine"`` (three or more), ``"bilinear"`` or ``"projective"`` (four or
@@ -95,7 +95,7 @@ class InteriorOrientation:
         object.__setattr__(self, "residuals", tuple(frozen(each) for each in self.residuals))
 
 
-def orient(fiducials: PhotoPoints, cameras: Mapping[str, Camera], settings: Settings) -> InteriorOrientation:
+def orient(fiducials: PhotoPoints, cameras: Mapping[str, Camera], settings: InteriorSettings) -> InteriorOrientation:
     """Interior orientation of all photos.
 
     Parameters

@@ -26,13 +26,13 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["DEGREES", "GROUPS", "AxisFit", "Evidence", "Polynomial", "Problem", "Settings", "fit"]
+__all__ = ["DEGREES", "GROUPS", "AxisFit", "Evidence", "Polynomial", "PolynomialSettings", "Problem", "fit"]
 
 DEGREES = ("auto", "1", "2", "3")
 
 
 @dataclass(frozen=True)
-class Settings:
+class PolynomialSettings:
     """Which polynomial takes out the strip deformation."""
 
     degree: str = "auto"  # ``"auto"`` (decided by evidence), ``"1"``, ``"2"`` or ``"3"``
@@ -73,12 +73,12 @@ class Polynomial:
         return xyz + self.corrections(xyz)
 
 
-def fit(problem: Problem, settings: Settings) -> Polynomial:
+def fit(problem: Problem, settings: PolynomialSettings) -> Polynomial:
     """Fit the polynomial that the settings ask for, or the one that the evidence supports.
 
     Parameters
     ----------
-    settings : Settings
+    settings : PolynomialSettings
         Degree, or ``"auto"``.
 
     Returns

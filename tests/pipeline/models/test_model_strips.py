@@ -73,7 +73,7 @@ def test_a_bent_strip_takes_its_centers_along() -> None:
 
     beam = replace(given, points=bent(given.points), centers=bent(given.centers))
     points = beam.measured()
-    settings = Settings(polynomial=correction.Settings("2"))
+    settings = Settings(polynomial=correction.PolynomialSettings("2"))
     plain, strip = (linked(inputs(given, points, bands=9), each) for each in (PLAIN, settings))
     off = [np.abs(s.intermediate.cartesian_from_intermediate(s.centers) - given.centers).max() for s in (plain, strip)]
     assert off[0] > 1.0
@@ -216,7 +216,7 @@ def test_centers_follow_the_polynomial_as_a_stiff_body() -> None:
 
 def straight(adjustment: str) -> Settings:
     """Settings in which nothing is decided from the data."""
-    return Settings(adjustment, polynomial=correction.Settings("1"), links=link_screening.Settings("none"))
+    return Settings(adjustment, polynomial=correction.PolynomialSettings("1"), links=link_screening.Settings("none"))
 
 
 def test_the_whole_chain_agrees_with_differences() -> None:

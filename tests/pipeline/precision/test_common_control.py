@@ -49,7 +49,7 @@ def by_strip(inputs: Inputs, wanted: Settings) -> list[Floats]:
 def test_common_control_makes_common_errors(adjustment: str) -> None:
     """Mean of two strips: a quarter of both covariances, and twice what their shared control does to both."""
     inputs = two_strips()
-    wanted = Settings(adjustment=adjustment, relative=UNSCREENED, polynomial=correction.Settings("1"))
+    wanted = Settings(adjustment=adjustment, relative=UNSCREENED, polynomial=correction.PolynomialSettings("1"))
     result = triangulate(inputs, wanted)
     observations, assured = result.refined.observations, result.precision
     assert assured is not None

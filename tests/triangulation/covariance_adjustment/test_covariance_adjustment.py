@@ -278,7 +278,7 @@ def test_check_points_together_follow_chi_square(adjustment: str) -> None:
 def test_repetitions_scatter_as_stated() -> None:
     """One strip of six photos with mixed control drawn anew 250 times, which knows the scatter to about 3 %."""
     inputs = without_noise(spec(6, use={"xyz": 0.5, "xy": 0.25, "z": 0.25}))
-    base = Settings(relative=UNSCREENED, polynomial=correction.Settings("2"))
+    base = Settings(relative=UNSCREENED, polynomial=correction.PolynomialSettings("2"))
     settings = {name: replace(base, adjustment=name) for name in ("polynomial", "covariance")}
     truth, rng = triangulate(inputs, base), np.random.default_rng(12)
     strip, true = truth.strips[0].strip, truth.points.cartesian

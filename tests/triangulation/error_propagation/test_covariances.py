@@ -31,7 +31,7 @@ def settings(adjustment: str, transfer: str = "least_squares") -> Settings:
         adjustment="similarity" if adjustment == "similarity" else "polynomial",
         relative=UNSCREENED,
         formation=StripFormationSettings(transfer),
-        polynomial=correction.Settings(degree),
+        polynomial=correction.PolynomialSettings(degree),
     )
 
 

@@ -17,7 +17,7 @@ from photostrip.camera import Camera, Distortion
 from photostrip.errors import GeometryError, InputError
 from photostrip.points import PhotoPoints
 from photostrip.triangulation.image_coordinates import corrections, lens_distortion
-from photostrip.triangulation.image_coordinates.corrections import Bending, Refined, Settings
+from photostrip.triangulation.image_coordinates.corrections import Bending, ImageCorrectionSettings, Refined
 
 Floats = NDArray[np.float64]
 
@@ -63,8 +63,8 @@ def observed(xy: Floats, photos: tuple[str, ...] = ("1",)) -> PhotoPoints:
     )
 
 
-def refine(xy: Floats, camera: Camera, settings: Settings | None = None) -> Refined:
-    return corrections.refine(observed(xy), {"1": camera}, settings or Settings())
+def refine(xy: Floats, camera: Camera, settings: ImageCorrectionSettings | None = None) -> Refined:
+    return corrections.refine(observed(xy), {"1": camera}, settings or ImageCorrectionSettings())
 
 
 unit = st.floats(-1, 1)
@@ -117,7 +117,7 @@ def test_every_correction_has_its_inverse(camera: Camera, image: Floats, constan
 
 @given(cameras, image_points)
 def test_a_table_of_points_is_refined_as_its_camera_alone(camera: Camera, image: Floats) -> None:
-    settings = Settings(refraction=True, flying_height=3000.0, ground_height=200.0)
+    settings = ImageCorrectionSettings(refraction=True, flying_height=3000.0, ground_height=200.0)
     found = refine(image, camera, settings).observations
     constant = Bending(corrections.refraction_constant(3000.0, 200.0))
     assert np.array_equal(found.xy, corrections.undistort(image, camera, constant))
@@ -415,7 +415,7 @@ def test_refraction_is_that_of_a_ray_through_the_standard_atmosphere(
 ) -> None:
     ideal, _ = traced(radius, flying, ground)
     assert ideal < radius  # the ray bends towards the denser air below: the image lies too far outside
-    settings = Settings(refraction=True, flying_height=flying, ground_height=ground)
+    settings = ImageCorrectionSettings(refraction=True, flying_height=flying, ground_height=ground)
     found = refine(np.array([[0.6 * radius, -0.8 * radius]]), PLAIN, settings)
     corrected = np.hypot(*found.observations.xy[0])
     assert corrected < radius
@@ -468,15 +468,15 @@ def test_refraction_shift_is_the_textbook_form(radius: float, flying: float) -> 
 def test_heights_of_the_settings_go_before_those_of_the_caller() -> None:
     image = np.array([[100.0, 100.0]])
 
-    def largest(settings: Settings) -> float:
+    def largest(settings: ImageCorrectionSettings) -> float:
         found = corrections.refine(observed(image), {"1": PLAIN}, settings, flying_height=5000.0, ground_height=500.0)
         return found.largest_um["refraction"]
 
     radius = np.hypot(100.0, 100.0)
     for settings, flying, ground in (
-        (Settings(refraction=True), 5000.0, 500.0),
-        (Settings(refraction=True, flying_height=4000.0), 4000.0, 500.0),
-        (Settings(refraction=True, flying_height=4000.0, ground_height=0.0), 4000.0, 0.0),
+        (ImageCorrectionSettings(refraction=True), 5000.0, 500.0),
+        (ImageCorrectionSettings(refraction=True, flying_height=4000.0), 4000.0, 500.0),
+        (ImageCorrectionSettings(refraction=True, flying_height=4000.0, ground_height=0.0), 4000.0, 0.0),
     ):
         expected = corrections.refraction_shift(radius, FOCAL, corrections.refraction_constant(flying, ground))
         assert largest(settings) == pytest.approx(expected / MICROMETRE)
@@ -485,9 +485,9 @@ def test_heights_of_the_settings_go_before_those_of_the_caller() -> None:
 def test_refraction_without_heights_or_below_the_ground_is_refused() -> None:
     image = np.array([[1.0, 1.0]])
     with pytest.raises(InputError, match="flying height and height of the ground are not known"):
-        refine(image, PLAIN, Settings(refraction=True, flying_height=3000.0))
+        refine(image, PLAIN, ImageCorrectionSettings(refraction=True, flying_height=3000.0))
     with pytest.raises(InputError, match="the flying height 400 m is not above the ground, 900 m"):
-        refine(image, PLAIN, Settings(refraction=True, flying_height=400.0, ground_height=900.0))
+        refine(image, PLAIN, ImageCorrectionSettings(refraction=True, flying_height=400.0, ground_height=900.0))
 
 
 # ------------------------------------------------------------------------------------------- Earth curvature
@@ -519,10 +519,10 @@ def test_the_textbook_size_of_curvature() -> None:
 
 def test_curvature_tells_its_largest_shift_and_needs_heights() -> None:
     image = np.array([[140.0, 0.0], [10.0, 0.0]])
-    settings = Settings(earth_radius=6370000.0, flying_height=4590.0, ground_height=0.0)
+    settings = ImageCorrectionSettings(earth_radius=6370000.0, flying_height=4590.0, ground_height=0.0)
     assert refine(image, PLAIN, settings).largest_um == {"earth curvature": pytest.approx(42.2, abs=0.1)}
     with pytest.raises(InputError, match="earth_curvature: flying height and height of the ground are not known"):
-        refine(image, PLAIN, Settings(earth_radius=6370000.0))
+        refine(image, PLAIN, ImageCorrectionSettings(earth_radius=6370000.0))
     with pytest.raises(InputError, match="earth_curvature: the flying height 4590 m is not above the ground, 5000 m"):
         refine(image, PLAIN, replace(settings, ground_height=5000.0))
 
@@ -535,7 +535,7 @@ def test_each_photo_gets_its_camera() -> None:
     second = replace(PLAIN, name="second", distortion=brown(FORWARD, (1e-7, 0.0, 0.0)))
     image = np.array([[30.0, 40.0], [60.0, 80.0]])
     used = {"a": first, "b": second, "c": PLAIN, "d": first}
-    found = corrections.refine(observed(image, tuple(used)), used, Settings())
+    found = corrections.refine(observed(image, tuple(used)), used, ImageCorrectionSettings())
     expected = np.vstack([corrections.undistort(image, camera) for camera in used.values()])
     assert np.array_equal(found.observations.xy, expected)
     assert np.array_equal(found.observations.xy[4:6], image)
@@ -547,21 +547,25 @@ def test_every_fault_of_every_camera_is_told_at_once() -> None:
     folding = replace(PLAIN, name="folding", distortion=brown(FORWARD, (-1e-4, 0.0, 0.0)))
     short = replace(PLAIN, name="short", distortion=table(FORWARD, (0.0, 50.0)))
     with pytest.raises(InputError) as caught:
-        corrections.refine(observed(np.full((1, 2), 60.0), ("a", "b")), {"a": folding, "b": short}, Settings())
+        corrections.refine(
+            observed(np.full((1, 2), 60.0), ("a", "b")), {"a": folding, "b": short}, ImageCorrectionSettings()
+        )
     assert [fault.code for fault in caught.value.faults] == ["distortion-folds", "beyond-distortion-table"]
 
 
 def test_nothing_to_do_costs_nothing_and_a_big_strip_little() -> None:
     photos = tuple(f"{i}" for i in range(1000))
     measured = observed(np.random.default_rng(1).uniform(-110, 110, (30, 2)), photos)
-    assert corrections.refine(measured, dict.fromkeys(photos, PLAIN), Settings()).observations is measured
+    assert (
+        corrections.refine(measured, dict.fromkeys(photos, PLAIN), ImageCorrectionSettings()).observations is measured
+    )
     zeros = replace(PLAIN, distortion=brown(FORWARD, (0.0, 0.0, 0.0)))
-    nothing = corrections.refine(measured, dict.fromkeys(photos, zeros), Settings())
+    nothing = corrections.refine(measured, dict.fromkeys(photos, zeros), ImageCorrectionSettings())
     assert nothing.largest_um == {"distortion": 0.0}
     assert np.array_equal(nothing.observations.xy, measured.xy)
     full = replace(PLAIN, principal_point=(0.01, 0.02), distortion=brown(BACKWARD, (1e-7, 0.0, 0.0), (1e-6, 1e-6)))
     start = time.perf_counter()
-    corrections.refine(measured, dict.fromkeys(photos, full), Settings())
+    corrections.refine(measured, dict.fromkeys(photos, full), ImageCorrectionSettings())
     assert time.perf_counter() - start < 2.0  # 0.03 s measured
 
 
@@ -569,12 +573,12 @@ def test_nothing_to_do_costs_nothing_and_a_big_strip_little() -> None:
 def test_each_correction_has_its_switch(off: str, effect: str) -> None:
     camera = replace(PLAIN, principal_point=(0.012, -0.004), distortion=brown(FORWARD, (1.2e-8, 0.0, 0.0)))
     points = observed(np.array([[80.0, -60.0], [-90.0, 10.0]]), ("1",))
-    both = corrections.refine(points, {"1": camera}, Settings())
-    one = corrections.refine(points, {"1": camera}, replace(Settings(), **{off: False}))
+    both = corrections.refine(points, {"1": camera}, ImageCorrectionSettings())
+    one = corrections.refine(points, {"1": camera}, replace(ImageCorrectionSettings(), **{off: False}))
     assert set(both.largest_um) - set(one.largest_um) == {effect}
     without = (
         replace(camera, principal_point=(0.0, 0.0)) if off == "principal_point" else replace(camera, distortion=None)
     )
-    expected = corrections.refine(points, {"1": without}, Settings())
+    expected = corrections.refine(points, {"1": without}, ImageCorrectionSettings())
     assert np.array_equal(one.observations.xy, expected.observations.xy)
     assert both.largest_um[effect] == pytest.approx(12.6 if off == "principal_point" else 12.0, rel=0.03)

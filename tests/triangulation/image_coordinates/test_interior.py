@@ -17,7 +17,7 @@ from photostrip.errors import InputError
 from photostrip.points import PhotoPoints
 from photostrip.triangulation.image_coordinates import interior
 from photostrip.triangulation.image_coordinates.fiducial_marks import WRONG_PATTERN
-from photostrip.triangulation.image_coordinates.interior import InteriorOrientation, Settings
+from photostrip.triangulation.image_coordinates.interior import InteriorOrientation, InteriorSettings
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -85,7 +85,7 @@ def points(photos: tuple[str, ...], xy: Floats, sigma: tuple[float, float] = (0.
 def orient(
     photos: Mapping[str, Marks], camera: Camera = CORNERS, transform: str = "auto", **more: Camera
 ) -> InteriorOrientation:
-    return interior.orient(table(photos), dict.fromkeys(photos, camera) | more, Settings(transform))
+    return interior.orient(table(photos), dict.fromkeys(photos, camera) | more, InteriorSettings(transform))
 
 
 def messages(photos: Mapping[str, Marks], camera: Camera = CORNERS, transform: str = "auto") -> list[str]:
@@ -192,7 +192,7 @@ def test_weights_follow_the_standard_deviations() -> None:
     marks = film(EIGHT, rng, noise=0.0)
     marks["F1"] = marks["F1"] + [0.3, -0.2]
     sigma = dict.fromkeys(EIGHT.fiducials, 0.005) | {"F1": 0.5}
-    found = interior.orient(table({"1": marks}, sigma), {"1": EIGHT}, Settings())
+    found = interior.orient(table({"1": marks}, sigma), {"1": EIGHT}, InteriorSettings())
     row = found.marks[0].index("F1")
     assert np.linalg.norm(np.delete(found.residuals[0], row, 0), axis=1).max() < 0.05 * MICROMETRE
     assert np.linalg.norm(found.residuals[0][row]) == pytest.approx(np.hypot(0.3, 0.2), rel=3e-3)
@@ -300,7 +300,7 @@ def test_a_mark_measured_twice_is_refused() -> None:
     rows = [0, 1, 2, 3, 0]
     twice = PhotoPoints(("1",), once.point_ids, once.photo[rows], once.point[rows], once.xy[rows], once.sigma[rows])
     with pytest.raises(InputError, match="photo 1: mark F1 is measured 2 times"):
-        interior.orient(twice, {"1": CORNERS}, Settings())
+        interior.orient(twice, {"1": CORNERS}, InteriorSettings())
 
 
 # ------------------------------------------------------------------------------------- turned and mirrored
@@ -457,7 +457,7 @@ def test_photos_of_several_cameras_keep_the_order_of_the_project() -> None:
     rng = np.random.default_rng(4)
     cameras = {"a": CORNERS, "b": DIGITAL, "c": EIGHT, "d": CORNERS, "e": SIDES}
     photos = {photo: film(cameras[photo], rng) for photo in "edca"}
-    found = interior.orient(table(photos), cameras, Settings())
+    found = interior.orient(table(photos), cameras, InteriorSettings())
     assert found.photo_ids == ("a", "c", "d", "e")
     assert found.without_marks == ("b",)
     for row, photo in enumerate(found.photo_ids):
@@ -468,24 +468,24 @@ def test_photos_of_several_cameras_keep_the_order_of_the_project() -> None:
 
 
 def test_digital_photos_pass_as_they_are() -> None:
-    found = interior.orient(table({"a": calibrated(CORNERS)}), {"a": CORNERS, "b": DIGITAL}, Settings())
+    found = interior.orient(table({"a": calibrated(CORNERS)}), {"a": CORNERS, "b": DIGITAL}, InteriorSettings())
     measured = points(("a", "b"), np.array([[1.0, 2.0], [30.0, -40.0]]))
     image = interior.transform(measured, found)
     assert np.array_equal(image.xy[2:], measured.xy[2:])
     assert np.array_equal(image.sigma[2:], measured.sigma[2:])
-    nothing = interior.orient(table({}), {"b": DIGITAL}, Settings())
+    nothing = interior.orient(table({}), {"b": DIGITAL}, InteriorSettings())
     only = points(("b",), np.array([[1.0, 2.0]]))
     assert interior.transform(only, nothing) is only
 
 
 def test_marks_on_a_photo_of_a_camera_without_marks_are_refused() -> None:
     with pytest.raises(InputError, match="photo b: fiducial marks are measured, but camera DMC has none"):
-        interior.orient(table({"b": calibrated(CORNERS)}), {"b": DIGITAL}, Settings())
+        interior.orient(table({"b": calibrated(CORNERS)}), {"b": DIGITAL}, InteriorSettings())
 
 
 def test_marks_of_photos_in_no_strip_are_left_aside() -> None:
     found = interior.orient(
-        table({"a": calibrated(CORNERS), "x": {}, "y": {"F1": np.zeros(2)}}), {"a": CORNERS}, Settings()
+        table({"a": calibrated(CORNERS), "x": {}, "y": {"F1": np.zeros(2)}}), {"a": CORNERS}, InteriorSettings()
     )
     assert found.photo_ids == ("a",)
     assert found.notes[0].photos == ("x", "y")

@@ -18,7 +18,7 @@ from photostrip.pipeline import Settings as RunSettings
 from photostrip.pipeline import triangulate
 from photostrip.triangulation.absolute_orientation import weights
 from photostrip.triangulation.polynomial import correction
-from photostrip.triangulation.polynomial.correction import Problem, Settings, fit
+from photostrip.triangulation.polynomial.correction import PolynomialSettings, Problem, fit
 from photostrip.triangulation.polynomial.terms import bands, choose_terms, count_stations
 from tests.strips import MICROMETRE, control_points, fly, project, targets
 from tests.vectors import cases, section
@@ -90,7 +90,7 @@ def test_the_examples_of_the_formula_book(example: Vector) -> None:
     terms, expected, tol = tuple(example.input["terms"]), example.expected, example.tol
     design = columns(xyz, terms)
     assert np.linalg.matrix_rank(design / np.abs(design).max(axis=0)) == expected["rank"]
-    found = fit(problem(xyz, given_), Settings("3" if "X^3" in terms else "2"))
+    found = fit(problem(xyz, given_), PolynomialSettings("3" if "X^3" in terms else "2"))
     if "error_or_fallback" in expected:
         assert [axis.terms for axis in found.axes] == [SQUARE] * 3
         assert found.degree == 2
@@ -121,7 +121,7 @@ def test_coefficients_of_a_deformation_come_back(seed: int) -> None:
     xyz = layout(SEVEN)
     scale = np.abs(columns(xyz)).max(axis=0)
     truth = rng.uniform(-5, 5, (6, 3)) / scale[:, None]
-    found = fit(problem(xyz, xyz + columns(xyz) @ truth), Settings("3"))
+    found = fit(problem(xyz, xyz + columns(xyz) @ truth), PolynomialSettings("3"))
     for number, axis in enumerate(found.axes):
         assert axis.terms == CUBIC
         assert np.abs((axis.coefficients - truth[:, number]) * scale).max() < 1e-8
@@ -145,7 +145,7 @@ def test_the_fit_is_weighted_least_squares(seed: int) -> None:
     xyz = layout(SEVEN)
     plan, height = rng.uniform(0.05, 0.5, (2, 21, 1))
     given_ = xyz + rng.normal(0, 0.5, xyz.shape)
-    found = fit(problem(xyz, given_, sigma=np.hstack([plan, plan, height])), Settings("3"))
+    found = fit(problem(xyz, given_, sigma=np.hstack([plan, plan, height])), PolynomialSettings("3"))
     design = columns(xyz) / polynomial_scales(xyz)
     for number, sigma in enumerate((plan, plan, height)):
         theirs, *_ = np.linalg.lstsq(design / sigma, (given_ - xyz)[:, number] / sigma[:, 0], rcond=None)
@@ -157,7 +157,7 @@ def test_the_fit_is_weighted_least_squares(seed: int) -> None:
 def test_standard_deviations_are_those_of_the_errors() -> None:
     rng, xyz, errors, sigmas = np.random.default_rng(3), layout(SEVEN), [], []
     for _ in range(100):
-        found = fit(problem(xyz, xyz + rng.normal(0, 0.2, xyz.shape)), Settings("3"))
+        found = fit(problem(xyz, xyz + rng.normal(0, 0.2, xyz.shape)), PolynomialSettings("3"))
         errors += [axis.coefficients for axis in found.axes]
         sigmas += [axis.sigmas for axis in found.axes]
     ratio = np.mean(np.square(errors), axis=0) / np.mean(np.square(sigmas), axis=0)
@@ -168,7 +168,7 @@ def test_standard_deviations_are_those_of_the_errors() -> None:
 
 def test_an_exact_fit_has_no_standard_deviations() -> None:
     xyz = layout([-9000, 0, 9000], rows=(-1400.0, 1400.0))[:5]
-    found = fit(problem(xyz, xyz + 1.0), Settings("2"))
+    found = fit(problem(xyz, xyz + 1.0), PolynomialSettings("2"))
     for axis in found.axes:
         assert axis.redundancy == 0
         assert np.isnan(axis.sigma0)
@@ -219,7 +219,7 @@ def test_control_on_one_side_carries_no_terms_across(y: list[float], terms: tupl
 
 def test_three_bands_of_any_number_of_points_carry_no_cubic() -> None:
     xyz = layout([-9000, 0, 9000], rows=np.linspace(-1400, 1400, 9).tolist())
-    found = fit(problem(xyz, xyz + bent(xyz, 3.0, 2)), Settings("3"))
+    found = fit(problem(xyz, xyz + bent(xyz, 3.0, 2)), PolynomialSettings("3"))
     assert found.degree == 2
     assert found.stations == (3, 3)
     assert found.asked == "3"
@@ -229,7 +229,7 @@ def test_the_degree_asked_for_is_the_degree() -> None:
     xyz = layout(SEVEN)
     one = problem(xyz, xyz + bent(xyz, 3.0, 2))
     for degree in (1, 2, 3):
-        found = fit(one, Settings(str(degree)))
+        found = fit(one, PolynomialSettings(str(degree)))
         assert found.degree == degree
         assert found.evidence[-1].accepted
     assert found.reach == pytest.approx((xyz[:, 0].min(), xyz[:, 0].max()))
@@ -261,7 +261,7 @@ def noisy(seed: int, deformation: Floats, xyz: Floats, sigma: float = 0.05) -> P
 @pytest.mark.parametrize(("power", "degree"), [(2, 2), (3, 3)])
 def test_a_deformation_asks_for_its_degree(power: int, degree: int) -> None:
     xyz = layout(SEVEN)
-    degrees = [fit(noisy(seed, bent(xyz, 3.0, power), xyz), Settings()).degree for seed in range(30)]
+    degrees = [fit(noisy(seed, bent(xyz, 3.0, power), xyz), PolynomialSettings()).degree for seed in range(30)]
     assert min(degrees) == degree
     assert degrees.count(degree) > 15  # a term too many is taken now and then; it costs little
 
@@ -269,14 +269,14 @@ def test_a_deformation_asks_for_its_degree(power: int, degree: int) -> None:
 def test_an_affine_deformation_asks_for_the_first_degree() -> None:
     xyz = layout(SEVEN)
     stretch = np.column_stack([0 * xyz[:, 0], xyz[:, 1] * 1e-3, 0 * xyz[:, 0]])  # 1.4 m at the edges, none along
-    degrees = [fit(noisy(seed, stretch, xyz), Settings()).degree for seed in range(30)]
+    degrees = [fit(noisy(seed, stretch, xyz), PolynomialSettings()).degree for seed in range(30)]
     assert min(degrees) == 1
     assert degrees.count(1) >= 18
 
 
 def test_without_deformation_the_similarity_is_kept_as_often_as_the_tests_say() -> None:
     xyz = layout(SEVEN)
-    degrees = np.array([fit(noisy(seed, 0 * xyz, xyz), Settings()).degree for seed in range(120)])
+    degrees = np.array([fit(noisy(seed, 0 * xyz, xyz), PolynomialSettings()).degree for seed in range(120)])
     kept = (degrees == 0).mean()
     assert 0.5 < kept < 0.95
 
@@ -290,7 +290,7 @@ def test_the_f_test_is_that_of_two_sums_of_squares() -> None:
     affine = np.column_stack([0 * xyz[:, 0], xyz[:, 1] * 1e-3, xyz[:, 1] * 1e-3])  # so that every degree is a step
     one = noisy(1, bent(xyz, 2.0, 2) + affine, xyz, sigma=0.05)
     one = replace(one, weight=one.weight * 1e6)  # the control's own sigma does not limit the variance
-    found, squares = fit(one, Settings()), {}
+    found, squares = fit(one, PolynomialSettings()), {}
     for terms in (("1", "X", "Y"), SQUARE, CUBIC):
         design = columns(one.xyz, terms) / np.abs(columns(one.xyz, terms)).max(axis=0)
         residuals = one.misclosures - design @ np.linalg.lstsq(design, one.misclosures, rcond=None)[0]
@@ -332,7 +332,7 @@ def test_bands_left_out_in_closed_form_are_refitted(seed: int) -> None:
     sigma = np.repeat(rng.uniform(0.05, 0.2, (21, 1)), 3, axis=1)
     given_ = xyz + bent(xyz, 0.5, 2) + rng.normal(0, 1, xyz.shape) * sigma
     one = problem(xyz, given_, sigma=sigma)
-    found = fit(one, Settings("3"))
+    found = fit(one, PolynomialSettings("3"))
     inner = [np.arange(3 * band, 3 * band + 3) for band in range(1, 6)]
     for group, axes in correction.GROUPS:
         for evidence in steps(found, group)[1:]:
@@ -347,7 +347,7 @@ def test_points_left_out_in_closed_form_are_refitted(seed: int) -> None:
     rng = np.random.default_rng(seed)
     xyz = layout([-9000, 0, 9000])  # without its middle band it carries no second degree
     one = problem(xyz, xyz + rng.normal(0, 0.1, xyz.shape))
-    found = fit(one, Settings("2"))
+    found = fit(one, PolynomialSettings("2"))
     single = [[row] for row in range(9)]
     for group, axes in correction.GROUPS:
         for evidence in steps(found, group)[1:]:
@@ -365,7 +365,7 @@ def test_bands_are_left_out_when_the_ladder_says_so_of_what_is_left(seed: int, s
     rows = np.linspace(-1400.0, 1400.0, per_band) * spread
     xyz = layout(rng.permutation(np.linspace(-9000, 9000, stations)) * rng.uniform(0.05, 1.0, stations), rows.tolist())
     one = problem(xyz, xyz + rng.normal(0, 0.1, xyz.shape))
-    found = fit(one, Settings("auto"))
+    found = fit(one, PolynomialSettings("auto"))
     group = bands(xyz[:, 0], one.spacing)
     for kind, _ in correction.GROUPS:
         richest = steps(found, kind)[-1]
@@ -386,7 +386,7 @@ def test_the_similarity_left_out_is_nearly_that_refitted() -> None:
         for rows in inner:
             rest = np.setdiff1d(np.arange(21), rows)
             errors.append(Similarity.from_points(one.xyz[rest], given_[rest])(one.xyz[rows]) - given_[rows])
-        found = fit(one, Settings())
+        found = fit(one, PolynomialSettings())
         theirs = float(np.sqrt(np.mean(np.square(np.concatenate(errors)[:, 2]))))
         ratios.append(steps(found, "height")[0].left_out / theirs)
     assert np.mean(ratios) == pytest.approx(1, abs=0.1)
@@ -395,7 +395,7 @@ def test_the_similarity_left_out_is_nearly_that_refitted() -> None:
 def test_residuals_of_the_evidence_are_those_of_the_control() -> None:
     xyz = layout(SEVEN)
     one = noisy(2, bent(xyz, 2.0, 3), xyz)
-    found = fit(one, Settings())
+    found = fit(one, PolynomialSettings())
     assert steps(found, "plan")[0].rms == pytest.approx(np.sqrt((one.misclosures[:, :2] ** 2).mean()), rel=1e-9)
     last = [e for e in steps(found, "height") if e.accepted][-1]
     assert last.degree == found.degree == 3
@@ -420,7 +420,7 @@ def test_auto_is_never_worse_than_the_similarity_by_more_than_noise(bands_: int)
         moved = similarity(anywhere)
         squares["similarity"] += ((moved - anywhere) ** 2).sum()
         for degree in ("auto", "3"):
-            squares[degree] += ((fit(one, Settings(degree))(moved) - anywhere) ** 2).sum()
+            squares[degree] += ((fit(one, PolynomialSettings(degree))(moved) - anywhere) ** 2).sum()
     auto, forced = (np.sqrt(squares[name] / squares["similarity"]) for name in ("auto", "3"))
     assert 1.0 <= auto < 1.25
     assert auto < forced  # the highest degree pays for every term
@@ -432,7 +432,7 @@ def test_with_a_deformation_auto_takes_nearly_all_of_it_out() -> None:
     for power in (2, 3):
         given_ = xyz + bent(xyz, 5.0, power) + np.random.default_rng(power).normal(0, 0.05, xyz.shape)
         similarity = Similarity.from_points(xyz, given_)
-        found = fit(problem(similarity(xyz), given_, sigma=0.05), Settings())
+        found = fit(problem(similarity(xyz), given_, sigma=0.05), PolynomialSettings())
         error = found(similarity(anywhere)) - anywhere - bent(anywhere, 5.0, power)
         assert 0.005 < np.sqrt((error**2).mean()) < 0.08
 
@@ -445,7 +445,7 @@ def test_plan_and_height_are_fitted_from_what_they_are_given() -> None:
     deformation = bent(xyz, 2.0, 2)
     use = ["xy" if n % 3 == 1 else "z" for n in range(21)]  # plan on the axis, heights at the edges
     one = problem(xyz, xyz + deformation, use)
-    found = fit(one, Settings("2"))
+    found = fit(one, PolynomialSettings("2"))
     plan, height = found.axes[0], found.axes[2]
     assert plan.redundancy == 7 - len(plan.terms)
     assert height.redundancy == 14 - 5
@@ -460,7 +460,7 @@ def test_plan_and_height_are_fitted_from_what_they_are_given() -> None:
 def test_heights_may_be_bent_more_than_plan() -> None:
     xyz = layout(SEVEN)
     only_height = bent(xyz, 5.0, 3) * [0, 0, 1]
-    found = fit(noisy(4, only_height, xyz), Settings())
+    found = fit(noisy(4, only_height, xyz), PolynomialSettings())
     assert max(e.degree for e in steps(found, "height") if e.accepted) == 3
     assert found.axes[2].terms == CUBIC
 
@@ -474,7 +474,7 @@ def test_plan_control_comes_in_along_the_axes_of_its_ground_frame(azimuth: float
     use = ["xy" if n % 2 else "xyz" for n in range(21)]
     one = problem(xyz, np.zeros((21, 3)), use, azimuth_deg=azimuth)
     ground = one.targets.intermediate.cartesian_from_intermediate(xyz + deformation)
-    found = fit(problem(xyz, ground, use, azimuth_deg=azimuth), Settings("2"))
+    found = fit(problem(xyz, ground, use, azimuth_deg=azimuth), PolynomialSettings("2"))
     assert np.allclose(found(xyz), xyz + deformation, rtol=0, atol=1e-6)
 
 
@@ -492,7 +492,7 @@ def test_a_cubic_through_three_stations_would_be_off_by_tens_of_metres_between()
     assert np.abs(xyz + design @ exact - given_).max() < 1e-5  # it fits perfectly
     assert np.abs(between + columns(between) @ exact - truth).max() > 10.0  # metres
     for degree in ("3", "auto"):
-        found = fit(problem(xyz, given_), Settings(degree))
+        found = fit(problem(xyz, given_), PolynomialSettings(degree))
         assert found.degree <= 2
         assert np.abs(found(between) - truth).max() < 1.0
 
@@ -504,7 +504,7 @@ def test_an_axis_along_the_meridian_of_an_east_west_strip_is_thirty_times_worse(
     for azimuth in (90.0, 0.0):
         one = problem(east, given_, azimuth_deg=azimuth)
         one = replace(one, xyz=one.targets.intermediate.intermediate_from_cartesian(east))
-        found = fit(one, Settings("2"))
+        found = fit(one, PolynomialSettings("2"))
         assert found.degree == 2  # the bands across would pass for stations along
         rms[azimuth] = np.sqrt(np.mean([axis.residuals**2 for axis in found.axes]))
     assert 0.01 < rms[90.0] < 0.03
@@ -532,7 +532,7 @@ def strip_result(flown: Flown, heading_deg: float, degree: str = "2", bands_: Se
     """Run a strip whose ground is turned so that it flies in a heading (as simulated: 90 degrees, east)."""
     ground = about_vertical(flown.xyz, 90.0 - heading_deg)
     control = control_points({name: ground[flown.at[name]] for name in flown.bands(*bands_)})
-    settings = RunSettings(polynomial=Settings(degree))
+    settings = RunSettings(polynomial=PolynomialSettings(degree))
     return triangulate(project(flown, control), settings)
 
 
@@ -573,7 +573,7 @@ def test_long_strips_are_warned_of(photos: int, said: bool) -> None:
 def test_control_of_one_kind_leaves_the_other_axes_to_themselves(degree: str, few: str, many: str) -> None:
     xyz = layout(SEVEN)
     use = [few if n in {0, 2, 18} else many for n in range(21)]  # three full points at two stations
-    found = fit(problem(xyz, xyz + bent(xyz, 3.0, 2), use), Settings(degree))
+    found = fit(problem(xyz, xyz + bent(xyz, 3.0, 2), use), PolynomialSettings(degree))
     axes = (2,) if many == "z" else (0, 1)
     for number, axis in enumerate(found.axes):
         assert len(axis.terms) <= (6 if number in axes else 3)

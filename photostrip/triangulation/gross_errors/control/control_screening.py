@@ -190,7 +190,7 @@ def _enough(control: ControlPoints, out: Flags, share: float = LARGEST_SHARE) ->
 def _richest(problem: correction.Problem) -> correction.Polynomial | None:
     """Polynomial of the highest degree that leaves redundancy in every axis; None when there is none."""
     for degree in ("3", "2", "1"):
-        fit = correction.fit(problem, correction.Settings(degree))
+        fit = correction.fit(problem, correction.PolynomialSettings(degree))
         if all(axis.terms and axis.redundancy >= LEAST_REDUNDANCY for axis in fit.axes):
             return fit
     return None
