@@ -144,7 +144,7 @@ def settings(method: str, *, screening: str = "none", precision: bool = True) ->
     adjustments = {"similarity": "similarity", "covariance": "covariance", ALONE: "covariance"}
     return Settings(
         adjustment=adjustments.get(method, "polynomial"),
-        covariance=conditions.Settings(distances=method != ALONE),
+        covariance=conditions.CovarianceSettings(distances=method != ALONE),
         relative=RelativeSettings(screening=screening),
         polynomial=correction.PolynomialSettings(degree),
         precision=precision,

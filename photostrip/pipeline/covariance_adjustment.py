@@ -9,16 +9,13 @@ import numpy as np
 
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.geometry.rotation import from_vector
-from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 from photostrip.notes import Note
 from photostrip.triangulation import absolute_orientation as absolute
 from photostrip.triangulation.covariance_adjustment import conditions as strip_conditions
-from photostrip.triangulation.covariance_adjustment import prediction, reforming, relinearisation
+from photostrip.triangulation.covariance_adjustment import prediction, relinearisation
 from photostrip.triangulation.covariance_adjustment import system as strip_system
-from photostrip.triangulation.covariance_adjustment.conditions import centers_of
 from photostrip.triangulation.error_propagation import control_errors, strip_errors
 from photostrip.triangulation.error_propagation.covariances import image_variance
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ELEMENTS, ErrorRows
 from photostrip.triangulation.resection import resection as exterior
 
 if TYPE_CHECKING:
@@ -54,15 +51,11 @@ class CovarianceAdjustment:
     points: Floats  # (q, 3, 3): covariances of the points, metres^2
     photos: Floats  # (m, 6, 6): covariances of centre and small rotation of the photos
     control: control_errors.Misclosures  # control coordinates that counted
-    tested: prediction.Tested  # test of the whole, and of each of these coordinates
+    tested: prediction.AdjustmentTest  # test of the whole, and of each of these coordinates
     factor: float  # variance factor of the image coordinates
     basis: str  # where it comes from
     sigma: float  # standard deviation of an image coordinate of weight one, mm
-    # errors, conditions, local, system: rows of the strip, conditions, unknowns and the solved system
-    errors: strip_errors.StripErrors
-    conditions: strip_conditions.Conditions
-    local: strip_conditions.Local
-    system: strip_system.System
+    system: strip_system.System  # the solved system, with the rows of the strip and the conditions
     passes: int  # how often the strip was formed
 
     def by_control(self, points: Numbers, coordinates: Numbers) -> Floats:
@@ -80,12 +73,8 @@ class CovarianceAdjustment:
         ndarray, shape (n, 3, c)
             Derivatives, intermediate frame.
         """
-        wanted = self.conditions
-        place = np.empty(len(self.control.point), np.intp)
-        rows = np.flatnonzero(wanted.kind == strip_conditions.CONTROL)
-        place[wanted.source[rows]] = rows
-        things = self.errors.points.take(points)
-        return prediction.by_conditions(self.errors, wanted, self.local, self.system, things, place[coordinates])
+        rows = self.system.errors.points.take(points)
+        return prediction.influence(self.system, rows, self.system.conditions.of_control(coordinates))
 
 
 def adjust(
@@ -94,7 +83,7 @@ def adjust(
     control: tuple[Targets, Numbers],
     observations: PhotoPoints,
     sigma: float,
-    settings: strip_conditions.Settings,
+    settings: strip_conditions.CovarianceSettings,
 ) -> CovarianceAdjustment:
     """Adjust a strip with its own covariance.
 
@@ -108,7 +97,7 @@ def adjust(
         Ideal image coordinates of the project.
     sigma : float
         Standard deviation of an image coordinate of weight one, mm.
-    settings : strip_conditions.Settings
+    settings : strip_conditions.CovarianceSettings
         Which misclosures are distributed.
 
     Returns
@@ -119,48 +108,46 @@ def adjust(
     given = _Given(strip, control, observations, measured(strip, observations), settings)
     factor, basis = image_variance(formed[0], sigma)
     one, passes = _first(given, formed, factor), 1
-    turn = rate = relinearisation.largest_turn(one.system, one.length)
+    turn = rate = relinearisation.largest_turn(one.system)
     while passes < MOST_PASSES and turn * rate / 2 > ENOUGH * sigma / strip.camera.principal_distance:
         one, fresh = _next(given, one, factor, fresh=turn > FRESH), turn > FRESH
-        turn = relinearisation.largest_turn(one.system, one.length)
+        turn = relinearisation.largest_turn(one.system)
         passes, rate = passes + 1, turn if fresh else rate
-    things = [one.errors.points, photo_rows(one.errors)]
-    (points, photos), cofactors = prediction.predict(one.errors, one.conditions, one.local, one.system, things)
-    known = [relinearisation.displacements(one.errors, rows, one.images) for rows in things]
+    errors = one.system.errors
+    tables = [errors.points, prediction.photo_rows(errors)]
+    (points, photos), cofactors = prediction.predict(one.system, tables)
+    known = [relinearisation.displacements(errors, rows, one.images) for rows in tables]
     left = photos.error - known[1]
     similarity = one.absolute.similarity
     return CovarianceAdjustment(
-        similarity(one.formed.xyz) - (points.error - known[0]),
-        similarity(one.formed.centers) - left[:, :3],
-        from_vector(-left[:, 3:]) @ similarity.rotation @ one.formed.rotations,
-        points.covariance * factor,
-        photos.covariance * factor,
-        one.control,
-        prediction.tested(one.conditions, one.system, cofactors, len(one.control.point)),
-        factor,
-        basis,
-        sigma * float(np.sqrt(factor)),
-        one.errors,
-        one.conditions,
-        one.local,
-        one.system,
-        passes,
+        xyz=similarity(one.formed.xyz) - (points.error - known[0]),
+        centers=similarity(one.formed.centers) - left[:, :3],
+        rotations=from_vector(-left[:, 3:]) @ similarity.rotation @ one.formed.rotations,
+        points=points.covariance * factor,
+        photos=photos.covariance * factor,
+        control=one.control,
+        tested=prediction.tested(one.system, cofactors, len(one.control.point)),
+        factor=factor,
+        basis=basis,
+        sigma=sigma * float(np.sqrt(factor)),
+        system=one.system,
+        passes=passes,
     )
 
 
 @dataclass(frozen=True, eq=False)
 class _Given:
-    """What all passes have in common: strip, control, image points, the places of their photos, settings."""
+    """What all linearisations have in common: strip, control, image points, the places of their photos, settings."""
 
     strip: Strip
     control: tuple[Targets, Numbers]
     observations: PhotoPoints
     position: Numbers
-    settings: strip_conditions.Settings
+    settings: strip_conditions.CovarianceSettings
 
 
 @dataclass(frozen=True, eq=False)
-class _Pass:
+class _Linearised:
     """One linear adjustment, at a strip that was formed from image coordinates less the errors known so far.
 
     ``images`` are these errors, in units of the stated standard deviations.
@@ -170,33 +157,29 @@ class _Pass:
     formed: FormedStrip
     absolute: AbsoluteOrientation
     images: Floats
-    errors: strip_errors.StripErrors
     control: control_errors.Misclosures
-    conditions: strip_conditions.Conditions
-    local: strip_conditions.Local
-    length: float
     system: strip_system.System
 
 
-def _first(given: _Given, formed: tuple[Orientation, FormedStrip, AbsoluteOrientation], factor: float) -> _Pass:
+def _first(given: _Given, formed: tuple[Orientation, FormedStrip, AbsoluteOrientation], factor: float) -> _Linearised:
     errors = strip_errors.differentiate_strip(
         formed[0], formed[1], formed[2].similarity, given.position, given.observations.sigma
     )
     return _solved(given, formed, errors, np.zeros((len(errors.images.row), 2)), factor)
 
 
-def _next(given: _Given, before: _Pass, factor: float, *, fresh: bool) -> _Pass:
+def _next(given: _Given, before: _Linearised, factor: float, *, fresh: bool) -> _Linearised:
     """Form the strip from corrected image coordinates, and adjust it with the whole errors as unknowns again.
 
-    The derivatives of the pass before will do, unless the strip has turned too much; then they are made afresh.
+    The derivatives at hand will do, unless the strip has turned too much; then they are made afresh.
     """
-    images = relinearisation.image_errors(before.errors, before.conditions, before.system)
-    seen = before.errors.images
+    images = relinearisation.image_errors(before.system)
+    seen = before.system.errors.images
     xy = given.observations.xy.copy()
     xy[seen.row] -= images * seen.sigma
-    orientation = reforming.oriented_again(before.orientation, xy)
+    orientation = relinearisation.oriented_again(before.orientation, xy)
     observations = replace(given.observations, xy=xy)
-    formed = reforming.formed_again(before.formed, orientation, observations, given.strip.photos)
+    formed = relinearisation.formed_again(before.formed, orientation, observations, given.strip.photos)
     targets, rows = given.control
     # the strip fits its control by now: weights do not matter to where it lies
     oriented = absolute.orient(formed.xyz[rows], targets, targets.control.use.astype(float), formed.xyz)
@@ -205,20 +188,18 @@ def _next(given: _Given, before: _Pass, factor: float, *, fresh: bool) -> _Pass:
         formed = replace(formed, model_xyz=np.where(np.isnan(before.formed.model_xyz), np.nan, formed.model_xyz))
         errors = strip_errors.differentiate_strip(orientation, formed, oriented.similarity, position, sigma)
         return _solved(given, (orientation, formed, oriented), errors, images, factor)
-    found, wanted = before.control, before.conditions
+    found, wanted = before.control, before.system.conditions
     control = oriented.misclosures[found.point, found.axis]
     value = strip_conditions.misclosures_at(wanted, formed, oriented.similarity, control)
-    value += relinearisation.displacements(before.errors, wanted.rows, images)[:, 0]
+    value += relinearisation.displacements(before.system.errors, wanted.rows, images)[:, 0]
     formed = replace(formed, model_xyz=np.where(np.isnan(before.formed.model_xyz), np.nan, formed.model_xyz))
-    system = replace(before.system, solution=before.system.solved_for(value))
     return replace(
         before,
         orientation=orientation,
         formed=formed,
         absolute=oriented,
         images=images,
-        conditions=replace(wanted, value=value),
-        system=system,
+        system=strip_system.solved_for(before.system, replace(wanted, value=value)),
     )
 
 
@@ -228,43 +209,22 @@ def _solved(
     errors: strip_errors.StripErrors,
     images: Floats,
     factor: float,
-) -> _Pass:
+) -> _Linearised:
     """Solve the conditions ``w + H v = A y + H v' + g``, v known so far, v' all errors of the image coordinates."""
     (orientation, strip, oriented), (targets, rows) = formed, given.control
     at_control = oriented.similarity(strip.xyz)[rows]
     found = control_errors.misclosures(errors.points, targets.turned(at_control), rows, targets.axes(at_control))
     misclosures = oriented.misclosures[found.point, found.axis]
-    length = float(np.linalg.norm(errors.pairs.base, axis=1).mean())
-    local = strip_conditions.Local.about(centers_of(errors)[:-1], length)
     wanted = strip_conditions.conditions(
-        errors, (orientation, strip), (found, misclosures), local, distances=given.settings.distances
+        errors, orientation, strip, found, misclosures, distances=given.settings.distances
     )
     if images.any():
         known = relinearisation.displacements(errors, wanted.rows, images)[:, 0]
         wanted = replace(wanted, value=wanted.value + known)
     solved = strip_system.system(errors, wanted, factor)
-    return _Pass(orientation, strip, oriented, images, errors, found, wanted, local, length, solved)
-
-
-def photo_rows(errors: strip_errors.StripErrors) -> ErrorRows:
-    """Rows of derivatives of the photos in the chain: each moves with the model on its right, the last with its own.
-
-    Returns
-    -------
-    ErrorRows
-        Centre and small rotation of each photo, d = 6.
-    """
-    models = errors.models
-    centers = centers_of(errors)
-    frame = np.zeros((models + 1, 6, SIMILARITY_PARAMETERS))
-    frame[:, :3] = similarity_derivatives(centers, np.zeros(3))
-    frame[:, 3:, 3:6] = np.eye(3)
-    core = np.zeros((models + 1, 1, 6, COMPONENTS))
-    core[-1, 0, :3, ELEMENTS] = errors.pairs.base_by_elements[-1]
-    core[-1, 0, 3:, ELEMENTS] = errors.pairs.rotation_by_elements[-1]
-    first = np.append(np.arange(models), models - 1)
-    none = np.zeros(0, np.intp)
-    return ErrorRows(first, frame, core, none, none, np.zeros((0, 6, 2)))
+    return _Linearised(
+        orientation=orientation, formed=strip, absolute=oriented, images=images, control=found, system=solved
+    )
 
 
 def resection(adjusted: CovarianceAdjustment, seen: tuple[Numbers, Floats, Floats], focal: float) -> exterior.Resection:

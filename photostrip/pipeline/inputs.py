@@ -122,7 +122,7 @@ class Settings:
     links: link_screening.Settings = field(default_factory=link_screening.Settings)
     absolute: absolute.AbsoluteSettings = field(default_factory=absolute.AbsoluteSettings)
     polynomial: polynomial.PolynomialSettings = field(default_factory=polynomial.PolynomialSettings)
-    covariance: conditions.Settings = field(default_factory=conditions.Settings)
+    covariance: conditions.CovarianceSettings = field(default_factory=conditions.CovarianceSettings)
     bundle: bundle.Settings = field(default_factory=bundle.Settings)
     interior: interior.InteriorSettings = field(default_factory=interior.InteriorSettings)
     refinement: refinement.ImageCorrectionSettings = field(default_factory=refinement.ImageCorrectionSettings)

@@ -206,12 +206,9 @@ def _predicted(strip: IdealStrip, ground: _Fit) -> Accuracy:
     numbers, errors = ground.numbers, strip.errors
     axes = np.broadcast_to(np.eye(3), (len(numbers), 3, 3))
     found = control_errors.misclosures(errors.points, ground.control, numbers, axes)
-    length = float(np.linalg.norm(errors.pairs.base, axis=1).mean())
-    local = conditions.Local.about(conditions.centers_of(errors)[:-1], length)
-    given = np.zeros(len(found.point))
-    wanted = conditions.conditions(errors, (strip.orientation, strip.formed), (found, given), local)
+    wanted = conditions.conditions(errors, strip.orientation, strip.formed, found, np.zeros(len(found.point)))
     solved = system.system(errors, wanted, 1.0)
-    (points,), cofactors = prediction.predict(errors, wanted, local, solved, [errors.points])
+    (points,), cofactors = prediction.predict(solved, [errors.points])
     rows = np.flatnonzero(wanted.kind == conditions.CONTROL)
     redundant = cofactors[rows] * wanted.noise[rows]
     with np.errstate(divide="ignore", invalid="ignore"):

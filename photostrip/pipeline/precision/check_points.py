@@ -78,11 +78,11 @@ def by_fit(found: Propagation, given: Given, rows: Numbers, factor: float) -> co
 
 def by_covariance(own: CovarianceAdjustment, given: Given) -> covariances.CheckTest:
     """Test the check points of a strip that was adjusted with its own covariance."""
-    wanted = own.conditions
-    taken = prediction.influence(own.errors, wanted, own.local, own.system, given.seen.rows)
+    wanted = own.system.conditions
+    taken = prediction.influence(own.system, given.seen.rows, np.arange(len(wanted.value)))[:, 0]
     # the similarities of the models are unknowns of this adjustment, not errors
     parts = (wanted.rows.without_similarity(), wanted.noise, taken)
-    return _tested(given, _joint(own.errors, given.seen.rows.without_similarity(), parts, own.factor))
+    return _tested(given, _joint(own.system.errors, given.seen.rows.without_similarity(), parts, own.factor))
 
 
 @dataclass(frozen=True, eq=False)

@@ -116,7 +116,7 @@ def _of_covariance(
         adjusted.control.variance,
         adjusted.sigma,
         adjusted.basis,
-        check_points.by_covariance(adjusted, check_points.given_at(strip, adjusted.errors, checks, frames))
+        check_points.by_covariance(adjusted, check_points.given_at(strip, adjusted.system.errors, checks, frames))
         if len(checks[1])
         else None,
     )

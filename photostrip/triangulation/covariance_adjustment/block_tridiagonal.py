@@ -6,7 +6,7 @@ Source: derived; block elimination from the first block on, and the backward rec
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -18,26 +18,23 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
+class InverseRow(NamedTuple):
+    """Blocks of one row of the inverse, (b, b) each, 0 beyond the end."""
+
+    diagonal: Floats
+    following: Floats  # the next block, and
+    after: Floats  # the one after that
+
+
 @dataclass(frozen=True, eq=False)
 class Factors:
     """An eliminated system of n blocks of b rows."""
 
-    inverses: Floats  # (n, b, b): inverses of the pivot blocks
-    shares: Floats  # (n, b, b): those times the blocks beside the diagonal; the last is 0
+    inverses: Floats  # (n, b, b): P_i^-1, inverses of the pivot blocks P_i = D_i - B_(i-1)^T P_(i-1)^-1 B_(i-1)
+    shares: Floats  # (n, b, b): P_i^-1 B_i, B_i the blocks beside the diagonal; the last is 0
 
     def solve(self, right: Floats) -> Floats:
-        """Solve for right sides.
-
-        Parameters
-        ----------
-        right : ndarray, shape (n, b, k)
-            Right sides by blocks.
-
-        Returns
-        -------
-        ndarray, shape (n, b, k)
-            Solutions by blocks.
-        """
+        """Solve for right sides (n, b, k) by blocks."""
         reduced = right.copy()
         for number in range(1, len(right)):
             reduced[number] -= self.shares[number - 1].T @ reduced[number - 1]
@@ -46,21 +43,18 @@ class Factors:
             result[number] -= self.shares[number] @ result[number + 1]
         return result
 
-    def inverse(self) -> Iterator[tuple[int, tuple[Floats, Floats, Floats]]]:
-        """Give blocks of the inverse, from the last row of blocks to the first.
+    def inverse(self) -> Iterator[tuple[int, InverseRow]]:
+        """Yield the rows of blocks of the inverse Z, from the last to the first.
 
-        Yields
-        ------
-        blocks : tuple of ndarray, shape (b, b)
-            Of that row: on the diagonal, the next and the one after; 0 beyond the end.
+        Z(i,k) = -P_i^-1 B_i Z(i+1,k) for k > i, Z(i,i) = P_i^-1 - Z(i,i+1) (P_i^-1 B_i)^T.
         """
         zero = np.zeros_like(self.inverses[0])
-        own, beside = zero, zero
+        diagonal, beside = zero, zero
         for number in range(len(self.inverses) - 1, -1, -1):
             share = self.shares[number]
-            near, far = -(share @ own), -(share @ beside)
-            own, beside = self.inverses[number] - near @ share.T, near
-            yield number, (own, near, far)
+            following, after = -(share @ diagonal), -(share @ beside)
+            diagonal, beside = self.inverses[number] - following @ share.T, following
+            yield number, InverseRow(diagonal, following, after)
 
 
 def eliminate(diagonal: Floats, beside: Floats) -> Factors:
@@ -69,9 +63,9 @@ def eliminate(diagonal: Floats, beside: Floats) -> Factors:
     Parameters
     ----------
     diagonal : ndarray, shape (n, b, b)
-        Blocks on the diagonal, symmetric.
+        Blocks D on the diagonal, symmetric.
     beside : ndarray, shape (n, b, b)
-        Blocks to the right of them; the last does not count.
+        Blocks B to the right of them; the last does not count.
 
     Raises
     ------

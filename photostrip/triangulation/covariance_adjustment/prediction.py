@@ -4,29 +4,37 @@ No polynomial is chosen. The similarities of all models are unknowns; the steps 
 distances of the pass points from the common centres are conditions, whose covariances are exact products of their rows
 by the image coordinates. Written model by model the system is banded and its cost grows with the length of the strip.
 
-Source: derived; see docs/precision.md.
+Source: derived; see docs/precision.md, eq. 7.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
 from photostrip.distributions import gamma_cdf
-from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
+from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 from photostrip.statistics import normal_quantile
-from photostrip.triangulation.covariance_adjustment.conditions import CONTROL, DISTANCE, Conditions, Local
-from photostrip.triangulation.covariance_adjustment.system import Padded, System, pad, products, same_images
+from photostrip.triangulation.covariance_adjustment.block_tridiagonal import InverseRow
+from photostrip.triangulation.covariance_adjustment.conditions import CONTROL, DISTANCE, centers_of
+from photostrip.triangulation.covariance_adjustment.system import (
+    PaddedRows,
+    SameImages,
+    products,
+    rank_in_model,
+    same_images,
+)
 from photostrip.triangulation.error_propagation.covariances import images_with_components, local_covariances
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ELEMENTS, ErrorRows
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.error_propagation.derivatives import ErrorRows
+    from photostrip.triangulation.covariance_adjustment.system import System
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
     Floats = NDArray[np.float64]
@@ -38,14 +46,20 @@ CHECKED = 1e-6  # part of a control coordinate's variance that the others must c
 
 @dataclass(frozen=True, eq=False)
 class Predicted:
-    """Errors of things, as the adjustment finds them."""
+    """Errors of points or photos, as the adjustment finds them."""
 
     error: Floats  # (n, d): to be subtracted
     covariance: Floats  # (n, d, d): of what is left, for a variance factor of 1
 
+    @classmethod
+    def empty(cls, rows: ErrorRows) -> Self:
+        """Room for the errors of rows."""
+        n, size = rows.by_similarity.shape[:2]
+        return cls(np.zeros((n, size)), np.zeros((n, size, size)))
+
 
 @dataclass(frozen=True, eq=False)
-class Tested:
+class AdjustmentTest:
     """What the adjustment says about itself, in the order of the control coordinates."""
 
     squares: float  # weighted sum of squares of all misclosures
@@ -75,215 +89,199 @@ class Tested:
 # ----------------------------------------------------------------------------------------------------- prediction
 
 
-def predict(
-    errors: StripErrors, wanted: Conditions, local: Local, found: System, things: Sequence[ErrorRows]
-) -> tuple[list[Predicted], Floats]:
-    """Predict the errors of things, and say how well they are known.
+def predict(found: System, tables: Sequence[ErrorRows]) -> tuple[list[Predicted], Floats]:
+    """Predict the errors of points and photos, and say how well they are known.
 
-    Parameters
-    ----------
-    things : sequence of ErrorRows
-        Points, photos.
+    With b the column of a row: its covariances with the conditions and its coefficients of the unknowns, e = b^T
+    [lambda; y] and Cov = C - b^T K^-1 b. A row has to do with its own block and the two beside it, so that only the
+    inverse near the diagonal is needed.
 
     Returns
     -------
+    predicted : list of Predicted
+        For each table of rows.
     cofactors : ndarray, shape (n,)
         Of the correlates of the conditions.
     """
-    orders = [np.argsort(rows.first, kind="stable") for rows in things]
-    jobs = [_Job.of(errors, wanted, local, found, rows.take(order)) for rows, order in zip(things, orders, strict=True)]
+    orders = [np.argsort(rows.first, kind="stable") for rows in tables]
+    columns = [_Columns.of(found, rows.take(order)) for rows, order in zip(tables, orders, strict=True)]
+    predicted = [Predicted.empty(rows) for rows in tables]
     layout = found.layout
     cofactors = np.zeros(len(layout.block))
     ends = np.searchsorted(layout.block, np.arange(layout.blocks + 1))
     zero = np.zeros((layout.height, layout.height))
-    window = [(zero, zero, zero)] * 3
-    for number, blocks in found.factors.inverse():
+    none = InverseRow(zero, zero, zero)
+
+    def visit(number: int, before: InverseRow, own: InverseRow, after: InverseRow) -> None:
+        around = np.block(
+            [
+                [before.diagonal, before.following, before.after],
+                [before.following.T, own.diagonal, own.following],
+                [before.after.T, own.following.T, after.diagonal],
+            ]
+        )
+        for each, result in zip(columns, predicted, strict=True):
+            each.predict(number, around, result)
+
+    own = after = none
+    for number, before in found.factors.inverse():
         position = layout.position[ends[number] : ends[number + 1]]
-        cofactors[ends[number] : ends[number + 1]] = blocks[0][position, position]
-        window = [blocks, *window[:2]]
+        cofactors[ends[number] : ends[number + 1]] = before.diagonal[position, position]
         if number + 1 < layout.blocks:
-            _visit(jobs, number + 1, window, found)
-    _visit(jobs, 0, [(zero, zero, zero), *window[:2]], found)
-    return [_predicted(errors, job, order) for job, order in zip(jobs, orders, strict=True)], cofactors
+            visit(number + 1, before, own, after)
+        own, after = before, own
+    visit(0, none, own, after)
+    for each, result, order in zip(columns, predicted, orders, strict=True):
+        formed = local_covariances(found.errors, each.rows, images_with_components(found.errors, each.rows))
+        back = np.argsort(order, kind="stable")
+        result.covariance[:] = (formed - result.covariance)[back]
+        result.error[:] = result.error[back]
+    return predicted, cofactors
 
 
-def _predicted(errors: StripErrors, job: _Job, order: Numbers) -> Predicted:
-    """Return what was found, in the order in which the things were given."""
-    covariance = local_covariances(errors, job.rows, images_with_components(errors, job.rows)) - job.quadratic
-    back = np.argsort(order, kind="stable")
-    return Predicted(job.error[back], covariance[back])
+def photo_rows(errors: StripErrors) -> ErrorRows:
+    """Rows of the photos of a strip: centre and small rotation, d = 6.
 
-
-def _visit(jobs: Sequence[_Job], number: int, window: Sequence[tuple[Floats, Floats, Floats]], found: System) -> None:
-    """Finish the things whose first model lies in a block, with the inverse around it."""
-    (before, before_own, before_after), (own, own_after, _), (after, _, _) = window
-    around = np.block(
-        [
-            [before, before_own, before_after],
-            [before_own.T, own, own_after],
-            [before_after.T, own_after.T, after],
-        ]
+    Each photo moves with the model on its right, the last with its own.
+    """
+    models = errors.models
+    by_similarity = np.zeros((models + 1, 6, SIMILARITY_PARAMETERS))
+    by_similarity[:, :3] = similarity_derivatives(centers_of(errors), np.zeros(3))
+    by_similarity[:, 3:, 3:6] = np.eye(3)
+    by_component = np.zeros((models + 1, 1, 6, COMPONENTS))
+    by_component[-1, 0, :3, ELEMENTS] = errors.pairs.base_by_elements[-1]
+    by_component[-1, 0, 3:, ELEMENTS] = errors.pairs.rotation_by_elements[-1]
+    none = np.zeros(0, np.intp)
+    return ErrorRows(
+        first=np.append(np.arange(models), models - 1),
+        by_similarity=by_similarity,
+        by_component=by_component,
+        item=none,
+        image=none,
+        by_image=np.zeros((0, 6, 2)),
     )
-    for job in jobs:
-        job.visit(number, around, found)
 
 
 @dataclass(frozen=True, eq=False)
-class _Job:
-    """Things to be predicted, block by block; results are filled in."""
+class _Columns:
+    """Columns b of rows that are ordered by their first models, block by block."""
 
-    rows: ErrorRows  # the things, ordered by their first models
-    padded: Padded
-    frame: Floats  # (n, d, 7): by the unknowns of the first model
-    # things and conditions that use the same image points, and their products; ordered by things
-    shared: tuple[Numbers, Numbers, Floats]
-    # error, quadratic: (n, d) and (n, d, d): what is found
-    error: Floats
-    quadratic: Floats
+    found: System
+    rows: ErrorRows
+    padded: PaddedRows
+    by_unknowns: Floats  # (n, d, 7): by the unknowns of the first model
+    shared: SameImages  # image points in common with conditions, ordered by rows
 
     @classmethod
-    def of(cls, errors: StripErrors, wanted: Conditions, local: Local, found: System, rows: ErrorRows) -> _Job:
-        """Prepare things that are ordered by their first models."""
-        n, size = rows.by_similarity.shape[:2]
-        counts = np.bincount(rows.first, minlength=errors.models)
-        rank = np.arange(n) - (np.cumsum(counts) - counts)[rows.first]
-        padded = pad(errors, rows, rank, found.padded.core.shape[2])
-        thing, condition, value = same_images(rows, wanted.rows)
-        order = np.argsort(thing, kind="stable")
+    def of(cls, found: System, rows: ErrorRows) -> Self:
+        """Prepare rows."""
+        rank = rank_in_model(rows.first, found.errors.models)
+        shared = same_images(rows, found.conditions.rows)
+        order = np.argsort(shared.first, kind="stable")
         return cls(
-            rows,
-            padded,
-            rows.by_similarity @ local.to_common[rows.first],
-            (thing[order], condition[order], value[order, :, 0]),
-            np.zeros((n, size)),
-            np.zeros((n, size, size)),
+            found=found,
+            rows=rows,
+            padded=PaddedRows.of(found.errors, rows, rank, found.padded.by_component.shape[2]),
+            by_unknowns=rows.by_similarity @ found.conditions.local.to_common[rows.first],
+            shared=SameImages(shared.first[order], shared.second[order], shared.value[order, :, 0]),
         )
 
-    def columns(self, number: int, found: System) -> tuple[int, int, Floats]:
-        """Covariances of the things of one block with the conditions around, and coefficients of their unknowns.
-
-        Returns the first thing of the block, the first after it, and an array of three blocks of rows.
-        """
-        layout, size = found.layout, self.rows.by_similarity.shape[1]
+    def of_block(self, number: int) -> tuple[slice, Floats]:
+        """Rows whose first model lies in a block, and their columns (3, b, k) in the blocks before, own and after."""
+        layout, size = self.found.layout, self.rows.by_similarity.shape[1]
         low, high = np.searchsorted(self.rows.first, [number * layout.width, (number + 1) * layout.width]).tolist()
-        mixed = np.zeros((3, layout.height, (high - low) * size))
+        columns = np.zeros((3, layout.height, (high - low) * size))
         if low < high:
-            self._with_conditions(mixed, number, low, found)
-            begin, end = np.searchsorted(self.shared[0], [low, high])
-            thing, condition, value = (column[begin:end] for column in self.shared)
+            self._fill(columns, number, low)
+            begin, end = np.searchsorted(self.shared.first, [low, high])
+            row, condition, value = (column[begin:end] for column in self.shared)
             block, position = layout.block[condition] - number + 1, layout.position[condition]
-            columns = (thing - low)[:, None] * size + np.arange(size)
-            np.add.at(mixed, (block[:, None], position[:, None], columns), value)
-        return low, high, mixed
+            place = (row - low)[:, None] * size + np.arange(size)
+            np.add.at(columns, (block[:, None], position[:, None], place), value)
+        return slice(low, high), columns
 
-    def visit(self, number: int, around: Floats, found: System) -> None:
-        """Finish the things of one block, given the inverse of it and its neighbours."""
-        layout, size = found.layout, self.rows.by_similarity.shape[1]
-        low, high, mixed = self.columns(number, found)
-        if low == high:
+    def predict(self, number: int, around: Floats, result: Predicted) -> None:
+        """Fill in error b^T [lambda; y] and b^T K^-1 b of one block, given the inverse of it and its neighbours."""
+        layout, size = self.found.layout, self.rows.by_similarity.shape[1]
+        rows, columns = self.of_block(number)
+        count = rows.stop - rows.start
+        if not count:
             return
+        solution = np.zeros((3, layout.height))
         inside = slice(max(number - 1, 0), number + 2)
-        window = np.zeros((3, layout.height))
-        window[inside.start - number + 1 :][: len(found.solution[inside])] = found.solution[inside]
-        flat = mixed.reshape(3 * layout.height, -1)
-        self.error[low:high] = (window.ravel() @ flat).reshape(-1, size)
-        split = flat.reshape(len(flat), high - low, size).transpose(1, 2, 0)
-        self.quadratic[low:high] = split @ (around @ flat).reshape(len(flat), high - low, size).transpose(1, 0, 2)
+        solution[inside.start - number + 1 :][: len(self.found.solution[inside])] = self.found.solution[inside]
+        flat = columns.reshape(3 * layout.height, -1)
+        result.error[rows] = (solution.ravel() @ flat).reshape(-1, size)
+        split = flat.reshape(len(flat), count, size).transpose(1, 2, 0)
+        result.covariance[rows] = split @ (around @ flat).reshape(len(flat), count, size).transpose(1, 0, 2)
 
-    def _with_conditions(self, mixed: Floats, number: int, low: int, found: System) -> None:
+    def _fill(self, columns: Floats, number: int, low: int) -> None:
         """Fill in the covariances with conditions around, and the coefficients of the unknowns."""
-        layout, size, models = found.layout, self.rows.by_similarity.shape[1], len(found.layout.start)
-        mine = np.arange(number * layout.width, min((number + 1) * layout.width, models))
-        ends = np.searchsorted(self.rows.first, [*mine, mine[-1] + 1])
+        layout, size = self.found.layout, self.rows.by_similarity.shape[1]
+        models = len(layout.start)
+        model = np.arange(number * layout.width, min((number + 1) * layout.width, models))
+        ends = np.searchsorted(self.rows.first, [*model, model[-1] + 1])
         for apart in range(-layout.width, layout.width + 1):
-            inside = (mine + apart >= 0) & (mine + apart < models)
+            inside = (model + apart >= 0) & (model + apart < models)
             if not inside.any():
                 continue
-            values = products(self.padded, found.padded, mine[inside], apart)
+            values = products(self.padded, self.found.padded, model[inside], apart)
             for place, value in zip(np.flatnonzero(inside).tolist(), values, strict=True):
-                other, count = mine[place] + apart, (ends[place + 1] - ends[place]) * size
-                top, rows = layout.start[other], layout.unknown[other] - layout.start[other]
+                other, count = model[place] + apart, (ends[place + 1] - ends[place]) * size
+                block, top, height = other // layout.width - number + 1, layout.start[other], layout.unknown[other]
                 left = (ends[place] - low) * size
-                mixed[other // layout.width - number + 1, top : top + rows, left : left + count] = value[
-                    :count, :rows
-                ].T
-        for place, model in enumerate(mine.tolist()):
-            top, left, right = layout.unknown[model], (ends[place] - low) * size, (ends[place + 1] - low) * size
-            frame = self.frame[ends[place] : ends[place + 1]].reshape(-1, SIMILARITY_PARAMETERS)
-            mixed[1, top : top + SIMILARITY_PARAMETERS, left:right] = frame.T
+                columns[block, top:height, left : left + count] = value[:count, : height - top].T
+        for place, unknown in enumerate(layout.unknown[model].tolist()):
+            left, right = (ends[place] - low) * size, (ends[place + 1] - low) * size
+            by_unknowns = self.by_unknowns[ends[place] : ends[place + 1]].reshape(-1, SIMILARITY_PARAMETERS)
+            columns[1, unknown : unknown + SIMILARITY_PARAMETERS, left:right] = by_unknowns.T
 
 
-def influence(errors: StripErrors, wanted: Conditions, local: Local, found: System, rows: ErrorRows) -> Floats:
-    """Predicted errors of a few things by the misclosures of all conditions.
+def influence(found: System, rows: ErrorRows, chosen: Numbers) -> Floats:
+    """Differentiate predicted errors by the misclosures of conditions: b^T K^-1 e, shape (n, d, c).
 
-    Parameters
-    ----------
-    rows : ErrorRows
-        The things, d = 1, in any order.
-
-    Returns
-    -------
-    ndarray, shape (n, c)
-        One row for each thing.
-    """
-    order = np.argsort(rows.first, kind="stable")
-    job = _Job.of(errors, wanted, local, found, rows.take(order))
-    layout = found.layout
-    right = np.zeros((layout.blocks + 2, layout.height, len(order)))
-    for number in range(layout.blocks):
-        low, high, mixed = job.columns(number, found)
-        right[number : number + 3, :, order[low:high]] = mixed
-    solved = found.factors.solve(right[1:-1])
-    return np.asarray(solved[layout.block, layout.position].T, float)
-
-
-def by_conditions(
-    errors: StripErrors, wanted: Conditions, local: Local, found: System, rows: ErrorRows, chosen: Numbers
-) -> Floats:
-    """Predicted errors of many things by the misclosures of some conditions.
-
-    Parameters
-    ----------
-    rows : ErrorRows
-        n things of d coordinates, in any order.
-    chosen : ndarray of int, shape (c,)
-        The conditions that are asked about.
-
-    Returns
-    -------
-    ndarray, shape (n, d, c)
-        What is subtracted from each thing, by each misclosure.
+    The system is solved for the columns of the n rows or for the unit vectors of the c conditions, whichever are fewer.
     """
     layout, size = found.layout, rows.by_similarity.shape[1]
+    order = np.argsort(rows.first, kind="stable")
+    columns = _Columns.of(found, rows.take(order))
+    block, position = layout.block[chosen], layout.position[chosen]
+    result = np.zeros((len(order), size, len(chosen)))
+    if len(order) * size < len(chosen):
+        right = np.zeros((layout.blocks + 2, layout.height, len(order), size))
+        for number in range(layout.blocks):
+            at, values = columns.of_block(number)
+            right[number : number + 3, :, order[at]] = values.reshape(*values.shape[:2], -1, size)
+        solved = found.factors.solve(right[1:-1].reshape(layout.blocks, layout.height, -1))
+        result[:] = solved[block, position].T.reshape(result.shape)
+        return result
     right = np.zeros((layout.blocks, layout.height, len(chosen)))
-    right[layout.block[chosen], layout.position[chosen], np.arange(len(chosen))] = 1.0
+    right[block, position, np.arange(len(chosen))] = 1.0
     solved = np.zeros((layout.blocks + 2, layout.height, len(chosen)))
     solved[1:-1] = found.factors.solve(right)
-    order = np.argsort(rows.first, kind="stable")
-    job = _Job.of(errors, wanted, local, found, rows.take(order))
-    result = np.zeros((len(order), size, len(chosen)))
     for number in range(layout.blocks):
-        low, high, mixed = job.columns(number, found)
-        if low < high:
-            window = solved[number : number + 3].reshape(3 * layout.height, -1)
-            result[order[low:high]] = (mixed.reshape(len(window), -1).T @ window).reshape(high - low, size, -1)
+        at, values = columns.of_block(number)
+        near = solved[number : number + 3].reshape(3 * layout.height, -1)
+        result[order[at]] = (values.reshape(len(near), -1).T @ near).reshape(-1, size, len(chosen))
     return result
 
 
-def tested(wanted: Conditions, found: System, cofactors: Floats, count: int) -> Tested:
-    """Test the adjustment as a whole and every control coordinate.
+def tested(found: System, cofactors: Floats, count: int) -> AdjustmentTest:
+    """Test the adjustment as a whole, w^T lambda, and each control coordinate, lambda / sqrt(q).
 
-    Parameters
-    ----------
-    cofactors : ndarray, shape (n,)
-        Of the correlates.
+    ``cofactors`` (n,) are those of the correlates, ``count`` is the number of control coordinates.
     """
-    correlates = found.solution[found.layout.block, found.layout.position]
+    wanted, correlates = found.conditions, found.correlates
     rows = np.flatnonzero(wanted.kind == CONTROL)
     normalised, size = np.full(count, np.nan), np.full(count, np.nan)
     checked = rows[cofactors[rows] * (wanted.noise[rows] + 1e-12) > CHECKED]
     normalised[wanted.source[checked]] = correlates[checked] / np.sqrt(cofactors[checked])
     size[wanted.source[checked]] = -correlates[checked] / cofactors[checked]  # given minus true
     distances = int((wanted.kind == DISTANCE).sum())
-    redundancy = count - SIMILARITY_PARAMETERS + distances
-    return Tested(float(wanted.value @ correlates), redundancy, normalised, size, distances)
+    return AdjustmentTest(
+        squares=float(wanted.value @ correlates),
+        redundancy=count - SIMILARITY_PARAMETERS + distances,
+        normalised=normalised,
+        size=size,
+        distances=distances,
+    )

@@ -1,11 +1,12 @@
-"""What an adjusted strip says about its measurements, and whether its linear equations were good enough.
+"""Relinearisation: a long strip formed again from corrected image coordinates, and its equations solved again there.
 
 The adjustment is linear in the errors of the image coordinates. In a long strip these turn the last models by so much
-that squares of the turns count. The strip is then formed once more from corrected image coordinates, and the
-misclosures it has there go through the equations that were eliminated already: Newton's method with the first
-derivatives, which lessens what is left by the size of the turns at every pass.
+that squares of the turns count. The strip is then formed once more from corrected image coordinates, with every
+decision kept: which points take part, their weights, the pass points that join models. Its misclosures there go through
+the equations that were eliminated already: Newton's method with the first derivatives, which lessens what is left by
+the size of the turns every time.
 
-Source: derived; see docs/precision.md.
+Source: derived; see docs/precision.md, eq. 3 and 7.
 """
 
 from __future__ import annotations
@@ -17,78 +18,97 @@ import numpy as np
 
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.triangulation.error_propagation.covariances import by_images
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, REACH, SPAN, ErrorRows
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, REACH, SPAN
+from photostrip.triangulation.relative_orientation.solution import iterate_elements, y_parallaxes
+from photostrip.triangulation.strip_formation import non_neighbours
+from photostrip.triangulation.strip_formation.strip import model_points, place_models
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.covariance_adjustment.conditions import Conditions
+    from photostrip.points import PhotoPoints
     from photostrip.triangulation.covariance_adjustment.system import System
+    from photostrip.triangulation.error_propagation.derivatives import ErrorRows
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
+    from photostrip.triangulation.relative_orientation.orientation import Orientation
+    from photostrip.triangulation.strip_formation.scale_transfer import Junctions
+    from photostrip.triangulation.strip_formation.strip import FormedStrip
 
     Floats = NDArray[np.float64]
 
 
-def without_frame(rows: ErrorRows) -> ErrorRows:
-    """Leave out the similarity of the first model, which is an unknown of the adjustment and no error."""
-    return replace(rows, by_similarity=np.zeros_like(rows.by_similarity))
+def image_errors(found: System) -> Floats:
+    """Errors of the image coordinates that the adjustment finds, H^T lambda, shape (n, 2).
 
-
-def image_errors(errors: StripErrors, wanted: Conditions, found: System) -> Floats:
-    """Return the errors of the image coordinates that the adjustment finds.
-
-    Returns
-    -------
-    ndarray, shape (n, 2)
-        H^T lambda, in units of the stated standard deviations, in the order of ``errors.images``.
+    In their stated standard deviations, in the order of ``errors.images``.
     """
-    correlates = found.solution[found.layout.block, found.layout.position]
-    return by_images(errors, without_frame(wanted.rows), correlates)
+    return by_images(found.errors, found.conditions.rows.without_similarity(), found.correlates)
 
 
 def displacements(errors: StripErrors, rows: ErrorRows, images: Floats) -> Floats:
-    """Return what errors of image coordinates do to things, their first models held fast.
+    """Displace rows by errors of image coordinates (k, 2) in their stated standard deviations: shape (n, d).
 
-    Parameters
-    ----------
-    images : ndarray, shape (k, 2)
-        Errors, in units of the stated standard deviations.
-
-    Returns
-    -------
-    ndarray, shape (n, d)
-        Displacements.
+    The first model of each row is held fast: dX = sum K(s) u(first + s) + D v (eq. 3).
     """
-    units = np.zeros((errors.models + rows.by_component.shape[1], COMPONENTS))
+    components = np.zeros((errors.models + rows.by_component.shape[1], COMPONENTS))
     for slot in range(SPAN):
         model = errors.images.photo - REACH + slot
         inside = np.flatnonzero((model >= 0) & (model < errors.models))
         moved = errors.images.components[inside, slot] @ images[inside, :, None]
-        np.add.at(units, model[inside], moved[:, :, 0])
+        np.add.at(components, model[inside], moved[:, :, 0])
     result = np.zeros(rows.by_similarity.shape[:2])
     for slot in range(rows.by_component.shape[1]):
-        result += (rows.by_component[:, slot] @ units[rows.first + slot, :, None])[:, :, 0]
+        result += (rows.by_component[:, slot] @ components[rows.first + slot, :, None])[:, :, 0]
     np.add.at(result, rows.item, (rows.by_image @ images[rows.image, :, None])[:, :, 0])
     return result
 
 
-def largest_turn(found: System, length: float) -> float:
-    """Return the largest turn and change of scale of a model.
-
-    Parameters
-    ----------
-    found : System
-        The solved system, with the unknowns of each model about its left photo.
-    length : float
-        Length by which rotations and scales are multiplied in it, metres.
-
-    Returns
-    -------
-    float
-        Root of the sum of their squares, radians.
-    """
+def largest_turn(found: System) -> float:
+    """Largest turn and change of scale of a model: root of the sum of their squares, radians."""
     layout = found.layout
     models = np.arange(len(layout.start))
     columns = layout.unknown[:, None] + np.arange(3, SIMILARITY_PARAMETERS)
-    unknowns = found.solution[(models // layout.width)[:, None], columns] / length
+    unknowns = found.solution[(models // layout.width)[:, None], columns] / found.conditions.local.length
     return float(np.sqrt(np.square(unknowns).sum(axis=1).max()))
+
+
+# --------------------------------------------------------------------------------------------- the strip formed again
+
+
+def oriented_again(orientation: Orientation, xy: Floats) -> Orientation:
+    """Orient the pairs of a strip on other image coordinates (k, 2), starting at the elements they have.
+
+    What is said of their precision stays.
+    """
+    left, right = (xy[orientation.rows[:, side]] for side in (0, 1))
+    pairs = replace(orientation.pairs, left=left, right=right)
+    elements = iterate_elements(orientation.elements, pairs).elements
+    return replace(orientation, pairs=pairs, elements=elements, parallax=y_parallaxes(elements, pairs))
+
+
+def formed_again(
+    formed: FormedStrip, orientation: Orientation, observations: PhotoPoints, photos: Sequence[str]
+) -> FormedStrip:
+    """Form a strip from pairs that were oriented again.
+
+    Points and junctions are those of ``formed``; ``model_xyz`` holds the points that were left out, too.
+    """
+    models = model_points(orientation)
+    junctions = _joined(formed.junctions, orientation, models.vectors)
+    there = np.asarray(np.isfinite(formed.model_xyz).all(axis=1), bool)
+    again = place_models(orientation, models, junctions, orientation.used & there)
+    if not len(formed.bridging):
+        return again
+    return non_neighbours.bridge(again, observations, photos, orientation.pairs.focal, formed.bridging)
+
+
+def _joined(joined: Junctions, orientation: Orientation, vectors: Floats) -> Junctions:
+    """Return the scale transfer with the same pass points and weights."""
+    base, _ = orientation.relative
+    before = np.linalg.norm(vectors[joined.before] - base[joined.junction], axis=1)
+    ratio = before / np.linalg.norm(vectors[joined.after], axis=1)
+    total = np.bincount(joined.junction, joined.weight, len(joined.factor))
+    factor = np.bincount(joined.junction, joined.weight * ratio, len(joined.factor)) / total
+    return replace(joined, ratio=ratio, factor=factor)

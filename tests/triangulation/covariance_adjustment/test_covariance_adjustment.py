@@ -27,11 +27,10 @@ from tests.derivatives import UNSCREENED, errors_of, spec, without_noise, writte
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.error_propagation.derivatives import ErrorRows
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
     Floats = NDArray[np.float64]
-    Prepared = tuple[StripErrors, conditions.Conditions, conditions.Local]
+    Prepared = tuple[StripErrors, conditions.Conditions]
 
 COVARIANCE = Settings(adjustment="covariance", relative=UNSCREENED)
 SIMILARITY = Settings(adjustment="similarity", relative=UNSCREENED)
@@ -49,15 +48,11 @@ def noisy(photos: int, lap: float, bands: int = 3, seed: int = 4) -> Result:
 def prepared(result: Result, *, distances: bool) -> Prepared:
     found = errors_of(result)
     (strip,) = result.strips
-    local = conditions.Local.about(conditions.centers_of(found.errors)[:-1], 900.0)
     given = strip.absolute.misclosures[found.control.point, found.control.axis]
-    formed = (strip.orientation, strip.formed)
-    wanted = conditions.conditions(found.errors, formed, (found.control, given), local, distances=distances)
-    return found.errors, wanted, local
-
-
-def without_frame(rows: ErrorRows) -> ErrorRows:
-    return replace(rows, by_similarity=np.zeros_like(rows.by_similarity))
+    wanted = conditions.conditions(
+        found.errors, strip.orientation, strip.formed, found.control, given, distances=distances
+    )
+    return found.errors, wanted
 
 
 @pytest.mark.parametrize("distances", [False, True])
@@ -65,17 +60,17 @@ def without_frame(rows: ErrorRows) -> ErrorRows:
 def test_the_band_gives_what_the_whole_matrix_gives(photos: int, lap: float, *, distances: bool) -> None:
     """Coordinates, covariances and test values against K [lambda; y] = [w; 0] with everything written out."""
     result = noisy(photos, lap, min(3, photos))
-    errors, wanted, local = prepared(result, distances=distances)
+    errors, wanted = prepared(result, distances=distances)
     factor, n = 1.3, errors.models
     (strip,), found = result.strips, errors_of(result)
     control = strip.absolute.misclosures[found.control.point, found.control.axis]
     again = conditions.misclosures_at(wanted, strip.formed, strip.absolute.similarity, control)
     assert again == pytest.approx(wanted.value, abs=1e-9)
     solved = system.system(errors, wanted, factor)
-    things = [errors.points, pipeline_covariance.photo_rows(errors)]
-    predicted, cofactors = prediction.predict(errors, wanted, local, solved, things)
+    tables = [errors.points, prediction.photo_rows(errors)]
+    predicted, cofactors = prediction.predict(solved, tables)
 
-    by_images = written_out(without_frame(wanted.rows), errors)[:, 0]
+    by_images = written_out(wanted.rows.without_similarity(), errors)[:, 0]
     design = np.zeros((len(wanted.value), 7 * (n + 1)))
     for row, model in enumerate(wanted.rows.first.tolist()):
         design[row, 7 * model : 7 * model + 7] = wanted.rows.by_similarity[row, 0]
@@ -86,17 +81,17 @@ def test_the_band_gives_what_the_whole_matrix_gives(photos: int, lap: float, *, 
     solution = np.linalg.solve(whole, np.concatenate([wanted.value, np.zeros(7 * n)]))
     inverse = np.linalg.inv(whole)
     assert cofactors == pytest.approx(np.diag(inverse)[: len(cofactors)], abs=1e-8 * np.abs(inverse).max())
-    images = relinearisation.image_errors(errors, wanted, solved)
+    images = relinearisation.image_errors(solved)
     expected = by_images.T @ solution[: len(by_images)]
     assert images.ravel() == pytest.approx(expected, abs=1e-8 * np.abs(expected).max())
-    for rows, seen in zip(things, predicted, strict=True):
-        own = written_out(without_frame(rows), errors)
+    for rows, seen in zip(tables, predicted, strict=True):
+        own = written_out(rows.without_similarity(), errors)
         size = rows.by_similarity.shape[1]
         for thing in range(len(rows.first)):
             column = np.zeros((len(whole), size))
             column[: len(by_images)] = by_images @ own[thing].T
             start = len(by_images) + 7 * rows.first[thing]
-            column[start : start + 7] = (rows.by_similarity[thing] @ local.to_common[rows.first[thing]]).T
+            column[start : start + 7] = (rows.by_similarity[thing] @ wanted.local.to_common[rows.first[thing]]).T
             assert seen.error[thing] == pytest.approx(column.T @ solution, abs=1e-9)
             moved = relinearisation.displacements(errors, rows, images)[thing]
             assert moved == pytest.approx(own[thing] @ images.ravel(), abs=1e-9)
@@ -150,8 +145,8 @@ def formed_from_what_is_taken_for_true(result: Result) -> Floats:
     """Lay the strip of the corrected image coordinates on what the adjustment gives the control: all points."""
     inputs, own = result.inputs, result.strips[0].covariance
     assert own is not None
-    xy, images = inputs.observations.xy.copy(), own.errors.images
-    xy[images.row] -= relinearisation.image_errors(own.errors, own.conditions, own.system) * images.sigma
+    xy, images = inputs.observations.xy.copy(), own.system.errors.images
+    xy[images.row] -= relinearisation.image_errors(own.system) * images.sigma
     row_of = {inputs.observations.point_ids[number]: row for row, number in enumerate(result.points.number)}
     given = np.array([result.points.ground[row_of[name]] for name in inputs.control.ids])
     control = replace(inputs.control, enu=given)
@@ -180,7 +175,7 @@ def test_passes_go_on_until_nothing_is_left_to_be_linear(monkeypatch: pytest.Mon
 def test_the_control_alone_when_asked_for() -> None:
     """Without the distances nothing is known better, and much is known worse; both forms say what took part."""
     inputs = noisy(9, 80.0).inputs
-    alone = replace(COVARIANCE, covariance=conditions.Settings(distances=False))
+    alone = replace(COVARIANCE, covariance=conditions.CovarianceSettings(distances=False))
     found = [triangulate(inputs, wanted) for wanted in (alone, COVARIANCE)]
     documents = [document_of(result) for result in found]
     blocks = [document["covariance"][0] for document in documents]
