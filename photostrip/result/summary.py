@@ -12,6 +12,7 @@ from photostrip.result.adjustment.pairs import Parallaxes, rejected_by_strip, si
 from photostrip.result.adjustment.strips import AXES
 from photostrip.result.numbers import GROUND, Document, Plain, micrometres, rms, rounded
 from photostrip.result.points.ground import of_used
+from photostrip.result.quantities import record
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -106,13 +107,7 @@ def _of_photos(result: Result) -> Document:
         "flying_height": rounded(np.average([s.depth for s in result.strips], weights=photos), 2),
     }
     if result.bundle is not None:
-        sigma0_found, image_rms, shares = image_fit(result)
-        document |= {
-            "sigma0_um": micrometres(sigma0_found),
-            "redundancy": shares,
-            "image_rms_um": micrometres(image_rms),
-            "sigma0_pairs_um": document["sigma0_um"],
-        }
+        document |= record("summary", image_fit(result.bundle)) | {"sigma0_pairs_um": document["sigma0_um"]}
     return document
 
 

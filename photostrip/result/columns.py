@@ -1,0 +1,77 @@
+"""Columns of the CSV files beside result.json, with the quantities of the keys that they are written from."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
+
+from photostrip.result.quantities import Quantity, angle_decimals, coordinate_decimals, table_at
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from photostrip.result.numbers import Document
+
+MATRIX = [f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3)]
+
+
+class Column(NamedTuple):
+    """A column of a table beside result.json."""
+
+    name: str
+    key: str  # in the records behind the table
+    quantity: Quantity
+
+
+def columns(block: str, names: str) -> list[Column]:
+    """List columns by the keys of the records of a block; ``name=key`` where a column has another name."""
+    table = table_at(block)
+    pairs = [(name, key or name) for name, _, key in (each.partition("=") for each in names.split())]
+    return [Column(name, key, found) for name, key in pairs if isinstance(found := table[key], Quantity)]
+
+
+points_csv = partial(
+    columns,
+    "points",
+    "point=id role x y z sigma_x sigma_y sigma_z rays models image_rms_um cov_xy cov_xz cov_yz "
+    "ellipse_a ellipse_b ellipse_azimuth_deg",
+)
+rejected_csv = partial(
+    columns,
+    "rejected",
+    "strip photo other_photo point stage test value limit unit reason zone size size_unit readmitted blamed",
+)
+residuals_csv = partial(columns, "residuals", "photo point=points vx_um vy_um used")
+parallaxes_csv = partial(columns, "parallaxes", "left right point=points q_um used")
+links_csv = partial(columns, "link_residuals", "before after point=points vx_um vy_um vz_um test used")
+reliability_csv = partial(
+    columns, "residuals", "photo point=points redundancy_x redundancy_y test_x test_y detectable_x_um detectable_y_um"
+)
+
+
+def photos_csv(angles: Document) -> list[Column]:
+    """List the columns of photos.csv for a system and a unit of angles; the keys are those of flat records."""
+    decimals, unit = angle_decimals(angles["unit"]), angles["unit"]
+    names = [f"{name}_{unit}" for name in angles["system"].split("-")]
+    angle = Quantity("angle of the photo", "number", unit, decimals)
+    sigma = Quantity("standard deviation of the angle", "number", unit, decimals)
+    return [
+        *columns("photos", "photo=id strip x y z"),
+        *(Column(name, name, angle) for name in names),
+        *(each._replace(key=each.name) for each in columns("photos", " ".join(f"{name}=rotation" for name in MATRIX))),
+        *columns("photos", "image_rms_um points"),
+        *columns("points", "sigma_x sigma_y sigma_z"),
+        *(Column(f"sigma_{name}", f"sigma_{name}", sigma) for name in names),
+    ]
+
+
+def in_frame(listed: Iterable[Column], frame: Document) -> list[Column]:
+    """Give the coordinates among columns the decimals of their frame."""
+    decimals = dict(zip("xyz", coordinate_decimals(frame["kind"], frame["axes"]), strict=True))
+    return [
+        each._replace(quantity=replace(each.quantity, kind="number", decimals=decimals[each.key]))
+        if each.key in decimals
+        else each
+        for each in listed
+    ]

@@ -1,0 +1,113 @@
+"""The description of the result: every key of every result is in it, written as it says, and stands in the manual."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from photostrip.formats.output.simulation import inputs_of
+from photostrip.pipeline import Settings
+from photostrip.result.columns import photos_csv, points_csv, rejected_csv, reliability_csv
+from photostrip.result.quantities import Quantity, described, quantity_at
+from photostrip.simulate import Models, simulate
+from tests.renew_golden import SAMPLES, baseline
+from tests.results import case, solved, spec
+from tests.source_tree import ROOT
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from photostrip.result.quantities import Table
+
+    Document = dict[str, Any]
+
+ENDINGS = {"_um": "um", "_ppm": "ppm", "_deg": "deg", "_mm": "mm", "_arcsec": "arcsec"}
+
+
+def leaves(value: object, path: str = "") -> Iterator[tuple[str, object, str]]:
+    """Give the path of every key without parts, its value, and the unit that stands beside it."""
+    if isinstance(value, dict):
+        for key, each in value.items():
+            unit = value.get("size_unit" if key == "size" else "unit", "")
+            yield from ((p, v, u or unit) for p, v, u in leaves(each, f"{path}.{key}" if path else key))
+    elif isinstance(value, list) and value and isinstance(value[0], dict):
+        for each in value:
+            yield from leaves(each, path)
+    else:
+        yield path, value, ""
+
+
+def faults(document: Document) -> set[str]:
+    """Give the keys that are not described, and those that are not written as they are described."""
+    found = set()
+    for path, value, unit in leaves(document):
+        quantity = quantity_at(path)
+        if value in (None, [], {}):  # a part that is missing
+            continue
+        if quantity is None or not quantity.meaning:
+            found.add(f"{path} is not described")
+        elif quantity.kind == "number" and quantity.rounded(value, unit) != value:  # type: ignore[arg-type]
+            found.add(f"{path} has other decimals: {value}")
+        elif quantity.kind in {"text", "word", "flag", "count"} and re.search(r"\d\.\d", json.dumps(value)):
+            found |= set() if isinstance(value, str | list) and quantity.kind == "text" else {f"{path} is a number"}
+    return found
+
+
+@pytest.mark.parametrize("name", SAMPLES)
+def test_every_key_of_a_sample_is_described(name: str) -> None:
+    assert faults(json.loads(baseline(name).read_text(encoding="utf-8"))) == set()
+
+
+@pytest.mark.parametrize("adjustment", ["polynomial", "covariance", "bundle"])
+def test_every_key_of_a_result_is_described(adjustment: str) -> None:
+    assert faults(solved(case("projected", 2).inputs, Settings(adjustment=adjustment)).document) == set()
+
+
+def test_every_key_of_independent_models_is_described() -> None:
+    assert faults(solved(inputs_of(simulate(replace(spec(), models=Models())))).document) == set()
+
+
+@pytest.mark.parametrize("frame", ["geographic", "geocentric", "local"])
+def test_coordinates_are_described_in_every_frame(frame: str) -> None:
+    assert faults(case(frame).document) == set()
+
+
+def described_keys(table: Table, path: str = "") -> Iterator[tuple[str, Quantity]]:
+    for key, entry in table.items():
+        if isinstance(entry, Quantity):
+            yield f"{path}{key}", entry
+        else:
+            yield from described_keys(entry, f"{path}{key}.")
+
+
+KEYS = dict(described_keys(described()))
+
+
+def test_a_unit_in_the_name_of_a_key_is_its_unit() -> None:
+    named = {path: ENDINGS[end] for path in KEYS for end in ENDINGS if path.split(".")[-1].endswith(end)}
+    assert {path: KEYS[path].unit for path in named} == named
+
+
+def test_an_unknown_key_and_other_decimals_are_found() -> None:
+    document = json.loads(baseline(SAMPLES[0]).read_text(encoding="utf-8"))
+    document["strips"][0]["colour"] = "red"
+    document["strips"][0]["base"] += 0.001
+    assert {fault.split()[0] for fault in faults(document)} == {"strips.colour", "strips.base"}
+
+
+def test_the_manual_names_every_key() -> None:
+    words = set(re.findall(r"\w+", (ROOT / "docs/files/result.md").read_text(encoding="utf-8")))
+    assert {path for path in KEYS if path.rpartition(".")[2] not in words} == set()
+
+
+def test_columns_of_tables_have_a_unit_and_a_meaning() -> None:
+    angles = {"system": "omega-phi-kappa", "unit": "gon"}
+    for columns in (points_csv(), photos_csv(angles), rejected_csv(), reliability_csv()):
+        assert all(column.quantity.meaning for column in columns)
+    by_name = {column.name: column.quantity for column in photos_csv(angles)}
+    assert by_name["omega_gon"] == replace(by_name["sigma_omega_gon"], meaning=by_name["omega_gon"].meaning)
+    assert by_name["omega_gon"].unit == "gon"
