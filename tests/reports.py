@@ -12,7 +12,7 @@ from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING
 
-from photostrip.formats.output.result_files import to_json
+from photostrip.formats.output.result_json import to_json
 from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline import Settings
 from photostrip.report import sections_of, title_of

@@ -61,7 +61,7 @@ def ascii_only() -> bool:
 
 def print_json(document: Document) -> None:
     """Print a document as result.json is written."""
-    from photostrip.formats.output.result_files import to_json
+    from photostrip.formats.output.result_json import to_json
 
     sys.stdout.write(to_json(document, ascii_only=ascii_only()))
 
@@ -104,7 +104,7 @@ def report_text(
     from photostrip.report.page import layout, text
 
     if form is Format.JSON:
-        from photostrip.formats.output.result_files import to_json
+        from photostrip.formats.output.result_json import to_json
 
         return to_json(document, ascii_only=ascii_letters)
     if form is Format.GITHUB:
@@ -134,7 +134,7 @@ def trace_text(result: Result, form: Format) -> str:
         result = replace(result, strips=result.bundle.start.strips, frames=(*result.frames, result.output))
     document = trace_of(result)
     if form is Format.JSON:
-        from photostrip.formats.output.result_files import to_json
+        from photostrip.formats.output.result_json import to_json
 
         return to_json(document)
     title, sections = trace_title(document), trace_sections(document)

@@ -45,7 +45,7 @@ def hand_out(
 
     ascii_only = not console.speaks_unicode(sys.stdout)
     if form == "json":
-        from photostrip.formats.output.result_files import to_json
+        from photostrip.formats.output.result_json import to_json
 
         sys.stdout.write(to_json(document, ascii_only=ascii_only))
     elif form == "csv":

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.formats.output.result_files import to_json
+from photostrip.formats.output.result_json import to_json
 from tests.results import spec, write_project
 from tests.source_tree import ROOT
 

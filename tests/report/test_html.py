@@ -15,7 +15,7 @@ from xml.etree import ElementTree as ET
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.formats.output.result_files import to_json
+from photostrip.formats.output.result_json import to_json
 from photostrip.report import sections_of
 from photostrip.report.html import to_html
 from photostrip.report.page.parts import Facts, Table, Words

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from photostrip.errors import InputError
-from photostrip.formats.output.result_files import to_json
+from photostrip.formats.output.result_json import to_json
 from photostrip.report import chosen_sections, require_complete, sections_of, title_of
 from photostrip.report.page.layout import cells
 from photostrip.report.page.parts import Column, Facts, Section, Table, Words

@@ -75,7 +75,7 @@ def _refuse_itself(result: Path, place: Path) -> None:
 
 
 def _read(file: str) -> dict[str, Any]:
-    from photostrip.formats.output.result_files import read_result
+    from photostrip.formats.output.result_json import read_result
 
     return read_result(file)
 
@@ -102,7 +102,7 @@ def _update(document: dict[str, Any], file: str, place: Path, allowed: Tolerance
     """Write the baseline, and say what changes by it."""
     from photostrip.compare import baseline_of, compare_results
     from photostrip.errors import InputError
-    from photostrip.formats.output.result_files import to_json
+    from photostrip.formats.output.result_json import to_json
     from photostrip.formats.text.writing import write_text
     from photostrip.report.commands.compare import headline
 

@@ -335,7 +335,7 @@ def deliver(document: Document, form: Form, output: Path | None, drawn: Document
 def _rendered(document: Document, output: Path) -> str:
     """Return a plan in the form that the ending of a file asks for."""
     from photostrip.formats.output.plans import plan_csv
-    from photostrip.formats.output.result_files import to_json
+    from photostrip.formats.output.result_json import to_json
     from photostrip.report.commands.plans import plan_report
     from photostrip.report.page import text
 

@@ -30,7 +30,7 @@ def report(
     It is the report that `photostrip run` printed. FILE may end in .txt, .md, .html or .json. The exit code does not
     depend on the tolerances: the report of a failed result is a report.
     """
-    from photostrip.formats.output.result_files import read_result
+    from photostrip.formats.output.result_json import read_result
     from photostrip.formats.text.writing import write_text
     from photostrip.report import require_complete
 

@@ -161,7 +161,7 @@ def _write(
     document: dict[str, Any], survey: Survey, output: Path | None, plot: Path | None, depfile: Path | None
 ) -> None:
     """Write files of a result, the picture and the rule for make."""
-    from photostrip.formats.output.result_files import to_json
+    from photostrip.formats.output.result_json import to_json
     from photostrip.formats.output.terrestrial_displacements import cameras_csv, displacements_csv
     from photostrip.formats.text.writing import make_rule, write_files, write_text
     from photostrip.report.pictures.terrestrial import displacement_plot

@@ -1,84 +1,22 @@
-"""The document of a result as text: result.json, and the CSV tables beside it."""
+"""The files of a result: result.json and the CSV tables beside it."""
 
 from __future__ import annotations
 
-import json
 import re
 from typing import TYPE_CHECKING, Any
 
-from photostrip.errors import Fault, InputError
-from photostrip.formats.text.files import MEGABYTE, decode, read_bytes, refuse
+from photostrip.formats.output.result_json import to_json
 from photostrip.result import columns as tables
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from photostrip.result.columns import Column
-    from photostrip.result.numbers import Document, Plain
+    from photostrip.result.numbers import Document
     from photostrip.result.quantities import Quantity
 
-LARGEST_RESULT = 1000 * MEGABYTE
-SCHEMA = 1
-LINE = 160  # characters up to which a dictionary stands on one line
 NEEDS_QUOTES = re.compile(r'[",\r\n]|^\s|\s$')
 BY_UNIT_DECIMALS = 2  # of numbers whose unit stands in another column
-
-_encode = json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode
-_encode_ascii = json.JSONEncoder(ensure_ascii=True, allow_nan=False).encode
-
-
-def to_json(document: Document, *, ascii_only: bool = False) -> str:
-    """Return the text of result.json.
-
-    Each element of a list of records stands on a line of its own, so that results can be compared line by line.
-    """
-    encode = _encode_ascii if ascii_only else _encode
-    return "{\n" + ",\n".join(f"{encode(key)}: {_block(value, encode)}" for key, value in document.items()) + "\n}\n"
-
-
-def _block(value: Plain, encode: Callable[[Plain], str]) -> str:
-    text = encode(value)
-    if isinstance(value, list) and value and isinstance(value[0], dict):
-        # One call for the whole list, lines broken afterwards, in front of the first key of each record. Inside a
-        # string these signs cannot stand, its quotation marks being escaped; between records a line feed is a blank.
-        begin = f"{{{encode(next(iter(value[0])))}: "
-        return "[\n" + text[1:-1].replace(f"}}, {begin}", f"}},\n{begin}") + "\n]"
-    if isinstance(value, dict) and len(text) > LINE:
-        return "{\n" + ",\n".join(f"  {encode(key)}: {encode(each)}" for key, each in value.items()) + "\n}"
-    return text
-
-
-def read_result(file: str) -> Document:
-    """Read a result.json.
-
-    Raises
-    ------
-    InputError
-        When the file cannot be read, is not JSON or not a result of photostrip.
-    """
-    text, _ = decode(file, read_bytes(file, LARGEST_RESULT))
-    try:
-        document: Any = json.loads(text)
-    except json.JSONDecodeError as error:
-        message = f"is not JSON: {error.msg[:1].lower()}{error.msg[1:]}"
-        fix = "a result.json that was not written to its end? run the project again"
-        raise InputError(Fault(message, "result-json", file, error.lineno, error.colno, fix=fix)) from None
-    except RecursionError:
-        refuse(file, "result-json", "is nested too deeply", expected="a result.json of photostrip")
-    if not isinstance(document, dict) or "photostrip_result" not in document:
-        refuse(file, "result-kind", "has no key `photostrip_result`", expected="a result.json of photostrip")
-    if document["photostrip_result"] != SCHEMA:
-        refuse(
-            file,
-            "result-schema",
-            f"has the result format {document['photostrip_result']!r}",
-            expected=str(SCHEMA),
-            fix="run the project again with this version of photostrip",
-        )
-    return document
-
-
-# ------------------------------------------------------------------------------------------------------- tables
 
 
 def result_files(document: Document, resolved: str = "") -> dict[str, str]:

@@ -15,7 +15,7 @@ from photostrip.cli.main import main
 from photostrip.compare import Tolerances, baseline_of
 from photostrip.compare.tolerances import SETS, UNITS
 from photostrip.errors import InputError
-from photostrip.formats.output.result_files import to_json
+from photostrip.formats.output.result_json import to_json
 from photostrip.formats.output.result_lines import line_finder
 from photostrip.project.tolerance_profile import load_tolerances
 from photostrip.report.page.junit import Case, to_junit

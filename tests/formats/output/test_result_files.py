@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 import pytest
 
 from photostrip.errors import InputError
-from photostrip.formats.output.result_files import read_result, result_files, to_json
+from photostrip.formats.output.result_files import result_files
+from photostrip.formats.output.result_json import read_result, to_json
 from photostrip.pipeline import triangulate
 from photostrip.result.document import document_of
 from tests.results import FRAMES, case, solved
