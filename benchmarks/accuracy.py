@@ -183,7 +183,7 @@ def run(task: Task) -> Outcome:
         degrees[choice] = _degrees(result)
     if BUNDLE in task.choices:
         squares[BUNDLE] = mean_squares(simulation, result, bundle(simulation)[result.points.number])
-    pairs = result.strips[0].orientation.pairs
+    pairs = result.strips[0].of_photos.orientation.pairs
     return Outcome(squares, degrees, len(pairs.pair) / pairs.size)
 
 

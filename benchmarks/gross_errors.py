@@ -118,8 +118,8 @@ def adjusted(simulation: Simulation, settings: Settings, wrong_rows: set[tuple[s
     bad = np.array([key in injected for key in keys])
     used, placing = np.zeros(len(bad), bool), np.zeros(len(bad), bool)
     for strip in result.strips:
-        oriented = strip.orientation
-        placing[strip.rows] = True
+        oriented = strip.of_photos.orientation
+        placing[strip.of_photos.rows] = True
         used[oriented.rows[oriented.used].ravel()] = True
     used |= placing
     own = np.array([name in spoiled for name in names])[new]
@@ -149,8 +149,8 @@ def supported(result: Result, wrong_rows: set[tuple[str, str]]) -> bool:
     """Whether the strip has enough good points: in each zone of each pair that has any, and two at each joint."""
     observations = result.refined.observations
     for strip in result.strips:
-        pairs, rows, photos = strip.orientation.pairs, strip.orientation.rows, strip.strip.photos
-        place = 6 * pairs.pair + strip.screened.zone - 1
+        pairs, rows, photos = strip.of_photos.orientation.pairs, strip.of_photos.orientation.rows, strip.strip.photos
+        place = 6 * pairs.pair + strip.of_photos.screened.zone - 1
         names = [observations.point_ids[number] for number in observations.point[rows[:, 0]]]
         good = [
             (photos[pair], name) not in wrong_rows and (photos[pair + 1], name) not in wrong_rows
@@ -158,7 +158,7 @@ def supported(result: Result, wrong_rows: set[tuple[str, str]]) -> bool:
         ]
         if not set(place.tolist()) <= set(place[np.array(good)].tolist()):
             return False
-        joined = strip.formed.junctions
+        joined = strip.of_photos.formed.junctions
         right = np.array(good)[joined.before] & np.array(good)[joined.after]
         if (np.bincount(joined.junction[right], minlength=len(joined.factor)) < PASS_POINTS).any():
             return False

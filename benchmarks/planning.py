@@ -395,7 +395,7 @@ def found_share(
         given[point, axis] += size
         control = replace(inputs.control, enu=given)
         formed = form_strip(inputs.strips[0], inputs.observations, wanted)
-        own = adjust_formed(formed, inputs.observations, control, frames, wanted).covariance
+        own = adjust_formed(formed, inputs.observations, control, frames, wanted).of_photos.covariance
         assert own is not None  # noqa: S101
         row = np.flatnonzero((own.control.point == point) & (own.control.axis == axis))
         seen += bool(np.abs(own.tested.normalised[row]) > LIMIT)

@@ -164,8 +164,8 @@ def true_inputs(spec: Spec) -> Inputs:
 def placed(strip: StripResult, frame: IntermediateFrame) -> tuple[Floats, Floats, Floats]:
     """Points, centres and rotations in the axes of a frame."""
     there = strip.intermediate
-    centers = frame.intermediate_from_cartesian(there.cartesian_from_intermediate(strip.resection.centers))
-    rotations = frame.intermediate_rotations(there.cartesian_rotations(strip.resection.rotations))
+    centers = frame.intermediate_from_cartesian(there.cartesian_from_intermediate(strip.of_photos.resection.centers))
+    rotations = frame.intermediate_rotations(there.cartesian_rotations(strip.of_photos.resection.rotations))
     return frame.intermediate_from_cartesian(strip.cartesian), centers, rotations
 
 
@@ -198,7 +198,7 @@ def repeated(task: tuple[Case, int, int]) -> dict[str, list[Floats]]:
     sums = {method: [np.zeros(each.shape) for each in displaced(true, true) for _ in range(2)] for method in wanted}
     for _ in range(number):
         again = drawn(inputs, rng)
-        formed = form_strip(strip.strip, again.observations, first)
+        formed = form_strip(strip.of_photos.strip, again.observations, first)
         control = again.control.take(np.flatnonzero(measured))
         for method, asked in wanted.items():
             found = adjust_formed(formed, again.observations, control, truth.frames, asked)
@@ -258,12 +258,12 @@ def compared(case: Case, seed: int) -> dict[str, Floats]:
     found["bundle"] = accuracy.mean_squares(simulation, result, bundle)
     (strip,), precision = result.strips, result.precision
     assert precision is not None  # noqa: S101
-    assert strip.covariance is not None  # noqa: S101
+    assert strip.of_photos.covariance is not None  # noqa: S101
     fixed = {name for name, check in zip(inputs.control.ids, inputs.control.check, strict=True) if not check}
     free = np.array([inputs.observations.point_ids[n] not in fixed for n in result.points.number])
     axes = strip.intermediate.axes
     found["stated"] = np.diagonal(axes.T @ precision.points[free] @ axes, axis1=1, axis2=2).mean(axis=0)
-    tested = strip.covariance.tested
+    tested = strip.of_photos.covariance.tested
     found["test"] = np.array([tested.squares / tested.redundancy, float(len(tested.doubtful) > 0)])
     found["rejected"] = np.array([float(len(strip.wrong_control) > 0)])
     return found

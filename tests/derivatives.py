@@ -86,11 +86,11 @@ class Placed:
         """Bring a result into a frame."""
         strip = result.strips[0]
         there = strip.intermediate
-        centers = there.cartesian_from_intermediate(strip.resection.centers)
+        centers = there.cartesian_from_intermediate(strip.of_photos.resection.centers)
         return cls(
             frame.intermediate_from_cartesian(strip.cartesian),
             frame.intermediate_from_cartesian(centers),
-            frame.intermediate_rotations(there.cartesian_rotations(strip.resection.rotations)),
+            frame.intermediate_rotations(there.cartesian_rotations(strip.of_photos.resection.rotations)),
         )
 
     def minus(self, other: Placed) -> tuple[Floats, Floats]:

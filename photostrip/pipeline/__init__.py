@@ -1,7 +1,6 @@
 """The method from measured coordinates to the result: no disk, no YAML, no printing."""
 
 from photostrip.pipeline.inputs import ADJUSTMENTS, Inputs, MeasuredModels, ModelStrip, Settings, Strip
-from photostrip.pipeline.models.model_results import LinkedStrip
 from photostrip.pipeline.results import CHECK, CONTROL, NEW, Adjusted, Precision, Result, StripResult, Ties
 from photostrip.pipeline.run import triangulate
 
@@ -12,7 +11,6 @@ __all__ = [
     "NEW",
     "Adjusted",
     "Inputs",
-    "LinkedStrip",
     "MeasuredModels",
     "ModelStrip",
     "Precision",

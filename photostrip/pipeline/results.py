@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -14,8 +14,7 @@ if TYPE_CHECKING:
     from photostrip.geodesy.local_frame import IntermediateFrame
     from photostrip.notes import Finding, Note
     from photostrip.pipeline.covariance_adjustment import CovarianceAdjustment
-    from photostrip.pipeline.inputs import Inputs, Settings, Strip
-    from photostrip.pipeline.models.model_results import LinkedStrip
+    from photostrip.pipeline.inputs import Inputs, ModelStrip, Settings, Strip
     from photostrip.points import ControlPoints
     from photostrip.triangulation import absolute_orientation as absolute
     from photostrip.triangulation.bundle.observations.problem import Problem
@@ -28,6 +27,7 @@ if TYPE_CHECKING:
     from photostrip.triangulation.gross_errors.pairs import screening
     from photostrip.triangulation.gross_errors.rays import strip_screening
     from photostrip.triangulation.image_coordinates import corrections, interior
+    from photostrip.triangulation.independent_models.formation import FormedModels
     from photostrip.triangulation.polynomial import correction as polynomial
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.resection import resection as exterior
@@ -40,46 +40,127 @@ if TYPE_CHECKING:
 NEW, CONTROL, CHECK = "new", "control", "check"
 
 
+class StripShape(Protocol):
+    """Points and perspective centres of a strip as it was formed, in the frame and scale of its first model."""
+
+    @property
+    def point(self) -> Numbers:
+        """Numbers of the points, ascending, shape (q,)."""
+
+    @property
+    def xyz(self) -> Floats:
+        """Strip coordinates of the points, shape (q, 3): means over the models that hold them."""
+
+    @property
+    def model_count(self) -> Numbers:
+        """Number of those models, shape (q,)."""
+
+    @property
+    def centers(self) -> Floats:
+        """Perspective centres in flight order, shape (n, 3); NaN where one is not known."""
+
+    @property
+    def ends(self) -> Floats:
+        """Two places between which the strip runs, shape (2, 3)."""
+
+
 @dataclass(frozen=True, eq=False)
-class StripResult:
-    """Every stage of one strip, in order."""
+class PhotoStages:
+    """What only a strip of photos has."""
 
     strip: Strip
-    orientation: Orientation  # relative orientation of its pairs, after screening
-    rejections: tuple[screening.Rejection, ...]
+    sigma: float  # median standard deviation of its image coordinates, mm
+    # relative orientation of its pairs with the search for gross errors: log, zones, detectable errors
+    screened: screening.Screened
     formed: FormedStrip
+    contradictions: strip_screening.Verdict  # measurements that the strip as a whole does not confirm
+    resection: exterior.Resection  # photos oriented on the adjusted points, intermediate frame
+    rows: Numbers  # (m,): image points that took part in the resections, rows of the observations
+    # the adjustment with the strip's own covariance; None with other adjustments
+    covariance: CovarianceAdjustment | None = None
+
+    @property
+    def orientation(self) -> Orientation:
+        """Relative orientation of the pairs, after screening."""
+        return self.screened.orientation
+
+    @property
+    def rejections(self) -> tuple[screening.Rejection, ...]:
+        """Points taken out of pairs."""
+        return self.screened.rejections
+
+
+@dataclass(frozen=True, eq=False)
+class ModelStages:
+    """What only a strip of independent models has."""
+
+    strip: ModelStrip
+    formed: FormedModels  # the models in one system, and the links between them
+    # (f, 3): adjusted perspective centres in flight order, intermediate frame, metres; NaN where none was measured
+    centers: Floats
+    scales: Floats  # (k,): denominator of the scale of each model
+
+
+@dataclass(frozen=True, eq=False)
+class StripResult:
+    """Every stage of one strip of photos or of independent models, in order."""
+
     precision: tuple[float, float]  # a-priori standard deviation of a point in plan and height from one model, metres
     intermediate: IntermediateFrame
     control: ControlPoints  # control that took part
     control_rows: Numbers  # (n,): its rows in the strip's points
     absolute: absolute.AbsoluteOrientation
-    # correction of the strip deformation; None with ``adjustment: similarity``
+    # correction of the strip deformation; None with other adjustments
     polynomial: polynomial.Polynomial | None
     xyz: Floats  # (q, 3): adjusted points, intermediate frame, metres; points of ``formed.point``
     cartesian: Floats  # (q, 3): the same in the project's Cartesian frame
-    resection: exterior.Resection  # photos oriented on the adjusted points, intermediate frame
-    rows: Numbers  # (m,): image points that took part in the resections, rows of the observations
-    depth: float  # mean distance of the points from the cameras along the viewing direction, metres
+    rays: Numbers  # (q,): photos on which each point was measured and used
+    depth: float  # mean distance of the points from the cameras along the viewing direction, metres; NaN if unknown
     notes: tuple[Note, ...]  # what this strip's numbers say beside themselves
-    # the search for gross errors: log, zones, detectable errors; it holds ``orientation`` and ``rejections`` too
-    screened: screening.Screened
-    contradictions: strip_screening.Verdict  # measurements that the strip as a whole does not confirm
     # control coordinates that were not used; ``control`` says so in its ``use``
     wrong_control: tuple[control_screening.ControlRejection, ...]
-    # the adjustment with the strip's own covariance; None with other adjustments
-    covariance: CovarianceAdjustment | None = None
     # what the covariance of the strip says of each coordinate of ``control``; None without
     judged_control: control_significance.Judged | None = None
+    photo_stages: PhotoStages | None = None  # None for independent models
+    model_stages: ModelStages | None = None  # None for photos
+
+    @property
+    def strip(self) -> Strip | ModelStrip:
+        """What was flown: id and photos, and cameras or models."""
+        return self.of_models.strip if self.photo_stages is None else self.photo_stages.strip
+
+    @property
+    def formed(self) -> StripShape:
+        """The strip as it was formed."""
+        return self.of_models.formed if self.photo_stages is None else self.photo_stages.formed
 
     @property
     def centers(self) -> Floats:
-        """Perspective centres in flight order, intermediate frame, metres."""
-        return self.resection.centers
+        """Adjusted perspective centres in flight order, intermediate frame, metres; NaN where none is known."""
+        return self.of_models.centers if self.photo_stages is None else self.photo_stages.resection.centers
 
     @property
     def scale_number(self) -> float:
-        """Denominator of the photo scale."""
-        return self.depth / (self.strip.camera.principal_distance / 1000)
+        """Denominator of the photo scale, or of the mean scale of the models."""
+        if self.photo_stages is None:
+            return float(np.exp(np.log(self.of_models.scales).mean()))
+        return self.depth / (self.photo_stages.strip.camera.principal_distance / 1000)
+
+    @property
+    def of_photos(self) -> PhotoStages:
+        """What only a strip of photos has; to be asked of such a strip alone."""
+        if self.photo_stages is None:
+            msg = "a strip of independent models"
+            raise TypeError(msg)
+        return self.photo_stages
+
+    @property
+    def of_models(self) -> ModelStages:
+        """What only a strip of independent models has; to be asked of such a strip alone."""
+        if self.model_stages is None:
+            msg = "a strip of photos"
+            raise TypeError(msg)
+        return self.model_stages
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +274,7 @@ class Result:
     output: GroundFrame  # ground frame of the result
     interior: interior.InteriorOrientation | None
     refined: corrections.Refined  # ideal image coordinates and the size of each correction
-    strips: tuple[StripResult, ...]
+    strips: tuple[StripResult, ...]  # of photos or of independent models, never both
     points: Adjusted
     # (c,): row in ``points`` of every point of ``inputs.control``; -1 where it has no coordinates
     control_rows: Numbers
@@ -206,12 +287,16 @@ class Result:
     precision: Precision | None = None  # how precise points and photos are; None when it was not computed
     bundle: Bundle | None = None  # the bundle adjustment; ``strips`` then carry its orientations and points
     findings: tuple[Finding, ...] = ()  # what the data say against themselves
-    linked: tuple[LinkedStrip, ...] = ()  # strips of independent models; there are then no `strips`
 
     @property
-    def flights(self) -> tuple[StripResult | LinkedStrip, ...]:
-        """The strips, of photos or of models: what they have in common has the same name."""
-        return self.linked or self.strips
+    def photo_strips(self) -> tuple[StripResult, ...]:
+        """The strips where they are of photos, otherwise none."""
+        return self.strips if self.inputs.models is None else ()
+
+    @property
+    def model_strips(self) -> tuple[StripResult, ...]:
+        """The strips where they are of independent models, otherwise none."""
+        return () if self.inputs.models is None else self.strips
 
     @property
     def roles(self) -> tuple[str, ...]:

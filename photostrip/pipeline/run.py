@@ -15,7 +15,7 @@ from photostrip.pipeline import overruling
 from photostrip.pipeline.inputs import ADJUSTMENTS
 from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.precision import strip_precision
-from photostrip.pipeline.results import Adjusted, Result, StripResult, Ties
+from photostrip.pipeline.results import Adjusted, Result, Ties
 from photostrip.pipeline.strip import adjust_strip
 from photostrip.triangulation.image_coordinates import corrections, interior
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from photostrip.geodesy.crs import GroundFrame
     from photostrip.pipeline.block.adjust import Block
     from photostrip.pipeline.inputs import Inputs, Settings
-    from photostrip.pipeline.models.model_results import LinkedStrip
+    from photostrip.pipeline.results import StripResult
     from photostrip.points import ControlPoints, PhotoPoints
 
     Floats = NDArray[np.float64]
@@ -82,12 +82,11 @@ def _triangulated(inputs: Inputs, settings: Settings, directory: Path | None) ->
     control = _measured_control(inputs, refined.observations)
     block: Block | None = None
     strips: tuple[StripResult, ...] = ()
-    linked: tuple[LinkedStrip, ...] = ()
     if inputs.models is not None:
         from photostrip.pipeline.models.model_strips import adjust_all  # strips of photos need none of it
 
-        linked = adjust_all(inputs.models, control, frames, settings)
-        points, ties = _join(linked, refined.observations, output)
+        strips = adjust_all(inputs.models, control, frames, settings)
+        points, ties = _join(strips, refined.observations, output)
     elif settings.adjustment == "bundle":
         from photostrip.pipeline.block.adjust import adjust_block  # a strip needs none of its libraries
 
@@ -100,12 +99,11 @@ def _triangulated(inputs: Inputs, settings: Settings, directory: Path | None) ->
         points, ties = _join(strips, refined.observations, output)
     rows, differences = _at_given_points(inputs, frames, points, refined.observations)
     missing = _not_determined(refined.observations, points, inputs, strips)
-    flights = linked or strips
     covariances = block.precision if block is not None and settings.precision else None
     if block is None and settings.precision:
-        each = [_precision(strip, refined.observations, frames, inputs.control) for strip in flights]
-        covariances = strip_precision.joined(each, flights, points)
-    found = block.notes if block is not None else tuple(note for strip in flights for note in strip.notes)
+        each = [_precision(strip, refined.observations, frames, inputs.control) for strip in strips]
+        covariances = strip_precision.joined(each, strips, points)
+    found = block.notes if block is not None else tuple(note for strip in strips for note in strip.notes)
     notes = _notes(inputs, settings, found, fiducial)
     return Result(
         inputs,
@@ -123,15 +121,14 @@ def _triangulated(inputs: Inputs, settings: Settings, directory: Path | None) ->
         notes,
         covariances,
         None if block is None else block.bundle,
-        linked=linked,
     )
 
 
 def _precision(
-    strip: StripResult | LinkedStrip, observations: PhotoPoints, frames: Sequence[GroundFrame], given: ControlPoints
+    strip: StripResult, observations: PhotoPoints, frames: Sequence[GroundFrame], given: ControlPoints
 ) -> strip_precision.StripPrecision:
     """Covariances of one strip of either kind."""
-    if isinstance(strip, StripResult):
+    if strip.photo_stages is not None:
         return strip_precision.of_strip(strip, observations, frames, given)
     from photostrip.pipeline.models import model_precision
 
@@ -272,7 +269,7 @@ def _ideal_coordinates(
 def _heights(first: Result, frames: Sequence[GroundFrame]) -> tuple[float, float]:
     """Mean height of the cameras and of the ground above the ellipsoid, metres."""
     frame = frames[0] if frames else first.output
-    centers = np.concatenate([s.intermediate.cartesian_from_intermediate(s.resection.centers) for s in first.strips])
+    centers = np.concatenate([s.intermediate.cartesian_from_intermediate(s.centers) for s in first.strips])
     ground = first.points.cartesian
     heights = [points[:, 2] if frame.kind == "local" else frame.geodetic(points)[:, 2] for points in (centers, ground)]
     return float(heights[0].mean()), float(heights[1].mean())
@@ -290,9 +287,7 @@ def _measured_control(inputs: Inputs, observations: PhotoPoints) -> ControlPoint
     return control.take(np.array(kept, np.intp))
 
 
-def _join(
-    strips: Sequence[StripResult | LinkedStrip], observations: PhotoPoints, output: GroundFrame
-) -> tuple[Adjusted, Ties]:
+def _join(strips: Sequence[StripResult], observations: PhotoPoints, output: GroundFrame) -> tuple[Adjusted, Ties]:
     """Points of all strips: the mean where strips share a point, and their differences there."""
     strip = np.concatenate([np.full(len(s.formed.point), number) for number, s in enumerate(strips)])
     point = np.concatenate([s.formed.point for s in strips])
@@ -303,10 +298,7 @@ def _join(
     mean = sums / count[:, None]
     rays = np.zeros(len(number), np.intp)
     for s in strips:
-        if isinstance(s, StripResult):
-            np.add.at(rays, np.searchsorted(number, observations.point[s.rows]), 1)
-        else:
-            rays[np.searchsorted(number, s.formed.point)] += s.formed.photo_count
+        rays[np.searchsorted(number, s.formed.point)] += s.rays
     ids = [observations.point_ids[n] for n in number]
     joined = Adjusted(number, mean, output.ground_from_cartesian(mean, ids=ids), rays)
     return joined, _ties(strip, point, cartesian, output)
@@ -344,13 +336,13 @@ def _not_determined(
     observations: PhotoPoints, points: Adjusted, inputs: Inputs, strips: Sequence[StripResult]
 ) -> dict[str, str]:
     """Points that were measured and have no coordinates, with the reason."""
-    contradicted = {int(number) for strip in strips for number in strip.contradictions.point}
-    placed = {photo: (n, k) for n, strip in enumerate(inputs.strips) for k, photo in enumerate(strip.photos)}
     done = np.zeros(len(observations.point_ids), bool)
     done[points.number] = True
     if inputs.models is not None:
         why = "its coordinates in the models contradict each other, or were left out"
         return {observations.point_ids[number]: why for number in np.flatnonzero(~done).tolist()}
+    placed = {photo: (n, k) for n, strip in enumerate(inputs.strips) for k, photo in enumerate(strip.photos)}
+    contradicted = {int(number) for strip in strips for number in strip.of_photos.contradictions.point}
     seen: dict[int, list[tuple[int, int]]] = {}
     for row in np.flatnonzero(~done[observations.point]):
         photo = observations.photo_ids[observations.photo[row]]

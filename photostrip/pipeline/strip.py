@@ -14,7 +14,7 @@ from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.notes import Note
 from photostrip.pipeline import covariance_adjustment as covariance
 from photostrip.pipeline import overruling
-from photostrip.pipeline.results import StripResult
+from photostrip.pipeline.results import PhotoStages, StripResult
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.error_propagation import control_errors, covariances, strip_errors
 from photostrip.triangulation.gross_errors.control import control_screening, control_significance
@@ -75,7 +75,6 @@ class Formed:
     strip: Strip
     sigma: float  # median standard deviation of its image coordinates, mm
     screened: screening.Screened  # the search for gross errors in its pairs
-    oriented: Orientation  # relative orientation of the pairs, as the strip was formed
     formed: FormedStrip
     contradictions: strip_screening.Verdict  # points whose rays contradict each other from model to model
 
@@ -109,7 +108,7 @@ def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> F
     screened = overruling.restored(screened, pairs.weight, kept)
     refuse_unusable(screened.orientation, screened.converged, strip.photos)
     screened, formed, contradictions = _form(strip, observations, screened, settings, pairs.weight)
-    return Formed(strip, sigma, screened, screened.orientation, formed, contradictions)
+    return Formed(strip, sigma, screened, formed, contradictions)
 
 
 def adjust_formed(
@@ -123,7 +122,7 @@ def adjust_formed(
         When the absolute orientation cannot be determined; the strip is named.
     """
     strip, sigma, screened = stage.strip, stage.sigma, stage.screened
-    oriented, formed, contradictions = stage.oriented, stage.formed, stage.contradictions
+    oriented, formed, contradictions = screened.orientation, stage.formed, stage.contradictions
     here, rows = control_of(formed, control, observations.point_ids)
     spread_at = partial(_precision, formed, oriented, sigma)
     intermediate, orientation, spread = to_ground(strip, formed, (here, rows), frames, spread_at)
@@ -152,34 +151,37 @@ def adjust_formed(
         own = covariance.adjust(strip, whole, (targets, rows), observations, sigma, settings.covariance)
     adjusted = own.xyz if own is not None else xyz if correction is None else correction(xyz)
     resection, image_rows = _orient_photos(strip, observations, oriented, formed, adjusted, orientation, own)
+    rows_seen = np.searchsorted(formed.point, observations.point[image_rows])
     return StripResult(
-        strip,
-        oriented,
-        screened.rejections,
-        formed,
-        spread,
-        intermediate,
-        here,
-        rows,
-        orientation,
-        correction,
-        adjusted,
-        intermediate.cartesian_from_intermediate(adjusted),
-        resection,
-        image_rows,
-        _depth(strip, observations, image_rows, formed, adjusted, resection),
-        (
+        precision=spread,
+        intermediate=intermediate,
+        control=here,
+        control_rows=rows,
+        absolute=orientation,
+        polynomial=correction,
+        xyz=adjusted,
+        cartesian=intermediate.cartesian_from_intermediate(adjusted),
+        rays=np.bincount(rows_seen, minlength=len(formed.point)),
+        depth=_depth(strip, observations, image_rows, formed, adjusted, resection),
+        notes=(
             *overruling.notes(settings.relative, strip.id, strip.photos),
             *_screening_notes(strip, screened, sigma),
             *wrong_control_notes(strip, wrong),
             *_notes(strip, oriented, formed, orientation, correction, adjusted, resection),
             *covariance.notes(strip, here, own),
         ),
-        screened,
-        contradictions,
-        wrong,
-        own,
-        judged,
+        wrong_control=wrong,
+        judged_control=judged,
+        photo_stages=PhotoStages(
+            strip=strip,
+            sigma=sigma,
+            screened=screened,
+            formed=formed,
+            contradictions=contradictions,
+            resection=resection,
+            rows=image_rows,
+            covariance=own,
+        ),
     )
 
 

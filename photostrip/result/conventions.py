@@ -53,7 +53,7 @@ def conventions_of(result: Result) -> Document:
         "rms": "square root of the mean square",
         "order": "photos in flight order, points in natural order of their ids",
     }
-    if not result.linked:
+    if not result.model_strips:
         return found
     return {key: value for key, value in found.items() if key not in MEANT_OF_PHOTOS} | MEANT_OF_MODELS
 
@@ -66,7 +66,7 @@ def settings_of(result: Result) -> Document:
         value = getattr(settings, field.name)
         if field.name in {"bundle", "covariance"} and settings.adjustment != field.name:
             continue
-        if field.name in (OF_PHOTOS if result.linked else OF_MODELS):
+        if field.name in (OF_PHOTOS if result.model_strips else OF_MODELS):
             continue
         if is_dataclass(value) and not isinstance(value, type):
             found[field.name] = asdict(value)
@@ -137,6 +137,6 @@ def _curvature(result: Result) -> Document:
         size, how = 0.0, "none: the local frame is taken as truly Cartesian"
     else:
         a, b = result.output.ellipsoid or (6378137.0, 6356752.3)
-        reach = max(float(np.linalg.norm(s.xyz[:, :2], axis=1).max(initial=0.0)) for s in result.flights)
+        reach = max(float(np.linalg.norm(s.xyz[:, :2], axis=1).max(initial=0.0)) for s in result.strips)
         size, how = reach**2 / (a + b), "carried by the frames: coordinates go through geocentric space"
     return {"asked": wanted, "treatment": how, "largest": rounded(size, GROUND)}

@@ -35,7 +35,7 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         Numbers are rounded to decimals that lie well below what they are good for.
     """
     rank = natural_rank(result.refined.observations.point_ids)
-    images = [photos.ImageResiduals.of(result, strip, rank) for strip in result.strips]
+    images = [photos.ImageResiduals.of(result, strip, rank) for strip in result.photo_strips]
     singles = photos.singles_of(result, rank)
     found = ground.differences(result)
     numbers = summary.summary_of(result, found)
@@ -49,7 +49,7 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         "settings": conventions.settings_of(result),
         "corrections": conventions.corrections_of(result),
         "cameras": conventions.cameras_of(result),
-        "strips": models.strips_of(result) if result.linked else strips.strips_of(result),
+        "strips": models.strips_of(result) if result.model_strips else strips.strips_of(result),
         "absolute": strips.absolute_of(result),
         **strips.polynomials_of(result),
         **covariance.covariances_of(result),
@@ -62,19 +62,19 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         "not_determined": ground.not_determined_of(result),
         "findings": [_finding(each) for each in result.findings],
         "notes": [_note(note) for note in (*notes, *result.notes)],
-        "models": models.models_of(result) if result.linked else pairs.models_of(result),
-        **({"links": models.links_of(result)} if result.linked else {}),
+        "models": models.models_of(result) if result.model_strips else pairs.models_of(result),
+        **({"links": models.links_of(result)} if result.model_strips else {}),
         **deformation.deformations_of(result),
         "junctions": pairs.junctions_of(result),
         "photos": models.photos_of(result)
-        if result.linked
+        if result.model_strips
         else [*photos.photos_of(result, images), *photos.single_photos_of(result, singles)],
         "points": ground.points_of(result, photos.point_rms(result, [*images, *singles]), rank),
         "residuals": bundle.with_reliability(
             result, [*photos.residuals_of(result, images), *photos.single_residuals_of(result, singles)]
         ),
         "parallaxes": pairs.parallaxes_of(result, rank),
-        **({"link_residuals": models.residuals_of(result, rank)} if result.linked else {}),
+        **({"link_residuals": models.residuals_of(result, rank)} if result.model_strips else {}),
     }
     verdict = verdict_of(body)
     head = {

@@ -41,13 +41,13 @@ def counts_of(result: Result, measurements: int) -> Document:
     roles, control = result.roles, result.inputs.control
     measured = result.control_rows >= 0
     part = measured & ~control.check & control.use.any(axis=1)
-    strips = result.strips
+    strips = result.photo_strips
     bundle = None if result.bundle is None else result.bundle.screened.selection
     out = 0 if result.bundle is None else sum(not each.readmitted for each in result.bundle.screened.rejections)
     found = {
         "strips": len(result.inputs.flights),
         "photos": sum(len(strip.photos) for strip in result.inputs.flights),
-        "models": sum(len(s.formed.scale) for s in strips),
+        "models": sum(len(s.of_photos.formed.scale) for s in strips),
         "points": len(roles),
         "new_points": roles.count("new"),
         "control_points": int(part.sum()),
@@ -56,16 +56,18 @@ def counts_of(result: Result, measurements: int) -> Document:
         "check_points": int((measured & control.check).sum()),
         "given_not_measured": int((~measured).sum()),
         "image_points": measurements,
-        "image_points_used": sum(len(s.rows) for s in strips) if bundle is None else int(bundle.images.sum()),
-        "pass_point_transfers": sum(int(s.formed.junctions.used.sum()) for s in strips),
-        "rejected_in_pairs": sum(not rejection.readmitted for s in strips for rejection in s.rejections),
-        "rejected_in_scale_transfer": sum(int((~s.formed.junctions.used).sum()) for s in strips),
-        "rejected_for_rays": sum(len(np.unique(s.contradictions.point[rejected_by_strip(s)])) for s in strips),
+        "image_points_used": sum(len(s.of_photos.rows) for s in strips) if bundle is None else int(bundle.images.sum()),
+        "pass_point_transfers": sum(int(s.of_photos.formed.junctions.used.sum()) for s in strips),
+        "rejected_in_pairs": sum(not rejection.readmitted for s in strips for rejection in s.of_photos.rejections),
+        "rejected_in_scale_transfer": sum(int((~s.of_photos.formed.junctions.used).sum()) for s in strips),
+        "rejected_for_rays": sum(
+            len(np.unique(s.of_photos.contradictions.point[rejected_by_strip(s)])) for s in strips
+        ),
         **({} if bundle is None else {"rejected_in_bundle": out}),
         "not_determined": len(result.not_determined),
         "ties": len(result.ties.number),
     }
-    return found | models.counts_of(result) if result.linked else found
+    return found | models.counts_of(result) if result.model_strips else found
 
 
 def summary_of(result: Result, found: Differences) -> Document:
@@ -77,7 +79,7 @@ def summary_of(result: Result, found: Differences) -> Document:
         What is left at control and check points; rejected control does not count.
     """
     found = of_used(result, found)
-    document = models.summary_of(result) if result.linked else _of_photos(result)
+    document = models.summary_of(result) if result.model_strips else _of_photos(result)
     control = result.inputs.control
     roles = {"control": ~control.check & control.use.any(axis=1), "check": control.check}
     for role, rows in roles.items():
@@ -91,20 +93,24 @@ def summary_of(result: Result, found: Differences) -> Document:
 
 def _of_photos(result: Result) -> Document:
     """Say how good the image coordinates are, and how large the photos."""
-    sums = [Parallaxes.of(strip) for strip in result.strips]
+    sums = [Parallaxes.of(strip) for strip in result.photo_strips]
     squares = np.concatenate([each.squares for each in sums])
     redundancy = np.concatenate([each.redundancy for each in sums])
-    photos = np.array([len(s.strip.photos) for s in result.strips])
-    sigma = [result.refined.observations.sigma[s.rows].ravel() for s in result.strips]
-    parallax = [float(np.abs(s.orientation.parallax[s.orientation.used]).max()) for s in result.strips]
+    photos = np.array([len(s.strip.photos) for s in result.photo_strips])
+    sigma = [result.refined.observations.sigma[s.of_photos.rows].ravel() for s in result.photo_strips]
+    parallax = [
+        float(np.abs(s.of_photos.orientation.parallax[s.of_photos.orientation.used]).max()) for s in result.photo_strips
+    ]
     document: Document = {
         "sigma0_um": micrometres(sigma0(squares, redundancy)),
         "sigma_given_um": micrometres(rms(np.concatenate(sigma))),
         "redundancy": int(redundancy.sum()),
         "max_parallax_um": micrometres(max(parallax)),
-        "image_rms_um": micrometres(rms(np.concatenate([s.resection.residuals.ravel() for s in result.strips]))),
-        "photo_scale": rounded(np.average([s.scale_number for s in result.strips], weights=photos), 1),
-        "flying_height": rounded(np.average([s.depth for s in result.strips], weights=photos), 2),
+        "image_rms_um": micrometres(
+            rms(np.concatenate([s.of_photos.resection.residuals.ravel() for s in result.photo_strips]))
+        ),
+        "photo_scale": rounded(np.average([s.scale_number for s in result.photo_strips], weights=photos), 1),
+        "flying_height": rounded(np.average([s.depth for s in result.photo_strips], weights=photos), 2),
     }
     if result.bundle is not None:
         document |= record("summary", image_fit(result.bundle)) | {"sigma0_pairs_um": document["sigma0_um"]}

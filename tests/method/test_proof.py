@@ -82,7 +82,9 @@ class Recovery:
     def centers(self) -> float:
         """Largest error of a coordinate of a perspective centre, metres."""
         return max(
-            float(np.abs(strip.intermediate.cartesian_from_intermediate(strip.resection.centers) - true).max())
+            float(
+                np.abs(strip.intermediate.cartesian_from_intermediate(strip.of_photos.resection.centers) - true).max()
+            )
             for strip, true in zip(self.result.strips, self._of_photos(self.simulation.truth.centers), strict=True)
         )
 
@@ -90,7 +92,9 @@ class Recovery:
     def rotations(self) -> float:
         """Largest angle between a photo's orientation and the true one, radians."""
         return max(
-            float(angle_between(strip.intermediate.cartesian_rotations(strip.resection.rotations), true).max())
+            float(
+                angle_between(strip.intermediate.cartesian_rotations(strip.of_photos.resection.rotations), true).max()
+            )
             for strip, true in zip(self.result.strips, self._of_photos(self.simulation.truth.rotations), strict=True)
         )
 
@@ -120,8 +124,8 @@ def assert_exact(found: Recovery) -> None:
     assert found.rotations < MICRON
     assert found.result.not_determined == {}
     assert len(found.result.points.number) == len(found.simulation.observations.point_ids)
-    assert not any(strip.rejections for strip in found.result.strips)
-    assert all(strip.resection.solved.all() for strip in found.result.strips)
+    assert not any(strip.of_photos.rejections for strip in found.result.strips)
+    assert all(strip.of_photos.resection.solved.all() for strip in found.result.strips)
     given_differences = found.result.control_differences[found.simulation.control.use]
     assert np.abs(given_differences).max() < MICRON
 
@@ -335,7 +339,7 @@ def test_points_common_to_strips_agree() -> None:
 
 def test_the_final_orientations_fit_the_adjusted_points() -> None:
     strip = recovered(exact(Spec(flight=Flight(photos=30)))).result.strips[0]
-    assert np.abs(strip.resection.residuals).max() < 1e-9  # mm
+    assert np.abs(strip.of_photos.resection.residuals).max() < 1e-9  # mm
     assert strip.scale_number == pytest.approx(10_000.0, rel=0.01)
 
 
@@ -416,8 +420,8 @@ def test_image_noise_becomes_errors_of_its_size_no_more_and_no_less() -> None:
     assert np.median(error) < 6.0 * SIGMA
     assert found.centers > 0.3 * SIGMA
     assert found.rotations > 1e-6
-    assert float(np.median(strip.orientation.sigma0)) == pytest.approx(0.005, rel=0.15)
-    assert 0.003 < float(np.sqrt((strip.resection.residuals**2).mean())) < 0.008  # mm
+    assert float(np.median(strip.of_photos.orientation.sigma0)) == pytest.approx(0.005, rel=0.15)
+    assert 0.003 < float(np.sqrt((strip.of_photos.resection.residuals**2).mean())) < 0.008  # mm
 
 
 @pytest.mark.parametrize("sigma_um", [0.05, 0.5, 20.0])
@@ -435,8 +439,8 @@ def test_relative_orientation_finds_the_noise() -> None:
     """Mean over many pairs of the estimated variance, with its own standard error."""
     spec = replace(strip_of(200, 20), seed=3)
     strip = recovered(spec, Settings(relative=RelativeSettings(screening="none"))).result.strips[0]
-    redundancy = strip.orientation.points_used - 5
-    variance = float((strip.orientation.sigma0**2 @ redundancy) / redundancy.sum()) / 0.005**2
+    redundancy = strip.of_photos.orientation.points_used - 5
+    variance = float((strip.of_photos.orientation.sigma0**2 @ redundancy) / redundancy.sum()) / 0.005**2
     assert variance == pytest.approx(1.0, abs=3 * np.sqrt(2 / redundancy.sum()))
 
 
@@ -471,17 +475,17 @@ def numbers(result: Result) -> dict[str, Floats]:
     for strip in result.strips:
         name = strip.strip.id
         found |= {
-            f"{name} elements": strip.orientation.elements,
-            f"{name} weights": strip.orientation.pairs.weight,
-            f"{name} scale": strip.formed.scale,
+            f"{name} elements": strip.of_photos.orientation.elements,
+            f"{name} weights": strip.of_photos.orientation.pairs.weight,
+            f"{name} scale": strip.of_photos.formed.scale,
             f"{name} strip": strip.formed.xyz,
             f"{name} frame": np.vstack([strip.intermediate.origin, strip.intermediate.axes]),
             f"{name} similarity": np.append(strip.absolute.similarity.shift, strip.absolute.similarity.scale),
             f"{name} misclosures": strip.absolute.misclosures,
-            f"{name} rejected": np.array([[r.row, r.value, r.limit] for r in strip.rejections]),
-            f"{name} centers": strip.resection.centers,
-            f"{name} rotations": strip.resection.rotations,
-            f"{name} residuals": strip.resection.residuals,
+            f"{name} rejected": np.array([[r.row, r.value, r.limit] for r in strip.of_photos.rejections]),
+            f"{name} centers": strip.of_photos.resection.centers,
+            f"{name} rotations": strip.of_photos.resection.rotations,
+            f"{name} residuals": strip.of_photos.resection.residuals,
         }
         if strip.polynomial is not None:
             found[f"{name} degree"] = np.array([strip.polynomial.degree])
@@ -555,8 +559,8 @@ def coordinates(result: Result) -> dict[str, Floats]:
     ids = result.inputs.observations.point_ids
     found = {f"point {ids[n]}": xyz for n, xyz in zip(result.points.number, result.points.cartesian, strict=True)}
     for strip in result.strips:
-        centers = strip.intermediate.cartesian_from_intermediate(strip.resection.centers)
-        rotations = strip.intermediate.cartesian_rotations(strip.resection.rotations)
+        centers = strip.intermediate.cartesian_from_intermediate(strip.of_photos.resection.centers)
+        rotations = strip.intermediate.cartesian_rotations(strip.of_photos.resection.rotations)
         for photo, center, rotation in zip(strip.strip.photos, centers, rotations, strict=True):
             found[f"photo {photo}"] = np.vstack([center, rotation])
     return found

@@ -94,7 +94,7 @@ def rms(values: Floats) -> Floats:
 
 def parallax_rms(strip: StripResult) -> Floats:
     """Rms of the y parallaxes of each pair that were used, micrometres, shared by both photos."""
-    orientation = strip.orientation
+    orientation = strip.of_photos.orientation
     used = orientation.used
     by_pair = [orientation.parallax[used & (orientation.pairs.pair == n)] for n in range(orientation.pairs.size)]
     found: Floats = np.array([rms(each) for each in by_pair]) / SHARED / MICROMETRE
@@ -103,7 +103,7 @@ def parallax_rms(strip: StripResult) -> Floats:
 
 def largest_parallax(found: Result) -> tuple[str, float]:
     """Point with the largest y parallax of the first strip, and its residual shared by both photos, micrometres."""
-    orientation = found.strips[0].orientation
+    orientation = found.strips[0].of_photos.orientation
     row = int(np.argmax(np.abs(orientation.parallax)))
     name = found.refined.observations.point_ids[orientation.point[row]]
     return name, float(abs(orientation.parallax[row]) / SHARED / MICROMETRE)
@@ -111,7 +111,7 @@ def largest_parallax(found: Result) -> tuple[str, float]:
 
 def ratio_spread(strip: StripResult) -> Floats:
     """Relative standard deviation of the scale ratios of all common points of each joint, rejected ones too."""
-    joints = strip.formed.junctions
+    joints = strip.of_photos.formed.junctions
     ratios = [joints.ratio[joints.junction == n] for n in range(len(joints.factor))]
     return np.array([each.std(ddof=1) / each.mean() for each in ratios])
 
@@ -327,13 +327,13 @@ def test_without_the_outlier_the_first_lunar_pair_fits_like_the_others() -> None
 
 def test_lunar_models_are_joined_by_as_many_points_with_the_same_spread() -> None:
     strip = apollo(screening="none", free=False).strips[0]
-    assert np.bincount(strip.formed.junctions.junction).tolist() == [31, 43, 64]
+    assert np.bincount(strip.of_photos.formed.junctions.junction).tolist() == [31, 43, 64]
     assert ratio_spread(strip) == pytest.approx([2.1e-3, 8.5e-4, 5.9e-4], rel=0.08)
 
 
 def test_the_scale_transfer_finds_the_lunar_outlier_too() -> None:
     found = apollo(screening="none", free=False)
-    joints = found.strips[0].formed.junctions
+    joints = found.strips[0].of_photos.formed.junctions
     names = [found.refined.observations.point_ids[point] for point in joints.point[~joints.used]]
     assert names == [OUTLIER]
 
@@ -448,10 +448,10 @@ def test_the_strasbourg_tables_are_what_was_published() -> None:
 
 def test_strasbourg_pairs_fit_as_others_found() -> None:
     found = strasbourg()
-    assert found.strips[0].orientation.points_used.tolist() == [233, 206]
+    assert found.strips[0].of_photos.orientation.points_used.tolist() == [233, 206]
     assert parallax_rms(found.strips[0]) == pytest.approx([5.6, 5.0], abs=0.06)
     assert largest_parallax(found)[1] == pytest.approx(13.8, abs=0.4)
-    assert found.strips[0].rejections == ()
+    assert found.strips[0].of_photos.rejections == ()
 
 
 def test_points_measured_by_hand_fit_better() -> None:
@@ -467,7 +467,7 @@ def test_points_measured_by_hand_fit_better() -> None:
 
 def test_strasbourg_models_are_joined_by_as_many_points_with_the_same_spread() -> None:
     strip = strasbourg().strips[0]
-    assert np.bincount(strip.formed.junctions.junction).tolist() == [95]
+    assert np.bincount(strip.of_photos.formed.junctions.junction).tolist() == [95]
     assert ratio_spread(strip) == pytest.approx([8.7e-4], rel=0.03)
 
 
@@ -517,8 +517,8 @@ def test_strasbourg_orientations_agree_with_the_published_bundle() -> None:
     found = strasbourg()
     strip = found.strips[0]
     centers, rotations, sigmas = published_orientations()
-    shifts = strip.intermediate.cartesian_from_intermediate(strip.resection.centers) - centers
-    turns = strip.intermediate.cartesian_rotations(strip.resection.rotations) @ rotations.transpose(0, 2, 1)
+    shifts = strip.intermediate.cartesian_from_intermediate(strip.of_photos.resection.centers) - centers
+    turns = strip.intermediate.cartesian_rotations(strip.of_photos.resection.rotations) @ rotations.transpose(0, 2, 1)
     angles = np.degrees(np.stack([turns[:, 2, 1], turns[:, 0, 2], turns[:, 1, 0]], axis=1))
     assert np.abs(shifts).max() < 1.2
     assert np.abs(angles).max() < 0.04
@@ -613,7 +613,7 @@ def test_simulated_photos_are_near_the_truth_and_not_on_it() -> None:
 
 
 def test_the_simulated_noise_is_found_again() -> None:
-    orientation = result(SIMULATED).strips[0].orientation
+    orientation = result(SIMULATED).strips[0].of_photos.orientation
     squares = float((orientation.pairs.weight * orientation.parallax**2).sum()) / 2
     redundancy = int(orientation.used.sum()) - 5 * orientation.pairs.size
     sigma0 = np.sqrt(squares / redundancy) / MICROMETRE

@@ -164,7 +164,7 @@ def test_the_program_lays_x_along_the_strip(heading: float) -> None:
     strip = triangulate(inputs_of(done), Settings()).strips[0]
     off = (np.degrees(strip.intermediate.azimuth) - heading + 180) % 360 - 180
     assert abs(off) < 1.0  # the ends of the strip are displaced at random
-    centers = strip.resection.centers
+    centers = strip.of_photos.resection.centers
     assert np.ptp(centers[:, 0]) > 30 * np.ptp(centers[:, 1])
     assert (np.diff(centers[:, 0]) > 0).all()
 
@@ -299,7 +299,9 @@ def test_points_seen_once_are_listed_and_change_nothing() -> None:
     }
     np.testing.assert_array_equal(before.points.number, after.points.number)
     np.testing.assert_array_equal(before.points.cartesian, after.points.cartesian)
-    np.testing.assert_array_equal(before.strips[0].resection.rotations, after.strips[0].resection.rotations)
+    np.testing.assert_array_equal(
+        before.strips[0].of_photos.resection.rotations, after.strips[0].of_photos.resection.rotations
+    )
 
 
 @pytest.mark.parametrize("seen_on", [(2,), (3, 5)], ids=["one photo", "two photos that are not neighbours"])
@@ -354,8 +356,8 @@ def test_photos_that_see_no_control_are_carried_by_the_strip() -> None:
     for sigma_um, low, high in ((0.0, 0.0, 1e-6), (5.0, 0.05, 5.0)):
         noisy = simulate(replace(spec, image=Image(sigma_um=sigma_um)))
         strip = triangulate(inputs_of(noisy), settings_of(noisy)).strips[0]
-        assert strip.resection.solved.all()
-        centers = strip.intermediate.cartesian_from_intermediate(strip.resection.centers)
+        assert strip.of_photos.resection.solved.all()
+        centers = strip.intermediate.cartesian_from_intermediate(strip.of_photos.resection.centers)
         error = np.linalg.norm(centers - noisy.truth.centers, axis=1)
         assert low <= error[without].max() < high
 

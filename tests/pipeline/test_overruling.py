@@ -33,7 +33,7 @@ def adjusted(keep: tuple[str, ...] = (), drop: tuple[str, ...] = ()) -> Result:
 
 
 def in_use(result: Result, photo: str, point: str) -> bool:
-    o, oriented = result.refined.observations, result.strips[0].orientation
+    o, oriented = result.refined.observations, result.strips[0].of_photos.orientation
     (row,) = np.flatnonzero((o.photo == o.photo_ids.index(photo)) & (o.point == o.point_ids.index(point)))
     return bool((oriented.used & (oriented.rows == row).any(axis=1)).any())
 
@@ -49,8 +49,8 @@ def test_a_measurement_that_is_kept_stays_in_use_and_is_reported() -> None:
     assert in_use(result, *WRONG)
     (note,) = (note for note in result.notes if note.code == "user-keep")
     assert "105/p4_1" in note.message
-    back = [r for r in result.strips[0].rejections if r.readmitted]
-    assert {int(result.strips[0].orientation.point[r.row]) for r in back} == {
+    back = [r for r in result.strips[0].of_photos.rejections if r.readmitted]
+    assert {int(result.strips[0].of_photos.orientation.point[r.row]) for r in back} == {
         result.refined.observations.point_ids.index("p4_1")
     }
 

@@ -297,26 +297,31 @@ def _strip(
     inside = seen[points.number]
     number, cartesian = points.number[inside], points.cartesian[inside]
     xyz = frame.intermediate_from_cartesian(cartesian)
-    formed = strip.formed
+    formed = strip.of_photos.formed
     at = np.minimum(np.searchsorted(formed.point, number), len(formed.point) - 1)
     known = formed.point[at] == number
     models = np.where(known, formed.model_count[at], 0)
     shape = np.where(known[:, None], formed.xyz[at], np.nan)
     control_at = np.searchsorted(number, formed.point[strip.control_rows])
-    focal = np.full(len(photos), strip.strip.camera.principal_distance)
+    focal = np.full(len(photos), strip.of_photos.strip.camera.principal_distance)
     at_rows = np.searchsorted(number, observations.point[rows])
     residuals = observations.xy[rows] - project(xyz[at_rows], centers, rotations, position[rows], focal)
     counts = np.maximum(2 * np.bincount(position[rows], minlength=len(photos)), 1)
     rms = np.sqrt(np.bincount(position[rows], (residuals**2).sum(axis=1), len(photos)) / counts)
+    stages = replace(
+        strip.of_photos,
+        formed=replace(formed, point=number, xyz=shape, model_count=models),
+        resection=Resection(centers, rotations, residuals, rms, np.ones(len(photos), bool)),
+        rows=rows,
+    )
     return replace(
         strip,
-        formed=replace(formed, point=number, xyz=shape, model_count=models),
         control_rows=np.minimum(control_at, len(number) - 1),
         xyz=xyz,
         cartesian=cartesian,
-        resection=Resection(centers, rotations, residuals, rms, np.ones(len(photos), bool)),
-        rows=rows,
+        rays=points.rays[inside],
         polynomial=None,
+        photo_stages=stages,
     )
 
 

@@ -284,8 +284,8 @@ def _begin(
     used = np.zeros(int(rows.max(initial=-1)) + 1, bool)
     paired = np.zeros(len(used), bool)
     for strip in start.strips:
-        used[strip.rows[strip.rows < len(used)]] = True
-        seen = np.unique(strip.orientation.rows)
+        used[strip.of_photos.rows[strip.of_photos.rows < len(used)]] = True
+        seen = np.unique(strip.of_photos.orientation.rows)
         paired[seen[seen < len(used)]] = True
     inside = used[rows]
     free = ~paired[rows]

@@ -382,8 +382,8 @@ def _together(
     points = _mean_points(strips, len(observations.point_ids))
     oriented: dict[str, tuple[Floats, Floats]] = {}
     for strip in strips:
-        centers = strip.intermediate.cartesian_from_intermediate(strip.resection.centers)
-        turned = strip.intermediate.cartesian_rotations(strip.resection.rotations)
+        centers = strip.intermediate.cartesian_from_intermediate(strip.of_photos.resection.centers)
+        turned = strip.intermediate.cartesian_rotations(strip.of_photos.resection.rotations)
         oriented |= {photo: (c, r) for photo, c, r in zip(strip.strip.photos, centers, turned, strict=True)}
     singles = {strip.photos[0]: strip.camera.principal_distance for strip in inputs.strips if len(strip.photos) == 1}
     if singles:

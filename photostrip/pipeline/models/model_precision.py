@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from photostrip.geodesy.crs import GroundFrame
     from photostrip.geodesy.local_frame import IntermediateFrame
-    from photostrip.pipeline.models.model_results import LinkedStrip
+    from photostrip.pipeline.results import StripResult
     from photostrip.points import ControlPoints, PhotoPoints
     from photostrip.triangulation.error_propagation.control_errors import FitOperator, Misclosures
     from photostrip.triangulation.independent_models.formation import FormedModels
@@ -54,13 +54,13 @@ def variance_factor(formed: FormedModels) -> tuple[float, str]:
 
 
 def of_linked(
-    strip: LinkedStrip, observations: PhotoPoints, frames: Sequence[GroundFrame], given: ControlPoints
+    strip: StripResult, observations: PhotoPoints, frames: Sequence[GroundFrame], given: ControlPoints
 ) -> StripPrecision:
     """Covariances of one strip of independent models.
 
     Parameters
     ----------
-    strip : LinkedStrip
+    strip : StripResult
         The strip with all its stages.
     frames : sequence of GroundFrame
         Ground frames of the given points.
@@ -73,7 +73,7 @@ def of_linked(
         Covariances of points and perspective centres, test of the check points. The rotations of the photos are not
         known, and neither are their covariances.
     """
-    formed, axes = strip.formed, strip.intermediate.axes
+    formed, axes = strip.of_models.formed, strip.intermediate.axes
     found = model_errors.differentiate(formed, strip.absolute.similarity)
     seen, fit = _fit_to_control(strip, found, frames)
     factor, basis = variance_factor(formed)
@@ -138,7 +138,7 @@ def joint(
 
 
 def _fit_to_control(
-    strip: LinkedStrip, found: ModelErrors, frames: Sequence[GroundFrame]
+    strip: StripResult, found: ModelErrors, frames: Sequence[GroundFrame]
 ) -> tuple[Misclosures, FitOperator]:
     """Misclosures at the control and the operator of the fit, with the weights that were in force."""
     targets = absolute_orientation.Targets(strip.control, frames, strip.intermediate)
@@ -169,9 +169,9 @@ def _weights(seen: Misclosures, rows: Numbers, operator: Floats | None = None) -
     return rows, weights.transpose(1, 0, 2)
 
 
-def _influence(strip: LinkedStrip, fit: FitOperator) -> Floats:
+def _influence(strip: StripResult, fit: FitOperator) -> Floats:
     """Displacement of points and centres by the parameters of the fit, shape (k, 3, t)."""
-    formed = strip.formed
+    formed = strip.of_models.formed
     nodes = strip.absolute.similarity(formed.node_xyz)
     influence = fit.influence(nodes)
     points = len(formed.point)
@@ -195,7 +195,7 @@ def _scaled_rows(xyz: Floats, above: Floats, terms: Sequence[tuple[str, ...]], u
 
 
 def _check(
-    strip: LinkedStrip,
+    strip: StripResult,
     parts: tuple[ModelErrors, Misclosures, FitOperator, Floats],
     checks: tuple[ControlPoints, Numbers],
     frames: Sequence[GroundFrame],

@@ -10,7 +10,7 @@ import numpy as np
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.pipeline.models import model_precision
 from photostrip.pipeline.models.model_notes import link_notes
-from photostrip.pipeline.models.model_results import LinkedStrip
+from photostrip.pipeline.results import ModelStages, StripResult
 from photostrip.pipeline.strip import control_notes, control_of, polynomial_notes, to_ground, wrong_control_notes
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.gross_errors.control import control_screening
@@ -36,17 +36,18 @@ if TYPE_CHECKING:
 
 LEAST_SOLID = 4  # points that can tell a body from its mirror image
 CENTER = "center of photo "
+MILLIMETRES = 1000.0  # in a metre
 ADJUSTMENTS = ("polynomial", "similarity")
 
 
 def adjust_all(
     models: MeasuredModels, control: ControlPoints, frames: Sequence[GroundFrame], settings: Settings
-) -> tuple[LinkedStrip, ...]:
+) -> tuple[StripResult, ...]:
     """Take all strips of independent models through the method.
 
     Returns
     -------
-    tuple of LinkedStrip
+    tuple of StripResult
         In the project's order.
 
     Raises
@@ -100,7 +101,7 @@ def require_named(settings: link_screening.Settings, measured: ModelPoints) -> N
 
 def adjust_models(
     strip: ModelStrip, measured: ModelPoints, control: ControlPoints, frames: Sequence[GroundFrame], settings: Settings
-) -> LinkedStrip:
+) -> StripResult:
     """Take one strip of independent models through the method.
 
     Parameters
@@ -149,27 +150,32 @@ def adjust_models(
         correction = polynomial.fit(polynomial.Problem(xyz[rows], targets, weight, *extent), settings.polynomial)
     adjusted = xyz if correction is None else correction(xyz)
     places = _centers(formed, orientation, correction)
-    return LinkedStrip(
-        strip,
-        formed,
-        spread,
-        intermediate,
-        here,
-        rows,
-        orientation,
-        correction,
-        adjusted,
-        intermediate.cartesian_from_intermediate(adjusted),
-        places,
-        float(np.nanmean(places[:, 2]) - adjusted[:, 2].mean()) if np.isfinite(places).any() else float("nan"),
-        (
+    depth = float(np.nanmean(places[:, 2]) - adjusted[:, 2].mean()) if np.isfinite(places).any() else float("nan")
+    return StripResult(
+        precision=spread,
+        intermediate=intermediate,
+        control=here,
+        control_rows=rows,
+        absolute=orientation,
+        polynomial=correction,
+        xyz=adjusted,
+        cartesian=intermediate.cartesian_from_intermediate(adjusted),
+        rays=formed.photo_count,
+        depth=depth,
+        notes=(
             *link_notes(strip, measured, formed),
             *wrong_control_notes(strip, wrong),
             *control_notes(strip, orientation),
             *polynomial_notes(strip, correction, adjusted),
         ),
-        wrong,
-        judged,
+        wrong_control=wrong,
+        judged_control=judged,
+        model_stages=ModelStages(
+            strip=strip,
+            formed=formed,
+            centers=places,
+            scales=orientation.similarity.scale * formed.places.scale * MILLIMETRES,
+        ),
     )
 
 

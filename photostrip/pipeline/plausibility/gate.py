@@ -132,8 +132,8 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
         return accepted(_of_models(inputs, inputs.models, settings, directory), settings.accept)
     examined = replace(before(inputs, settings), observations=result.refined.observations)
     stages = result.strips if result.bundle is None else result.bundle.start.strips  # as they were formed
-    formed = [evidence.Formed(each.strip, each.orientation, each.formed) for each in stages]
-    strips = tuple(each.strip for each in stages)  # a photo that is a strip of its own forms nothing
+    formed = [evidence.Formed(each.strip, each.orientation, each.formed) for each in (s.of_photos for s in stages)]
+    strips = tuple(each.strip for each in formed)  # a photo that is a strip of its own forms nothing
     told = [*examined.findings, *_of_control(inputs, examined, strips, formed, directory)]
     for each in formed:
         told += _of_strip(each, result.refined.observations)
@@ -361,8 +361,8 @@ def _of_rotations(result: Result, formed: Sequence[evidence.Formed], directory: 
     rows = {photo: row for row, photo in enumerate(given.photos)}
     photos, angles, rotations = [], [], []
     for strip in result.strips:
-        cartesian = strip.intermediate.cartesian_from_intermediate(strip.resection.centers)
-        turned = frame.axes_at(cartesian) @ strip.intermediate.cartesian_rotations(strip.resection.rotations)
+        cartesian = strip.intermediate.cartesian_from_intermediate(strip.of_photos.resection.centers)
+        turned = frame.axes_at(cartesian) @ strip.intermediate.cartesian_rotations(strip.of_photos.resection.rotations)
         for number, photo in enumerate(strip.strip.photos):
             if photo in rows:
                 photos.append(photo)

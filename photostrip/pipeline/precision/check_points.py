@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
     from photostrip.geodesy.crs import GroundFrame
     from photostrip.pipeline.covariance_adjustment import CovarianceAdjustment
-    from photostrip.pipeline.models.model_results import LinkedStrip
     from photostrip.pipeline.precision.propagation import Propagation
     from photostrip.pipeline.results import StripResult
     from photostrip.points import ControlPoints, PhotoPoints
@@ -33,7 +32,7 @@ LARGEST = 100  # check points of a strip that are tested together, spread over i
 
 
 def check_points(
-    strip: StripResult | LinkedStrip, control: ControlPoints, observations: PhotoPoints
+    strip: StripResult, control: ControlPoints, observations: PhotoPoints
 ) -> tuple[ControlPoints, Numbers]:
     """Check points that a strip holds, and their rows in its points.
 

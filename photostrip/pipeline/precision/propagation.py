@@ -53,13 +53,17 @@ def propagation(strip: StripResult, observations: PhotoPoints, frames: Sequence[
     Propagation
         Everything that covariances are made of.
     """
-    position = measured(strip.strip, observations)
+    position = measured(strip.of_photos.strip, observations)
     similarity = strip.absolute.similarity
-    errors = strip_errors.differentiate_strip(strip.orientation, strip.formed, similarity, position, observations.sigma)
+    errors = strip_errors.differentiate_strip(
+        strip.of_photos.orientation, strip.of_photos.formed, similarity, position, observations.sigma
+    )
     xyz = similarity(strip.formed.xyz)
     found, fit = _fit_to_control(strip, errors, xyz, frames)
     influence = fit.influence(xyz)
-    photos = photo_errors.differentiate_photos(errors, sightings(strip, observations), strip.resection, influence)
+    photos = photo_errors.differentiate_photos(
+        errors, sightings(strip, observations), strip.of_photos.resection, influence
+    )
     return Propagation(
         errors=errors,
         control=found,
@@ -73,10 +77,10 @@ def propagation(strip: StripResult, observations: PhotoPoints, frames: Sequence[
 
 def sightings(strip: StripResult, observations: PhotoPoints) -> photo_errors.Sightings:
     """Collect the image points on which the photos of a strip were oriented."""
-    point = np.searchsorted(strip.formed.point, observations.point[strip.rows])
-    focal = strip.strip.camera.principal_distance
-    photo = measured(strip.strip, observations)[strip.rows]
-    return photo_errors.Sightings(photo, point, strip.rows, strip.xyz[point], focal)
+    point = np.searchsorted(strip.formed.point, observations.point[strip.of_photos.rows])
+    focal = strip.of_photos.strip.camera.principal_distance
+    photo = measured(strip.of_photos.strip, observations)[strip.of_photos.rows]
+    return photo_errors.Sightings(photo, point, strip.of_photos.rows, strip.xyz[point], focal)
 
 
 def _fit_to_control(

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
     from photostrip.geodesy.crs import GroundFrame
     from photostrip.pipeline.covariance_adjustment import CovarianceAdjustment
-    from photostrip.pipeline.models.model_results import LinkedStrip
     from photostrip.pipeline.results import Adjusted, StripResult
     from photostrip.points import ControlPoints, PhotoPoints
 
@@ -72,12 +71,12 @@ def of_strip(
         Covariances of points and photos, test of the check points.
     """
     checks = check_points.check_points(strip, given, observations)
-    if strip.covariance is not None:
-        return _of_covariance(strip, strip.covariance, checks, frames)
+    if strip.of_photos.covariance is not None:
+        return _of_covariance(strip, strip.of_photos.covariance, checks, frames)
     found = propagation(strip, observations, frames)
     errors, operator = found.errors, found.fit.operator
-    stated = float(np.median(observations.sigma[measured(strip.strip, observations) >= 0]))
-    factor, basis = covariances.image_variance(strip.orientation, stated)
+    stated = float(np.median(observations.sigma[measured(strip.of_photos.strip, observations) >= 0]))
+    factor, basis = covariances.image_variance(strip.of_photos.orientation, stated)
     parameters = covariances.of_parameters(errors, found.control, operator, factor)
     points = covariances.covariances(errors, errors.points, parameters, found.influence) * factor
     photos = np.full((len(strip.strip.photos), 6, 6), np.nan)
@@ -129,9 +128,7 @@ def _turned(strip: StripResult, points: Floats, photos: Floats) -> tuple[Floats,
     return axes @ points @ axes.T, both @ photos @ both.T
 
 
-def joined(
-    strips: Sequence[StripPrecision], results: Sequence[StripResult | LinkedStrip], points: Adjusted
-) -> Precision:
+def joined(strips: Sequence[StripPrecision], results: Sequence[StripResult], points: Adjusted) -> Precision:
     """Precision of all strips together; a point of several strips is their mean.
 
     Returns

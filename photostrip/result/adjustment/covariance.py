@@ -18,7 +18,11 @@ if TYPE_CHECKING:
 
 def covariances_of(result: Result) -> Document:
     """Return a record for each strip that was adjusted with its own covariance, under the key ``covariance``."""
-    blocks = [_block(strip, strip.covariance) for strip in result.strips if strip.covariance is not None]
+    blocks = [
+        _block(strip, strip.of_photos.covariance)
+        for strip in result.photo_strips
+        if strip.of_photos.covariance is not None
+    ]
     return {"covariance": blocks} if blocks else {}
 
 
@@ -27,7 +31,7 @@ def _block(strip: StripResult, found: CovarianceAdjustment) -> Document:
     ratio = tested.squares / tested.redundancy if tested.redundancy > 0 else float("nan")
     block = {
         "strip": strip.strip.id,
-        "models": len(strip.formed.scale),
+        "models": len(strip.of_photos.formed.scale),
         "passes": found.passes,
         "control_coordinates": len(found.control.point),
         "distances": tested.distances,

@@ -27,7 +27,7 @@ def deformations_of(result: Result) -> Document:
     """
     if result.bundle is not None:
         return {}
-    found = [(strip, model) for strip in result.strips for model in model_deformations(strip, result.frames)]
+    found = [(strip, model) for strip in result.photo_strips for model in model_deformations(strip, result.frames)]
     rows = []
     for strip, model in found:
         left, right = strip.strip.photos[model.model : model.model + 2]

@@ -66,7 +66,7 @@ def model_deformations(strip: StripResult, frames: Sequence[GroundFrame]) -> tup
     Source: [003] eq. 10.12.
     """
     height = np.flatnonzero(strip.control.use[:, 2])
-    oriented, formed = strip.orientation, strip.formed
+    oriented, formed = strip.of_photos.orientation, strip.of_photos.formed
     number = formed.point[strip.control_rows[height]]
     order = np.argsort(number)
     found = []
@@ -89,11 +89,11 @@ def _of_model(
     base = ends[1] - ends[0]
     length = float(np.hypot(base[0], base[1]))
     along = np.array([base[0], base[1]]) / length
-    xyz = similarity(strip.formed.model_xyz[rows])
+    xyz = similarity(strip.of_photos.formed.model_xyz[rows])
     if not len(rows):
         return None
     arm = xyz - ends[0]
-    scale = float(-arm[:, 2].mean()) / (strip.orientation.pairs.focal / MILLIMETRES)
+    scale = float(-arm[:, 2].mean()) / (strip.of_photos.orientation.pairs.focal / MILLIMETRES)
     xy = np.column_stack([arm[:, :2] @ along, arm[:, :2] @ (-along[1], along[0])]) / scale * MILLIMETRES
     if not determines_paraboloid(xy):
         return None

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.pipeline import LinkedStrip, Result
+    from photostrip.pipeline import Result, StripResult
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -44,7 +44,7 @@ def _directed(values: Plain, names: Sequence[str] = DIRECTIONS) -> Document:
     return dict(zip(names, values, strict=True))
 
 
-def gaps(strip: LinkedStrip) -> Floats:
+def gaps(strip: StripResult) -> Floats:
     """Differences of what neighbouring models have in common, after minus before.
 
     Returns
@@ -52,32 +52,32 @@ def gaps(strip: LinkedStrip) -> Floats:
     ndarray, shape (t, 3)
         Metres along the strip, to its left and up, of every common point of every link.
     """
-    shared, similarity, formed = strip.formed.links.shared, strip.absolute.similarity, strip.formed
+    shared, similarity, formed = strip.of_models.formed.links.shared, strip.absolute.similarity, strip.of_models.formed
     gap = formed.model_xyz[shared.after] - formed.model_xyz[shared.before]
     found: Floats = similarity.scale * gap @ similarity.rotation.T
     return found
 
 
-def _sigma0(strip: LinkedStrip) -> float:
+def _sigma0(strip: StripResult) -> float:
     """Root of the variance of the model coordinates over what is stated; NaN without redundancy."""
-    solved = strip.formed.links.solved
+    solved = strip.of_models.formed.links.solved
     redundancy = int(solved.redundancy.sum())
     return float(np.sqrt(solved.squares.sum() / redundancy)) if redundancy else float("nan")
 
 
-def _stated(strip: LinkedStrip) -> float:
+def _stated(strip: StripResult) -> float:
     """Root mean square of the stated standard deviations of points, mm."""
-    models = strip.formed.models
+    models = strip.of_models.formed.models
     return rms(models.sigma[models.node < models.points].ravel())
 
 
 def strips_of(result: Result) -> list[Document]:
     """Return the list ``strips``: what each strip is like and how well it holds together."""
-    return [_strip(strip) for strip in result.linked]
+    return [_strip(strip) for strip in result.model_strips]
 
 
-def _strip(strip: LinkedStrip) -> Document:
-    formed, links = strip.formed, strip.formed.links
+def _strip(strip: StripResult) -> Document:
+    formed, links = strip.of_models.formed, strip.of_models.formed.links
     base = np.linalg.norm(np.diff(strip.centers, axis=0), axis=1)
     known = base[np.isfinite(base)]
     gap_rms = [rms(column) for column in gaps(strip)[links.used].T]
@@ -103,23 +103,26 @@ def _strip(strip: LinkedStrip) -> Document:
     }
 
 
-def _drift(strip: LinkedStrip) -> float:
+def _drift(strip: StripResult) -> float:
     """Change of scale along the strip that the links let expect, parts per million."""
-    variance = strip.formed.links.solved.cofactors[:, 6, 6].sum() * strip.formed.links.factor
-    return float(np.sqrt(variance)) * PPM if strip.formed.links.shared.count else float("nan")
+    variance = strip.of_models.formed.links.solved.cofactors[:, 6, 6].sum() * strip.of_models.formed.links.factor
+    return float(np.sqrt(variance)) * PPM if strip.of_models.formed.links.shared.count else float("nan")
 
 
 def counts_of(result: Result) -> Document:
     """Return what the block ``counts`` says of models beside points and control."""
-    links = [strip.formed.links for strip in result.linked]
-    points = [strip.formed.models.node < strip.formed.models.points for strip in result.linked]
+    links = [strip.of_models.formed.links for strip in result.model_strips]
+    points = [
+        strip.of_models.formed.models.node < strip.of_models.formed.models.points for strip in result.model_strips
+    ]
     return {
-        "models": sum(strip.formed.models.count for strip in result.linked),
+        "models": sum(strip.of_models.formed.models.count for strip in result.model_strips),
         "image_points": 0,
         "image_points_used": 0,
         "model_points": sum(int(each.sum()) for each in points),
         "model_points_used": sum(
-            int((each & strip.formed.used).sum()) for each, strip in zip(points, result.linked, strict=True)
+            int((each & strip.of_models.formed.used).sum())
+            for each, strip in zip(points, result.model_strips, strict=True)
         ),
         "model_centers": sum(int((~each).sum()) for each in points),
         "pass_point_transfers": sum(int(each.used.sum()) for each in links),
@@ -132,12 +135,12 @@ def counts_of(result: Result) -> Document:
 
 def summary_of(result: Result) -> Document:
     """Return what the block ``summary`` says of models, before what is left at given points."""
-    strips = result.linked
-    redundancy = np.array([strip.formed.links.solved.redundancy.sum() for strip in strips])
+    strips = result.model_strips
+    redundancy = np.array([strip.of_models.formed.links.solved.redundancy.sum() for strip in strips])
     share = redundancy / max(int(redundancy.sum()), 1)
     ratio = float(np.sqrt((share * np.nan_to_num([_sigma0(strip) ** 2 for strip in strips])).sum()))
     stated = rms(np.array([_stated(strip) for strip in strips]))
-    models = np.array([strip.formed.models.count for strip in strips])
+    models = np.array([strip.of_models.formed.models.count for strip in strips])
     return {
         "sigma0_um": micrometres(ratio * stated if redundancy.sum() else np.nan),
         "sigma_given_um": micrometres(stated),
@@ -155,11 +158,11 @@ def summary_of(result: Result) -> Document:
 
 def models_of(result: Result) -> list[Document]:
     """Return the list ``models``: what each model holds and how it lies in its strip, in flight order."""
-    return [model for strip in result.linked for model in _models(strip)]
+    return [model for strip in result.model_strips for model in _models(strip)]
 
 
-def _models(strip: LinkedStrip) -> list[Document]:
-    formed, models, photos = strip.formed, strip.formed.models, strip.strip.photos
+def _models(strip: StripResult) -> list[Document]:
+    formed, models, photos = strip.of_models.formed, strip.of_models.formed.models, strip.strip.photos
     point = models.node < models.points
     used = np.bincount(models.model[point & formed.used], minlength=models.count)
     total = np.bincount(models.model[point], minlength=models.count)
@@ -167,13 +170,13 @@ def _models(strip: LinkedStrip) -> list[Document]:
     base = np.linalg.norm(np.diff(strip.centers, axis=0), axis=1)
     turned = strip.absolute.similarity.rotation @ formed.places.rotation
     columns = zip(
-        strip.strip.models,
+        strip.of_models.strip.models,
         used.tolist(),
         (total - used).tolist(),
         center.tolist(),
         rounded(base, GROUND),
         significant(formed.places.scale, EXACT),
-        rounded(strip.model_scales, 1),
+        rounded(strip.of_models.scales, 1),
         rounded(turned.reshape(-1, 9), ROTATION),
         strict=True,
     )
@@ -190,13 +193,13 @@ def _models(strip: LinkedStrip) -> list[Document]:
 
 def links_of(result: Result) -> list[Document]:
     """Return the list ``links``: how every model fits the one before it, in flight order."""
-    return [link for strip in result.linked for link in _links(result, strip)]
+    return [link for strip in result.model_strips for link in _links(result, strip)]
 
 
-def _links(result: Result, strip: LinkedStrip) -> list[Document]:
-    links, models = strip.formed.links, strip.formed.models
-    shared, solved, names = links.shared, links.solved, strip.strip.models
-    gap, far, found = gaps(strip), far_ends(strip.formed), []
+def _links(result: Result, strip: StripResult) -> list[Document]:
+    links, models = strip.of_models.formed.links, strip.of_models.formed.models
+    shared, solved, names = links.shared, links.solved, strip.of_models.strip.models
+    gap, far, found = gaps(strip), far_ends(strip.of_models.formed), []
     smallest = detectable(shared, links)
     for number in range(shared.count):
         rows = np.flatnonzero(shared.link == number)
@@ -248,8 +251,8 @@ def residuals_of(result: Result, rank: Numbers) -> list[Document]:
     After minus before, in micrometres along the axes of the model before; also of points that took no part.
     """
     found = []
-    for strip in result.linked:
-        links, models, names = strip.formed.links, strip.formed.models, strip.strip.models
+    for strip in result.model_strips:
+        links, models, names = strip.of_models.formed.links, strip.of_models.formed.models, strip.of_models.strip.models
         shared = links.shared
         place = np.concatenate([rank, len(rank) + np.arange(len(strip.strip.photos) + models.node.max(initial=0))])
         for number in range(shared.count):
@@ -273,9 +276,13 @@ def residuals_of(result: Result, rank: Numbers) -> list[Document]:
 def rejected_of(result: Result) -> list[Document]:
     """Return what was taken out of links and control, as in the list ``rejected``."""
     found = []
-    for strip in result.linked:
-        shared, formed, names = strip.formed.links.shared, strip.formed, strip.strip.models
-        for each in strip.formed.links.rejections:
+    for strip in result.model_strips:
+        shared, formed, names = (
+            strip.of_models.formed.links.shared,
+            strip.of_models.formed,
+            strip.of_models.strip.models,
+        )
+        for each in strip.of_models.formed.links.rejections:
             link = each.link
             before, after = shared.before[each.row], shared.after[each.row]
             size = float(np.linalg.norm(each.error)) * MICROMETRES
@@ -308,9 +315,9 @@ def rejected_of(result: Result) -> list[Document]:
     return found
 
 
-def _other_point(strip: LinkedStrip, row: int, size: float) -> str:
+def _other_point(strip: StripResult, row: int, size: float) -> str:
     """Say that a difference is of the size of the model, as where one id stands for two points."""
-    models = strip.formed.models
+    models = strip.of_models.formed.models
     xyz = models.xyz[models.model == models.model[row]]
     extent = float(np.linalg.norm(xyz - xyz.mean(axis=0), axis=1).max())
     return ", as where one id stands for two points" if size > ANOTHER_POINT * extent else ""
@@ -328,11 +335,11 @@ def _guilty(names: tuple[str, str], used: tuple[bool, bool]) -> str:
 
 def photos_of(result: Result) -> list[Document]:
     """List ``photos``: perspective centres in flight order; rotations of photos are not known from models."""
-    return [photo for number, strip in enumerate(result.linked) for photo in _photos(result, number, strip)]
+    return [photo for number, strip in enumerate(result.model_strips) for photo in _photos(result, number, strip)]
 
 
-def _photos(result: Result, number: int, strip: LinkedStrip) -> list[Document]:
-    photos, models = strip.strip.photos, strip.formed.models
+def _photos(result: Result, number: int, strip: StripResult) -> list[Document]:
+    photos, models = strip.strip.photos, strip.of_models.formed.models
     known = np.flatnonzero(np.isfinite(strip.centers).all(axis=1))
     cartesian = strip.intermediate.cartesian_from_intermediate(strip.centers[known])
     ids = [f"at the center of photo {photos[row]}" for row in known.tolist()]
@@ -342,7 +349,7 @@ def _photos(result: Result, number: int, strip: LinkedStrip) -> list[Document]:
         row: (place, sigma) for row, place, sigma in zip(known.tolist(), places, sigmas, strict=True)
     }
     point = models.node < models.points
-    count = np.bincount(models.model[point & strip.formed.used], minlength=models.count).tolist()
+    count = np.bincount(models.model[point & strip.of_models.formed.used], minlength=models.count).tolist()
     system, unit = result.settings.angle_system, result.settings.angle_unit
     found = []
     for row, photo in enumerate(photos):

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.pipeline import LinkedStrip, Result, StripResult
+    from photostrip.pipeline import Result, StripResult
     from photostrip.points import PhotoPoints
     from photostrip.triangulation.gross_errors.control.control_screening import ControlRejection
     from photostrip.triangulation.gross_errors.pairs.screening import Rejection
@@ -49,7 +49,7 @@ class Parallaxes:
     @classmethod
     def of(cls, strip: StripResult) -> Parallaxes:
         """Sum up the parallaxes of a strip."""
-        oriented = strip.orientation
+        oriented = strip.of_photos.orientation
         pairs, used = oriented.pairs, oriented.used
         size = np.where(used, np.abs(oriented.parallax), -1.0)
         peak = np.flatnonzero(size == np.maximum.reduceat(size, pairs.starts)[pairs.pair])
@@ -72,15 +72,15 @@ def sigma0(squares: Floats, redundancy: Numbers) -> float:
 def models_of(result: Result) -> list[Document]:
     """Return the list ``models``: relative orientation and scale of every pair, in flight order."""
     ids = result.refined.observations.point_ids
-    return [model for strip in result.strips for model in _models(strip, ids)]
+    return [model for strip in result.photo_strips for model in _models(strip, ids)]
 
 
 def _models(strip: StripResult, ids: Sequence[str]) -> list[Document]:
-    oriented, formed, photos = strip.orientation, strip.formed, strip.strip.photos
+    oriented, formed, photos = strip.of_photos.orientation, strip.of_photos.formed, strip.strip.photos
     sums = Parallaxes.of(strip)
     used = oriented.points_used
     total = np.bincount(oriented.pairs.pair, minlength=len(used))
-    base = np.linalg.norm(np.diff(strip.resection.centers, axis=0), axis=1)
+    base = np.linalg.norm(np.diff(strip.of_photos.resection.centers, axis=0), axis=1)
     columns = {
         "sigma0_um": micrometres(oriented.sigma0),
         "rms_parallax_um": micrometres(sums.rms),
@@ -89,9 +89,9 @@ def _models(strip: StripResult, ids: Sequence[str]) -> list[Document]:
         "points_used": used.tolist(),
         "points_rejected": (total - used).tolist(),
         "redundancy": sums.redundancy.tolist(),
-        "zones": strip.screened.counts.tolist(),
+        "zones": strip.of_photos.screened.counts.tolist(),
         "detectable_um": micrometres(_detectable(strip)),
-        "masked_errors_suspected": strip.screened.masked.tolist(),
+        "masked_errors_suspected": strip.of_photos.screened.masked.tolist(),
         "condition": significant(oriented.condition),
         "iterations": oriented.iterations.tolist(),
         "base": rounded(base, GROUND),
@@ -116,8 +116,8 @@ def _models(strip: StripResult, ids: Sequence[str]) -> list[Document]:
 
 def _detectable(strip: StripResult) -> Floats:
     """Largest of the smallest errors that can be found at the points of each pair, mm; NaN where one is never seen."""
-    size = np.where(strip.orientation.used, strip.screened.detectable, 0.0)
-    worst = np.maximum.reduceat(np.nan_to_num(size, nan=0.0, posinf=np.inf), strip.orientation.pairs.starts)
+    size = np.where(strip.of_photos.orientation.used, strip.of_photos.screened.detectable, 0.0)
+    worst = np.maximum.reduceat(np.nan_to_num(size, nan=0.0, posinf=np.inf), strip.of_photos.orientation.pairs.starts)
     return np.where(np.isfinite(worst), worst, np.nan)
 
 
@@ -125,14 +125,14 @@ def parallaxes_of(result: Result, rank: Numbers) -> list[Document]:
     """Return the list ``parallaxes``: y parallaxes of all points of every pair, in natural order of the points."""
     ids = result.refined.observations.point_ids
     found = []
-    for strip in result.strips:
-        oriented, photos = strip.orientation, strip.strip.photos
+    for strip in result.photo_strips:
+        oriented, photos = strip.of_photos.orientation, strip.strip.photos
         order = np.lexsort((rank[oriented.point], oriented.pairs.pair))
         names = [ids[number] for number in oriented.point[order]]
         values, used = micrometres(oriented.parallax[order]), oriented.used[order].tolist()
         redundancy = rounded(np.where(oriented.used, oriented.redundancy, np.nan)[order], 3)
-        detectable = rounded(1000 * strip.screened.detectable[order], 1)
-        zone = strip.screened.zone[order].tolist()
+        detectable = rounded(1000 * strip.of_photos.screened.detectable[order], 1)
+        zone = strip.of_photos.screened.zone[order].tolist()
         ends = [*oriented.pairs.starts.tolist(), len(names)]
         found += [
             {
@@ -154,11 +154,11 @@ def parallaxes_of(result: Result, rank: Numbers) -> list[Document]:
 def junctions_of(result: Result) -> list[Document]:
     """Return the list ``junctions``: the scale transfer at every photo that joins two models."""
     ids = result.refined.observations.point_ids
-    return [junction for strip in result.strips for junction in _junctions(strip, ids)]
+    return [junction for strip in result.photo_strips for junction in _junctions(strip, ids)]
 
 
 def _junctions(strip: StripResult, ids: Sequence[str]) -> list[Document]:
-    photos, joined = strip.strip.photos, strip.formed.junctions
+    photos, joined = strip.strip.photos, strip.of_photos.formed.junctions
     joints = len(joined.factor)
     count = np.bincount(joined.junction, joined.used, joints).astype(np.intp)
     gap = discrepancies(strip)
@@ -202,8 +202,8 @@ def discrepancies(strip: StripResult) -> Floats:
         Metres along the strip, to its left and up, of every pass point of every joint; NaN where its rays were
         left out.
     """
-    joined, similarity = strip.formed.junctions, strip.absolute.similarity
-    gap = strip.formed.model_xyz[joined.after] - strip.formed.model_xyz[joined.before]
+    joined, similarity = strip.of_photos.formed.junctions, strip.absolute.similarity
+    gap = strip.of_photos.formed.model_xyz[joined.after] - strip.of_photos.formed.model_xyz[joined.before]
     return similarity.scale * gap @ similarity.rotation.T
 
 
@@ -218,10 +218,10 @@ def rejected_of(result: Result) -> list[Document]:
     """
     ids = result.refined.observations.point_ids
     found = []
-    for strip in result.strips:
-        oriented = strip.orientation
+    for strip in result.photo_strips:
+        oriented = strip.of_photos.orientation
         pair, point = oriented.pairs.pair, oriented.point
-        gone = sorted(strip.rejections, key=lambda each: (int(pair[each.row]), natural(ids[point[each.row]])))
+        gone = sorted(strip.of_photos.rejections, key=lambda each: (int(pair[each.row]), natural(ids[point[each.row]])))
         found += [_from_pair(strip, rejection, result.refined.observations) for rejection in gone]
         found += _from_joints(strip, ids)
         found += _from_rays(strip, result.refined.observations)
@@ -230,7 +230,7 @@ def rejected_of(result: Result) -> list[Document]:
 
 
 def _from_pair(strip: StripResult, rejection: Rejection, observations: PhotoPoints) -> Document:
-    pair = int(strip.orientation.pairs.pair[rejection.row])
+    pair = int(strip.of_photos.orientation.pairs.pair[rejection.row])
     left, right = strip.strip.photos[pair : pair + 2]
     size = rejection.size * 1000
     reason = f"y parallax {size:.1f} µm in the pair oriented without it"
@@ -241,7 +241,7 @@ def _from_pair(strip: StripResult, rejection: Rejection, observations: PhotoPoin
         unit, value, limit = "um", value * 1000, limit * 1000
     if rejection.readmitted:
         reason = "taken back: the pair or the strip oriented on the other points predicts it, or the user keeps it"
-    told = [row for row in _told(strip) if row in strip.orientation.rows[rejection.row]]
+    told = [row for row in _told(strip) if row in strip.of_photos.orientation.rows[rejection.row]]
     blamed = [observations.photo_ids[observations.photo[row]] for row in told]
     if blamed and not rejection.readmitted:
         reason += f"; the wrong ray is that of photo {', '.join(blamed)}: the others of the point meet without it"
@@ -251,7 +251,7 @@ def _from_pair(strip: StripResult, rejection: Rejection, observations: PhotoPoin
         "strip": strip.strip.id,
         "photo": left,
         "other_photo": right,
-        "point": observations.point_ids[strip.orientation.point[rejection.row]],
+        "point": observations.point_ids[strip.of_photos.orientation.point[rejection.row]],
         "stage": "relative",
         "test": rejection.test,
         "value": rounded(value, 2),
@@ -269,22 +269,22 @@ def _from_pair(strip: StripResult, rejection: Rejection, observations: PhotoPoin
 
 def _told(strip: StripResult) -> list[int]:
     """Rows of the observations that are known to be wrong, of their points' rays."""
-    found = strip.contradictions
+    found = strip.of_photos.contradictions
     return [int(row) for row, kind in zip(found.wrong, found.kind, strict=True) if kind == TOLD]
 
 
 def _from_joints(strip: StripResult, ids: Sequence[str]) -> list[Document]:
     """Pass points that did not belong in a scale transfer; the error as that of an x parallax in one of the models."""
-    joined, zone = strip.formed.junctions, strip.screened.zone
+    joined, zone = strip.of_photos.formed.junctions, strip.of_photos.screened.zone
     out = np.flatnonzero(~joined.used).tolist()
     rows = np.array(
         sorted(out, key=lambda row: (int(joined.junction[row]), natural(ids[int(joined.point[row])]))), np.intp
     )
     joint = joined.junction[rows]
-    base, _ = strip.orientation.relative
+    base, _ = strip.of_photos.orientation.relative
     deviation = joined.ratio[rows] / joined.factor[joint] - 1
-    depth = depths(strip.formed.vectors[joined.after[rows]], base[joint + 1])
-    size = deviation * strip.orientation.pairs.focal / depth * 1000
+    depth = depths(strip.of_photos.formed.vectors[joined.after[rows]], base[joint + 1])
+    size = deviation * strip.of_photos.orientation.pairs.focal / depth * 1000
     return [
         {
             "strip": strip.strip.id,
@@ -314,7 +314,7 @@ def _from_rays(strip: StripResult, observations: PhotoPoints) -> list[Document]:
 
     A ray that all its pairs have rejected stands with those.
     """
-    found, news = strip.contradictions, rejected_by_strip(strip)
+    found, news = strip.of_photos.contradictions, rejected_by_strip(strip)
     zone = _zones_of(strip, len(observations))
     names = [observations.point_ids[number] for number in found.point]
     place = {photo: number for number, photo in enumerate(strip.strip.photos)}
@@ -353,7 +353,7 @@ def _zones_of(strip: StripResult, rays: int) -> Numbers:
     """Return the standard zone of each image point in the pair with the next photo or the one before; 0 in none."""
     zone = np.zeros(rays, np.intp)
     for side in (1, 0):
-        zone[strip.orientation.rows[:, side]] = strip.screened.zone
+        zone[strip.of_photos.orientation.rows[:, side]] = strip.of_photos.screened.zone
     return zone
 
 
@@ -365,14 +365,14 @@ def rejected_by_strip(strip: StripResult) -> Flags:
     ndarray of bool
         For each entry of ``strip.contradictions``.
     """
-    oriented = strip.orientation
+    oriented = strip.of_photos.orientation
     logged = np.zeros(len(oriented.point), bool)
-    logged[[each.row for each in strip.rejections if not each.readmitted]] = True
-    news: Flags = np.isin(strip.contradictions.wrong, oriented.rows[~logged])
+    logged[[each.row for each in strip.of_photos.rejections if not each.readmitted]] = True
+    news: Flags = np.isin(strip.of_photos.contradictions.wrong, oriented.rows[~logged])
     return news
 
 
-def from_control(strip: StripResult | LinkedStrip, wrong: ControlRejection) -> Document:
+def from_control(strip: StripResult, wrong: ControlRejection) -> Document:
     """Return an entry of ``rejected``: wrong control."""
     sizes = dict(zip(AXES, wrong.size, strict=True))
     reason = "; ".join(f"{axis} by about {sizes[axis]:+.2f} m" for axis in wrong.axes)

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.pipeline import LinkedStrip, Result, StripResult
+    from photostrip.pipeline import Result, StripResult
     from photostrip.triangulation.polynomial.correction import AxisFit, Evidence, Polynomial
 
     Floats = NDArray[np.float64]
@@ -38,18 +38,18 @@ AXES = ("x", "y", "z")
 
 def strips_of(result: Result) -> list[Document]:
     """Return the list ``strips``: what each strip is like and how well it holds together."""
-    return [_strip(result, strip) for strip in result.strips]
+    return [_strip(result, strip) for strip in result.photo_strips]
 
 
 def _strip(result: Result, strip: StripResult) -> Document:
-    sums, formed, resection = Parallaxes.of(strip), strip.formed, strip.resection
-    used = strip.orientation.used
+    sums, formed, resection = Parallaxes.of(strip), strip.of_photos.formed, strip.of_photos.resection
+    used = strip.of_photos.orientation.used
     gap = discrepancies(strip)[formed.junctions.used]  # rms() passes over points left out for their rays
     gap_rms = [rms(column) for column in gap.T]
-    sigma = result.refined.observations.sigma[strip.rows]
+    sigma = result.refined.observations.sigma[strip.of_photos.rows]
     return {
         "id": strip.strip.id,
-        "camera": strip.strip.camera.name,
+        "camera": strip.of_photos.strip.camera.name,
         "photos": len(strip.strip.photos),
         "models": len(formed.scale),
         "points": len(formed.point),
@@ -60,7 +60,7 @@ def _strip(result: Result, strip: StripResult) -> Document:
         "sigma_given_um": micrometres(np.sqrt(np.mean(sigma**2))),
         "sigma0_um": micrometres(sigma0(sums.squares, sums.redundancy)),
         "redundancy": int(sums.redundancy.sum()),
-        "rms_parallax_um": micrometres(rms(strip.orientation.parallax[used])),
+        "rms_parallax_um": micrometres(rms(strip.of_photos.orientation.parallax[used])),
         "image_rms_um": micrometres(rms(resection.residuals)),
         "precision": {"plan": rounded(strip.precision[0], GROUND), "height": rounded(strip.precision[1], GROUND)},
         "discrepancy": dict(zip(("along", "across", "up"), rounded(gap_rms, GROUND), strict=True)),
@@ -73,13 +73,13 @@ def _drift(strip: StripResult) -> Document:
 
     The scale is handed from model to model, so its error grows as a sum of independent ones.
     """
-    joined, correction = strip.formed.junctions, strip.polynomial
+    joined, correction = strip.of_photos.formed.junctions, strip.polynomial
     count = np.bincount(joined.junction, joined.used, len(joined.factor))
     with np.errstate(invalid="ignore"):
         expected = np.sqrt((joined.spread**2 / count).sum()) * PPM
     found = None
     if correction is not None and correction.axes[0].terms:
-        ends = strip.resection.centers[[0, -1], 0]
+        ends = strip.of_photos.resection.centers[[0, -1], 0]
         start, end = (_scale_change(correction, x) for x in ends)
         found = rounded((end - start) * PPM, 1)
     return {"expected_ppm": rounded(expected, 1), "found_ppm": found}
@@ -94,10 +94,10 @@ def _scale_change(correction: Polynomial, x: float) -> float:
 
 def absolute_of(result: Result) -> list[Document]:
     """Return the list ``absolute``: the similarity of every strip to its control."""
-    return [_absolute(strip) for strip in result.flights]
+    return [_absolute(strip) for strip in result.strips]
 
 
-def _absolute(strip: StripResult | LinkedStrip) -> Document:
+def _absolute(strip: StripResult) -> Document:
     found, use = strip.absolute, strip.control.use
     misclosures = rounded([rms(column) for column in np.where(use, found.misclosures, np.nan).T], GROUND)
     return {
@@ -131,7 +131,7 @@ def _by_axis(values: Sequence[Plain]) -> Document:
 
 def polynomials_of(result: Result) -> Document:
     """Return the list ``polynomials`` under its key: the correction of every strip that has one; empty without any."""
-    found = [_polynomial(strip.strip.id, strip.polynomial) for strip in result.flights if strip.polynomial is not None]
+    found = [_polynomial(strip.strip.id, strip.polynomial) for strip in result.strips if strip.polynomial is not None]
     return {"polynomials": found} if found else {}
 
 

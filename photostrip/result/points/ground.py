@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.pipeline import LinkedStrip, Result, StripResult
+    from photostrip.pipeline import Result, StripResult
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -100,7 +100,7 @@ def points_of(result: Result, image_rms: Floats, rank: Numbers) -> list[Document
     points, ids = result.points, result.refined.observations.point_ids
     names = [ids[number] for number in points.number]
     models = np.zeros(len(ids), np.intp)
-    for strip in result.flights:
+    for strip in result.strips:
         models[strip.formed.point] += strip.formed.model_count
     columns = zip(
         names,
@@ -181,7 +181,7 @@ def _rejected(result: Result) -> Flags:
         problem, selection = result.bundle.screened.problem, result.bundle.screened.selection
         rows = [row_of[problem.point_name(int(point))] for point in problem.control.point]
         held[rows], used[rows] = True, selection.control
-    for strip in result.strips if result.bundle is None else ():
+    for strip in result.photo_strips if result.bundle is None else ():
         rows = [row_of[name] for name in strip.control.ids]
         held[rows] = True
         used[rows] |= strip.control.use
@@ -196,7 +196,7 @@ def _turned(found: Floats, frame: GroundFrame, place: Floats, axes: Floats) -> F
 
 def _expected(result: Result) -> tuple[Floats, Floats, tuple[tuple[str, ...], ...]]:
     """Give standard deviation of the differences, photo scale and strips of every given point."""
-    control, strips = result.inputs.control, result.flights
+    control, strips = result.inputs.control, result.strips
     number = {name: n for n, name in enumerate(result.refined.observations.point_ids)}
     numbers = np.array([number.get(name, -1) for name in control.ids], np.intp)
     held = np.array([np.isin(numbers, strip.formed.point) for strip in strips]).reshape(len(strips), len(control))
@@ -239,7 +239,7 @@ def _expected_of_bundle(
             share = np.sqrt(np.clip(group.redundancy, LEAST_SHARE**2, 1.0))
             residual = group.sigma * share * result.bundle.unit
             sigma[rows] = np.where(np.isfinite(residual), residual, sigma[rows])
-    strips = result.strips
+    strips = result.photo_strips
     of_strips = np.array([s.scale_number for s in strips])
     scale = np.where(held.any(axis=0), (held.T @ of_strips) / count, np.mean(of_strips) if len(strips) else np.nan)
     names = tuple(tuple(s.strip.id for s, yes in zip(strips, column, strict=True) if yes) for column in held.T)
@@ -296,12 +296,12 @@ def ties_of(result: Result, rank: Numbers) -> list[Document]:
     ties, ids = result.ties, result.refined.observations.point_ids
     if not len(ties.number):
         return []
-    scale = np.array([s.scale_number for s in result.flights])[ties.strips].mean(axis=1)
+    scale = np.array([s.scale_number for s in result.strips])[ties.strips].mean(axis=1)
     moved = rounded(result.output.user_from_internal(ties.difference), GROUND)
     level = _level_ties(result)
     size = np.column_stack([np.hypot(level[:, 0], level[:, 1]), level[:, 2]])
     metres, in_photo = rounded(size, GROUND), rounded(size / scale[:, None] * 1e6, 1)
-    names = [s.strip.id for s in result.flights]
+    names = [s.strip.id for s in result.strips]
     order = np.lexsort((ties.strips[:, 1], ties.strips[:, 0], rank[ties.number])).tolist()
     return [
         {
@@ -336,7 +336,7 @@ def misclosures_of(result: Result) -> list[Document]:
     Beside them, how far each coordinate is checked by all others, and its share in its own polynomial.
     """
     rows = []
-    for strip in result.flights:
+    for strip in result.strips:
         values = rounded(np.where(strip.control.use, strip.absolute.misclosures, np.nan), GROUND)
         redundancy, detectable = _checked(strip)
         leverage = _leverage(strip)
@@ -355,7 +355,7 @@ def misclosures_of(result: Result) -> list[Document]:
     return rows
 
 
-def _checked(strip: StripResult | LinkedStrip) -> tuple[Plain, Plain]:
+def _checked(strip: StripResult) -> tuple[Plain, Plain]:
     """Redundancy numbers of the control, and the smallest errors that would be found, metres."""
     found, nothing = strip.judged_control, np.full(strip.control.use.shape, np.nan)
     if found is None:
@@ -364,7 +364,7 @@ def _checked(strip: StripResult | LinkedStrip) -> tuple[Plain, Plain]:
     return rounded(np.where(known, found.redundancy, np.nan), 3), rounded(found.detectable, 3)
 
 
-def _leverage(strip: StripResult | LinkedStrip) -> Plain:
+def _leverage(strip: StripResult) -> Plain:
     """Share of each control point in the polynomials of X, Y, Z at its own place, 0 to 1."""
     nothing = np.full(strip.control.use.shape, np.nan)
     if strip.polynomial is None:

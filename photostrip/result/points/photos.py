@@ -46,12 +46,12 @@ class ImageResiduals:
         position = position[rows]
         known = np.full((len(observations.point_ids), 3), np.nan)
         known[strip.formed.point] = strip.xyz
-        resection = strip.resection
-        focal = np.full(len(photos), strip.strip.camera.principal_distance)
+        resection = strip.of_photos.resection
+        focal = np.full(len(photos), strip.of_photos.strip.camera.principal_distance)
         with np.errstate(invalid="ignore"):
             computed = project(known[observations.point[rows]], resection.centers, resection.rotations, position, focal)
         used = np.zeros(len(observations), bool)
-        used[strip.rows] = True
+        used[strip.of_photos.rows] = True
         return cls(rows, position, observations.xy[rows] - computed, used[rows])
 
 
@@ -59,13 +59,13 @@ def photos_of(result: Result, residuals: list[ImageResiduals]) -> list[Document]
     """Return the list ``photos``: exterior orientations in the frame of the result, in flight order."""
     return [
         photo
-        for number, (strip, image) in enumerate(zip(result.strips, residuals, strict=True))
+        for number, (strip, image) in enumerate(zip(result.photo_strips, residuals, strict=True))
         for photo in _photos(result, number, strip, image)
     ]
 
 
 def _photos(result: Result, number: int, strip: StripResult, image: ImageResiduals) -> list[Document]:
-    photos, resection = strip.strip.photos, strip.resection
+    photos, resection = strip.strip.photos, strip.of_photos.resection
     cartesian = strip.intermediate.cartesian_from_intermediate(resection.centers)
     ground = result.output.ground_from_cartesian(cartesian, ids=[f"at the center of photo {p}" for p in photos])
     turned = strip.intermediate.cartesian_rotations(resection.rotations)
@@ -114,7 +114,7 @@ def residuals_of(result: Result, residuals: list[ImageResiduals]) -> list[Docume
     observations = result.refined.observations
     ids = observations.point_ids
     found = []
-    for strip, image in zip(result.strips, residuals, strict=True):
+    for strip, image in zip(result.photo_strips, residuals, strict=True):
         names = [ids[number] for number in observations.point[image.rows].tolist()]
         vx, vy = (micrometres(image.residuals[:, axis]) for axis in (0, 1))
         used = image.used.tolist()

@@ -14,7 +14,7 @@ from photostrip.statistics import chi2_quantile, normal_quantile
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.pipeline import LinkedStrip, Result, StripResult
+    from photostrip.pipeline import Result, StripResult
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -193,7 +193,7 @@ def precision_of(result: Result) -> Document:
     block: Document = {
         "basis": [
             {"strip": strip.strip.id, "sigma_um": micrometres(value), "basis": basis}
-            for strip, value, basis in zip(result.flights, precision.sigma, precision.basis, strict=True)
+            for strip, value, basis in zip(result.strips, precision.sigma, precision.basis, strict=True)
         ],
         "points": {
             name: _summed(column, [ids[number] for number in result.points.number])
@@ -201,7 +201,7 @@ def precision_of(result: Result) -> Document:
         },
         "along": [
             row
-            for strip, photos in zip(result.flights, precision.photos, strict=True)
+            for strip, photos in zip(result.strips, precision.photos, strict=True)
             for row in _along(result, strip, sigma, photos)
         ],
     }
@@ -228,7 +228,7 @@ def _check(result: Result) -> Document:
             "squares": significant(test.squares),
             "p": significant(test.probability),
         }
-        for strip, test in zip(result.flights, result.precision.checks, strict=False)
+        for strip, test in zip(result.strips, result.precision.checks, strict=False)
         if test is not None
     ]
     return {
@@ -280,7 +280,7 @@ def _summed(sigma: Floats, names: list[str]) -> Document:
     return {"rms": rounded(rms(sigma), GROUND), "max": rounded(sigma[worst], GROUND), "worst": names[worst]}
 
 
-def _along(result: Result, strip: StripResult | LinkedStrip, sigma: Floats, photos: Floats) -> list[Document]:
+def _along(result: Result, strip: StripResult, sigma: Floats, photos: Floats) -> list[Document]:
     """Precision along a strip: of the points nearest to each photo, and of its perspective centre."""
     centers = strip.centers
     known = np.isfinite(centers[:, 0])

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.geometry.similarity import Similarity
-    from photostrip.pipeline.models.model_results import LinkedStrip
     from photostrip.pipeline.results import Result, StripResult
     from photostrip.triangulation.relative_orientation.pairs import Pairs
 
@@ -65,7 +64,7 @@ def pair_rounds(result: Result, strip: StripResult) -> list[list[PairRound]]:
     list of list of PairRound
         For each pair one round, or two when points of it were rejected.
     """
-    final = strip.orientation
+    final = strip.of_photos.orientation
     given = _with_all_points(result, strip)
     start = _starts(given, final.elements)
     rounds = [[first] for first in _round(start, given)]
@@ -78,9 +77,9 @@ def pair_rounds(result: Result, strip: StripResult) -> list[list[PairRound]]:
 
 def _with_all_points(result: Result, strip: StripResult) -> Pairs:
     """Return the pairs of a strip as they were before any point was rejected."""
-    photos, focal = strip.strip.photos, strip.strip.camera.principal_distance
+    photos, focal = strip.strip.photos, strip.of_photos.strip.camera.principal_distance
     pairs = collect_pairs(result.refined.observations, photos, focal)
-    kept = set(map(tuple, strip.orientation.rows.tolist()))
+    kept = set(map(tuple, strip.of_photos.orientation.rows.tolist()))
     return pairs.without(np.array([tuple(row) not in kept for row in pairs.rows.tolist()], bool))
 
 
@@ -109,7 +108,7 @@ def _round(start: Floats, pairs: Pairs) -> list[PairRound]:
     return [PairRound(*each) for each in zip(counts, map(tuple, steps), ends, strict=True)]
 
 
-def similarity_steps(result: Result, strip: StripResult | LinkedStrip) -> list[SimilarityStep]:
+def similarity_steps(result: Result, strip: StripResult) -> list[SimilarityStep]:
     """Repeat the absolute orientation of a strip on the control that was used."""
     points = strip.formed.xyz[strip.control_rows]
     targets = absolute_orientation.Targets(strip.control, result.frames, strip.intermediate)

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.pipeline import Result
-    from photostrip.pipeline.models.model_results import LinkedStrip
     from photostrip.pipeline.results import StripResult
     from photostrip.result.trace.replay import PairRound, SimilarityStep
 
@@ -64,13 +63,13 @@ def trace_of(result: Result) -> Document:
         "angles": unit,
         "symbols": SYMBOLS,
         "strips": [
-            *(_strip(result, strip, UNITS[unit]) for strip in result.strips),
-            *(_linked(result, strip, UNITS[unit]) for strip in result.linked),
+            _linked(result, strip, UNITS[unit]) if result.model_strips else _strip(result, strip, UNITS[unit])
+            for strip in result.strips
         ],
     }
 
 
-def _linked(result: Result, strip: LinkedStrip, factor: float) -> Document:
+def _linked(result: Result, strip: StripResult, factor: float) -> Document:
     """Return a strip of independent models: its links are in the result, the way to the ground is as for photos."""
     return {
         "strip": strip.strip.id,
@@ -98,7 +97,7 @@ def _strip(result: Result, strip: StripResult, factor: float) -> Document:
 
 def _pairs(result: Result, strip: StripResult, factor: float) -> list[Document]:
     """Relative orientation of every pair: rounds of the iteration, rejections, parallaxes and model points."""
-    photos, orientation = strip.strip.photos, strip.orientation
+    photos, orientation = strip.strip.photos, strip.of_photos.orientation
     found = []
     for number, rounds in enumerate(pair_rounds(result, strip)):
         found.append(
@@ -133,7 +132,7 @@ def _round(each: PairRound, factor: float) -> Document:
 
 
 def _rejected(result: Result, strip: StripResult, number: int) -> list[Document]:
-    ids, orientation = result.refined.observations.point_ids, strip.orientation
+    ids, orientation = result.refined.observations.point_ids, strip.of_photos.orientation
     return [
         {
             "point": ids[orientation.point[each.row]],
@@ -143,14 +142,14 @@ def _rejected(result: Result, strip: StripResult, number: int) -> list[Document]
             "q": rounded(each.parallax, MILLIMETRES),
             "readmitted": bool(each.readmitted),
         }
-        for each in strip.rejections
+        for each in strip.of_photos.rejections
         if orientation.pairs.pair[each.row] == number
     ]
 
 
 def _points(result: Result, strip: StripResult, number: int) -> list[Document]:
     """Image coordinates, parallax, ray factor and strip coordinates of the points of a pair."""
-    orientation, ids = strip.orientation, result.refined.observations.point_ids
+    orientation, ids = strip.of_photos.orientation, result.refined.observations.point_ids
     rows = orientation.pairs.rows_of(np.array([number]))
     pairs = orientation.pairs.take(np.array([number]))
     left, right = base_rays(orientation.elements[[number]], pairs)
@@ -159,7 +158,7 @@ def _points(result: Result, strip: StripResult, number: int) -> list[Document]:
         rounded(np.column_stack([pairs.left, pairs.right]), MILLIMETRES),
         rounded(orientation.parallax[rows], MILLIMETRES),
         rounded(model.ray_factor, MODEL),
-        rounded(strip.formed.model_xyz[rows], MODEL),
+        rounded(strip.of_photos.formed.model_xyz[rows], MODEL),
         (pairs.weight > 0).tolist(),
     )
     found = []
@@ -174,7 +173,7 @@ def _points(result: Result, strip: StripResult, number: int) -> list[Document]:
 
 def _chain(strip: StripResult, factor: float) -> list[Document]:
     """Orientation and place of every photo in the strip, and the base that leads to it."""
-    formed, found = strip.formed, []
+    formed, found = strip.of_photos.formed, []
     for number, photo in enumerate(strip.strip.photos):
         turn = dict(zip(("alpha", "omega", "kappa"), _angles(formed.rotations[number], factor), strict=True))
         row: Document = {"photo": photo, **turn, "A": rounded(formed.rotations[number].ravel(), COSINE)}
@@ -199,7 +198,7 @@ def _angles(rotation: Floats, factor: float) -> list[float]:
 
 def _scale_transfer(result: Result, strip: StripResult) -> list[Document]:
     """Pass points of every joint: distances, ratios, the factor."""
-    formed, ids = strip.formed, result.refined.observations.point_ids
+    formed, ids = strip.of_photos.formed, result.refined.observations.point_ids
     joints, photos = formed.junctions, strip.strip.photos
     found = []
     for joint, factor in enumerate(joints.factor.tolist()):
@@ -232,7 +231,7 @@ def _scale_transfer(result: Result, strip: StripResult) -> list[Document]:
 # ---------------------------------------------------------------------------------------------------- the ground
 
 
-def _absolute(result: Result, strip: StripResult | LinkedStrip, factor: float) -> Document:
+def _absolute(result: Result, strip: StripResult, factor: float) -> Document:
     """Absolute orientation: the frame, the control in it, the steps, the similarity."""
     steps = similarity_steps(result, strip)
     similarity, frame = strip.absolute.similarity, strip.intermediate
@@ -277,7 +276,7 @@ def _similarity_step(number: int, step: SimilarityStep, factor: float) -> Docume
     }
 
 
-def _polynomial(result: Result, strip: StripResult | LinkedStrip) -> Document | None:
+def _polynomial(result: Result, strip: StripResult) -> Document | None:
     """Polynomials of a strip: coefficients by term, free terms and residuals at the control."""
     found = strip.polynomial
     if found is None:

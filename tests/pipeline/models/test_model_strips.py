@@ -11,7 +11,7 @@ import pytest
 from photostrip.errors import InputError
 from photostrip.formats.output.simulation import inputs_of
 from photostrip.geometry.similarity import Similarity
-from photostrip.pipeline import Inputs, LinkedStrip, MeasuredModels, ModelStrip, Settings, triangulate
+from photostrip.pipeline import Inputs, MeasuredModels, ModelStrip, Settings, StripResult, triangulate
 from photostrip.pipeline.models.model_strips import adjust_models, form_models
 from photostrip.report.sections.document import sections_of
 from photostrip.result.document import document_of
@@ -38,8 +38,8 @@ def with_points(given: Inputs, points: ModelPoints) -> Inputs:
     return replace(given, models=replace(given.models, points=points))
 
 
-def linked(given: Inputs, settings: Settings = PLAIN) -> LinkedStrip:
-    (strip,) = triangulate(given, settings).linked
+def linked(given: Inputs, settings: Settings = PLAIN) -> StripResult:
+    (strip,) = triangulate(given, settings).strips
     return strip
 
 
@@ -54,7 +54,7 @@ def test_models_without_errors_come_back_to_the_truth(crs: str, adjustment: str,
     result = triangulate(inputs_of(simulated), Settings(adjustment=adjustment))
     assert np.abs(result.points.cartesian - simulated.truth.points.xyz[result.points.number]).max() < EXACT
     place = {photo: row for row, photo in enumerate(simulated.truth.photo_ids)}
-    for strip in result.linked:
+    for strip in result.strips:
         found = strip.intermediate.cartesian_from_intermediate(strip.centers)
         assert np.abs(found - simulated.truth.centers[[place[photo] for photo in strip.strip.photos]]).max() < EXACT
     assert len(result.ties.number) > 3
@@ -226,8 +226,8 @@ def test_the_whole_chain_agrees_with_differences() -> None:
     first = inputs(given, measured, bands=3, sigma=0.05)
     whole = triangulate(first, straight("polynomial"))
     assert whole.precision is not None
-    assert whole.linked[0].polynomial is not None
-    assert whole.linked[0].polynomial.degree == 1
+    assert whole.strips[0].polynomial is not None
+    assert whole.strips[0].polynomial.degree == 1
     assert first.models is not None
     (strip,) = first.models.strips
     control = first.control.take(~first.control.check)
@@ -309,7 +309,7 @@ def test_precision_of_points_of_two_strips() -> None:
     for number, strip in enumerate(given.models.strips):
         only = replace(given, models=MeasuredModels((strip,), given.models.points))
         alone.append(triangulate(only, Settings()))
-        assert len(alone[number].linked) == 1
+        assert len(alone[number].strips) == 1
     both = np.intersect1d(alone[0].points.number, alone[1].points.number)
     assert len(both)
     size = [np.trace(r.precision.points, axis1=1, axis2=2)[np.isin(r.points.number, both)] for r in (*alone, result)]  # type: ignore[union-attr]

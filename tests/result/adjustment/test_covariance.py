@@ -35,8 +35,8 @@ def test_the_block_holds_the_tests(strips: int) -> None:
         assert block["sigma0"] == pytest.approx(np.sqrt(block["squares"] / block["redundancy"]), rel=1e-3)
         assert block["p"] == pytest.approx(1 - gamma_cdf(block["squares"] / 2, block["redundancy"] / 2), rel=1e-2)
         assert [row["id"] for row in block["control"][::3]] == sorted(strip.control.ids, key=lambda n: int(n[1:]))
-        joints = len(strip.formed.junctions.factor)
-        assert block["distances"] == int(strip.formed.junctions.used.sum()) - joints
+        joints = len(strip.of_photos.formed.junctions.factor)
+        assert block["distances"] == int(strip.of_photos.formed.junctions.used.sum()) - joints
 
 
 def test_points_are_better_than_with_a_polynomial() -> None:

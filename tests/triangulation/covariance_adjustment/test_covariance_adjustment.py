@@ -50,7 +50,7 @@ def prepared(result: Result, *, distances: bool) -> Prepared:
     (strip,) = result.strips
     given = strip.absolute.misclosures[found.control.point, found.control.axis]
     wanted = conditions.conditions(
-        found.errors, strip.orientation, strip.formed, found.control, given, distances=distances
+        found.errors, strip.of_photos.orientation, strip.of_photos.formed, found.control, given, distances=distances
     )
     return found.errors, wanted
 
@@ -64,7 +64,7 @@ def test_the_band_gives_what_the_whole_matrix_gives(photos: int, lap: float, *, 
     factor, n = 1.3, errors.models
     (strip,), found = result.strips, errors_of(result)
     control = strip.absolute.misclosures[found.control.point, found.control.axis]
-    again = conditions.misclosures_at(wanted, strip.formed, strip.absolute.similarity, control)
+    again = conditions.misclosures_at(wanted, strip.of_photos.formed, strip.absolute.similarity, control)
     assert again == pytest.approx(wanted.value, abs=1e-9)
     solved = system.system(errors, wanted, factor)
     tables = [errors.points, prediction.photo_rows(errors)]
@@ -129,8 +129,8 @@ def test_true_coordinates_come_back(lap: float) -> None:
     result, plain = triangulate(inputs, COVARIANCE), triangulate(inputs, SIMILARITY)
     assert result.points.cartesian == pytest.approx(plain.points.cartesian, abs=1e-6)
     (strip,) = result.strips
-    assert strip.resection.rotations == pytest.approx(plain.strips[0].resection.rotations, abs=1e-9)
-    assert strip.resection.residuals == pytest.approx(0.0, abs=1e-9)
+    assert strip.of_photos.resection.rotations == pytest.approx(plain.strips[0].of_photos.resection.rotations, abs=1e-9)
+    assert strip.of_photos.resection.residuals == pytest.approx(0.0, abs=1e-9)
 
 
 def bent(photos: int, sigma: float) -> Inputs:
@@ -143,7 +143,7 @@ def bent(photos: int, sigma: float) -> Inputs:
 
 def formed_from_what_is_taken_for_true(result: Result) -> Floats:
     """Lay the strip of the corrected image coordinates on what the adjustment gives the control: all points."""
-    inputs, own = result.inputs, result.strips[0].covariance
+    inputs, own = result.inputs, result.strips[0].of_photos.covariance
     assert own is not None
     xy, images = inputs.observations.xy.copy(), own.system.errors.images
     xy[images.row] -= relinearisation.image_errors(own.system) * images.sigma
@@ -210,9 +210,9 @@ def test_a_wrong_control_point_is_named(axis: int, size: float) -> None:
     strip, name = adjusted(3, wrong=size, axis=axis)
     notes = [note for note in strip.notes if note.code == "control-doubtful"]
     assert [note.points for note in notes] == [(name,)]
-    assert strip.covariance is not None
-    worst = strip.covariance.tested.doubtful[0]
-    assert strip.covariance.tested.size[worst] == pytest.approx(size, abs=0.45)
+    assert strip.of_photos.covariance is not None
+    worst = strip.of_photos.covariance.tested.doubtful[0]
+    assert strip.of_photos.covariance.tested.size[worst] == pytest.approx(size, abs=0.45)
     clean, _ = adjusted(3)
     assert not [note for note in clean.notes if note.code in {"control-doubtful", "strip-contradicted"}]
 
@@ -220,7 +220,7 @@ def test_a_wrong_control_point_is_named(axis: int, size: float) -> None:
 @pytest.mark.slow
 def test_sums_of_squares_follow_chi_square() -> None:
     """Mean and scatter of the test of the whole over 60 strips, and of the test values of control."""
-    found = [adjusted(seed)[0].covariance for seed in range(60)]
+    found = [adjusted(seed)[0].of_photos.covariance for seed in range(60)]
     tested = [each.tested for each in found if each is not None]
     ratio = np.array([each.squares / each.redundancy for each in tested])
     expected = np.sqrt(2 / tested[0].redundancy)
@@ -239,8 +239,8 @@ def test_coordinates_worse_than_stated_are_told() -> None:
     bent = xy * (1 + 0.03 * (radius / 100) ** 2 / 100)  # 30 micrometres at 100 mm
     sharp = replace(observations, xy=bent, sigma=np.full_like(observations.sigma, 0.001))
     (strip,) = triangulate(replace(inputs, observations=sharp), COVARIANCE).strips
-    assert strip.covariance is not None
-    tested = strip.covariance.tested
+    assert strip.of_photos.covariance is not None
+    tested = strip.of_photos.covariance.tested
     assert tested.probability < 1e-3
     assert {note.code for note in strip.notes} & {"control-doubtful", "strip-contradicted"}
 
@@ -276,7 +276,7 @@ def test_repetitions_scatter_as_stated() -> None:
     base = Settings(relative=UNSCREENED, polynomial=correction.PolynomialSettings("2"))
     settings = {name: replace(base, adjustment=name) for name in ("polynomial", "covariance")}
     truth, rng = triangulate(inputs, base), np.random.default_rng(12)
-    strip, true = truth.strips[0].strip, truth.points.cartesian
+    strip, true = truth.strips[0].of_photos.strip, truth.points.cartesian
     measured = np.flatnonzero(np.isin(inputs.control.ids, truth.strips[0].control.ids))
     squares = {name: np.zeros_like(true) for name in settings}
     for _ in range(250):

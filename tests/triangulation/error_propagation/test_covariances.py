@@ -127,7 +127,7 @@ def test_a_photo_goes_where_all_its_points_go() -> None:
     """Points that move together take the photo with them: the sum over its points is a motion of the whole."""
     result = triangulate(without_noise(spec(6)), settings("similarity"))
     found = errors_of(result)
-    centers = result.strips[0].resection.centers - found.errors.origin
+    centers = result.strips[0].of_photos.resection.centers - found.errors.origin
     assert found.photos.by_similarity[:, :3, :3] == pytest.approx(np.broadcast_to(np.eye(3), (6, 3, 3)), abs=1e-9)
     assert found.photos.by_similarity[:, :3, 6] == pytest.approx(centers, abs=1e-6)
     assert found.photos.by_similarity[:, 3:, 3:6] == pytest.approx(np.broadcast_to(np.eye(3), (6, 3, 3)), abs=1e-9)
@@ -148,7 +148,7 @@ def test_points_without_a_model_have_rows_too(adjustment: str) -> None:
     inputs = replace(inputs, observations=replace(observations, xy=xy))
     plain = Settings(adjustment="similarity")
     result = triangulate(inputs, plain)
-    formed = result.strips[0].formed
+    formed = result.strips[0].of_photos.formed
     assert set(formed.bridging) == {rows[0], rows[2]}
     found = errors_of(result)
     place = int(np.searchsorted(formed.point, point))

@@ -57,7 +57,7 @@ def adjusted(strip: Flown) -> Result:
 
 def told(strip: Flown, result: Result) -> dict[tuple[str, str], str]:
     """What the strip says of which measurement."""
-    o, found = strip.observations, result.strips[0].contradictions
+    o, found = strip.observations, result.strips[0].of_photos.contradictions
     return {
         (o.photo_ids[o.photo[row]], o.point_ids[o.point[row]]): kind
         for row, kind in zip(found.wrong, found.kind, strict=True)
@@ -234,7 +234,7 @@ def test_the_wrong_ray_across_the_base_is_named_and_the_point_kept(photo: str, p
     strip = spoiled(flown(), {(photo, "p4_1"): (0.0, 0.4)})
     result = adjusted(strip)
     assert told(strip, result) == {(photo, "p4_1"): TOLD}, place
-    size = result.strips[0].contradictions.size[0]
+    size = result.strips[0].of_photos.contradictions.size[0]
     assert size[1] == pytest.approx(0.4, abs=0.05)
     assert "p4_1" not in result.not_determined
     row = list(result.points.number).index(strip.at["p4_1"])
@@ -260,7 +260,7 @@ def test_an_error_along_the_base_takes_the_place_and_leaves_the_parallaxes() -> 
     result = adjusted(strip)
     assert set(told(strip, result).values()) == {SEVERAL}
     assert "p4_1" in result.not_determined
-    oriented = result.strips[0].orientation
+    oriented = result.strips[0].of_photos.orientation
     assert oriented.used[oriented.point == strip.at["p4_1"]].all()
 
 
@@ -273,12 +273,12 @@ def test_two_wrong_points_of_a_corner_do_not_cost_the_good_one() -> None:
     result = adjusted(spoiled(strip, wrong))
     assert set(told(strip, result)) == set(wrong)
     used = np.zeros(len(o.point), bool)
-    used[result.strips[0].rows] = True
+    used[result.strips[0].of_photos.rows] = True
     assert sorted(np.flatnonzero(~used)) == sorted(row_of(strip, *each) for each in wrong)
 
 
 def test_strips_without_errors_lose_nothing() -> None:
-    lost = [len(adjusted(flown(seed, extra=100)).strips[0].contradictions.wrong) for seed in range(20)]
+    lost = [len(adjusted(flown(seed, extra=100)).strips[0].of_photos.contradictions.wrong) for seed in range(20)]
     assert sum(each > 0 for each in lost) <= 2
 
 
@@ -287,8 +287,8 @@ def test_the_users_measurement_stays() -> None:
     inputs = project(strip, control_points({n: strip.xyz[strip.at[n]] for n in strip.bands(*STATIONS)}, sigma=0.02))
     settings = Settings()
     kept = replace(settings, relative=replace(settings.relative, keep=["105/p4_1"]))
-    assert triangulate(inputs, kept).strips[0].contradictions.wrong.tolist() == []
-    assert triangulate(inputs, settings).strips[0].contradictions.wrong.tolist() != []
+    assert triangulate(inputs, kept).strips[0].of_photos.contradictions.wrong.tolist() == []
+    assert triangulate(inputs, settings).strips[0].of_photos.contradictions.wrong.tolist() != []
 
 
 # ---------------------------------------------------------------------------------------------------- independence
@@ -310,7 +310,7 @@ def outcome(strip: Flown, *, name: str = "") -> tuple[set[tuple[str, str]], dict
     """Give the measurements that are not used, and the coordinates of all points; names without a prefix."""
     result = adjusted(strip)
     o = strip.observations
-    unused = np.setdiff1d(np.arange(len(o.point)), result.strips[0].rows)
+    unused = np.setdiff1d(np.arange(len(o.point)), result.strips[0].of_photos.rows)
     out = {(o.photo_ids[o.photo[row]].removeprefix(name), o.point_ids[o.point[row]]) for row in unused}
     return out, {o.point_ids[n]: xyz for n, xyz in zip(result.points.number, result.points.cartesian, strict=True)}
 
