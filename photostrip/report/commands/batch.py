@@ -2,27 +2,32 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from photostrip.report.page.figures import counted, metres, micrometres
+from photostrip.report.page.figures import counted, metres
 from photostrip.report.page.junit import Case, to_junit
-from photostrip.report.page.parts import DASH, Column, Section, Table, Words
+from photostrip.report.page.parts import DASH, Document, Section, Table, Words
+from photostrip.report.page.tables import number, tabulated, words
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    Document = dict[str, Any]
+
+def known(count: int | None) -> str:
+    """Write a number that a project without a result does not have."""
+    return DASH if count is None else str(count)
+
 
 COLUMNS = (
-    Column("project", left=True),
-    Column("status", left=True),
-    Column("photos", rank=1),
-    Column("points", rank=2),
-    Column("rejected", rank=2),
-    Column("σ0", "µm", rank=1),
-    Column("at", left=True, rank=1),
-    Column("plan", "m"),
-    Column("height", "m"),
+    words("project", "project"),
+    words("status", "status"),
+    number("photos", "photos", known, rank=1),
+    number("points", "points", known, rank=2),
+    number("rejected", "rejected", known, rank=2),
+    number("σ0", "sigma0_um", 1, "µm", rank=1),
+    words("at", lambda outcome: outcome["rms_at"] or DASH, rank=1),
+    number("plan", "rms_plan_m", 3, "m"),
+    number("height", "rms_height_m", 3, "m"),
 )
 ROWS = 60  # projects that are shown; more stand in summary.csv
 MESSAGES = 3  # of one project that are shown
@@ -55,20 +60,7 @@ def _table(outcomes: Sequence[Document], *, everything: bool) -> Table:
     shown = list(outcomes) if everything or len(outcomes) <= ROWS else _worst_first(outcomes)[:ROWS]
     missing = len(outcomes) - len(shown)
     note = f"{counted(missing, 'more project')} not shown, none worse: --verbose, or summary.csv" if missing else ""
-    return Table(COLUMNS, tuple(map(_row, shown)), note=note)
-
-
-def _row(outcome: Document) -> tuple[str, ...]:
-    numbers = (DASH if outcome[name] is None else str(outcome[name]) for name in ("photos", "points", "rejected"))
-    return (
-        outcome["project"],
-        outcome["status"],
-        *numbers,
-        micrometres(outcome["sigma0_um"]),
-        outcome["rms_at"] or DASH,
-        metres(outcome["rms_plan_m"]),
-        metres(outcome["rms_height_m"]),
-    )
+    return tabulated(shown, COLUMNS, note=note)
 
 
 def _told(wrong: Sequence[Document], *, everything: bool) -> list[Words]:

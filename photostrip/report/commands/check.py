@@ -5,15 +5,14 @@ Rendered from plain values alone, as the accuracy report is; nothing is computed
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from photostrip.report.page.figures import counted, listed, short
-from photostrip.report.page.parts import DASH, Column, Facts, Section, Table, Words
+from photostrip.report.page.parts import DASH, Document, Facts, Section, Words
+from photostrip.report.page.tables import number, tabulated, words
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-Document = dict[str, Any]
+    from collections.abc import Callable, Iterator, Sequence
 
 CONTROL_SHOWN = 24  # rows of the table of control; --verbose prints all
 IDS_SHOWN = 8
@@ -127,26 +126,25 @@ def _sigmas(control: Sequence[Document], *, everything: bool) -> Section:
     """Table of the standard deviation that each control coordinate gets, and where it stands."""
     shown = control if everything else control[:CONTROL_SHOWN]
     axes = control[0]["axes"] if control and all(each["axes"] == control[0]["axes"] for each in control) else "xyz"
+
+    def sigma(place: int) -> Callable[[Document], str]:
+        return lambda each: DASH if each["sigma"][place] is None else short(each["sigma"][place])
+
     columns = (
-        Column("point", left=True),
-        Column("role", left=True),
-        *(Column(f"σ {axis}", "m") for axis in axes),
-        Column("photos"),
-        Column("from", left=True),
-    )
-    rows = tuple(
-        (
-            each["id"],
-            each["role"] if any(each["counts"]) else "off",
-            *(DASH if value is None else short(value) for value in each["sigma"]),
-            str(each["photos"]),
-            "; ".join(dict.fromkeys(_source(source) for source in each["sigma_from"] if source)) or DASH,
-        )
-        for each in shown
+        words("point", "id"),
+        words("role", lambda each: each["role"] if any(each["counts"]) else "off"),
+        *(number(f"σ {axis}", sigma(n), unit="m") for n, axis in enumerate(axes)),
+        number("photos", "photos"),
+        words("from", _sources),
     )
     rest = len(control) - len(shown)
     note = f"{rest} more; --verbose prints all" if rest else ""
-    return Section("Standard deviations of the control", (Table(columns, rows, note=note),))
+    return Section("Standard deviations of the control", (tabulated(shown, columns, note=note),))
+
+
+def _sources(each: Document) -> str:
+    """Say where the standard deviations of a point stand."""
+    return "; ".join(dict.fromkeys(_source(source) for source in each["sigma_from"] if source)) or DASH
 
 
 def _source(place: Document) -> str:

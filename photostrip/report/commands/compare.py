@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING
 
 from photostrip.report.page.figures import counted, short, unit
-from photostrip.report.page.parts import DASH, Column, Part, Section, Table, Words
+from photostrip.report.page.parts import DASH, Document, Part, Section, Words
+from photostrip.report.page.tables import number, tabulated, words
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-Document = dict[str, Any]
+    from collections.abc import Callable, Sequence
 
 SMALL = 1e-4  # shares below are told in parts per million
 SHOWN = 20  # differences; --verbose prints all
@@ -50,7 +50,10 @@ def compare_sections(document: Document, *, quiet: bool = False, everything: boo
     verdict = Words(headline(document), "good" if same else "failed")
     if quiet:
         return (Section("", (verdict,)),)
-    found = [Section("", (verdict, _kinds(document["kinds"]))), *_sets(document["sets"], everything=everything)]
+    found = [
+        Section("", (verdict, tabulated(document["kinds"], KINDS))),
+        *_sets(document["sets"], everything=everything),
+    ]
     if document["differences"]:
         found.insert(1, _differences(document["differences"], everything=everything))
     return tuple(found)
@@ -84,24 +87,6 @@ def allowed_words(kind: Document) -> str:
     return ", ".join(parts) or "none"
 
 
-def _kinds(kinds: Sequence[Document]) -> Table:
-    columns = (
-        Column("quantity", left=True),
-        Column("compared"),
-        Column("beyond"),
-        Column("largest"),
-        Column("", left=True),
-        Column("at", left=True),
-        Column("allowed", left=True),
-    )
-    rows = []
-    for kind in kinds:
-        worst = kind["worst"]
-        cells = (DASH, "", "") if worst is None else (_size(worst), unit(worst["unit"]), place(worst))
-        rows.append((NAMES[kind["kind"]], str(kind["compared"]), str(kind["different"]), *cells, allowed_words(kind)))
-    return Table(columns, tuple(rows))
-
-
 def place(row: Document) -> str:
     """Say what a difference is of: the block of the result, the id, the quantity."""
     block = ONE.get(row["block"], str(row["block"]))
@@ -116,32 +101,41 @@ def _size(row: Document) -> str:
     return short(row["difference"], 3)
 
 
+def what(row: Document) -> str:
+    """Say what a difference is of, with its kind where a quantity has two: plan and height."""
+    return f"{place(row)}, {row['kind']}" if row["kind"] in {"plan", "height"} else place(row)
+
+
+def _of_worst(write: Callable[[Document], str], nothing: str = "") -> Callable[[Document], str]:
+    """Return what writes something of the worst difference of a kind."""
+    return lambda kind: nothing if kind["worst"] is None else write(kind["worst"])
+
+
+KINDS = (
+    words("quantity", lambda kind: NAMES[kind["kind"]]),
+    number("compared", "compared"),
+    number("beyond", "different"),
+    number("largest", _of_worst(_size, DASH)),
+    words("", _of_worst(lambda worst: unit(worst["unit"]))),
+    words("at", _of_worst(place)),
+    words("allowed", allowed_words),
+)
+
+
 def _differences(rows: Sequence[Document], *, everything: bool) -> Section:
     """Table of the differences beyond tolerance, worst first."""
-    columns = (
-        Column("of", left=True),
-        Column("baseline"),
-        Column("now"),
-        Column("difference"),
-        Column("allowed"),
-        Column("", left=True),
-    )
     shown = rows if everything else rows[:SHOWN]
-    cells = tuple(
-        (
-            place(row) if row["kind"] not in {"plan", "height"} else f"{place(row)}, {row['kind']}",
-            short(row["before"], 9),
-            short(row["now"], 9),
-            _size(row),
-            short(row["allowed"], 3),
-            unit(row["unit"]),
-        )
-        for row in shown
+    columns = (
+        words("of", what),
+        number("baseline", "before", partial(short, digits=9)),
+        number("now", "now", partial(short, digits=9)),
+        number("difference", _size),
+        number("allowed", "allowed", partial(short, digits=3)),
+        words("", lambda row: unit(row["unit"])),
     )
     rest = len(rows) - len(shown)
-    return Section(
-        "Beyond tolerance", (Table(columns, cells, note=f"{rest} more; --verbose prints all" if rest else ""),)
-    )
+    note = f"{rest} more; --verbose prints all" if rest else ""
+    return Section("Beyond tolerance", (tabulated(shown, columns, note=note),))
 
 
 def _sets(sets: Sequence[Document], *, everything: bool) -> list[Section]:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from photostrip.report.commands.compare import NAMES, allowed_words, place
+from photostrip.report.commands.compare import NAMES, allowed_words, what
 from photostrip.report.page.figures import short, unit
 from photostrip.report.page.junit import Case
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-Document = dict[str, Any]
+    from photostrip.report.page.parts import Document
 
 MOST = 50  # annotations of one comparison; a server shows no more
 
@@ -64,14 +64,14 @@ def _finding(document: Document, line: int, message: str) -> Document:
 def sentence(row: Document) -> str:
     """Say in a sentence how a number differs."""
     name = unit(row["unit"])
-    what = place(row) if row["kind"] not in {"plan", "height"} else f"{place(row)}, {row['kind']}"
+    quantity = what(row)
     if row["difference"] is None:
         before, now = (short(row[key], 9) if row[key] is not None else "nothing" for key in ("before", "now"))
-        return f"{what}: {now} where {before} was"
+        return f"{quantity}: {now} where {before} was"
     size = f"differs by {short(row['difference'], 3)} {name}".rstrip()
     allowed = f"allowed {short(row['allowed'], 3)} {name}".rstrip()
     values = "" if row["before"] is None else f" ({short(row['before'], 9)} before, {short(row['now'], 9)} now)"
-    return f"{what} {size}, {allowed}{values}"
+    return f"{quantity} {size}, {allowed}{values}"
 
 
 def compare_cases(document: Document) -> Iterator[Case]:

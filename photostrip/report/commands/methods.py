@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
-from photostrip.report.page.figures import metres, micrometres
-from photostrip.report.page.parts import Column, Part, Section, Table, Words
+from photostrip.report.page.parts import Document, Part, Section, Table, Words
+from photostrip.report.page.tables import number, tabulated, words
 
-Document = dict[str, Any]
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 
 def methods_sections(document: Document) -> tuple[Section, ...]:
@@ -30,30 +31,26 @@ def methods_sections(document: Document) -> tuple[Section, ...]:
 
 def _table(rows: list[Document], role: str) -> Table:
     """Tabulate what is left at the points of one role."""
-    columns = (
-        Column(f"at {role} points", left=True),
-        Column("plan"),
-        Column("rms", "m"),
-        Column("", "µm"),
-        Column("largest", "m"),
-        Column("height"),
-        Column("rms", "m"),
-        Column("", "µm"),
-        Column("largest", "m"),
-        *((Column("σ plan", "m", rank=1), Column("σ height", "m", rank=1)) if role == "check" else ()),
-    )
-    cells = []
-    for row in rows:
-        line = [row["adjustment"]]
-        for part in ("plan", "height"):
-            each = row[role][part]
-            line += [str(each["count"]), metres(each["rms"]), micrometres(each["rms_um"]), metres(each["max"])]
-        if role == "check":
-            known = row["precision"] or {"plan": None, "height": None}
-            line += [metres(known["plan"]), metres(known["height"])]
-        cells.append(tuple(line))
+    left_over = [
+        column
+        for part in ("plan", "height")
+        for column in (
+            number(part, f"{role}.{part}.count"),
+            number("rms", f"{role}.{part}.rms", 3, "m"),
+            number("", f"{role}.{part}.rms_um", 1, "µm"),
+            number("largest", f"{role}.{part}.max", 3, "m"),
+        )
+    ]
+    columns = [words(f"at {role} points", "adjustment"), *left_over]
+    if role == "check":
+        columns += [number(f"σ {part}", _precision(part), 3, "m", rank=1) for part in ("plan", "height")]
     note = "µm: at photo scale; σ: rms of the standard deviations of all points" if role == "check" else ""
-    return Table(columns, tuple(cells), note=note)
+    return tabulated(rows, columns, note=note)
+
+
+def _precision(part: str) -> Callable[[Document], float | None]:
+    """Return what reads the rms standard deviation of all points, where it is known."""
+    return lambda row: row["precision"][part] if row["precision"] else None
 
 
 def _verdict(document: Document) -> str:

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING
 
 from photostrip.report.page.figures import counted, fixed, power, short
-from photostrip.report.page.parts import Column, Facts, Part, Section, Table, Words
+from photostrip.report.page.parts import Document, Facts, Part, Section, Table, Words
+from photostrip.report.page.tables import number, tabulated, words
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-Document = dict[str, Any]
+    from collections.abc import Callable
 
 PRIMED = {"alpha1": "α1′", "kappa1": "κ1′", "alpha2": "α2′", "omega2": "ω2′", "kappa2": "κ2′"}
 GREEK = {"alpha": "α", "omega": "ω", "kappa": "κ", "tau": "τ", "nu": "ν", "xi": "ξ", "eta": "η", "theta": "θ"}
-USED = {True: "", False: "not used"}
 SOURCE = {
     "pairs": "Relative orientation of {left} – {right}",
     "chain": "Chain of strip {strip}: orientation and base of every photo, eq. 125-136",
@@ -47,7 +46,7 @@ def trace_sections(document: Document) -> tuple[Section, ...]:
     for strip in document["strips"]:
         found += [_pair(pair, unit) for pair in strip["pairs"]]
         found.append(_chain(strip, unit))
-        found += [_joint(joint) for joint in strip["scale_transfer"]]
+        found += [_junction(junction) for junction in strip["scale_transfer"]]
         found.append(_absolute(strip, unit))
         if strip["polynomial"] is not None:
             found.append(_polynomial(strip))
@@ -57,130 +56,90 @@ def trace_sections(document: Document) -> tuple[Section, ...]:
 def _pair(pair: Document, unit: str) -> Section:
     """Show the rounds of one pair: elements before each step and what is added, then rejections and points."""
     parts: list[Part] = []
-    for number, each in enumerate(pair["rounds"]):
-        which = "all points" if not number else "without the rejected points"
-        parts.append(Words(f"Round {number + 1}, {which}: {counted(each['points'], 'point')}", "head"))
+    for count, each in enumerate(pair["rounds"], 1):
+        which = "all points" if count == 1 else "without the rejected points"
+        parts.append(Words(f"Round {count}, {which}: {counted(each['points'], 'point')}", "head"))
         parts.append(_iterations(each, unit))
     if pair["rejected"]:
-        parts.append(_rejected(pair["rejected"]))
+        parts.append(tabulated(pair["rejected"], REJECTED))
     parts.append(Words(f"σ0 of an image coordinate: {fixed(pair['sigma0_um'], 2)} µm. The points, eq. 137-138:"))
-    parts.append(_points(pair["points"]))
+    parts.append(tabulated(pair["points"], POINTS))
     return Section(SOURCE["pairs"].format(**pair), tuple(parts))
 
 
 def _iterations(each: Document, unit: str) -> Table:
     columns = (
-        Column("step"),
-        Column("[wqq]", "mm²"),
-        *(Column(symbol, unit) for symbol in PRIMED.values()),
-        *(Column(f"d{symbol}", unit, rank=1) for symbol in PRIMED.values()),
-    )
-    rows = tuple(
-        (
-            str(step["iteration"]),
-            power(step["[wqq]"]),
-            *(fixed(step["elements"][name], 6) for name in PRIMED),
-            *(power(step["d"][name], 1) for name in PRIMED),
-        )
-        for step in each["steps"]
+        number("step", "iteration"),
+        number("[wqq]", "[wqq]", power, "mm²"),
+        *(number(symbol, f"elements.{name}", 6, unit) for name, symbol in PRIMED.items()),
+        *(number(f"d{symbol}", f"d.{name}", partial(power, digits=1), unit, rank=1) for name, symbol in PRIMED.items()),
     )
     end = ("end", "", *(fixed(each["end"][name], 6) for name in PRIMED), *("" for _ in PRIMED))
-    return Table(columns, rows, (end,))
+    return tabulated(each["steps"], columns, (end,))
 
 
-def _rejected(rows: Sequence[Document]) -> Table:
-    columns = (
-        Column("rejected", left=True),
-        Column("test", left=True),
-        Column("value"),
-        Column("limit"),
-        Column("q", "mm"),
-        Column("", left=True),
-    )
-    cells = tuple(
-        (
-            row["point"],
-            row["test"],
-            short(row["value"]),
-            short(row["limit"]),
-            fixed(row["q"], 4),
-            "taken back" if row["readmitted"] else "",
-        )
-        for row in rows
-    )
-    return Table(columns, cells)
+def _used(row: Document) -> str:
+    return "" if row["used"] else "not used"
 
 
-def _points(rows: Sequence[Document]) -> Table:
-    columns = (
-        Column("point", left=True),
-        *(Column(name, "mm") for name in ("x1", "y1", "x2", "y2", "q")),
-        Column("N"),
-        *(Column(name, "strip") for name in "XYZ"),
-        Column("", left=True),
-    )
-    cells = tuple(
-        (
-            row["point"],
-            *(fixed(row[name], 4) for name in ("x1", "y1", "x2", "y2", "q")),
-            fixed(row["N"], 7),
-            *(fixed(row[name], 6) for name in "XYZ"),
-            USED[row["used"]],
-        )
-        for row in rows
-    )
-    return Table(columns, cells)
+REJECTED = (
+    words("rejected", "point"),
+    words("test", "test"),
+    number("value", "value", short),
+    number("limit", "limit", short),
+    number("q", "q", 4, "mm"),
+    words("", lambda row: "taken back" if row["readmitted"] else ""),
+)
+POINTS = (
+    words("point", "point"),
+    *(number(name, name, 4, "mm") for name in ("x1", "y1", "x2", "y2", "q")),
+    number("N", "N", 7),
+    *(number(name, name, 6, "strip") for name in "XYZ"),
+    words("", _used),
+)
+
+
+def _component(key: str, place: int) -> Callable[[Document], float | None]:
+    """Return what reads one component of a vector; the first photo of a strip has no base."""
+    return lambda row: row[key][place] if key in row else None
+
+
+def _optional(key: str) -> Callable[[Document], float | None]:
+    return lambda row: row.get(key)
+
+
+def _of_base(decimals: int) -> Callable[[float | None], str]:
+    return lambda value: "" if value is None else fixed(value, decimals)
 
 
 def _chain(strip: Document, unit: str) -> Section:
+    """Show the orientation and base of every photo, then its rotation matrix as a row."""
     columns = (
-        Column("photo", left=True),
-        *(Column(GREEK[name], unit) for name in ("tau", "nu")),
-        *(Column(f"B{axis}") for axis in "XYZ"),
-        Column("k"),
-        *(Column(GREEK[name], unit) for name in ("alpha", "omega", "kappa")),
-        *(Column(f"{axis}s") for axis in "XYZ"),
+        words("photo", "photo"),
+        *(number(GREEK[name], _optional(name), _of_base(6), unit) for name in ("tau", "nu")),
+        *(number(f"B{axis}", _component("B", n), _of_base(6)) for n, axis in enumerate("XYZ")),
+        number("k", _optional("k"), _of_base(7)),
+        *(number(GREEK[name], name, 6, unit) for name in ("alpha", "omega", "kappa")),
+        *(number(f"{axis}s", _component("S", n), 6) for n, axis in enumerate("XYZ")),
     )
-    rows = []
-    for row in strip["chain"]:
-        base = (
-            *(fixed(row[name], 6) for name in ("tau", "nu")),
-            *(fixed(value, 6) for value in row["B"]),
-            fixed(row["k"], 7),
-        ) if "B" in row else ("",) * 6  # fmt: skip
-        angles = (fixed(row[name], 6) for name in ("alpha", "omega", "kappa"))
-        rows.append((row["photo"], *base, *angles, *(fixed(value, 6) for value in row["S"])))
-    return Section(SOURCE["chain"].format(**strip), (Table(columns, tuple(rows)), *_matrices(strip)))
+    places = [f"{row}{column}" for row in "abc" for column in "123"]
+    matrices = (words("photo", "photo"), *(number(name, _component("A", n), 8) for n, name in enumerate(places)))
+    note = "A = A_taunu A(α2′, ω2′, κ2′), eq. 131-133, by rows."
+    tables = (tabulated(strip["chain"], columns), tabulated(strip["chain"], matrices, note=note))
+    return Section(SOURCE["chain"].format(**strip), tables)
 
 
-def _matrices(strip: Document) -> tuple[Part, ...]:
-    """Rotation matrices of the photos, a row each."""
-    columns = (Column("photo", left=True), *(Column(f"{row}{column}") for row in "abc" for column in "123"))
-    rows = tuple((row["photo"], *(fixed(value, 8) for value in row["A"])) for row in strip["chain"])
-    return (Table(columns, rows, note="A = A_taunu A(α2′, ω2′, κ2′), eq. 131-133, by rows."),)
-
-
-def _joint(joint: Document) -> Section:
+def _junction(junction: Document) -> Section:
     columns = (
-        Column("point", left=True),
-        Column("D"),
-        Column("D'"),
-        Column("k_t"),
-        Column("k_t - k"),
-        Column("", left=True),
+        words("point", "point"),
+        *(number(name, name, 7) for name in ("D", "D'", "k_t")),
+        number("k_t - k", lambda row: row["k_t"] - junction["k"], partial(power, digits=1)),
+        words("", _used),
     )
-    rows = tuple(
-        (
-            row["point"],
-            *(fixed(row[name], 7) for name in ("D", "D'", "k_t")),
-            power(row["k_t"] - joint["k"], 1),
-            USED[row["used"]],
-        )
-        for row in joint["points"]
-    )
-    spread = "" if joint["sd_of_one"] is None else f"; standard deviation of one ratio {power(joint['sd_of_one'], 1)}"
-    text = f"k = {fixed(joint['k'], 9)} ({joint['form'].replace('_', ' ')}){spread}."
-    return Section(SOURCE["scale"].format(**joint), (Table(columns, rows), Words(text)))
+    one = junction["sd_of_one"]
+    spread = "" if one is None else f"; standard deviation of one ratio {power(one, 1)}"
+    text = f"k = {fixed(junction['k'], 9)} ({junction['form'].replace('_', ' ')}){spread}."
+    return Section(SOURCE["scale"].format(**junction), (tabulated(junction["points"], columns), Words(text)))
 
 
 def _absolute(strip: Document, unit: str) -> Section:
@@ -190,82 +149,72 @@ def _absolute(strip: Document, unit: str) -> Section:
     axes = "; ".join(" ".join(fixed(value, 9) for value in found["M"][row : row + 3]) for row in (0, 3, 6))
     facts = Facts((("A0", f"{fixed(found['A0'], 6)} {unit}"), ("origin, m", origin), ("M, by rows", axes)))
     columns = (
-        Column("step"),
-        Column("[wvv]"),
-        Column("s"),
-        *(Column(GREEK[name], unit) for name in ("xi", "eta", "theta")),
-        *(Column(f"{axis}0", "m") for axis in "XYZ"),
-        *(Column(f"d{axis}0", "m", rank=1) for axis in "XYZ"),
-    )
-    rows = tuple(
-        (
-            str(step["iteration"]),
-            short(step["[wvv]"], 6),
-            fixed(step["s"], 7),
-            *(fixed(step[name], 6) for name in ("xi", "eta", "theta")),
-            *(fixed(value, 4) for value in step["shift"]),
-            *(power(value, 1) for value in step["d_shift"]),
-        )
-        for step in found["steps"]
+        number("step", "iteration"),
+        number("[wvv]", "[wvv]", partial(short, digits=6)),
+        number("s", "s", 7),
+        *(number(GREEK[name], name, 6, unit) for name in ("xi", "eta", "theta")),
+        *(number(f"{axis}0", _component("shift", n), 4, "m") for n, axis in enumerate("XYZ")),
+        *(
+            number(f"d{axis}0", _component("d_shift", n), partial(power, digits=1), "m", rank=1)
+            for n, axis in enumerate("XYZ")
+        ),
     )
     angles = (fixed(found[name], 6) for name in ("xi", "eta", "theta"))
     end = ("end", "", fixed(found["s"], 7), *angles, *(fixed(value, 4) for value in found["shift"]), "", "", "")
     sigma0 = "no redundancy" if found["sigma0"] is None else f"σ0 = {short(found['sigma0'])}"
-    return Section(
-        SOURCE["absolute"].format(**strip), (facts, Table(columns, rows, (end,), sigma0), _control(found["control"]))
+    control = tabulated(
+        found["control"], CONTROL, note="v: strip minus given after the similarity, in the intermediate frame."
     )
+    steps = tabulated(found["steps"], columns, (end,), sigma0)
+    return Section(SOURCE["absolute"].format(**strip), (facts, steps, control))
 
 
-def _control(rows: Sequence[Document]) -> Table:
-    columns = (
-        Column("point", left=True),
-        Column("use", left=True),
-        *(Column(axis, "strip") for axis in "XYZ"),
-        *(Column(axis, "given, m") for axis in "XYZ"),
-        *(Column(f"v{axis}", "m") for axis in "XYZ"),
-    )
-    cells = tuple(
-        (
-            row["point"],
-            row["use"],
-            *(fixed(value, 6) for value in row["strip"]),
-            *(fixed(value, 3) for value in row["given"]),
-            *(fixed(moved - given, 3) for moved, given in zip(row["oriented"], row["given"], strict=True)),
-        )
-        for row in rows
-    )
-    return Table(columns, cells, note="v: strip minus given after the similarity, in the intermediate frame.")
+def _left_over(place: int) -> Callable[[Document], float]:
+    return lambda row: row["oriented"][place] - row["given"][place]
+
+
+CONTROL = (
+    words("point", "point"),
+    words("use", "use"),
+    *(number(axis, _component("strip", n), 6, "strip") for n, axis in enumerate("XYZ")),
+    *(number(axis, _component("given", n), 3, "given, m") for n, axis in enumerate("XYZ")),
+    *(number(f"v{axis}", _left_over(n), 3, "m") for n, axis in enumerate("XYZ")),
+)
+EVIDENCE = (
+    words("group", "group"),
+    number("degree", "degree"),
+    number("rms", "rms", 4, "m"),
+    number("left out", "left_out", 4, "m"),
+    number("F", "F", short),
+    number("p", "p", partial(short, digits=3)),
+    words("", lambda row: "taken" if row["taken"] else ""),
+)
+COEFFICIENTS = (
+    words("added to", "axis"),
+    words("term", "terms"),
+    number("coefficient", "coefficients", partial(power, digits=8)),
+    number("±", "sigmas", partial(power, digits=2)),
+)
+POLYNOMIAL_CONTROL = (
+    words("point", "point"),
+    number("X", "X", 3, "m"),
+    number("Y", "Y", 3, "m"),
+    *(number(f"l{axis}", _component("l", n), 3, "m") for n, axis in enumerate("XYZ")),
+    *(number(f"v{axis}", _component("v", n), 3, "m") for n, axis in enumerate("XYZ")),
+)
 
 
 def _polynomial(strip: Document) -> Section:
     """Evidence, coefficients and control of the polynomials."""
-    found = strip["polynomial"]
-    weighed = Table(
-        (Column("group", left=True), Column("degree"), Column("rms", "m"), Column("left out", "m"), Column("F"),
-         Column("p"), Column("", left=True)),
-        tuple(
-            (row["group"], str(row["degree"]), fixed(row["rms"], 4), fixed(row["left_out"], 4), short(row["F"]),
-             short(row["p"], 3), "taken" if row["taken"] else "")
-            for row in found["evidence"]
-        ),
-    )  # fmt: skip
-    coefficients = Table(
-        (Column("added to", left=True), Column("term", left=True), Column("coefficient"), Column("±")),
-        tuple(
-            (axis, term, power(value, 8), power(sigma, 2))
-            for axis, fit in found["axes"].items()
-            for term, value, sigma in zip(fit["terms"], fit["coefficients"], fit["sigmas"], strict=True)
-        ),
+    found, keys = strip["polynomial"], ("terms", "coefficients", "sigmas")
+    terms = [
+        {"axis": axis, **dict(zip(keys, values, strict=True))}
+        for axis, fit in found["axes"].items()
+        for values in zip(*(fit[key] for key in keys), strict=True)
+    ]
+    parts = (
+        tabulated(found["evidence"], EVIDENCE),
+        tabulated(terms, COEFFICIENTS) if terms else Words("No term is taken."),
+        tabulated(found["control"], POLYNOMIAL_CONTROL, note="l: given minus strip; v: corrected minus given."),
     )
-    control = Table(
-        (Column("point", left=True), Column("X", "m"), Column("Y", "m"), *(Column(f"l{axis}", "m") for axis in "XYZ"),
-         *(Column(f"v{axis}", "m") for axis in "XYZ")),
-        tuple(
-            (row["point"], fixed(row["X"], 3), fixed(row["Y"], 3), *(fixed(value, 3) for value in row["l"]),
-             *(fixed(value, 3) for value in row["v"]))
-            for row in found["control"]
-        ),
-        note="l: given minus strip; v: corrected minus given.",
-    )  # fmt: skip
-    parts = (weighed, coefficients, control) if coefficients.rows else (weighed, Words("No term is taken."), control)
     return Section(SOURCE["polynomial"].format(**strip), parts)

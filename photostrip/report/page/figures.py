@@ -64,6 +64,11 @@ def listed(names: Iterable[str], limit: int) -> str:
     return head if len(given) <= limit else f"{head} and {len(given) - limit} more"
 
 
+def joined(*notes: str) -> str:
+    """Return notes below a table as one, without the empty ones."""
+    return "; ".join(note for note in notes if note)
+
+
 def unit(name: str) -> str:
     """Return a unit of the document as it is printed."""
     return name.replace("um", "µm")

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING
 
-from photostrip.report.page.figures import counted, fixed, metres, power, ratio, short, unit
-from photostrip.report.page.parts import DASH, Column, Facts, Part, Section, Table, Words
+from photostrip.report.page.figures import counted, fixed, power, short, unit
+from photostrip.report.page.parts import DASH, Document, Facts, Part, Section, Words
+from photostrip.report.page.tables import number, tabulated, words
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-Document = dict[str, Any]
 
 NAMES = {"image": "image coordinates", "control": "control", "position": "camera positions", "attitude": "attitudes"}
 CORRELATIONS_SHOWN = 12
@@ -51,26 +51,16 @@ def _adjustment(block: Document) -> Section:
         ("gross errors", _screening(screening)),
     ]
     columns = (
-        Column("step"),
-        Column("sum of squares"),
-        Column("length"),
-        Column("damping"),
-        Column("largest shift", "m"),
-        Column("turn", "deg"),
+        number("step", "count"),
+        number("sum of squares", "chi_square", partial(short, digits=8)),
+        number("length", "length", partial(short, digits=3)),
+        number("damping", "damping", partial(short, digits=2)),
+        number("largest shift", "shift", partial(power, digits=1), "m"),
+        number("turn", "turn_deg", partial(power, digits=1), "deg"),
     )
-    rows = tuple(
-        (
-            str(number),
-            short(step["chi_square"], 8),
-            short(step["length"], 3),
-            short(step["damping"], 2),
-            power(step["shift"], 1),
-            power(step["turn_deg"], 1),
-        )
-        for number, step in enumerate(block["convergence"], 1)
-    )
+    steps = [{"count": count, **step} for count, step in enumerate(block["convergence"], 1)]
     note = "of the last adjustment, from the one before it; length: of the step, in standard deviations"
-    return Section("Bundle adjustment", (Facts(tuple(facts)), Table(columns, rows, note=note)))
+    return Section("Bundle adjustment", (Facts(tuple(facts)), tabulated(steps, columns, note=note)))
 
 
 def _datum(block: Document) -> str:
@@ -100,139 +90,97 @@ def _reliability(block: Document) -> Section:
     """How well the observations check each other."""
     reliable = block["reliability"]
     columns = (
-        Column("observations", left=True),
-        Column("number"),
-        Column("redund."),
-        Column("mean r"),
-        Column("least r"),
-        Column("unchecked"),
-        Column("detectable"),
-        Column("at most"),
-        Column("", left=True),
-        Column("effect", "σ"),
-    )
-    rows = tuple(
-        (
-            NAMES[each["group"]],
-            str(each["observations"]),
-            fixed(each["redundancy"], 1),
-            ratio(each["mean"]),
-            ratio(each["smallest"]),
-            str(each["uncontrolled"]),
-            short(each["detectable"], 3),
-            short(each["detectable_largest"], 3),
-            unit(each["unit"]),
-            fixed(each["external"], 1),
-        )
-        for each in reliable["groups"]
+        words("observations", _name),
+        number("number", "observations"),
+        number("redund.", "redundancy", 1),
+        number("mean r", "mean", 2),
+        number("least r", "smallest", 2),
+        number("unchecked", "uncontrolled"),
+        number("detectable", "detectable", partial(short, digits=3)),
+        number("at most", "detectable_largest", partial(short, digits=3)),
+        words("", lambda each: unit(each["unit"])),
+        number("effect", "external", 1, "σ"),
     )
     note = (
         "r: redundancy number, the share of an error that shows in its residual; detectable: the error found with a "
         f"probability of {100 * reliable['power']:g} % (median, largest); effect: what an error just not found moves "
         "at most, in standard deviations of what it moves (median)"
     )
-    parts: list[Part] = [Table(columns, rows, note=note)]
-    parts += _named("fit worst", "test", reliable["worst"])
-    parts += _named("hardest to check", "test", reliable["weakest"])
+    parts: list[Part] = [tabulated(reliable["groups"], columns, note=note)]
+    parts += _named("fit worst", reliable["worst"])
+    parts += _named("hardest to check", reliable["weakest"])
     return Section("Reliability", tuple(parts))
 
 
-def _named(title: str, test: str, rows: Sequence[Document]) -> list[Part]:
+def _name(row: Document) -> str:
+    """Name the kind of observations of a row."""
+    return NAMES[row.get("group") or row["kind"]]
+
+
+def _named(title: str, rows: Sequence[Document]) -> list[Part]:
     """Observations by their names."""
     if not rows:
         return []
     columns = (
-        Column(title, left=True),
-        Column("photo", left=True),
-        Column("point", left=True),
-        Column("", left=True),
-        Column("r"),
-        Column(test),
-        Column("detectable"),
-        Column("", left=True),
-        Column("effect", "m"),
+        words(title, _name),
+        words("photo", lambda each: each["photo"] or DASH),
+        words("point", lambda each: each["point"] or DASH),
+        words("", "axis"),
+        number("r", "redundancy", 2),
+        number("test", "standardised", 1),
+        number("detectable", "detectable", partial(short, digits=3)),
+        words("", lambda each: unit(each["unit"])),
+        number("effect", "effect", 3, "m"),
     )
-    cells = tuple(
-        (
-            NAMES[each["kind"]],
-            each["photo"] or DASH,
-            each["point"] or DASH,
-            each["axis"],
-            ratio(each["redundancy"]),
-            fixed(each["standardised"], 1),
-            short(each["detectable"], 3),
-            unit(each["unit"]),
-            metres(each["effect"]),
-        )
-        for each in rows[:NAMED]
-    )
-    return [Table(columns, cells)]
+    return [tabulated(rows[:NAMED], columns)]
 
 
 def _components(rows: Sequence[Document]) -> Section:
     """Show the standard deviations found by group."""
     columns = (
-        Column("group", left=True),
-        Column("observations"),
-        Column("redund."),
-        Column("factor"),
-        Column("±"),
-        Column("", left=True),
-    )
-    cells = tuple(
-        (
-            each["group"],
-            str(each["observations"]),
-            fixed(each["redundancy"], 1),
-            fixed(each["factor"], 3),
-            fixed(None if each["sigma"] is None else each["sigma"] * each["factor"], 3),
-            "" if each["estimated"] else "not estimated: too little redundancy",
-        )
-        for each in rows
+        words("group", "group"),
+        number("observations", "observations"),
+        number("redund.", "redundancy", 1),
+        number("factor", "factor", 3),
+        number("±", lambda each: None if each["sigma"] is None else each["sigma"] * each["factor"], 3),
+        words("", lambda each: "" if each["estimated"] else "not estimated: too little redundancy"),
     )
     text = "Each group's stated standard deviations, multiplied with its factor, were used."
-    return Section("Variance components", (Words(text), Table(columns, cells)))
+    return Section("Variance components", (Words(text), tabulated(rows, columns)))
+
+
+CALIBRATION = (
+    words("camera", "camera"),
+    words("parameter", "parameter"),
+    number("correction", "value", partial(short, digits=5)),
+    number("σ", "sigma", partial(short, digits=2)),
+    words("", lambda each: "" if each["unit"] == "1" else each["unit"]),
+    number("p", "p", partial(short, digits=2)),
+    words("", lambda each: "significant" if each["significant"] else "not significant"),
+)
+CORRECTIONS = (
+    words("camera positions", "name"),
+    number("correction", "value", partial(short, digits=5), "m"),
+    number("σ", "sigma", partial(short, digits=2), "m"),
+)
+CORRELATIONS = (
+    words("highly correlated", "first"),
+    words("with", "second"),
+    number("correlation", "value", lambda value: f"{value:+.3f}"),
+)
 
 
 def _parameters(block: Document) -> Section:
     """Calibration parameters, offsets and drifts, and what is hard to tell apart."""
     parts: list[Part] = []
     if block["calibration"]:
-        columns = (
-            Column("camera", left=True),
-            Column("parameter", left=True),
-            Column("correction"),
-            Column("σ"),
-            Column("", left=True),
-            Column("p"),
-            Column("", left=True),
-        )
-        rows = tuple(
-            (
-                each["camera"],
-                each["parameter"],
-                short(each["value"], 5),
-                short(each["sigma"], 2),
-                "" if each["unit"] == "1" else each["unit"],
-                short(each["p"], 2),
-                "significant" if each["significant"] else "not significant",
-            )
-            for each in block["calibration"]
-        )
-        parts.append(
-            Table(columns, rows, note="corrections of the given calibration; p: of a value as large by chance")
-        )
+        note = "corrections of the given calibration; p: of a value as large by chance"
+        parts.append(tabulated(block["calibration"], CALIBRATION, note=note))
     if block["corrections"]:
-        heads = (Column("camera positions", left=True), Column("correction", "m"), Column("σ", "m"))
-        cells = tuple((each["name"], short(each["value"], 5), short(each["sigma"], 2)) for each in block["corrections"])
-        parts.append(
-            Table(heads, cells, note="what is added to the given positions of a strip; a drift: per unit of time")
-        )
+        note = "what is added to the given positions of a strip; a drift: per unit of time"
+        parts.append(tabulated(block["corrections"], CORRECTIONS, note=note))
     if block["correlations"]:
-        pair = (Column("highly correlated", left=True), Column("with", left=True), Column("correlation"))
-        shown = block["correlations"][:CORRELATIONS_SHOWN]
-        more = len(block["correlations"]) - len(shown)
-        note = f"{counted(more, 'more pair')} in `bundle.correlations`" if more else ""
-        named = tuple((each["first"], each["second"], f"{each['value']:+.3f}") for each in shown)
-        parts.append(Table(pair, named, note=note))
+        more = len(block["correlations"]) - CORRELATIONS_SHOWN
+        note = f"{counted(more, 'more pair')} in `bundle.correlations`" if more > 0 else ""
+        parts.append(tabulated(block["correlations"][:CORRELATIONS_SHOWN], CORRELATIONS, note=note))
     return Section("Parameters that photos share", tuple(parts))

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from photostrip.report.page.figures import counted, fixed, ratio, signed
-from photostrip.report.page.parts import Column, Facts, Part, Section, Table, Words
+from photostrip.report.page.figures import counted, fixed, joined, ratio, signed
+from photostrip.report.page.parts import Document, Facts, Part, Section, Table, Words
+from photostrip.report.page.tables import number, tabulated, words
 from photostrip.report.sections.strip import worst_first
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-Document = dict[str, Any]
 
 
 def covariance_section(document: Document, *, everything: bool) -> Section:
@@ -57,21 +56,11 @@ def _control(block: Document, *, everything: bool) -> Table:
         block["control"], lambda row: abs(row["test"] or 0.0), "in `covariance`", everything=everything
     )
     columns = (
-        Column("control", left=True),
-        Column("axis", left=True),
-        Column("test"),
-        Column("error that would explain it", "m"),
-        Column("", left=True),
-    )
-    rows = tuple(
-        (
-            row["id"],
-            row["axis"],
-            fixed(row["test"], 2),
-            signed(row["size"]),
-            "WRONG?" if row["test"] is not None and abs(row["test"]) > block["limit"] else "",
-        )
-        for row in shown
+        words("control", "id"),
+        words("axis", "axis"),
+        number("test", "test", 2),
+        number("error that would explain it", "size", signed, "m"),
+        words("", lambda row: "WRONG?" if row["test"] is not None and abs(row["test"]) > block["limit"] else ""),
     )
     below = f"test: standard normal for right control; beyond {ratio(block['limit'])} it is doubtful"
-    return Table(columns, rows, note=f"{note}; {below}" if note else below)
+    return tabulated(shown, columns, note=joined(note, below))

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from photostrip.report.page.figures import counted, metres, micrometres, short
-from photostrip.report.page.parts import DASH, Column, Facts, Section, Table, Words
+from photostrip.report.page.figures import counted, micrometres, short
+from photostrip.report.page.parts import Document, Facts, Section, Words
+from photostrip.report.page.tables import number, tabulated, words
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-Document = dict[str, Any]
+    from collections.abc import Callable, Iterator
 
 WEIGHTS_SHOWN = 24  # control points; --verbose prints all
 LEAST_SHOWN = 0.001  # probabilities below are not told apart
@@ -91,28 +90,24 @@ def weights_section(document: Document, *, everything: bool) -> Section:
     control = [row for row in document["control"] if row["role"] == "control" and row["measured"]]
     shown = control if everything else control[:WEIGHTS_SHOWN]
     axes = document["frame"]["axes"]
+    up = next((place for place, axis in enumerate(axes) if axis in {"up", "z"}), 2)
+
+    def sigma(key: str, place: int) -> Callable[[Document], float | None]:
+        """Return what reads a standard deviation of a coordinate that counts: plan, height or both."""
+        letter = "z" if place == up else "x"
+        return lambda row: row[key][place] if letter in row["use"] else None
+
     columns = (
-        Column("point", left=True),
-        Column("use", left=True),
-        *(Column(f"σ {axis}", "given, m", rank=1) for axis in axes),
-        *(Column(f"σ {axis}", "in fit, m") for axis in axes),
-        Column("list", left=True, rank=2),
-    )
-    up = next((number for number, axis in enumerate(axes) if axis in {"up", "z"}), 2)
-    rows = tuple(
-        (row["id"], row["use"], *_sigmas(row, "sigma", up), *_sigmas(row, "sigma_fit", up), str(row["list"]))
-        for row in shown
+        words("point", "id"),
+        words("use", "use"),
+        *(number(f"σ {axis}", sigma("sigma", n), 3, "given, m", rank=1) for n, axis in enumerate(axes)),
+        *(number(f"σ {axis}", sigma("sigma_fit", n), 3, "in fit, m") for n, axis in enumerate(axes)),
+        words("list", "list", rank=2),
     )
     rest = len(control) - len(shown)
     more = f"{rest} more in `control` of result.json; " if rest else ""
     note = f"{more}in fit: together with a point of one model; a coordinate weighs 1 / σ² there"
     if len({row["list"] for row in control}) > 1:
         note += "; columns in the order of the axes of each list"
-    parts = (Table(columns, rows, note=note),) if rows else (Words("No control point was measured."),)
-    return Section("Weights of the control", parts)
-
-
-def _sigmas(row: Document, key: str, up: int) -> list[str]:
-    """Return the standard deviations of the coordinates that count: plan, height or both."""
-    counts = ["z" in row["use"] if column == up else "x" in row["use"] for column in range(3)]
-    return [metres(value) if used else DASH for value, used in zip(row[key], counts, strict=True)]
+    parts = tabulated(shown, columns, note=note) if shown else Words("No control point was measured.")
+    return Section("Weights of the control", (parts,))

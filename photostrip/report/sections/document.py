@@ -5,10 +5,10 @@ The only input is the content of result.json, so that ``photostrip report`` prin
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from photostrip.errors import Fault, InputError
-from photostrip.report.page.parts import Section, Words
+from photostrip.report.page.parts import Document, Section, Words
 from photostrip.report.sections.bundle import bundle_sections
 from photostrip.report.sections.covariance import covariance_section
 from photostrip.report.sections.decisions import decisions_section, weights_section
@@ -36,8 +36,6 @@ from photostrip.report.sections.verdict import accuracy, headline, verdict_secti
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-Document = dict[str, Any]
 
 
 def sections_of(document: Document, *, everything: bool = False) -> tuple[Section, ...]:

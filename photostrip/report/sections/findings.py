@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from photostrip.notes import before
-from photostrip.report.page.parts import Section, Words
+from photostrip.report.page.parts import Document, Part, Section, Words
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-    from photostrip.report.page.parts import Part
-
-Document = dict[str, Any]
 
 
 def findings_sections(document: Document) -> tuple[Section, ...]:

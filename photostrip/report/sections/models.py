@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
-from photostrip.report.page.figures import counted, fixed, metres, micrometres, percent, ratio
-from photostrip.report.page.parts import DASH, Column, Facts, Section, Table, Words
-from photostrip.report.sections.strip import DIRECTIONS, worst_first
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-Document = dict[str, Any]
+from photostrip.report.page.figures import counted, joined, micrometres, percent, ratio
+from photostrip.report.page.parts import DASH, Document, Facts, Section, Words
+from photostrip.report.page.tables import number, tabulated, words
+from photostrip.report.sections.strip import DIRECTIONS, photos_of, worst_first
 
 
 def of_models(document: Document) -> bool:
@@ -43,44 +37,36 @@ def links_section(document: Document, *, everything: bool) -> Section:
     total = out + sum(link["points_used"] + link["center"] for link in links)
     gone = f"{out} of {counted(total, 'common point')}, {percent(out, total)}"
     facts = Facts((("σ0", sigma0), ("largest test value", largest), ("rejected", gone)))
-    return Section("Links of the models", (facts, _links(shown, note)))
-
-
-def _links(links: Sequence[Document], note: str) -> Table:
-    columns = (
-        Column("models", left=True),
-        Column("points"),
-        Column("center", left=True),
-        Column("rej."),
-        Column("σ0"),
-        *(Column(name, "m") for name in DIRECTIONS),
-        *(Column(name, "µm", rank=2) for name in DIRECTIONS),
-        Column("scale ratio", rank=2),
-        Column("far end", "σ", rank=1),
-        Column("detect.", "µm", rank=3),
-        Column("strip", left=True, rank=4),
-    )
-    rows = tuple(
-        (
-            f"{link['before']} – {link['after']}",
-            str(link["points_used"]),
-            "yes" if link["center"] else "no",
-            str(len(link["points_rejected"])),
-            ratio(link["sigma0"]),
-            *(metres(link["discrepancy"][name]) for name in DIRECTIONS),
-            *(micrometres(link["discrepancy_um"][name]) for name in DIRECTIONS),
-            fixed(link["factor"], 6),
-            ratio(link["far_end"]),
-            micrometres(link["detectable_um"]),
-            link["strip"],
-        )
-        for link in links
-    )
     below = (
         "σ0: ratio to what the standard deviations of both models let expect; along, across, up: rms differences of "
         "the common points; far end: uncertainty of the second model's far end, in standard deviations of a coordinate"
     )
-    return Table(columns, rows, note=f"{note}; {below}" if note else below)
+    return Section("Links of the models", (facts, tabulated(shown, LINKS, note=joined(note, below))))
+
+
+LINKS = (
+    words("models", lambda link: f"{link['before']} – {link['after']}"),
+    number("points", "points_used"),
+    words("center", lambda link: "yes" if link["center"] else "no"),
+    number("rej.", lambda link: len(link["points_rejected"])),
+    number("σ0", "sigma0", 2),
+    *(number(name, f"discrepancy.{name}", 3, "m") for name in DIRECTIONS),
+    *(number(name, f"discrepancy_um.{name}", 1, "µm", rank=2) for name in DIRECTIONS),
+    number("scale ratio", "factor", 6, rank=2),
+    number("far end", "far_end", 2, "σ", rank=1),
+    number("detect.", "detectable_um", 1, "µm", rank=3),
+    words("strip", "strip", rank=4),
+)
+MODELS = (
+    words("model", "id"),
+    words("photos", photos_of),
+    number("points", "points_used"),
+    number("rej.", "points_rejected"),
+    number("centers", "centers"),
+    number("scale 1:", "model_scale", 0),
+    number("base", "base", 2, "m"),
+    words("strip", "strip", rank=2),
+)
 
 
 def models_section(document: Document, *, everything: bool) -> Section:
@@ -89,29 +75,6 @@ def models_section(document: Document, *, everything: bool) -> Section:
     middle = document["summary"]["model_scale"] or 1.0
     shown, note = worst_first(
         models, lambda m: abs(m["model_scale"] / middle - 1), "models in `models`", everything=everything
-    )
-    columns = (
-        Column("model", left=True),
-        Column("photos", left=True),
-        Column("points"),
-        Column("rej."),
-        Column("centers"),
-        Column("scale 1:"),
-        Column("base", "m"),
-        Column("strip", left=True, rank=2),
-    )
-    rows = tuple(
-        (
-            m["id"],
-            f"{m['left']} – {m['right']}",
-            str(m["points_used"]),
-            str(m["points_rejected"]),
-            str(m["centers"]),
-            fixed(m["model_scale"], 0),
-            fixed(m["base"], 2),
-            m["strip"],
-        )
-        for m in shown
     )
     text = (
         "The models are independent: each has a scale, a rotation and an origin of its own, and takes its place from "
@@ -126,7 +89,7 @@ def models_section(document: Document, *, everything: bool) -> Section:
     facts = [("points by models", by_models)]
     if missing:
         facts.append(("photos without a center", ", ".join(missing)))
-    return Section("Models", (Words(text), Facts(tuple(facts)), Table(columns, rows, note=note)))
+    return Section("Models", (Words(text), Facts(tuple(facts)), tabulated(shown, MODELS, note=note)))
 
 
 def project_rows(document: Document) -> list[tuple[str, str]]:

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from itertools import groupby
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from photostrip.notes import before
-from photostrip.report.page.figures import counted, listed, metres, micrometres, ratio, signed, unit
-from photostrip.report.page.parts import DASH, Column, Facts, Part, Section, Table, Words
+from photostrip.report.page.figures import counted, joined, listed, metres, micrometres, ratio, signed, unit
+from photostrip.report.page.parts import DASH, Document, Facts, Part, Section, Table, Words
+from photostrip.report.page.tables import number, tabulated, words
 from photostrip.report.sections.models import scale_word
 from photostrip.report.sections.strip import WORST_SHOWN, worst_first
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-Document = dict[str, Any]
+    from collections.abc import Callable, Sequence
 
 AXES = ("x", "y", "z")
 LETTERS = {"east": "x", "north": "y", "up": "z"}  # of `use`
+DIFFERENCES = ("dx", "dy", "dz")
 IDS_NAMED = 12
 WORST_POINTS = 8
 
@@ -53,27 +53,14 @@ def _given(document: Document, given: Sequence[Document], role: str, *, everythi
     axes, summary = document["frame"]["axes"], document["summary"]
     shown, note = worst_first(given, lambda row: row["normalised"] or 0.0, "points in `control`", everything=everything)
     columns = (
-        Column("point", left=True),
-        Column("use", left=True),
-        *(Column(f"d {axis}", "m") for axis in axes),
-        Column("plan", "µm"),
-        Column("height", "µm"),
-        Column("ratio", rank=1),
-        *(Column(f"σ {axis}", "m", rank=2) for axis in axes),
-        Column("strips", left=True, rank=3),
-    )
-    rows = tuple(
-        (
-            row["id"],
-            _used(row),
-            *(signed(row[key]) for key in ("dx", "dy", "dz")),
-            micrometres(row["plan_um"]),
-            micrometres(row["height_um"]),
-            ratio(row["normalised"]),
-            *map(metres, row["sigma"]),
-            ", ".join(row["strips"]),
-        )
-        for row in shown
+        words("point", "id"),
+        words("use", _used),
+        *(number(f"d {axis}", key, signed, "m") for axis, key in zip(axes, DIFFERENCES, strict=True)),
+        number("plan", "plan_um", 1, "µm"),
+        number("height", "height_um", 1, "µm"),
+        number("ratio", "normalised", 2, rank=1),
+        *(number(f"σ {axis}", _sigma(n), 3, "m", rank=2) for n, axis in enumerate(axes)),
+        words("strips", lambda row: ", ".join(row["strips"]), rank=3),
     )
     plan, height = summary[role]["plan"], summary[role]["height"]
     rms, mean = summary[f"{role}_rms"], summary[f"{role}_mean"]
@@ -92,7 +79,7 @@ def _given(document: Document, given: Sequence[Document], role: str, *, everythi
         (
             "largest",
             "",
-            *(_largest(given, key, axis) for key, axis in zip(("dx", "dy", "dz"), axes, strict=True)),
+            *(_largest(given, key, axis) for key, axis in zip(DIFFERENCES, axes, strict=True)),
             micrometres(plan["max_um"]),
             micrometres(height["max_um"]),
             _most(given),
@@ -102,7 +89,12 @@ def _given(document: Document, given: Sequence[Document], role: str, *, everythi
     other = "the adjustment" if "bundle" in document else "a point of one model"
     scale = scale_word(document)
     below = f"plan, height: at {scale} scale; ratio: to the standard deviation of the given point and of {other}"
-    return Table(columns, rows, foot, f"{note}; {below}" if note else below)
+    return tabulated(shown, columns, foot, joined(note, below))
+
+
+def _sigma(place: int) -> Callable[[Document], float | None]:
+    """Return what reads the standard deviation of a coordinate."""
+    return lambda row: row["sigma"][place]
 
 
 def _used(row: Document) -> str:
@@ -146,25 +138,15 @@ def ties_section(document: Document, *, everything: bool) -> Section:
         ties, lambda t: max(t["plan_um"], abs(t["height_um"])), "points in `ties`", everything=everything
     )
     columns = (
-        Column("point", left=True),
-        Column("strips", left=True),
-        *(Column(f"d {axis}", "m") for axis in axes),
-        Column("plan", "µm"),
-        Column("height", "µm"),
+        words("point", "id"),
+        words("strips", lambda t: " – ".join(t["strips"])),
+        *(number(f"d {axis}", key, signed, "m") for axis, key in zip(axes, DIFFERENCES, strict=True)),
+        number("plan", "plan_um", 1, "µm"),
+        number("height", "height_um", 1, "µm"),
     )
-    rows = tuple(
-        (
-            t["id"],
-            " – ".join(t["strips"]),
-            *(signed(t[key]) for key in ("dx", "dy", "dz")),
-            micrometres(t["plan_um"]),
-            micrometres(t["height_um"]),
-        )
-        for t in shown
-    )
-    foot = (("rms", "", *(metres(_rms(ties, k)) for k in ("dx", "dy", "dz")), *_rms_um(ties)),)
+    foot = (("rms", "", *(metres(_rms(ties, key)) for key in DIFFERENCES), *_rms_um(ties)),)
     below = "second strip minus first; the result has their mean"
-    return Section("Ties between strips", (Table(columns, rows, foot, f"{note}; {below}" if note else below),))
+    return Section("Ties between strips", (tabulated(shown, columns, foot, joined(note, below)),))
 
 
 def _rms(rows: Sequence[Document], key: str) -> float:
@@ -190,13 +172,12 @@ def image_section(document: Document) -> Section:
     for point in document["points"]:
         rays[point["rays"]] = rays.get(point["rays"], 0) + 1
     facts = Facts((("points by photos", ", ".join(f"{rays[n]} on {counted(n, 'photo')}" for n in sorted(rays))),))
-    worst_photos = Table(
-        (Column("worst photos", left=True), Column("rms", "µm"), Column("points"), Column("strip", left=True, rank=1)),
-        tuple((p["id"], micrometres(p["image_rms_um"]), str(p["points"]), p["strip"]) for p in photos),
+    rms = number("rms", "image_rms_um", 1, "µm")
+    worst_photos = tabulated(
+        photos, (words("worst photos", "id"), rms, number("points", "points"), words("strip", "strip", rank=1))
     )
-    worst_points = Table(
-        (Column("worst points", left=True), Column("rms", "µm"), Column("photos"), Column("role", left=True, rank=1)),
-        tuple((p["id"], micrometres(p["image_rms_um"]), str(p["rays"]), p["role"]) for p in points),
+    worst_points = tabulated(
+        points, (words("worst points", "id"), rms, number("photos", "rays"), words("role", "role", rank=1))
     )
     return Section("Image residuals", (Words(text), facts, worst_photos, worst_points))
 
@@ -208,27 +189,20 @@ def rejected_section(document: Document, *, everything: bool) -> Section:
         return Section("Rejected", (Words("Nothing was rejected."),))
     shown, note = worst_first(rejected, lambda r: abs(r["parallax_um"] or 0.0), "in `rejected`", everything=everything)
     columns = (
-        Column("point", left=True),
-        Column("photos", left=True),
-        Column("test", left=True),
-        Column("value"),
-        Column("limit"),
-        Column("", left=True),
-        Column("why", left=True, rank=1),
+        words("point", lambda row: row["point"] or DASH),
+        words("photos", lambda row: " – ".join(row[key] for key in ("photo", "other_photo") if row[key] is not None)),
+        words("test", "test"),
+        number("value", _tested("value")),
+        number("limit", _tested("limit")),
+        words("", lambda row: unit(row["unit"])),
+        words("why", "reason", rank=1),
     )
-    rows = tuple(
-        (
-            r["point"] or DASH,
-            " – ".join(photo for photo in (r["photo"], r["other_photo"]) if photo is not None),
-            r["test"],
-            micrometres(r["value"]) if r["unit"] else ratio(r["value"]),
-            micrometres(r["limit"]) if r["unit"] else ratio(r["limit"]),
-            unit(r["unit"]),
-            r["reason"],
-        )
-        for r in shown
-    )
-    return Section("Rejected", (Table(columns, rows, note=note),))
+    return Section("Rejected", (tabulated(shown, columns, note=note),))
+
+
+def _tested(key: str) -> Callable[[Document], str]:
+    """Return what writes a value of a test: micrometres, or a ratio where it has no unit."""
+    return lambda row: micrometres(row[key]) if row["unit"] else ratio(row[key])
 
 
 def not_determined_section(document: Document, *, everything: bool) -> Section:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from photostrip.report.page.figures import counted, fixed, metres, micrometres, ratio
-from photostrip.report.page.parts import Column, Facts, Section, Table, Words
+from photostrip.report.page.parts import Document, Facts, Section, Table, Words
+from photostrip.report.page.tables import number, tabulated, words
 from photostrip.report.sections.strip import ALL_SHOWN
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-Document = dict[str, Any]
 
 WORST_POINTS = 8
 STATIONS_SHOWN = 12
@@ -81,28 +80,16 @@ def _worst(document: Document) -> Table:
     by_height = [p for p in sorted(known, key=lambda p: p["sigma_z"], reverse=True) if p not in by_plan]
     axes = document["frame"]["axes"]
     columns = (
-        Column("least precise points", left=True),
-        *(Column(f"σ {axis}", "m") for axis in axes),
-        Column("ellipse a", "m"),
-        Column("b", "m"),
-        Column("azimuth", "deg", rank=1),
-        Column("photos", rank=2),
-        Column("role", left=True, rank=3),
-    )
-    rows = tuple(
-        (
-            p["id"],
-            *(metres(p[f"sigma_{axis}"]) for axis in "xyz"),
-            metres(p["ellipse_a"]),
-            metres(p["ellipse_b"]),
-            fixed(p["ellipse_azimuth_deg"], 0),
-            str(p["rays"]),
-            p["role"],
-        )
-        for p in (*by_plan, *by_height[: WORST_POINTS - len(by_plan)])
+        words("least precise points", "id"),
+        *(number(f"σ {axis}", f"sigma_{key}", 3, "m") for key, axis in zip("xyz", axes, strict=True)),
+        number("ellipse a", "ellipse_a", 3, "m"),
+        number("b", "ellipse_b", 3, "m"),
+        number("azimuth", "ellipse_azimuth_deg", 0, "deg", rank=1),
+        number("photos", "rays", rank=2),
+        words("role", "role", rank=3),
     )
     note = "the worst in plan, then in height; a, b: semi-axes of the standard error ellipse in plan (39 %)"
-    return Table(columns, rows, note=note)
+    return tabulated((*by_plan, *by_height[: WORST_POINTS - len(by_plan)]), columns, note=note)
 
 
 def _along(document: Document, rows: Sequence[Document], *, everything: bool) -> Table:
@@ -114,26 +101,16 @@ def _along(document: Document, rows: Sequence[Document], *, everything: bool) ->
         shown = [rows[round(number * step)] for number in range(STATIONS_SHOWN)]
         left_out = len(rows) - STATIONS_SHOWN
     columns = (
-        Column("at photo", left=True),
-        Column("distance", "m"),
-        Column("points"),
-        Column("σ plan", "m"),
-        Column("σ height", "m"),
-        Column("center plan", "m", rank=1),
-        Column("height", "m", rank=1),
-        *([Column("strip", left=True, rank=2)] if several else []),
-    )
-    cells = tuple(
-        (
-            row["photo"],
-            fixed(row["distance"], 0),
-            str(row["points"]),
-            *(metres(row[key]) for key in ("plan", "height", "centre_plan", "centre_height")),
-            *([row["strip"]] if several else []),
-        )
-        for row in shown
+        words("at photo", "photo"),
+        number("distance", "distance", 0, "m"),
+        number("points", "points"),
+        number("σ plan", "plan", 3, "m"),
+        number("σ height", "height", 3, "m"),
+        number("center plan", "centre_plan", 3, "m", rank=1),
+        number("height", "centre_height", 3, "m", rank=1),
+        *([words("strip", "strip", rank=2)] if several else []),
     )
     note = "rms of the points nearest to each photo, and its perspective center"
     if left_out:
         note += f"; {left_out} more photos in `precision` of result.json"
-    return Table(columns, cells, note=note)
+    return tabulated(shown, columns, note=note)

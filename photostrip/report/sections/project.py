@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
 from photostrip.report.page.figures import counted, fixed, metres, micrometres
-from photostrip.report.page.parts import Column, Facts, Section, Table
+from photostrip.report.page.parts import Document, Facts, Section
+from photostrip.report.page.tables import number, tabulated, words
 from photostrip.report.sections.models import measured, of_models, project_rows, scale_word
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-Document = dict[str, Any]
 
 
 def project_section(document: Document) -> Section:
@@ -115,7 +109,7 @@ def counts_section(document: Document) -> Section:
     if len(strips) == 1:
         rows.append((f"{scale_word(document)} scale", _scale(strips[0])))
         return Section("Counts", (Facts(tuple(rows)),))
-    return Section("Counts", (Facts(tuple(rows)), _strips(strips)))
+    return Section("Counts", (Facts(tuple(rows)), tabulated(strips, STRIPS)))
 
 
 def _rejections(counts: Document) -> str:
@@ -133,30 +127,14 @@ def _scale(strip: Document) -> str:
     )
 
 
-def _strips(strips: Sequence[Document]) -> Table:
-    columns = (
-        Column("strip", left=True),
-        Column("photos"),
-        Column("points"),
-        Column("scale 1:"),
-        Column("height", "m"),
-        Column("base", "m"),
-        Column("azimuth", "deg"),
-        Column("σ0", "µm"),
-        Column("image rms", "µm", rank=1),
-    )
-    rows = tuple(
-        (
-            s["id"],
-            str(s["photos"]),
-            str(s["points"]),
-            f"{s['photo_scale'] or s['model_scale']:.0f}",
-            fixed(s["flying_height"], 0),
-            fixed(s["base"], 0),
-            f"{s['azimuth_deg']:.1f}",
-            micrometres(s["sigma0_um"]),
-            micrometres(s["image_rms_um"]),
-        )
-        for s in strips
-    )
-    return Table(columns, rows)
+STRIPS = (
+    words("strip", "id"),
+    number("photos", "photos"),
+    number("points", "points"),
+    number("scale 1:", lambda strip: f"{strip['photo_scale'] or strip['model_scale']:.0f}"),
+    number("height", "flying_height", 0, "m"),
+    number("base", "base", 0, "m"),
+    number("azimuth", "azimuth_deg", lambda angle: f"{angle:.1f}", "deg"),
+    number("σ0", "sigma0_um", 1, "µm"),
+    number("image rms", "image_rms_um", 1, "µm", rank=1),
+)

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING
 
-from photostrip.report.page.figures import counted, fixed, metres, micrometres, percent, power, ratio, short
-from photostrip.report.page.parts import Column, Facts, Part, Section, Table, Words
+from photostrip.report.page.figures import counted, fixed, metres, micrometres, percent, power, short
+from photostrip.report.page.parts import Document, Facts, Part, Section, Table, Words
+from photostrip.report.page.tables import number, tabulated, words
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-
-Document = dict[str, Any]
 
 ALL_SHOWN = 24  # rows up to which a table is printed whole
 SMALL = 0.001  # probabilities below it are not told apart
@@ -18,6 +18,7 @@ HIGH_LEVERAGE = 0.7  # share of a control point in the polynomial at its own pla
 STRIPS_SHOWN = 3  # strips up to which every polynomial is shown with its evidence
 WORST_SHOWN = 12  # rows shown of a longer one
 ELEMENTS = (("alpha1", "α1"), ("kappa1", "κ1"), ("alpha2", "α2"), ("omega2", "ω2"), ("kappa2", "κ2"))
+ANGLES = (("alpha", "α"), ("omega", "ω"), ("kappa", "κ"))
 DIRECTIONS = ("along", "across", "up")
 GROUND_AXES = ("east", "north", "up")
 
@@ -62,92 +63,63 @@ def relative_section(document: Document, *, everything: bool) -> Section:
     )
     gone = f"{rejected} of {counted(total, 'point')} in pairs, {percent(rejected, total)}"
     facts = Facts((("σ0", sigma0), ("largest y parallax", largest), ("rejected", gone)))
-    return Section("Relative orientation", (facts, _pairs(shown, note), _elements(shown, note)))
+    pairs = tabulated(shown, PAIRS, note=note or "q: y parallax of the points used")
+    return Section("Relative orientation", (facts, pairs, tabulated(shown, ELEMENTS_OF_PAIRS, note=note)))
 
 
-def _pairs(models: Sequence[Document], note: str) -> Table:
-    columns = (
-        Column("photos", left=True),
-        Column("points"),
-        Column("rej."),
-        Column("σ0", "µm"),
-        Column("rms q", "µm"),
-        Column("max q", "µm"),
-        Column("at point", left=True),
-        Column("condition", rank=2),
-        Column("base", "m", rank=1),
-        Column("direction", "deg", rank=3),
-        Column("inclin.", "deg", rank=3),
-        Column("strip", left=True, rank=4),
-    )
-    rows = tuple(
-        (
-            f"{m['left']} – {m['right']}",
-            str(m["points_used"]),
-            str(m["points_rejected"]),
-            micrometres(m["sigma0_um"]),
-            micrometres(m["rms_parallax_um"]),
-            micrometres(m["max_parallax_um"]),
-            m["max_parallax_point"],
-            short(m["condition"], 3),
-            fixed(m["base"], 2),
-            fixed(m["base_direction_deg"], 3),
-            fixed(m["base_inclination_deg"], 3),
-            m["strip"],
-        )
-        for m in models
-    )
-    return Table(columns, rows, note=note or "q: y parallax of the points used")
+def photos_of(row: Document) -> str:
+    """Name the photos of a pair."""
+    return f"{row['left']} – {row['right']}"
 
 
-def _elements(models: Sequence[Document], note: str) -> Table:
-    columns = (
-        Column("photos", left=True),
-        *(Column(name, "deg") for _, name in ELEMENTS),
-        Column("largest σ", "deg", rank=1),
-    )
-    rows = tuple(
-        (
-            f"{m['left']} – {m['right']}",
-            *(fixed(m["elements"][key], 4) for key, _ in ELEMENTS),
-            fixed(max((m["sigmas"][key] for key, _ in ELEMENTS if m["sigmas"][key] is not None), default=None), 4),
-        )
-        for m in models
-    )
-    return Table(columns, rows, note=note)
+PAIRS = (
+    words("photos", photos_of),
+    number("points", "points_used"),
+    number("rej.", "points_rejected"),
+    number("σ0", "sigma0_um", 1, "µm"),
+    number("rms q", "rms_parallax_um", 1, "µm"),
+    number("max q", "max_parallax_um", 1, "µm"),
+    words("at point", "max_parallax_point"),
+    number("condition", "condition", partial(short, digits=3), rank=2),
+    number("base", "base", 2, "m", rank=1),
+    number("direction", "base_direction_deg", 3, "deg", rank=3),
+    number("inclin.", "base_inclination_deg", 3, "deg", rank=3),
+    words("strip", "strip", rank=4),
+)
+
+
+def _largest_sigma(model: Document) -> float | None:
+    """Return the largest standard deviation of the five elements."""
+    return max((model["sigmas"][key] for key, _ in ELEMENTS if model["sigmas"][key] is not None), default=None)
+
+
+ELEMENTS_OF_PAIRS = (
+    words("photos", photos_of),
+    *(number(name, f"elements.{key}", 4, "deg") for key, name in ELEMENTS),
+    number("largest σ", _largest_sigma, 4, "deg", rank=1),
+)
 
 
 def junction_section(document: Document, *, everything: bool) -> Section:
     """Scale transfer: how well neighbouring models agree, and how the scale drifts."""
-    joints = document["junctions"]
-    shown, note = worst_first(joints, lambda j: j["spread_ppm"] or 0.0, "joints in `junctions`", everything=everything)
-    columns = (
-        Column("photo", left=True),
-        Column("points"),
-        Column("rej."),
-        Column("scale ratio", rank=2),
-        Column("spread", "ppm"),
-        *(Column(name, "m") for name in DIRECTIONS),
-        *(Column(name, "µm", rank=1 if name == "up" else 3) for name in DIRECTIONS),
-        Column("strip", left=True, rank=4),
+    junctions = document["junctions"]
+    shown, note = worst_first(
+        junctions, lambda j: j["spread_ppm"] or 0.0, "joints in `junctions`", everything=everything
     )
-    rows = tuple(
-        (
-            j["photo"],
-            str(j["points_used"]),
-            str(len(j["points_rejected"])),
-            fixed(j["factor"], 6),
-            fixed(j["spread_ppm"], 0),
-            *(metres(j["discrepancy"][name]) for name in DIRECTIONS),
-            *(micrometres(j["discrepancy_um"][name]) for name in DIRECTIONS),
-            j["strip"],
-        )
-        for j in shown
+    columns = (
+        words("photo", "photo"),
+        number("points", "points_used"),
+        number("rej.", lambda junction: len(junction["points_rejected"])),
+        number("scale ratio", "factor", 6, rank=2),
+        number("spread", "spread_ppm", 0, "ppm"),
+        *(number(name, f"discrepancy.{name}", 3, "m") for name in DIRECTIONS),
+        *(number(name, f"discrepancy_um.{name}", 1, "µm", rank=1 if name == "up" else 3) for name in DIRECTIONS),
+        words("strip", "strip", rank=4),
     )
     below = note or "rms differences of the pass points of two models; spread: of the scale ratio of one pass point"
     facts = Facts(tuple((_labelled(document, s["id"], "scale drift"), _drift(s)) for s in document["strips"]))
-    table = (Table(columns, rows, note=below),) if rows else (Words("One model: no scale was transferred."),)
-    return Section("Scale transfer and junctions", (*table, facts))
+    table = tabulated(shown, columns, note=below) if shown else Words("One model: no scale was transferred.")
+    return Section("Scale transfer and junctions", (table, facts))
 
 
 def _labelled(document: Document, strip: str, label: str) -> str:
@@ -168,36 +140,29 @@ def _drift(strip: Document) -> str:
 def absolute_section(document: Document) -> Section:
     """Absolute orientation: the fit of each strip to its control before any polynomial."""
     columns = (
-        Column("strip", left=True),
-        Column("plan", "points"),
-        Column("height", "points"),
-        Column("σ0"),
-        Column("redund."),
-        Column("condition", rank=1),
-        *(Column(name, "m") for name in GROUND_AXES),
-        Column("scale", "m per mm", rank=3) if "links" in document else Column("base of scale", "m", rank=3),
-        *(Column(name, "deg", rank=2) for name in ("α", "ω", "κ")),
-    )
-    rows = tuple(
-        (
-            a["strip"],
-            str(a["control"]["plan"]),
-            str(a["control"]["height"]),
-            ratio(a["sigma0"]),
-            str(a["redundancy"]),
-            short(a["condition"], 3),
-            *(metres(a["misclosure_rms"][axis]) for axis in GROUND_AXES),
-            metres(a["scale"]),
-            *(fixed(a["angles_deg"][key] if a["angles_deg"] else None, 4) for key in ("alpha", "omega", "kappa")),
-        )
-        for a in document["absolute"]
+        words("strip", "strip"),
+        number("plan", "control.plan", unit="points"),
+        number("height", "control.height", unit="points"),
+        number("σ0", "sigma0", 2),
+        number("redund.", "redundancy"),
+        number("condition", "condition", partial(short, digits=3), rank=1),
+        *(number(axis, f"misclosure_rms.{axis}", 3, "m") for axis in GROUND_AXES),
+        number("scale", "scale", 3, "m per mm", rank=3)
+        if "links" in document
+        else number("base of scale", "scale", 3, "m", rank=3),
+        *(number(name, _angle(key), 4, "deg", rank=2) for key, name in ANGLES),
     )
     note = (
         "east, north, up: rms misclosures of the similarity; σ0: their ratio to what the control and one model let "
         "expect"
     )
     weights = tuple((_labelled(document, s["id"], "weights"), _weights(s["precision"])) for s in document["strips"])
-    return Section("Absolute orientation", (Table(columns, rows, note=note), Facts(weights)))
+    return Section("Absolute orientation", (tabulated(document["absolute"], columns, note=note), Facts(weights)))
+
+
+def _angle(key: str) -> Callable[[Document], float | None]:
+    """Return what reads an angle of the absolute orientation, where it is known."""
+    return lambda row: row["angles_deg"][key] if row["angles_deg"] else None
 
 
 def _weights(precision: Document) -> str:
@@ -244,27 +209,24 @@ def _leverage(document: Document, block: Document) -> str:
 
 def _by_strip(blocks: Sequence[Document]) -> Table:
     """Return one line for each of many strips."""
+
+    def degree(axis: str) -> Callable[[Document], int]:
+        return lambda block: _degree(block["terms"][axis])
+
+    def effect(axis: str) -> Callable[[Document], float]:
+        return lambda block: max(map(abs, block["effects"][axis]), default=0.0)
+
     columns = (
-        Column("strip", left=True),
-        Column("asked"),
-        Column("plan", "degree"),
-        Column("height", "degree"),
-        Column("plan", "stations"),
-        Column("height", "stations"),
-        *(Column(f"{axis} effect", "m") for axis in "XYZ"),
-    )
-    rows = tuple(
-        (
-            block["strip"],
-            block["asked"],
-            *(str(_degree(block["terms"][axis])) for axis in "xz"),
-            *(str(block["stations"][group]) for group in ("plan", "height")),
-            *(metres(max(map(abs, block["effects"][axis]), default=0.0)) for axis in "xyz"),
-        )
-        for block in blocks
+        words("strip", "strip"),
+        number("asked", "asked"),
+        number("plan", degree("x"), unit="degree"),
+        number("height", degree("z"), unit="degree"),
+        number("plan", "stations.plan", unit="stations"),
+        number("height", "stations.height", unit="stations"),
+        *(number(f"{axis.upper()} effect", effect(axis), 3, "m") for axis in "xyz"),
     )
     note = "effect: of the largest term; evidence and coefficients stand in `polynomials` of result.json"
-    return Table(columns, rows, note=note)
+    return tabulated(blocks, columns, note=note)
 
 
 def _choice(document: Document, block: Document) -> str:
@@ -285,59 +247,48 @@ def _degree(terms: Sequence[str]) -> int:
     return max((int(t[2:]) if t.startswith("X^") else int("X" in t) for t in terms), default=0)
 
 
+EVIDENCE = (
+    words("for", "group"),
+    number("degree", "degree"),
+    number("terms", "terms", rank=1),
+    number("redund.", "redundancy"),
+    number("rms", "rms", 3, "m"),
+    number("left out", "left_out", 3, "m"),
+    number("F", "f", 2),
+    number("p", "p", lambda p: "<0.001" if (p or 1) < SMALL else fixed(p, 3)),
+    words("taken", lambda step: "yes" if step["accepted"] else "no"),
+)
+
+
 def _evidence(block: Document) -> Table:
     steps = block["evidence"]
-    columns = (
-        Column("for", left=True),
-        Column("degree"),
-        Column("terms", rank=1),
-        Column("redund."),
-        Column("rms", "m"),
-        Column("left out", "m"),
-        Column("F"),
-        Column("p"),
-        Column("taken", left=True),
-    )
-    rows = tuple(
-        (
-            step["group"],
-            str(step["degree"]),
-            str(step["terms"]),
-            str(step["redundancy"]),
-            metres(step["rms"]),
-            metres(step["left_out"]),
-            ratio(step["f"]),
-            "<0.001" if (step["p"] or 1) < SMALL else fixed(step["p"], 3),
-            "yes" if step["accepted"] else "no",
-        )
-        for step in steps
-    )
     by = sorted({step["left_out_by"] for step in steps if step["left_out_by"]})
     note = (
         f"rms: at the control; left out: at control that took no part, one {' or '.join(by) or 'point'} at a time; "
         "F, p: ratio and probability by chance of the gain in all three axes together"
     )
-    return Table(columns, rows, note=note)
+    return tabulated(steps, EVIDENCE, note=note)
+
+
+COEFFICIENTS = (
+    words("axis", "axis"),
+    words("term", "terms"),
+    number("coefficient", "coefficients", power),
+    number("σ", "sigmas", partial(power, digits=1)),
+    number("t", "t", 2),
+    number("effect", "effects", 3, "m"),
+)
 
 
 def _coefficients(block: Document) -> Table:
-    columns = (
-        Column("axis", left=True),
-        Column("term", left=True),
-        Column("coefficient"),
-        Column("σ"),
-        Column("t"),
-        Column("effect", "m"),
-    )
-    rows = tuple(
-        (axis.upper(), term, power(value), power(sigma, 1), ratio(t), metres(effect))
-        for axis in ("x", "y", "z")
-        for term, value, sigma, t, effect in zip(
-            *(block[key][axis] for key in ("terms", "coefficients", "sigmas", "t", "effects")), strict=True
-        )
-    )
+    keys = ("terms", "coefficients", "sigmas", "t", "effects")
+    rows = [
+        {"axis": axis.upper(), **dict(zip(keys, values, strict=True))}
+        for axis in "xyz"
+        for values in zip(*(block[key][axis] for key in keys), strict=True)
+    ]
     note = (
         "X along the strip, Y to its left, Z up, metres; effect: at the end of the control's range and the edge of the "
         "strip; t: coefficient over its standard deviation σ, 2 and more are hardly chance"
     )
-    return Table(columns, rows, note=note)
+    return tabulated(rows, COEFFICIENTS, note=note)

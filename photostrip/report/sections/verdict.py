@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from functools import partial
 
 from photostrip.report.page.figures import counted, fixed, short, unit
-from photostrip.report.page.parts import Column, Part, Section, Table, Words
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-Document = dict[str, Any]
+from photostrip.report.page.parts import Document, Part, Section, Words
+from photostrip.report.page.tables import number, tabulated, words
 
 HEADLINES = {
     "good": "GOOD: nothing calls for a second look.",
@@ -47,26 +43,14 @@ def verdict_section(document: Document, *, everything: bool = False) -> Section:
     if len(look_at) > len(shown):
         parts.append(Words(f"{len(look_at) - len(shown)} more in `verdict` of result.json"))
     if document["tolerances"]:
-        parts.append(_tolerances(document["tolerances"]))
+        parts.append(tabulated(document["tolerances"], TOLERANCES))
     return Section("Verdict", tuple(parts))
 
 
-def _tolerances(tolerances: Sequence[Document]) -> Table:
-    columns = (
-        Column("tolerance", left=True),
-        Column("found"),
-        Column("allowed"),
-        Column("", left=True),
-        Column("", left=True),
-    )
-    rows = tuple(
-        (
-            each["name"],
-            fixed(each["value"], 2 if each["unit"] == "um" else 4),
-            short(each["limit"], 6),
-            unit(each["unit"]),
-            "kept" if each["passed"] else "NOT KEPT",
-        )
-        for each in tolerances
-    )
-    return Table(columns, rows)
+TOLERANCES = (
+    words("tolerance", "name"),
+    number("found", lambda each: fixed(each["value"], 2 if each["unit"] == "um" else 4)),
+    number("allowed", "limit", partial(short, digits=6)),
+    words("", lambda each: unit(each["unit"])),
+    words("", lambda each: "kept" if each["passed"] else "NOT KEPT"),
+)
