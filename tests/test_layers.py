@@ -17,11 +17,12 @@ if TYPE_CHECKING:
 LAYERS = (
     {"errors", "notes", "threads", "distributions"},
     {"points", "camera", "statistics", "geometry", "geodesy"},
-    {"triangulation", "terrestrial", "compare"},
+    {"triangulation", "terrestrial"},
     {"simulate"},
     {"planning"},
     {"pipeline"},
     {"result"},
+    {"compare"},
     {"formats"},
     {"project"},
     {"report"},

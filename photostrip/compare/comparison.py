@@ -24,12 +24,8 @@ if TYPE_CHECKING:
 Document = dict[str, Any]
 
 SCHEMA = 1
-LEFT_OUT = (
-    "version",
-    "residuals",
-    "parallaxes",
-    "link_residuals",
-)  # a number of ours, and what the other numbers are made of
+# A number of ours, and what the other numbers are made of.
+LEFT_OUT = ("version", "residuals", "parallaxes", "link_residuals")
 SAME_FRAME = {
     "crs": "the CRS",
     "kind": "the kind of frame",
@@ -43,11 +39,8 @@ SAME_FRAME = {
 def baseline_of(document: Document) -> Document:
     """Return what of a result is kept as a baseline.
 
-    Returns
-    -------
-    dict
-        The same without the residuals and parallaxes of single measurements, which make two thirds of it, and without
-        the version of the program.
+    It is without the residuals and parallaxes of single measurements, which make two thirds of a result, and without
+    the version of the program.
     """
     return {key: value for key, value in document.items() if key not in LEFT_OUT}
 
@@ -57,10 +50,7 @@ def compare_results(
 ) -> Document:
     """Compare a result with a baseline.
 
-    Parameters
-    ----------
-    document, baseline : dict
-        The documents of two results; the baseline may be a short one.
+    The baseline may be a short one.
 
     Returns
     -------
@@ -95,16 +85,16 @@ def compare_results(
         "status": "different" if different else "same",
         "kinds": kinds,
         "sets": sets,
-        "differences": [{key: value for key, value in row.items() if key != "differs"} for row in differences],
+        "differences": [_without_verdict(row) for row in differences],
     }
 
 
 def _require_comparable(document: Document, baseline: Document, files: tuple[str, str]) -> None:
     """Refuse results of different frames, or of different strips, with all reasons."""
     faults = []
-    own, other = (_frame(each) for each in (document, baseline))
+    frame, other = (_frame(each) for each in (document, baseline))
     for key, words in SAME_FRAME.items():
-        now, before = own.get(key), other.get(key)
+        now, before = frame.get(key), other.get(key)
         if _folded(now) != _folded(before):
             message = f"cannot be compared with {files[1] or 'the baseline'}: {words} is {_shown(now)}"
             fix = "write both in one frame (`output` in the project), or renew the baseline with --update"
@@ -142,36 +132,45 @@ def _shown(value: object) -> str:
 
 
 def _compared(document: Document, baseline: Document, tolerances: Tolerances) -> Iterator[Document]:
-    """Return a row for every number that stands in both."""
+    """Return a row for every number, place and rotation that stands in both."""
     before = {(q.block, q.id, q.name): q for q in quantities_of(baseline)}
     for now in quantities_of(document):
         then = before.get((now.block, now.id, now.name))
-        if then is not None and not (now.value is None and then.value is None):
-            yield _row_of_number(now, then, tolerances)
-    frame = baseline["frame"]
-    yield from _ground(frame, document, baseline, "points", tolerances)
-    yield from _ground(frame, document, baseline, "photos", tolerances)
-    yield from _control(frame, document, baseline, tolerances)
-    yield from _rotations(document, baseline, tolerances)
+        if then is None or (now.value is None and then.value is None):
+            continue
+        if now.value is None or then.value is None:  # it appeared, or is gone
+            known = then if now.value is None else now
+            yield _row(known._replace(value=now.value), then.value, math.inf, 0.0, tolerances)
+            continue
+        # a difference of decimal numbers has noise in its last bits: a tolerance of one digit lets one digit pass
+        noise = 4 * sys.float_info.epsilon * max(abs(now.value), abs(then.value))
+        allowed = tolerances.allowed(then.kind, then.unit, then.value)
+        size = max(abs(now.value - then.value) - noise, 0.0)
+        yield _row(then._replace(value=now.value), then.value, size, allowed, tolerances)
+    for kind, block, name, size in (
+        *_places("points", document, baseline),
+        *_places("photos", document, baseline),
+        *_control(document, baseline),
+        *_rotations(document, baseline),
+    ):
+        quantity = Quantity(kind, block, name, kind, UNITS[kind], None)
+        yield _row(quantity, None, size, tolerances.of(kind).absolute, tolerances)
 
 
-def _row_of_number(now: Quantity, then: Quantity, tolerances: Tolerances) -> Document:
-    known = then if then.value is not None else now
-    row: Document = {"kind": known.kind, "block": known.block, "id": known.id, "name": known.name}
-    row |= {"unit": known.unit, "before": then.value, "now": now.value}
-    if now.value is None or then.value is None:
-        return _judged(row, math.inf, 0.0, tolerances)
-    size = abs(now.value - then.value)
-    # a difference of decimal numbers has noise in its last bits: a tolerance of one digit lets one digit pass
-    noise = 4 * sys.float_info.epsilon * max(abs(now.value), abs(then.value))
-    return _judged(row, max(size - noise, 0.0), tolerances.allowed(known.kind, known.unit, then.value), tolerances)
-
-
-def _judged(row: Document, size: float, allowed: float, tolerances: Tolerances) -> Document:
-    """Complete a row: how large the difference is (None: a number appeared or is gone), whether it is too large."""
-    too_large = size > allowed and not tolerances.of(row["kind"]).ignore
-    known = float(f"{size:.6g}") if math.isfinite(size) else None
-    return row | {"difference": known, "allowed": allowed, "differs": too_large}
+def _row(now: Quantity, before: float | None, size: float, allowed: float, tolerances: Tolerances) -> Document:
+    """Return a number with the size of its difference, None where there is a number in one only."""
+    return {
+        "kind": now.kind,
+        "block": now.block,
+        "id": now.id,
+        "name": now.name,
+        "unit": now.unit,
+        "before": before,
+        "now": now.value,
+        "difference": float(f"{size:.6g}") if math.isfinite(size) else None,
+        "allowed": allowed,
+        "differs": size > allowed and not tolerances.of(now.kind).ignore,
+    }
 
 
 def _rank(row: Document) -> tuple[int, float, str, str]:
@@ -184,19 +183,19 @@ def _rank(row: Document) -> tuple[int, float, str, str]:
 
 def _kind(kind: str, rows: list[Document], tolerances: Tolerances) -> Document:
     """Sum up one kind of quantity."""
-    tolerance, unit = tolerances.of(kind), UNITS[kind]
-    own = [row for row in rows if row["kind"] == kind]
-    worst = min(own, key=_rank, default=None)
+    tolerance = tolerances.of(kind)
+    of_kind = [row for row in rows if row["kind"] == kind]
+    worst = min(of_kind, key=_rank, default=None)
     allowed = {"absolute": tolerance.absolute, "relative": tolerance.relative}
     if tolerance.absolute_um:
         allowed["absolute_um"] = tolerance.absolute_um
     return {
         "kind": kind,
-        "unit": unit,
+        "unit": UNITS[kind],
         "ignored": tolerance.ignore,
         "allowed": allowed,
-        "compared": len(own),
-        "different": sum(row["differs"] for row in own),
+        "compared": len(of_kind),
+        "different": sum(row["differs"] for row in of_kind),
         "worst": None if worst is None or worst["difference"] == 0 else _without_verdict(worst),
     }
 
@@ -207,58 +206,44 @@ def _without_verdict(row: Document) -> Document:
 
 # --------------------------------------------------------------------------------------------- places and rotations
 
+Difference = tuple[str, str, str, float]  # kind, block, id, size; infinite where there is a number in one only
 
-def _ground(
-    frame: Document, document: Document, baseline: Document, block: str, tolerances: Tolerances
-) -> Iterator[Document]:
-    """Compare places, in plan and in height."""
+
+def _places(block: str, document: Document, baseline: Document) -> Iterator[Difference]:
+    """Compare places, in plan and in height; a photo may have no place in both."""
     ids, now, before = _shared(document[block], baseline[block], ("x", "y", "z"))
-    known = np.asarray(~(np.isnan(now) & np.isnan(before)).all(axis=1))  # a photo may have no place in both
-    ids, now, before = [name for name, yes in zip(ids, known.tolist(), strict=True) if yes], now[known], before[known]
-    plan, height = plan_and_height(frame, now, before)
-    yield from _places(block, ids, plan, height, tolerances)
+    known = np.flatnonzero(~(np.isnan(now) & np.isnan(before)).all(axis=1))
+    sizes = plan_and_height(baseline["frame"], now[known], before[known])
+    return _sizes(block, [ids[row] for row in known], sizes)
 
 
-def _control(frame: Document, document: Document, baseline: Document, tolerances: Tolerances) -> Iterator[Document]:
+def _control(document: Document, baseline: Document) -> Iterator[Difference]:
     """Compare the differences at control, as far as all three are known."""
     ids, now, before = _shared(document["control"], baseline["control"], ("dx", "dy", "dz"))
     places = {row["id"]: [row[axis] for axis in "xyz"] for row in baseline["points"]}
     known = [n for n, name in enumerate(ids) if name in places and not np.isnan(now[n] - before[n]).any()]
-    if known:
-        at = np.array([places[ids[n]] for n in known], float)
-        plan, height = difference_in_plan_and_height(frame, now[known] - before[known], at)
-        yield from _places("control", [ids[n] for n in known], plan, height, tolerances)
+    at = np.array([places[ids[n]] for n in known], float).reshape(-1, 3)
+    sizes = difference_in_plan_and_height(baseline["frame"], now[known] - before[known], at)
+    return _sizes("control", [ids[n] for n in known], sizes)
 
 
-def _places(block: str, ids: list[str], plan: Floats, height: Floats, tolerances: Tolerances) -> Iterator[Document]:
-    for kind, sizes in (("plan", plan), ("height", height)):
-        allowed = tolerances.of(kind).absolute
-        for name, size in zip(ids, sizes.tolist(), strict=True):
-            row = {"kind": kind, "block": block, "id": name, "name": kind, "unit": "m", "before": None, "now": None}
-            yield _judged(row, _finite(size), allowed, tolerances)
+def _sizes(block: str, ids: list[str], sizes: tuple[Floats, Floats]) -> Iterator[Difference]:
+    for kind, column in zip(("plan", "height"), sizes, strict=True):
+        for name, size in zip(ids, column.tolist(), strict=True):
+            yield kind, block, name, size if math.isfinite(size) else math.inf
 
 
-def _finite(size: float) -> float:
-    """Take the difference of a number and none as infinite."""
-    return size if math.isfinite(size) else math.inf
-
-
-def _rotations(document: Document, baseline: Document, tolerances: Tolerances) -> Iterator[Document]:
+def _rotations(document: Document, baseline: Document) -> Iterator[Difference]:
     """Compare rotations by the angle of the rotation from one to the other, which no convention of angles changes."""
-    shared = _pairs(document["photos"], baseline["photos"])
-    allowed = tolerances.of("rotation").absolute
-    for now, before in shared:
-        if now["rotation"] is None and before["rotation"] is None:
-            continue
-        row = {"kind": "rotation", "block": "photos", "id": now["id"], "name": "rotation", "unit": "deg"}
-        row |= {"before": None, "now": None}
+    for now, before in _pairs(document["photos"], baseline["photos"]):
         if now["rotation"] is None or before["rotation"] is None:
-            yield _judged(row, math.inf, allowed, tolerances)
+            if now["rotation"] != before["rotation"]:
+                yield "rotation", "photos", now["id"], math.inf
             continue
         one, other = (np.array(row["rotation"], float).reshape(3, 3) for row in (now, before))
         # 2 sqrt(2) sin(angle / 2) is the length of the difference: exact for the smallest angles, unlike the cosine
         half = min(float(np.linalg.norm(one - other)) / math.sqrt(8.0), 1.0)
-        yield _judged(row, math.degrees(2.0 * math.asin(half)), allowed, tolerances)
+        yield "rotation", "photos", now["id"], math.degrees(2.0 * math.asin(half))
 
 
 def _pairs(now: list[Document], before: list[Document]) -> list[tuple[Document, Document]]:
@@ -270,7 +255,7 @@ def _pairs(now: list[Document], before: list[Document]) -> list[tuple[Document, 
 def _shared(
     now: list[Document], before: list[Document], keys: tuple[str, str, str]
 ) -> tuple[list[str], Floats, Floats]:
-    """Give ids and three numbers of the records that stand in both lists; NaN where there is none."""
+    """Return ids and three numbers of the records that stand in both lists; NaN where there is none."""
     pairs = _pairs(now, before)
     values = [[[row[key] for key in keys] for row in pair] for pair in pairs]
     columns = np.array(values, float).reshape(-1, 2, 3)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from photostrip.compare.quantities import model_id
+from photostrip.compare.quantities import name_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -44,7 +44,7 @@ def _ids(document: Document) -> Iterator[Member]:
         for row in document[block]:
             yield block, row["id"], f"{word} {row['id']}"
     for model in document["models"]:
-        yield "models", model_id(model), f"model {model_id(model)}"
+        yield "models", name_of("models", model), f"model {name_of('models', model)}"
 
 
 def _choices(document: Document) -> Iterator[Member]:
