@@ -29,7 +29,7 @@ limit_threads()  # before numpy is imported, also in the processes that are star
 import numpy as np  # noqa: E402
 
 from photostrip.formats.output.simulation import inputs_of, settings_of  # noqa: E402
-from photostrip.geodesy.crs import tie_frames  # noqa: E402
+from photostrip.geodesy.tying import tie_frames  # noqa: E402
 from photostrip.geometry.rotation import from_vector  # noqa: E402
 from photostrip.pipeline import triangulate  # noqa: E402
 from photostrip.simulate.simulation import simulate  # noqa: E402

@@ -29,8 +29,8 @@ limit_threads()  # before numpy is imported, also in the processes that are star
 import numpy as np  # noqa: E402
 
 from photostrip.formats.output.simulation import inputs_of  # noqa: E402
-from photostrip.geodesy.crs import tie_frames  # noqa: E402
 from photostrip.geodesy.frame_spec import FrameSpec  # noqa: E402
+from photostrip.geodesy.tying import tie_frames  # noqa: E402
 from photostrip.pipeline import Inputs, Settings, Strip, triangulate  # noqa: E402
 from photostrip.pipeline.strip import adjust_formed, form_strip  # noqa: E402
 from photostrip.planning.control_layout import Layout, Spot, numbers_of, spots_of  # noqa: E402

@@ -9,9 +9,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from photostrip.camera import Camera
-from photostrip.geodesy.crs import tie_frames
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.local_frame import IntermediateFrame
+from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline import Inputs, Strip
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.triangulation.absolute_orientation import Targets

@@ -24,7 +24,7 @@ FENCES = {
     "json": FILES,
     "matplotlib": ("report/*",),
     "pydantic": ("project/*",),
-    "pyproj": ("geodesy/crs.py",),
+    "pyproj": ("geodesy/crs.py", "geodesy/proj_operation.py"),
     "rich": ("report/page/console.py", "report/page/progress.py"),
     "typer": ("cli/*",),
     "yaml": ("project/*",),

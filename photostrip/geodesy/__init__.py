@@ -1,6 +1,10 @@
 """Ground frames: map, geographic, geocentric and local coordinates, tied to one Cartesian frame.
 
-- ``crs``: coordinate reference systems as the user names them (the only user of pyproj);
-- ``local_frame``: the ellipsoid, and the intermediate frame the strip is adjusted in;
-- ``curvature``: radii of the ellipsoid and the curvature correction of heights.
+Comes in: what a project says of its frames (``frame_spec``). Goes out: a ``GroundFrame`` for each (``tying``,
+``ground_frame``), with coordinates and directions of axes, and the ``IntermediateFrame`` in which a strip is adjusted
+(``local_frame``). ``crs`` and ``proj_operation`` are the only users of pyproj; ``datum_shift`` changes datums;
+``ground_axes`` gives directions, ``domain`` names what lies outside a projection; ``curvature`` has radii of the
+ellipsoid and the curvature correction of heights.
+
+Source: [001] eq. 142-144, 152, 153; [Bowring 1976].
 """

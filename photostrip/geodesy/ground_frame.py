@@ -11,18 +11,21 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.errors import Fault, GeometryError, InputError, PhotostripError
+from photostrip.errors import GeometryError, PhotostripError
 from photostrip.geodesy.curvature import (
     height_from_tangent,
     meridian_radius,
     prime_vertical_radius,
     tangent_from_height,
 )
+from photostrip.geodesy.datum_shift import DatumShift, Operation, wrapped_longitude
+from photostrip.geodesy.domain import finite_rows, named_rows, require_reached, require_rows
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec, Kind
+from photostrip.geodesy.ground_axes import axes_along_north, axes_between, true_axes
 from photostrip.geodesy.local_frame import geocentric_from_geodetic, geodetic_from_geocentric
 
 if TYPE_CHECKING:
@@ -40,66 +43,7 @@ WGS84: Ellipsoid = (6378137.0, 6356752.314245179)
 _DERIVATIVE_STEP = 1e-4  # of the radius: 640 m on the Earth; truncation and rounding stay below 1e-11 rad
 _EXACT = 1e-7  # metres: some projections of PROJ (equal-area ones) come back to a millimetre only
 _COMES_BACK = 1.0  # metres: a point that misses itself by more was never in the domain of the projection
-_POLE = 1e-9  # radians: nearer to a pole, east and north are not defined
 _CENTRE = 0.1  # of the radius: nearer to the centre of the body, latitude means nothing
-_ROWS_NAMED = 8
-
-
-class Operation(Protocol):
-    """A conversion of coordinates: a projection, a geoid, a change of datum."""
-
-    @property
-    def idle(self) -> bool:
-        """Whether coordinates pass unchanged."""
-
-    @property
-    def accuracy(self) -> float | None:
-        """Stated accuracy, metres; None when it is not known."""
-
-    @property
-    def grids(self) -> tuple[str, ...]:
-        """Paths of the grid files that are read."""
-
-    def apply(self, columns: Array, *, inverse: bool = False) -> Array:
-        """Transform rows of coordinates; what lies outside the domain becomes infinite."""
-
-
-@dataclass(frozen=True, eq=False)
-class DatumShift:
-    """Longitude, latitude (radians) and height of one datum into those of another, and back."""
-
-    operation: Operation
-    source_unit: float  # radians per unit of the geographic CRS
-    target_unit: float
-
-    def _apply(self, geodetic: Array, *, inverse: bool) -> Array:
-        """Run the operation in the units of the two CRSs."""
-        units = (self.source_unit, self.target_unit)
-        given, wanted = units[::-1] if inverse else units
-        moved = self.operation.apply(geodetic / (given, given, 1.0), inverse=inverse)
-        return moved * (wanted, wanted, 1.0)
-
-    def forward(self, geodetic: Array) -> Array:
-        """From the frame's own datum to that of the Cartesian frame."""
-        return geodetic if self.operation.idle else self._apply(geodetic, inverse=False)
-
-    def inverse(self, geodetic: Array) -> Array:
-        """Undo ``forward``.
-
-        PROJ inverts a seven-parameter shift to first order in its angles, 0.1 mm for one arc second and centimetres
-        for ten; one step of iteration makes the way back exact.
-        """
-        if self.operation.idle:
-            return geodetic
-        first = self._apply(geodetic, inverse=True)
-        miss = first - self._apply(self._apply(first, inverse=False), inverse=True)
-        miss[:, 0] = _wrapped(miss[:, 0])
-        return first + miss
-
-
-def _wrapped(angle: Array) -> Array:
-    """Bring differences of longitude into [-pi, pi)."""
-    return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,48 +86,17 @@ class GroundFrame:
         return first, second, third
 
     def internal_from_user(self, columns: ArrayLike) -> Array:
-        """Bring columns in the user's order into the internal order.
-
-        Parameters
-        ----------
-        columns : array_like, shape (..., 3)
-            Coordinates, or sigmas, in the order of ``axes``.
-
-        Returns
-        -------
-        ndarray, shape (..., 3)
-            The same in the order east, north, up (or X, Y, Z).
-        """
+        """Bring columns (coordinates or sigmas) in the order of ``axes`` into the internal order."""
         return np.asarray(columns, dtype=np.float64)[..., np.argsort(self.order)]
 
     def user_from_internal(self, columns: ArrayLike) -> Array:
-        """Bring columns in the internal order into the user's order.
-
-        Parameters
-        ----------
-        columns : array_like, shape (..., 3)
-            Coordinates, or sigmas, in the order east, north, up (or X, Y, Z).
-
-        Returns
-        -------
-        ndarray, shape (..., 3)
-            The same in the order of ``axes``.
-        """
+        """Bring columns (coordinates or sigmas) in the internal order into the order of ``axes``."""
         return np.asarray(columns, dtype=np.float64)[..., list(self.order)]
 
     def with_origin(self, origin: ArrayLike) -> GroundFrame:
-        """Set the point of tangency of the curvature correction.
+        """Set the point of tangency of the curvature correction: east and north of the control's centre of gravity.
 
-        Parameters
-        ----------
-        origin : array_like, shape (2,) or (3,)
-            East and north (further numbers are ignored) of the control's centre of gravity, metres.
-
-        Returns
-        -------
-        GroundFrame
-            The frame with that origin; the same frame when it has no curvature correction. Give every frame of a
-            project the same origin.
+        A frame without the correction stays what it is. Give every frame of a project the same origin.
         """
         if self.spec.curvature_radius is None:
             return self
@@ -193,19 +106,14 @@ class GroundFrame:
     # ---------------------------------------------------------------- points
 
     def cartesian_from_ground(self, enu: ArrayLike, *, ids: Sequence[str] | None = None) -> Array:
-        """Cartesian coordinates of ground points.
+        """Cartesian coordinates (n, 3), metres, of ground points (n, 3) in the CRS's own units.
+
+        They are geocentric; in a local world they are east, north, up in metres above the tangent plane.
 
         Parameters
         ----------
-        enu : array_like, shape (n, 3)
-            East, north, up (longitude, latitude, height; X, Y, Z), in the CRS's own units.
         ids : sequence of str, optional
             Ids of the points, for messages; without them rows are named, counted from 0.
-
-        Returns
-        -------
-        ndarray, shape (n, 3)
-            Geocentric X, Y, Z in metres; in a local world east, north, up in metres above the tangent plane.
 
         Raises
         ------
@@ -217,7 +125,7 @@ class GroundFrame:
         Source: [001] eq. 153 for a local frame with a radius.
         """
         points = np.array(enu, dtype=np.float64).reshape(-1, 3)
-        self._require(_finite(points), "a coordinate is not a number", ids)
+        require_rows(finite_rows(points), "a coordinate is not a number", ids)
         if self.kind == "local":
             return self._bent(points, tangent_from_height)
         if self.kind == "geocentric":
@@ -230,19 +138,14 @@ class GroundFrame:
         return self._cartesian_from_geodetic(np.column_stack([plan, height]), ids)
 
     def ground_from_cartesian(self, xyz: ArrayLike, *, ids: Sequence[str] | None = None) -> Array:
-        """Ground coordinates of points given in the Cartesian frame.
+        """Ground coordinates (n, 3), in the CRS's own units, of points (n, 3) in the Cartesian frame, metres.
+
+        Longitudes are in (-180, 180] degrees.
 
         Parameters
         ----------
-        xyz : array_like, shape (n, 3)
-            Points in the Cartesian frame, metres.
         ids : sequence of str, optional
             Ids of the points, for messages; without them rows are named, counted from 0.
-
-        Returns
-        -------
-        ndarray, shape (n, 3)
-            East, north, up (longitude in (-180, 180] degrees, latitude, height; X, Y, Z), in the CRS's own units.
 
         Raises
         ------
@@ -264,22 +167,13 @@ class GroundFrame:
         plan = geodetic[:, :2] / self._angle
         if self._plane is not None:
             plan = self._plane.apply(plan, inverse=True)
-        self._reached(plan, ids, "outside the domain of")
+        require_reached(finite_rows(plan), f"outside the domain of {self.spec.name}", ids)
         return np.column_stack([plan, self._from_ellipsoidal(plan, geodetic[:, 2], ids)])
 
     def geodetic(self, xyz: ArrayLike) -> Array:
-        """Longitude, latitude and ellipsoidal height, on the frame's own datum.
+        """Longitude, latitude (radians) and ellipsoidal height of Cartesian points, on the frame's own datum.
 
-        Parameters
-        ----------
-        xyz : array_like, shape (n, 3)
-            Points in the Cartesian frame, metres.
-
-        Returns
-        -------
-        ndarray, shape (n, 3)
-            Longitude in (-pi, pi] from the datum's zero meridian and latitude, radians; height above the ellipsoid,
-            metres. At a pole the longitude is 0.
+        Longitudes are in (-pi, pi] from the datum's zero meridian, and 0 at a pole.
 
         Raises
         ------
@@ -292,32 +186,24 @@ class GroundFrame:
         deep = ~(np.linalg.norm(points, axis=1) > _CENTRE * self._cartesian[0])
         if deep.any():
             raise GeometryError(
-                f"{_named(deep, None)}: not a point near the surface; are these geocentric coordinates in metres?",
+                f"{named_rows(deep, None)}: not a point near the surface; are these geocentric coordinates in metres?",
                 code="ground-domain",
             )
         geodetic = geodetic_from_geocentric(points, self._cartesian)
         if self._shift is not None:
             geodetic = self._shift.inverse(geodetic)
-            self._reached(geodetic, None, "no datum shift is known there to")
+            require_reached(finite_rows(geodetic), f"no datum shift is known there to {self.spec.name}", None)
         return geodetic
 
     # ------------------------------------------------------------ directions
 
     def axes_at(self, xyz: ArrayLike) -> Array:
-        """Directions of the ground axes at points, in the Cartesian frame.
+        """Directions (n, 3, 3) of the ground axes at Cartesian points; rows are unit vectors in the Cartesian frame.
 
-        Parameters
-        ----------
-        xyz : array_like, shape (n, 3)
-            Points in the Cartesian frame, metres.
-
-        Returns
-        -------
-        ndarray, shape (n, 3, 3)
-            Rows are unit vectors, orthogonal and right-handed: grid east, grid north and the ellipsoid's normal of a
-            projected frame; true east, north and the normal of a geographic one; the identity for ``geocentric`` and
-            ``local``. Where the lines of a grid do not cross at right angles (a projection that is not conformal), the
-            right angle that lies evenly between them.
+        They are orthogonal and right-handed: grid east, grid north and the ellipsoid's normal of a projected frame;
+        true east, north and the normal of a geographic one; the identity for ``geocentric`` and ``local``. Where the
+        lines of a grid do not cross at right angles (a projection that is not conformal), the right angle lies evenly
+        between them.
 
         Raises
         ------
@@ -328,37 +214,17 @@ class GroundFrame:
         if self.kind in {"geocentric", "local"}:
             return np.broadcast_to(np.eye(3), (len(points), 3, 3)).copy()
         geodetic = self.geodetic(points)
-        axes = self._true_axes(geodetic) if self.kind == "geographic" else self._grid_axes(geodetic)
+        axes = true_axes(geodetic) if self.kind == "geographic" else self._grid_axes(geodetic)
         return axes if self._shift is None else self._shifted_axes(geodetic, axes)
 
     def level_axes_at(self, xyz: ArrayLike) -> Array:
-        """Directions of east, north and up at points, in the Cartesian frame.
-
-        Parameters
-        ----------
-        xyz : array_like, shape (n, 3)
-            Points in the Cartesian frame, metres.
-
-        Returns
-        -------
-        ndarray, shape (n, 3, 3)
-            Rows are unit vectors: ``axes_at``, but true east, north and the normal for ``geocentric``.
-        """
-        return self._true_axes(self.geodetic(xyz)) if self.kind == "geocentric" else self.axes_at(xyz)
+        """Directions as ``axes_at`` gives them, but true east, north and the normal for ``geocentric``."""
+        return true_axes(self.geodetic(xyz)) if self.kind == "geocentric" else self.axes_at(xyz)
 
     def convergence(self, xyz: ArrayLike) -> Array:
-        """Meridian convergence: the azimuth of grid north.
+        """Meridian convergence at Cartesian points: the azimuth of grid north, radians in (-pi, pi], shape (n,).
 
-        Parameters
-        ----------
-        xyz : array_like, shape (n, 3)
-            Points in the Cartesian frame, metres.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            Angle from true north to grid north, clockwise, radians in (-pi, pi]; in the northern hemisphere positive
-            east of the central meridian. 0 for frames without a grid.
+        In the northern hemisphere it is positive east of the central meridian. 0 for frames without a grid.
 
         Raises
         ------
@@ -369,23 +235,15 @@ class GroundFrame:
         if self.kind != "projected":
             return np.zeros(len(points))
         geodetic = self.geodetic(points)
-        true, grid_north = self._true_axes(geodetic), self._grid_axes(geodetic)[:, 1]
+        true, grid_north = true_axes(geodetic), self._grid_axes(geodetic)[:, 1]
         east, north = np.einsum("nij,nj->in", true[:, :2], grid_north)
         return np.asarray(np.arctan2(east, north))
 
     def difference(self, enu_a: ArrayLike, enu_b: ArrayLike) -> Array:
-        """Difference of ground coordinates, a minus b, in metres along the axes.
+        """Difference of ground coordinates (n, 3), a minus b, in metres along east, north, up (X, Y, Z).
 
-        Parameters
-        ----------
-        enu_a, enu_b : array_like, shape (n, 3)
-            Ground coordinates in the internal order and the CRS's own units.
-
-        Returns
-        -------
-        ndarray, shape (n, 3)
-            Metres along east, north, up (X, Y, Z). For a projected frame the difference of coordinates times the unit;
-            for a geographic one metres on the ground, the short way across the meridian of 180 degrees.
+        For a projected frame it is the difference of coordinates times the unit; for a geographic one metres on the
+        ground, the short way across the meridian of 180 degrees.
         """
         a, b = (np.asarray(enu, dtype=np.float64).reshape(-1, 3) for enu in (enu_a, enu_b))
         delta = (a - b) * (self.plan_factor, self.plan_factor, self.height_factor)
@@ -393,7 +251,9 @@ class GroundFrame:
             return delta
         lat = (a[:, 1] + b[:, 1]) / 2.0 * self.plan_factor
         height = (a[:, 2] + b[:, 2]) / 2.0 * self.height_factor
-        delta[:, 0] = _wrapped(delta[:, 0]) * (prime_vertical_radius(lat, self.ellipsoid) + height) * np.cos(lat)
+        delta[:, 0] = (
+            wrapped_longitude(delta[:, 0]) * (prime_vertical_radius(lat, self.ellipsoid) + height) * np.cos(lat)
+        )
         delta[:, 1] *= meridian_radius(lat, self.ellipsoid) + height
         return delta
 
@@ -415,13 +275,7 @@ class GroundFrame:
         return tuple(dict.fromkeys(grid for operation in operations for grid in operation.grids))
 
     def describe(self) -> str:
-        """Say in one line what the frame is, for the report.
-
-        Returns
-        -------
-        str
-            CRS, order of columns, units, heights, datum shift.
-        """
+        """Say in one line what the frame is: CRS, order of columns, units, heights, datum shift."""
         named = self.title not in {"unknown", self.spec.crs}
         text = f"{self.spec.name} ({self.title})" if named else self.spec.name
         text += f": {', '.join(self.axes)}"
@@ -458,15 +312,15 @@ class GroundFrame:
             miss = plan - self._plane.apply(lonlat, inverse=True)
             # PROJ gives some points outside the domain a place inside: they do not come back. East may: some grids
             # go round the globe, and a coordinate beyond 180 degrees comes back as one before it.
-            good = _finite(lonlat) & (np.abs(miss[:, 1]) * self.plan_factor < _COMES_BACK)
-            self._require(good, f"outside the domain of {self.spec.name}", ids)
+            good = finite_rows(lonlat) & (np.abs(miss[:, 1]) * self.plan_factor < _COMES_BACK)
+            require_rows(good, f"outside the domain of {self.spec.name}", ids)
             if np.abs(miss).max(initial=0.0) * self.plan_factor > _EXACT:  # an inverse by a short series
                 near = (np.abs(miss[:, 0]) * self.plan_factor < _COMES_BACK)[:, None]
                 lonlat = self._plane.apply(plan + np.where(near, miss, 0.0))
             return lonlat * self._angle
         lonlat = plan * self._angle
         inside = (np.abs(lonlat[:, 0]) <= 2.0 * math.pi) & (np.abs(lonlat[:, 1]) <= math.pi / 2.0)
-        self._require(inside, "no such longitude and latitude (are the axes in the right order?)", ids)
+        require_rows(inside, "no such longitude and latitude (are the axes in the right order?)", ids)
         return lonlat
 
     def _ellipsoidal(self, points: Array, ids: Sequence[str] | None) -> Array:
@@ -474,7 +328,7 @@ class GroundFrame:
         if self._vertical is None:
             return points[:, 2] * self.height_factor + (self.spec.geoid_undulation or 0.0)
         height = self._vertical.apply(points)[:, 2]
-        self._require(np.isfinite(height), f"outside the geoid grid of {self.spec.name}", ids)
+        require_rows(np.isfinite(height), f"outside the geoid grid of {self.spec.name}", ids)
         return height
 
     def _from_ellipsoidal(self, plan: Array, ellipsoidal: Array, ids: Sequence[str] | None) -> Array:
@@ -482,7 +336,7 @@ class GroundFrame:
         if self._vertical is None:
             return (ellipsoidal - (self.spec.geoid_undulation or 0.0)) / self.height_factor
         first = self._vertical.apply(np.column_stack([plan, ellipsoidal]), inverse=True)[:, 2]
-        self._reached(first[:, None], ids, "outside the geoid grid of")
+        require_reached(finite_rows(first[:, None]), f"outside the geoid grid of {self.spec.name}", ids)
         # A geoid on a shifted datum is inverted by PROJ to 0.1 mm only; one step of iteration makes it exact.
         again = self._vertical.apply(np.column_stack([plan, first]))[:, 2]
         return first + (ellipsoidal - again) / self.height_factor
@@ -491,7 +345,7 @@ class GroundFrame:
         """Cartesian coordinates from longitude, latitude (radians) and height of the frame's own datum."""
         if self._shift is not None:
             geodetic = self._shift.forward(geodetic)
-            self._require(_finite(geodetic), f"no datum shift from {self.spec.name} is known there", ids)
+            require_rows(finite_rows(geodetic), f"no datum shift from {self.spec.name} is known there", ids)
         return geocentric_from_geodetic(geodetic, self._cartesian)
 
     def _own_geocentric(self, geodetic: Array) -> Array:
@@ -501,18 +355,6 @@ class GroundFrame:
     def _own_geodetic_from_geocentric(self, xyz: Array) -> Array:
         """Longitude, latitude, height on the frame's own datum."""
         return geodetic_from_geocentric(xyz, self.ellipsoid or WGS84)
-
-    def _true_axes(self, geodetic: Array) -> Array:
-        """Rows east, north, normal in the geocentric frame of the own datum."""
-        lon, lat = geodetic[:, 0], geodetic[:, 1]
-        pole = np.abs(lat) > math.pi / 2.0 - _POLE
-        if pole.any():
-            raise GeometryError(f"{_named(pole, None)}: at a pole there is no east and no north", code="pole")
-        (sin_l, cos_l), (sin_b, cos_b) = ((np.sin(angle), np.cos(angle)) for angle in (lon, lat))
-        east = np.stack([-sin_l, cos_l, np.zeros_like(lon)], axis=-1)
-        north = np.stack([-sin_b * cos_l, -sin_b * sin_l, cos_b], axis=-1)
-        up = np.stack([cos_b * cos_l, cos_b * sin_l, sin_b], axis=-1)
-        return np.stack([east, north, up], axis=1)
 
     def _grid_axes(self, geodetic: Array) -> Array:
         """Rows grid east, grid north, normal in the geocentric frame of the own datum.
@@ -528,15 +370,11 @@ class GroundFrame:
         offsets = step * np.array([[2, 0], [1, 0], [-1, 0], [-2, 0], [0, 2], [0, 1], [0, -1], [0, -2]])
         lonlat = self._plane.apply((plan + offsets[:, None, :]).reshape(-1, 2)) * self._angle
         around = lonlat.reshape(8, n, 2).transpose(1, 0, 2).reshape(n, 16)
-        self._reached(around, None, "outside, or at the edge of, the domain of")
+        require_reached(finite_rows(around), f"outside, or at the edge of, the domain of {self.spec.name}", None)
         # On the ellipsoid: with the height of the point, two lines that cross at right angles there would not here.
         xyz = self._own_geocentric(np.column_stack([lonlat, np.zeros(len(lonlat))])).reshape(2, 4, n, 3)
         weights = np.array([-1.0, 8.0, -8.0, 1.0])
-        east, north = (_unit(tangent) for tangent in np.einsum("k,aknc->anc", weights, xyz))
-        up = _unit(np.cross(east, north))
-        # Right angles, shared evenly between the two lines of the grid; nothing moves where the grid is conformal.
-        east = _unit(east + np.cross(north, up))
-        return np.stack([east, np.cross(up, east), up], axis=1)
+        return axes_between(*np.einsum("k,aknc->anc", weights, xyz))
 
     def _shifted_axes(self, geodetic: Array, axes: Array) -> Array:
         """Axes of the own datum, carried into the Cartesian frame through the datum shift."""
@@ -548,37 +386,4 @@ class GroundFrame:
             there = self._own_geodetic_from_geocentric(moved.reshape(-1, 3))
             ends.append(self._cartesian_from_geodetic(there, None).reshape(-1, 3, 3))
         east, north, _ = np.moveaxis(ends[0] - ends[1], 1, 0)
-        up = _unit(np.cross(east, north))
-        north = _unit(north - np.einsum("nc,nc->n", north, up)[:, None] * up)
-        return np.stack([np.cross(north, up), north, up], axis=1)
-
-    def _require(self, good: NDArray[np.bool_], trouble: str, ids: Sequence[str] | None) -> None:
-        """Refuse coordinates given by the user that cannot be used."""
-        if not good.all():
-            raise InputError(Fault(f"{_named(~good, ids)}: {trouble}", code="ground-domain"))
-
-    def _reached(self, values: Array, ids: Sequence[str] | None, trouble: str) -> None:
-        """Refuse computed points that cannot be expressed in this frame."""
-        bad = ~_finite(values)
-        if bad.any():
-            points = [ids[int(row)] for row in np.flatnonzero(bad)] if ids is not None else []
-            raise GeometryError(f"{_named(bad, ids)}: {trouble} {self.spec.name}", points=points, code="ground-domain")
-
-
-def _unit(vectors: Array) -> Array:
-    """Bring vectors to unit length."""
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
-
-
-def _finite(rows: Array) -> NDArray[np.bool_]:
-    """Rows without an infinite number: PROJ marks what it cannot transform by infinity."""
-    return np.asarray(np.isfinite(rows).all(axis=1))
-
-
-def _named(bad: NDArray[np.bool_], ids: Sequence[str] | None) -> str:
-    """Say which rows are meant, the first of them by name."""
-    rows = np.flatnonzero(bad)
-    names = [str(row) if ids is None else ids[int(row)] for row in rows[:_ROWS_NAMED]]
-    what = "row" if ids is None else "point"
-    more = f" and {len(rows) - len(names)} more" if len(rows) > len(names) else ""
-    return f"{what}{'s' if len(rows) > 1 else ''} {', '.join(names)}{more}"
+        return axes_along_north(east, north)

@@ -28,23 +28,10 @@ _CONVERGED = 1e-15  # radians, 6 nanometres on the Earth
 
 
 def geocentric_from_geodetic(geodetic: ArrayLike, ellipsoid: Ellipsoid) -> NDArray[np.float64]:
-    """Geocentric coordinates of points given by longitude, latitude and height.
+    """Geocentric coordinates (n, 3) of points given by longitude, latitude (radians) and height above the ellipsoid.
 
-    Parameters
-    ----------
-    geodetic : array_like, shape (n, 3)
-        Geodetic longitude (east positive) and latitude (north positive), radians; height above the ellipsoid, metres.
-    ellipsoid : tuple of float
-        Semi-axes (a, b), metres.
-
-    Returns
-    -------
-    ndarray, shape (n, 3)
-        X, Y, Z, metres: X towards the zero meridian, Z towards the north pole.
-
-    Notes
-    -----
-    Source: derived, X = (N + H) cos B cos L, Y = (N + H) cos B sin L, Z = (N (1 - e^2) + H) sin B.
+    X runs towards the zero meridian, Z towards the north pole: X = (N + H) cos B cos L, Y = (N + H) cos B sin L,
+    Z = (N (1 - e^2) + H) sin B.
     """
     lon, lat, height = np.asarray(geodetic, dtype=np.float64).reshape(-1, 3).T
     radius = prime_vertical_radius(lat, ellipsoid)
@@ -54,25 +41,12 @@ def geocentric_from_geodetic(geodetic: ArrayLike, ellipsoid: Ellipsoid) -> NDArr
 
 
 def geodetic_from_geocentric(xyz: ArrayLike, ellipsoid: Ellipsoid) -> NDArray[np.float64]:
-    """Longitude, latitude and height of points given by geocentric coordinates.
+    """Longitude in (-pi, pi], latitude (radians) and height above the ellipsoid, (n, 3), of geocentric coordinates.
 
-    Parameters
-    ----------
-    xyz : array_like, shape (n, 3)
-        Geocentric X, Y, Z, metres.
-    ellipsoid : tuple of float
-        Semi-axes (a, b), metres.
+    On the axis of rotation the longitude is 0. Made for points near the surface; towards the centre of the body, nearer
+    than a tenth of the radius, latitude and height mean nothing.
 
-    Returns
-    -------
-    ndarray, shape (n, 3)
-        Longitude in (-pi, pi] and latitude, radians; height above the ellipsoid, metres. On the axis of rotation
-        the longitude is 0.
-
-    Notes
-    -----
-    Source: Bowring 1976, iterated. Made for points near the surface; towards the centre of the
-    body, nearer than a tenth of the radius, latitude and height mean nothing.
+    Source: [Bowring 1976], iterated.
     """
     x, y, z = np.asarray(xyz, dtype=np.float64).reshape(-1, 3).T
     a, b = ellipsoid
@@ -93,24 +67,12 @@ def geodetic_from_geocentric(xyz: ArrayLike, ellipsoid: Ellipsoid) -> NDArray[np
 
 
 def axes_matrix(lat: float, lon: float, azimuth: float) -> NDArray[np.float64]:
-    """Direction cosines of the axes of an intermediate frame.
+    """Direction cosines M = Rz(L0) Ry(90 deg - B0) Rz(180 deg - A0) of the axes of an intermediate frame.
 
-    Parameters
-    ----------
-    lat, lon : float
-        Geodetic latitude and longitude of the middle of the network, radians.
-    azimuth : float
-        Azimuth A0 of the X axis, clockwise from north, radians.
+    Its columns are X (in azimuth A0, clockwise from north), Y (90 degrees to the left of X) and Z (the normal, up), in
+    geocentric components. With A0 = 0, X is north and Y is west.
 
-    Returns
-    -------
-    ndarray, shape (3, 3)
-        M. Its columns are X (in the azimuth), Y (90 degrees to the left of X) and Z (the normal, up), in
-        geocentric components. Orthogonal, determinant +1. With A0 = 0, X is north and Y is west.
-
-    Notes
-    -----
-    Source: [001] eq. 143 corrected; M = Rz(L0) Ry(90 deg - B0) Rz(180 deg - A0).
+    Source: [001] eq. 143, corrected.
     """
     sin_b, cos_b = np.sin(lat), np.cos(lat)
     sin_l, cos_l = np.sin(lon), np.cos(lon)
@@ -125,41 +87,20 @@ def axes_matrix(lat: float, lon: float, azimuth: float) -> NDArray[np.float64]:
 
 
 def local_axes_matrix(azimuth: float) -> NDArray[np.float64]:
-    """Direction cosines of the axes of an intermediate frame in a flat world (east, north, up).
+    """Direction cosines of the axes of an intermediate frame in a flat world, in east, north, up components.
 
-    Parameters
-    ----------
-    azimuth : float
-        Azimuth A0 of the X axis, clockwise from north, radians.
-
-    Returns
-    -------
-    ndarray, shape (3, 3)
-        M. Its columns are X (in the azimuth), Y (90 degrees to the left of X) and Z (up), in east, north, up
-        components: a rotation about the vertical. With A0 = 0, X is north and Y is west.
+    A rotation about the vertical: columns as in ``axes_matrix``.
     """
     sin_a, cos_a = np.sin(azimuth), np.cos(azimuth)
     return np.array([[sin_a, -cos_a, 0.0], [cos_a, sin_a, 0.0], [0.0, 0.0, 1.0]])
 
 
 def mean_position(lat: ArrayLike, lon: ArrayLike, height: ArrayLike) -> tuple[float, float, float]:
-    """Mean latitude, longitude and height of the control points.
+    """Mean latitude, longitude in [-pi, pi) and height of the control points.
 
-    Parameters
-    ----------
-    lat, lon : array_like, shape (n,)
-        Geodetic latitude and longitude, radians.
-    height : array_like, shape (n,)
-        Height, metres.
+    Longitudes are counted from the direction of their mean unit vector, so that 179 and -179 degrees have the mean 180
+    and not 0.
 
-    Returns
-    -------
-    tuple of float
-        Mean latitude, longitude in [-pi, pi) and height. Longitudes are counted from the direction of their mean
-        unit vector, so that 179 and -179 degrees have the mean 180 and not 0.
-
-    Notes
-    -----
     Source: [001] eq. 142, the longitude by way of directions.
     """
     lat, lon, height = (np.asarray(column, dtype=np.float64) for column in (lat, lon, height))
@@ -170,26 +111,17 @@ def mean_position(lat: ArrayLike, lon: ArrayLike, height: ArrayLike) -> tuple[fl
 
 
 def strip_azimuth(first: ArrayLike, last: ArrayLike) -> float:
-    """Azimuth of the strip from its first and last perspective centres.
+    """Azimuth A0 = atan2(-DY, DX), clockwise from north in (-pi, pi], of the strip from its end centres.
 
     Parameters
     ----------
     first, last : array_like, shape (3,)
         The two perspective centres in the intermediate frame of azimuth 0 (X north, Y west, Z up).
 
-    Returns
-    -------
-    float
-        A0, clockwise from north, radians, in (-pi, pi].
-
     Raises
     ------
     GeometryError
         If the two centres lie above each other: then the strip has no direction.
-
-    Notes
-    -----
-    Source: derived, A0 = atan2(-DY, DX).
     """
     dx, dy, _ = np.asarray(last, dtype=np.float64) - np.asarray(first, dtype=np.float64)
     if not np.hypot(dx, dy) > 0.0:
@@ -222,159 +154,48 @@ class IntermediateFrame:
     def at_centre(cls, cartesian_control: ArrayLike, lat: float, lon: float, azimuth: float) -> Self:
         """Frame at the middle of control points on an ellipsoid.
 
-        Parameters
-        ----------
-        cartesian_control : array_like, shape (n, 3)
-            Geocentric coordinates of the control points, metres; their mean is the origin.
-        lat, lon : float
-            Mean latitude and longitude (``mean_position``), radians; they give only the directions.
-        azimuth : float
-            Azimuth of the X axis, clockwise from north, radians.
+        The mean of their geocentric coordinates (n, 3) is the origin, which lies below the surface by the mean sagitta
+        of the network, a few metres for 20 km; that does no harm. The mean latitude and longitude (``mean_position``)
+        give only the directions, `azimuth` that of the X axis.
 
-        Returns
-        -------
-        IntermediateFrame
-            The frame.
-
-        Notes
-        -----
-        Source: [001] eq. 142, 143. The origin lies below the surface by the mean sagitta of the network, a few
-        metres for 20 km; that does no harm.
+        Source: [001] eq. 142, 143.
         """
         origin = np.mean(np.asarray(cartesian_control, dtype=np.float64), axis=0)
         return cls(origin, axes_matrix(lat, lon, azimuth), azimuth)
 
     @classmethod
     def at_local_centre(cls, cartesian_control: ArrayLike, azimuth: float) -> Self:
-        """Frame at the middle of control points in a local Cartesian frame (east, north, up).
-
-        Parameters
-        ----------
-        cartesian_control : array_like, shape (n, 3)
-            East, north, up of the control points, metres; their mean is the origin.
-        azimuth : float
-            Azimuth of the X axis, clockwise from north, radians.
-
-        Returns
-        -------
-        IntermediateFrame
-            The frame: the local one moved to the middle and turned about the vertical.
-        """
+        """Frame at the middle of control points in a local Cartesian frame, turned about the vertical."""
         origin = np.mean(np.asarray(cartesian_control, dtype=np.float64), axis=0)
         return cls(origin, local_axes_matrix(azimuth), azimuth)
 
     def with_azimuth(self, azimuth: float) -> Self:
-        """Turn the frame about Z, so that X runs in another azimuth.
-
-        Parameters
-        ----------
-        azimuth : float
-            New azimuth of the X axis, clockwise from north, radians.
-
-        Returns
-        -------
-        IntermediateFrame
-            The turned frame.
-        """
+        """Turn the frame about Z, so that X runs in another azimuth."""
         turn = self.azimuth - azimuth  # anticlockwise about Z
         sin, cos = np.sin(turn), np.cos(turn)
         about_z = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
         return type(self)(self.origin, self.axes @ about_z, azimuth)
 
     def intermediate_from_cartesian(self, xyz: ArrayLike) -> NDArray[np.float64]:
-        """Points from the Cartesian frame into this frame.
-
-        Parameters
-        ----------
-        xyz : array_like, shape (..., 3)
-            Points in the project's Cartesian frame, metres.
-
-        Returns
-        -------
-        ndarray, shape (..., 3)
-            The same points in the intermediate frame, metres.
-
-        Notes
-        -----
-        Source: [001] eq. 144.
-        """
+        """Points (..., 3) from the project's Cartesian frame into this frame. Source: [001] eq. 144."""
         return np.asarray((np.asarray(xyz, dtype=np.float64) - self.origin) @ self.axes)  # eq. 144
 
     def cartesian_from_intermediate(self, points: ArrayLike) -> NDArray[np.float64]:
-        """Points from this frame back into the Cartesian frame.
-
-        Parameters
-        ----------
-        points : array_like, shape (..., 3)
-            Points in the intermediate frame, metres.
-
-        Returns
-        -------
-        ndarray, shape (..., 3)
-            The same points in the project's Cartesian frame, metres.
-
-        Notes
-        -----
-        Source: [001] eq. 152.
-        """
+        """Points (..., 3) from this frame back into the Cartesian frame. Source: [001] eq. 152."""
         return np.asarray(self.origin + np.asarray(points, dtype=np.float64) @ self.axes.T)  # eq. 152
 
     def intermediate_vectors(self, vectors: ArrayLike) -> NDArray[np.float64]:
-        """Directions or differences from the Cartesian frame into this frame: turned, not shifted.
-
-        Parameters
-        ----------
-        vectors : array_like, shape (..., 3)
-            Vectors in the Cartesian frame.
-
-        Returns
-        -------
-        ndarray, shape (..., 3)
-            The same vectors in the intermediate frame.
-        """
+        """Directions or differences from the Cartesian frame into this frame: turned, not shifted."""
         return np.asarray(np.asarray(vectors, dtype=np.float64) @ self.axes)
 
     def cartesian_vectors(self, vectors: ArrayLike) -> NDArray[np.float64]:
-        """Directions or differences from this frame into the Cartesian frame: turned, not shifted.
-
-        Parameters
-        ----------
-        vectors : array_like, shape (..., 3)
-            Vectors in the intermediate frame.
-
-        Returns
-        -------
-        ndarray, shape (..., 3)
-            The same vectors in the Cartesian frame.
-        """
+        """Directions or differences from this frame into the Cartesian frame: turned, not shifted."""
         return np.asarray(np.asarray(vectors, dtype=np.float64) @ self.axes.T)
 
     def intermediate_rotations(self, rotations: ArrayLike) -> NDArray[np.float64]:
-        """Rotations of photos into the Cartesian frame, turned to lead into this frame.
-
-        Parameters
-        ----------
-        rotations : array_like, shape (..., 3, 3)
-            Rotations that take image axes to Cartesian axes.
-
-        Returns
-        -------
-        ndarray, shape (..., 3, 3)
-            Rotations that take image axes to the axes of the intermediate frame.
-        """
+        """Rotations (..., 3, 3) from image axes to Cartesian axes, turned to lead to the axes of this frame."""
         return np.asarray(self.axes.T @ np.asarray(rotations, dtype=np.float64))
 
     def cartesian_rotations(self, rotations: ArrayLike) -> NDArray[np.float64]:
-        """Rotations of photos into this frame, turned to lead into the Cartesian frame.
-
-        Parameters
-        ----------
-        rotations : array_like, shape (..., 3, 3)
-            Rotations that take image axes to the axes of the intermediate frame.
-
-        Returns
-        -------
-        ndarray, shape (..., 3, 3)
-            Rotations that take image axes to Cartesian axes.
-        """
+        """Rotations (..., 3, 3) from image axes to the axes of this frame, turned to lead to Cartesian axes."""
         return np.asarray(self.axes @ np.asarray(rotations, dtype=np.float64))

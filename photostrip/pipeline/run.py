@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.geodesy.crs import tie_frames
 from photostrip.geodesy.frame_spec import GROUND_AXES, FrameSpec
+from photostrip.geodesy.tying import tie_frames
 from photostrip.notes import Note
 from photostrip.pipeline import overruling
 from photostrip.pipeline.inputs import ADJUSTMENTS
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.camera import Camera
-    from photostrip.geodesy.crs import GroundFrame
+    from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.block.adjust import Block
     from photostrip.pipeline.inputs import Inputs, Settings
     from photostrip.pipeline.results import StripResult

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.geodesy.crs import GroundFrame
+    from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.inputs import ModelStrip, Settings, Strip
     from photostrip.points import ControlPoints, PhotoPoints
     from photostrip.triangulation.independent_models.formation import FormedModels

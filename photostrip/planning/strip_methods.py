@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import GeometryError
-from photostrip.geodesy.crs import tie_frames
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.local_frame import IntermediateFrame
+from photostrip.geodesy.tying import tie_frames
 from photostrip.planning.control_layout import USES, Layout, Spot, numbers_of
 from photostrip.points import ControlPoints
 from photostrip.triangulation import absolute_orientation

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.source import current, seen_from
-from photostrip.geodesy.crs import grid_names, tie_frames
+from photostrip.geodesy.crs import grid_names
+from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline import Inputs, Settings
 from photostrip.project.conversion import (
     ImageSystem,

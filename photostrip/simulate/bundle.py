@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.geodesy.crs import tie_frames
+from photostrip.geodesy.tying import tie_frames
 from photostrip.geometry.rotation import from_vector
 from photostrip.triangulation.bundle.observations.problem import Cameras, Control, Images, Problem, Start
 

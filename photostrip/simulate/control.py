@@ -14,7 +14,7 @@ from photostrip.simulate.draws import Draws, Purpose
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.geodesy.crs import GroundFrame
+    from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.points import PointTable
     from photostrip.simulate.placement import Placed
     from photostrip.simulate.spec import Spec

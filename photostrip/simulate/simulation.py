@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.geodesy.crs import tie_frames
 from photostrip.geodesy.frame_spec import FrameSpec
+from photostrip.geodesy.tying import tie_frames
 from photostrip.points import Frame, PhotoPoints, PointTable
 from photostrip.simulate.control import given_coordinates, roles
 from photostrip.simulate.coverage import shown
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.camera import Camera
-    from photostrip.geodesy.crs import GroundFrame
+    from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.points import ControlPoints, ModelPoints
     from photostrip.simulate.control import Roles
     from photostrip.simulate.film import Sheets

@@ -12,10 +12,13 @@ import numpy as np
 import pytest
 
 from photostrip.errors import InputError
-from photostrip.geodesy.crs import FrameSpec, GroundFrame, tie_frames
+from photostrip.geodesy.frame_spec import FrameSpec
+from photostrip.geodesy.tying import tie_frames
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from photostrip.geodesy.ground_frame import GroundFrame
 
 DATA = Path(__file__).parents[1] / "data" / "geodesy"
 ENU = ("east", "north", "up")

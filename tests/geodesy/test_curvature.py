@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -11,6 +13,9 @@ from pyproj import Geod
 from photostrip.geodesy import curvature
 from photostrip.geodesy.local_frame import IntermediateFrame, axes_matrix, geocentric_from_geodetic
 from tests.vectors import Vector, cases
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
 
 GRS80 = (6378137.0, 6378137.0 * (1.0 - 1.0 / 298.257222101))
 LAT = np.radians(42.5)
@@ -22,14 +27,34 @@ def ellipsoid_named(text: str) -> tuple[float, float]:
     return a, a * (1.0 - 1.0 / inverse)
 
 
+def mean_radius(lat: ArrayLike, ellipsoid: curvature.Ellipsoid) -> NDArray[np.float64]:
+    """Mean radius of curvature, sqrt(M N): wrong by at most 0.06 m at 20 km, in whatever direction."""
+    return np.sqrt(curvature.meridian_radius(lat, ellipsoid) * curvature.prime_vertical_radius(lat, ellipsoid))
+
+
+def radius_in_azimuth(lat: ArrayLike, azimuth: ArrayLike, ellipsoid: curvature.Ellipsoid) -> NDArray[np.float64]:
+    """Radius of the normal section in a direction, R_A = M N / (N cos^2 A + M sin^2 A) (Euler's formula)."""
+    m, n = curvature.meridian_radius(lat, ellipsoid), curvature.prime_vertical_radius(lat, ellipsoid)
+    angle = np.asarray(azimuth, dtype=np.float64)
+    return np.asarray(m * n / (n * np.cos(angle) ** 2 + m * np.sin(angle) ** 2))
+
+
+def height_on_sphere(z: ArrayLike, distance: ArrayLike, radius: ArrayLike) -> NDArray[np.float64]:
+    """Height above a sphere, h = sqrt(D^2 + (R + Z)^2) - R, without the difference of two numbers of the size of R."""
+    up = np.asarray(z, dtype=np.float64)
+    square = np.square(np.asarray(distance, dtype=np.float64))
+    level = np.asarray(radius) + up
+    return np.asarray(up + square / (np.sqrt(square + level**2) + level))
+
+
 @pytest.mark.parametrize("example", cases("earth_curvature"))
 def test_vectors(example: Vector) -> None:
     inside, out = example.input, example.expected
     lat, azimuth = np.radians([inside["B_deg"], inside["azimuth_of_point_deg"]])
     ellipsoid = ellipsoid_named(inside["ellipsoid"])
     distance = np.hypot(inside["X"], inside["Y"])
-    mean = curvature.mean_radius(lat, ellipsoid)
-    directed = curvature.radius_in_azimuth(lat, azimuth, ellipsoid)
+    mean = mean_radius(lat, ellipsoid)
+    directed = radius_in_azimuth(lat, azimuth, ellipsoid)
     found = {
         "D": distance,
         "M": curvature.meridian_radius(lat, ellipsoid),
@@ -39,7 +64,7 @@ def test_vectors(example: Vector) -> None:
         "correction_mean_R": curvature.curvature_correction(distance, mean),
         "Z_corrected_mean_R": curvature.height_from_tangent(inside["Z"], distance, mean),
         "Z_corrected_azimuth_R": curvature.height_from_tangent(inside["Z"], distance, directed),
-        "Z_corrected_sphere_exact_azimuth_R": curvature.height_on_sphere(inside["Z"], distance, directed),
+        "Z_corrected_sphere_exact_azimuth_R": height_on_sphere(inside["Z"], distance, directed),
     }
     assert found.keys() == out.keys()
     for name, value in found.items():
@@ -56,7 +81,7 @@ def errors_on_the_ellipsoid(distance_km: float, azimuth_deg: float, height: floa
     tangent = IntermediateFrame(geocentric_from_geodetic([[0.0, LAT, 0.0]], GRS80)[0], axes_matrix(LAT, 0.0, 0.0))
     x, y, z = tangent.intermediate_from_cartesian(point)[0]
     distance, azimuth = np.hypot(x, y), np.arctan2(-y, x)
-    radii = curvature.mean_radius(LAT, GRS80), curvature.radius_in_azimuth(LAT, azimuth, GRS80)
+    radii = mean_radius(LAT, GRS80), radius_in_azimuth(LAT, azimuth, GRS80)
     mean, directed = (float(curvature.height_from_tangent(z, distance, radius)) - height for radius in radii)
     return abs(mean), abs(directed)
 
@@ -76,7 +101,7 @@ def test_table_of_the_formula_s_accuracy(
 ) -> None:
     """At latitude 42.5 degrees, along the meridian and across it, the larger one."""
     found = [errors_on_the_ellipsoid(distance_km, azimuth) for azimuth in (0.0, 90.0)]
-    correction = curvature.curvature_correction(distance_km * 1e3, curvature.mean_radius(LAT, GRS80))
+    correction = curvature.curvature_correction(distance_km * 1e3, mean_radius(LAT, GRS80))
     assert round(float(correction), digits[0]) == size
     assert round(max(error for error, _ in found), digits[1]) == mean
     assert round(max(error for _, error in found), digits[2]) == directed
@@ -92,16 +117,16 @@ def test_high_terrain_is_off_by_half_a_centimetre_at_20_km() -> None:
 )
 def test_radii_keep_their_order(lat: float, azimuth: float) -> None:
     m, n = curvature.meridian_radius(lat, GRS80), curvature.prime_vertical_radius(lat, GRS80)
-    directed = curvature.radius_in_azimuth(lat, azimuth, GRS80)
+    directed = radius_in_azimuth(lat, azimuth, GRS80)
     assert m <= n * (1.0 + 1e-15)
     assert m * (1.0 - 1e-12) <= directed <= n * (1.0 + 1e-12)
-    assert m * (1.0 - 1e-12) <= curvature.mean_radius(lat, GRS80) <= n * (1.0 + 1e-12)
+    assert m * (1.0 - 1e-12) <= mean_radius(lat, GRS80) <= n * (1.0 + 1e-12)
 
 
 def test_radii_in_the_cardinal_directions() -> None:
     lat = np.radians([-80.0, 0.0, 42.5])
-    assert curvature.radius_in_azimuth(lat, 0.0, GRS80) == pytest.approx(curvature.meridian_radius(lat, GRS80))
-    across = curvature.radius_in_azimuth(lat, np.pi / 2, GRS80)
+    assert radius_in_azimuth(lat, 0.0, GRS80) == pytest.approx(curvature.meridian_radius(lat, GRS80))
+    across = radius_in_azimuth(lat, np.pi / 2, GRS80)
     assert across == pytest.approx(curvature.prime_vertical_radius(lat, GRS80))
 
 
@@ -120,10 +145,4 @@ def test_there_and_back_and_the_sphere(height: float, distance: float, radius: f
     assert z <= height
     assert curvature.height_from_tangent(z, distance, radius) == pytest.approx(height, abs=1e-8)
     exact = np.sqrt(np.longdouble(distance) ** 2 + (np.longdouble(radius) + np.longdouble(z)) ** 2) - radius
-    assert float(curvature.height_on_sphere(z, distance, radius)) == pytest.approx(float(exact), abs=1e-8)
-
-
-def test_largest_correction() -> None:
-    plan = [[500000.0, 4600000.0], [503000.0, 4604000.0], [500100.0, 4600000.0]]
-    assert curvature.largest_correction(plan, [500000.0, 4600000.0, 12.0], 6.37e6) == pytest.approx(25e6 / 2 / 6.37e6)
-    assert curvature.largest_correction(np.empty((0, 3)), [0.0, 0.0], 6.37e6) == 0.0
+    assert float(height_on_sphere(z, distance, radius)) == pytest.approx(float(exact), abs=1e-8)

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 import yaml
 
-from photostrip.geodesy.crs import FrameSpec, tie_frames
+from photostrip.geodesy.frame_spec import FrameSpec
+from photostrip.geodesy.tying import tie_frames
 from tests.geodesy.frames import write_gtx
 
 PAGE = Path(__file__).parents[2] / "docs" / "frames.md"

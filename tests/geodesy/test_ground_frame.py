@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import pickle
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -12,8 +13,12 @@ from hypothesis import strategies as st
 from pyproj import Proj, Transformer
 
 from photostrip.errors import GeometryError, InputError, PhotostripError
-from photostrip.geodesy.crs import FrameSpec, GroundFrame, tie_frames
+from photostrip.geodesy.frame_spec import FrameSpec
+from photostrip.geodesy.tying import tie_frames
 from tests.geodesy.frames import NEU, XYZ, frame, krueger, pair, spec
+
+if TYPE_CHECKING:
+    from photostrip.geodesy.ground_frame import GroundFrame
 
 MICROMETRE = 1e-6  # m
 NANORADIAN = 1e-9

@@ -12,11 +12,13 @@ import numpy as np
 import pytest
 
 from photostrip.errors import GeometryError, InputError
-from photostrip.geodesy.crs import FrameSpec, tie_frames
+from photostrip.geodesy.tying import tie_frames
 from tests.geodesy.frames import NEU, XYZ, frame, pair, refused, spec, write_gtx
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from photostrip.geodesy.frame_spec import FrameSpec
 
 MICROMETRE = 1e-6  # m
 ARC_SECOND = math.pi / 180.0 / 3600.0
@@ -301,7 +303,8 @@ def test_a_compound_crs_finds_its_grid_when_it_is_installed(tmp_path: Path) -> N
     """EGM96 from a data directory, in a process of its own: PROJ remembers where it has looked."""
     write_gtx(tmp_path / "egm96_15.gtx", np.full((11, 11), 44.25), south=40.0, west=10.0, step=1.0)
     program = """
-from photostrip.geodesy.crs import FrameSpec, tie_frames
+from photostrip.geodesy.frame_spec import FrameSpec
+from photostrip.geodesy.tying import tie_frames
 axes = ("east", "north", "up")
 (own,), out = tie_frames([FrameSpec("EPSG:32633+5773", axes, height="orthometric")], FrameSpec("EPSG:32633", axes))
 print(round(out.ground_from_cartesian(own.cartesian_from_ground([[5e5, 5e6, 100.0]]))[0, 2], 6))
@@ -634,7 +637,8 @@ def run(program: str, **environment: str) -> str:
 def test_local_and_geocentric_frames_do_without_pyproj() -> None:
     program = """
 import sys
-from photostrip.geodesy.crs import FrameSpec, tie_frames
+from photostrip.geodesy.frame_spec import FrameSpec
+from photostrip.geodesy.tying import tie_frames
 tie_frames([FrameSpec("local", ("east", "north", "up"))])
 frames, _ = tie_frames([FrameSpec("geocentric", ("x", "y", "z")), FrameSpec("geocentric", ("z", "x", "y"))])
 frames[0].geodetic([[4e6, 2e6, 4.5e6]])
@@ -645,7 +649,8 @@ print("pyproj" in sys.modules)
 
 def test_the_network_stays_off() -> None:
     program = """
-from photostrip.geodesy.crs import FrameSpec, tie_frames
+from photostrip.geodesy.frame_spec import FrameSpec
+from photostrip.geodesy.tying import tie_frames
 tie_frames([FrameSpec("EPSG:32633", ("east", "north", "up"))])
 import pyproj.network
 print(pyproj.network.is_network_enabled())

@@ -10,8 +10,8 @@ import pytest
 
 from photostrip.errors import EXIT_GEOMETRY, EXIT_INPUT, GeometryError, InputError
 from photostrip.formats.output.simulation import inputs_of, settings_of
-from photostrip.geodesy.crs import tie_frames
 from photostrip.geodesy.frame_spec import FrameSpec
+from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline import Inputs, Settings, triangulate
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.simulate import Control, Flight, Ground, Image, Simulation, Spec, Terrain, simulate

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.formats.output.simulation import inputs_of, settings_of
-from photostrip.geodesy.crs import tie_frames
+from photostrip.geodesy.tying import tie_frames
 from photostrip.geometry.rotation import angles
 from photostrip.pipeline import triangulate
 from photostrip.pipeline.inputs import CameraPositions, GivenOrientations

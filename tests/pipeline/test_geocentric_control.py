@@ -9,7 +9,8 @@ import pytest
 
 from photostrip.errors import InputError
 from photostrip.formats.output.simulation import inputs_of, settings_of
-from photostrip.geodesy.crs import FrameSpec, tie_frames
+from photostrip.geodesy.frame_spec import FrameSpec
+from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline import Inputs, Result, triangulate
 from photostrip.result.document import document_of
 from photostrip.simulate import Control, Flight, Ground, Spec, simulate

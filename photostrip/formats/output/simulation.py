@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photostrip.formats.text.findings import counted
-from photostrip.geodesy.crs import tie_frames
+from photostrip.geodesy.tying import tie_frames
 from photostrip.geometry.rotation import angles
 from photostrip.pipeline import Inputs, MeasuredModels, ModelStrip, Settings, Strip
 from photostrip.points import PhotoPoints

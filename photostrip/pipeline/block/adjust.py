@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.geodesy.crs import GroundFrame
+    from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.inputs import Inputs, Settings
     from photostrip.pipeline.results import BlockProblem, BlockStart, StripResult
     from photostrip.points import ControlPoints, PhotoPoints

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.geodesy.crs import GroundFrame
+    from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.inputs import CameraPositions, GivenOrientations, Inputs, Settings
     from photostrip.pipeline.results import BlockStart
     from photostrip.points import ControlPoints, PhotoPoints

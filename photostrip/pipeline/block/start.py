@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.geodesy.crs import GroundFrame
+    from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.inputs import Inputs, Settings
     from photostrip.pipeline.results import StripResult
     from photostrip.pipeline.strip import Formed

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.geodesy.crs import GroundFrame
+    from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.geodesy.local_frame import IntermediateFrame
     from photostrip.pipeline.inputs import MeasuredModels, ModelStrip, Settings
     from photostrip.points import ControlPoints, ModelPoints

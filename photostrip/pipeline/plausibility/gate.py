@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, TypedDict
 import numpy as np
 
 from photostrip.errors import PhotostripError
-from photostrip.geodesy.crs import area_of_use, tie_frames
+from photostrip.geodesy.crs import area_of_use
+from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline.plausibility import distance_trial, evidence, given_cameras
 from photostrip.pipeline.plausibility.base_directions import closer_look
 from photostrip.triangulation.image_coordinates import interior
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from photostrip.geodesy.crs import GroundFrame
+    from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.notes import Finding
     from photostrip.pipeline.inputs import Inputs, MeasuredModels, Settings, Strip
     from photostrip.pipeline.results import Result

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.errors import PhotostripError
-from photostrip.geodesy.crs import tie_frames
+from photostrip.geodesy.tying import tie_frames
 from photostrip.geometry.similarity import Similarity, collinearity
 from photostrip.triangulation.plausibility import found
 from photostrip.triangulation.plausibility.photos import flight
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.geodesy.crs import GroundFrame
     from photostrip.geodesy.frame_spec import FrameSpec
+    from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.notes import Finding
     from photostrip.pipeline.inputs import Inputs, Strip
     from photostrip.pipeline.plausibility.evidence import Formed

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.geodesy.crs import GroundFrame
+    from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.results import StripResult
     from photostrip.points import PhotoPoints
     from photostrip.triangulation.error_propagation.derivatives import ErrorRows

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.geodesy.crs import GroundFrame
+    from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.covariance_adjustment import CovarianceAdjustment
     from photostrip.pipeline.results import Adjusted, StripResult
     from photostrip.points import ControlPoints, PhotoPoints

@@ -15,7 +15,7 @@ import numpy as np
 
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.text.findings import Findings
-from photostrip.geodesy.crs import tie_frames
+from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline import overruling
 from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.run import require_whole
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.formats.measured.control import ControlTable
-    from photostrip.geodesy.crs import GroundFrame
+    from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.notes import Finding, Note
     from photostrip.points import PhotoPoints
     from photostrip.project.loading import Project

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.geodesy.crs import GroundFrame
+    from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.points import ControlPoints
 
     Floats = NDArray[np.float64]

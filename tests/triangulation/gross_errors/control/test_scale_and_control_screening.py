@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from photostrip.geodesy.crs import tie_frames
+from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline import Settings, triangulate
 from photostrip.pipeline.strip import adjust_strip
 from photostrip.result.document import document_of

@@ -1,0 +1,46 @@
+"""Points outside the domain of a projection, a geoid grid or a datum shift: found, and named in messages."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import Fault, GeometryError, InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
+
+_ROWS_NAMED = 8
+
+
+def finite_rows(rows: Array) -> Flags:
+    """Rows without an infinite number: PROJ marks what it cannot transform by infinity."""
+    return np.asarray(np.isfinite(rows).all(axis=1))
+
+
+def named_rows(bad: Flags, ids: Sequence[str] | None) -> str:
+    """Say which rows are meant, the first of them by name; without ids by number, counted from 0."""
+    rows = np.flatnonzero(bad)
+    names = [str(row) if ids is None else ids[int(row)] for row in rows[:_ROWS_NAMED]]
+    what = "row" if ids is None else "point"
+    more = f" and {len(rows) - len(names)} more" if len(rows) > len(names) else ""
+    return f"{what}{'s' if len(rows) > 1 else ''} {', '.join(names)}{more}"
+
+
+def require_rows(good: Flags, trouble: str, ids: Sequence[str] | None) -> None:
+    """Refuse coordinates given by the user that cannot be used."""
+    if not good.all():
+        raise InputError(Fault(f"{named_rows(~good, ids)}: {trouble}", code="ground-domain"))
+
+
+def require_reached(good: Flags, trouble: str, ids: Sequence[str] | None) -> None:
+    """Refuse computed points that cannot be expressed in a frame."""
+    if not good.all():
+        points = [ids[int(row)] for row in np.flatnonzero(~good)] if ids is not None else []
+        raise GeometryError(f"{named_rows(~good, ids)}: {trouble}", points=points, code="ground-domain")

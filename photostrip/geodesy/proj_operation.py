@@ -1,0 +1,133 @@
+"""Operations of PROJ between coordinate reference systems, chosen once for all points.
+
+With ``crs`` the only module that uses pyproj; it loads it with the first CRS that needs it. PROJ's network access
+stays off.
+"""
+
+from __future__ import annotations
+
+import re
+import warnings
+from functools import cache, cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+    from pyproj import CRS, Transformer
+
+    Array = NDArray[np.float64]
+
+
+@cache
+def load_pyproj() -> Any:  # noqa: ANN401 (a module; pyproj does not say what it exports)
+    """Load pyproj at first need, its network access off: a run must not depend on what a server sends."""
+    import pyproj
+    import pyproj.network
+
+    network: Any = pyproj.network
+    network.set_network_enabled(active=False)
+    return pyproj
+
+
+class ProjOperation:
+    """One PROJ operation between two CRSs, chosen once and then kept for all points.
+
+    PROJ often knows several operations between two datums, each for a country, and picks one for each point. Two
+    points of one strip must not be shifted by different operations, so the one that PROJ picks for the middle row
+    of the first points is kept.
+    """
+
+    def __init__(self, source: CRS, target: CRS) -> None:
+        self._ends = (source, target)
+        self._decided_by: tuple[Array, bool] | None = None  # the point, and whether it went the inverse way
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Keep what the operation is made from: PROJ's own object cannot be sent to another process."""
+        return {"_ends": self._ends, "_decided_by": self._decided_by}
+
+    @cached_property
+    def transformer(self) -> Transformer:
+        """The PROJ object; making it takes 1 to 100 ms. Raises ProjError where no sound operation exists."""
+        made: Transformer = load_pyproj().Transformer.from_crs(*self._ends, always_xy=True, allow_ballpark=False)
+        if self._decided_by is not None:  # in another process
+            point, inverse = self._decided_by
+            made = _used(made, point, inverse=inverse)
+        return made
+
+    @property
+    def idle(self) -> bool:
+        """Whether coordinates pass unchanged, as between ETRS89 and WGS 84."""
+        return self.transformer.definition.startswith("proj=noop")
+
+    def apply(self, columns: Array, *, inverse: bool = False) -> Array:
+        """Transform rows of coordinates; what lies outside the domain becomes infinite."""
+        if self._decided_by is None and len(columns):
+            self._decided_by = columns[len(columns) // 2], inverse
+            self.transformer = _used(self.transformer, columns[len(columns) // 2], inverse=inverse)
+        rows = np.repeat(columns, 2, axis=0) if len(columns) == 1 else columns  # pyproj 3.6 takes one row for numbers
+        return np.stack(_run(self.transformer, rows.T, inverse=inverse), axis=-1)[: len(columns)]
+
+    @property
+    def accuracy(self) -> float | None:
+        """Accuracy that PROJ states, metres; None when it states none, or has not chosen yet."""
+        stated = float(self.transformer.accuracy)
+        return stated if stated >= 0.0 else None
+
+    @property
+    def grids(self) -> tuple[str, ...]:
+        """Paths of the grid files that the operation reads."""
+        steps = self.transformer.operations or ()
+        named = re.findall(r"\bgrids=(\S+)", self.transformer.definition)
+        paths = [name for names in named for name in names.split(",") if Path(name).is_file()]
+        return tuple(
+            dict.fromkeys([*paths, *(grid.full_name for step in steps for grid in step.grids if grid.available)])
+        )
+
+    def __str__(self) -> str:
+        if not self.idle and self._decided_by is None:
+            return "chosen by PROJ at the first point"
+        steps = [step for step in self.transformer.description.split(" + ") if not step.startswith("axis order change")]
+        return " + ".join(steps) + (
+            ", accuracy not known" if self.accuracy is None else f", accuracy {self.accuracy:g} m"
+        )
+
+
+def _run(transformer: Transformer, columns: Array, *, inverse: bool) -> Any:  # noqa: ANN401 (arrays or numbers)
+    """Hand columns to PROJ and get columns back."""
+    transform: Any = transformer.transform
+    return transform(*columns, direction="INVERSE" if inverse else "FORWARD", errcheck=False)
+
+
+def _used(transformer: Transformer, point: Array, *, inverse: bool) -> Transformer:
+    """Single out the operation that PROJ uses for one point."""
+    _run(transformer, point, inverse=inverse)
+    try:
+        return transformer.get_last_used_operation()
+    except load_pyproj().exceptions.ProjError:
+        return transformer  # nothing is valid at this point, or nothing is to be done
+
+
+def trouble_with(operation: ProjOperation) -> str:
+    """Make an operation; give what PROJ says against it, nothing when it is sound."""
+    try:
+        operation.transformer  # noqa: B018 (made here, so that a refusal comes before any computing)
+    except load_pyproj().exceptions.ProjError as error:
+        return str(error) or "no operation"
+    return ""
+
+
+def missing_grids(source: CRS, target: CRS) -> str:
+    """Name the grids that PROJ would use between two CRSs if they were there."""
+    from pyproj.transformer import TransformerGroup
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # it warns of what is asked here
+        try:
+            group = TransformerGroup(source, target, always_xy=True, allow_ballpark=False)
+        except load_pyproj().exceptions.ProjError:
+            return ""
+    missing = ([g.short_name for g in best.grids if not g.available] for best in group.unavailable_operations)
+    return " and ".join(next(filter(None, missing), []))  # of the best operation: PROJ lists it first

@@ -1,0 +1,228 @@
+"""The ground frames of a project, tied together in one Cartesian frame.
+
+A strip is adjusted in Cartesian space. Control lists come in map projections, longitudes and latitudes, geocentric
+or local coordinates, each list in a frame of its own; results go out in one. ``tie_frames`` ties all of them to
+the geocentric frame of the output's datum (or to the local frame). Frames of one datum are tied exactly, by the
+formulas of the ellipsoid; between datums an operation of PROJ is used, never a guessed one ("ballpark") and never
+one whose grid file is missing.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from photostrip.errors import Fault, InputError, PhotostripError
+from photostrip.geodesy.crs import CrsParts, missing_own_grids, read_crs
+from photostrip.geodesy.datum_shift import DatumShift
+from photostrip.geodesy.frame_spec import FrameSpec, Refusal, contradictions
+from photostrip.geodesy.ground_frame import GroundFrame
+from photostrip.geodesy.proj_operation import ProjOperation, missing_grids, trouble_with
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from photostrip.geodesy.curvature import Ellipsoid
+
+_SAME_AXIS = 1e-10  # relative: two semi-axes are the same within 0.6 mm on the Earth
+
+
+def tie_frames(
+    specs: Sequence[FrameSpec],
+    output: FrameSpec | None = None,
+    *,
+    directory: Path | None = None,
+    keys: Sequence[str] = (),
+) -> tuple[list[GroundFrame], GroundFrame]:
+    """Tie the frames of all control lists and of the output to one Cartesian frame.
+
+    Parameters
+    ----------
+    specs : sequence of FrameSpec
+        Frame of each control list.
+    output : FrameSpec or None
+        Frame of the results; None: that of the first control list.
+    directory : Path, optional
+        Where grid files named in PROJ strings are looked for first: the project file's directory.
+    keys : sequence of str, optional
+        Key of each frame in the project file; without it they are those of the control lists.
+
+    Returns
+    -------
+    tuple
+        The control lists' frames, in their order, and the output's. The Cartesian frame is the geocentric one of the
+        output's datum, or the local frame.
+
+    Raises
+    ------
+    InputError
+        With every fault of every frame: unknown or unsuitable CRS, contradictory heights, missing geoid grid, no
+        sound operation between two datums, local and geodetic frames in one project.
+    """
+    wanted = list(zip(keys or [f"control[{i}]" for i in range(len(specs))], specs, strict=True))
+    if output is not None:
+        wanted.append(("output", output))
+    if not wanted:
+        raise InputError(Fault("no ground frame is given", code="crs-missing", expected="a control list with its crs"))
+    target = output if output is not None else specs[0]
+    faults: list[Fault] = []
+    parts = _read_all(wanted, directory, faults)
+    if not faults:
+        _check_together(wanted, parts, faults)
+    frames = {} if faults else _build_all(wanted, parts, target, faults)
+    if faults:
+        raise InputError(faults)
+    return [frames[spec] for spec in specs], frames[target]
+
+
+def _read_all(
+    wanted: list[tuple[str, FrameSpec]], directory: Path | None, faults: list[Fault]
+) -> dict[FrameSpec, CrsParts]:
+    """Read each distinct frame once, collecting what is wrong with it."""
+    parts: dict[FrameSpec, CrsParts] = {}
+    places: dict[FrameSpec, str] = {}
+    for path, spec in wanted:
+        if spec in places:
+            continue
+        places[spec] = path
+        try:
+            own = read_crs(spec, directory)
+        except Refusal as refusal:
+            faults.append(refusal.at(path))
+            continue
+        against = contradictions(spec, own.kind, own.vertical, three_dimensional=own.three_dimensional)
+        faults.extend(refusal.at(path) for refusal in against)
+        parts[spec] = own
+    return parts
+
+
+def _check_together(wanted: list[tuple[str, FrameSpec]], parts: dict[FrameSpec, CrsParts], faults: list[Fault]) -> None:
+    """Find what can only be seen when the frames are put side by side."""
+    first_path, first = wanted[0]
+    for path, spec in wanted[1:]:
+        if (parts[spec].kind == "local") != (parts[first].kind == "local"):
+            message = f"{spec.name} cannot be tied to {first.name} of {first_path}: nobody knows where `local` lies"
+            fix = "give all of them as `local`, or none"
+            faults.append(Fault(message, code="local-mixed", key=f"{path}.crs", fix=fix))
+        elif spec.curvature_radius != first.curvature_radius:
+            message = (
+                f"the curvature correction differs from that of {first_path}: it counts before and after, or never"
+            )
+            faults.append(Fault(message, code="curvature-once", key=f"{path}.crs"))
+
+
+def _build_all(
+    wanted: list[tuple[str, FrameSpec]], parts: dict[FrameSpec, CrsParts], target: FrameSpec, faults: list[Fault]
+) -> dict[FrameSpec, GroundFrame]:
+    """Make the frames; frames of one foreign datum share one shift, so that it is chosen once for all."""
+    frames: dict[FrameSpec, GroundFrame] = {}
+    shifts: list[tuple[CrsParts, DatumShift]] = []
+    out = parts[target]
+    for path, spec in wanted:
+        own, shift = parts[spec], None
+        if spec in frames:
+            continue
+        try:
+            vertical = _vertical_operation(spec, own) if own.vertical else None
+            if own.kind != "local" and own is not out and not _same_datum(own, out):
+                shift = next((made for other, made in shifts if _same_datum(own, other)), None)
+                if shift is None:
+                    shift = _datum_shift(spec, own, target, out)
+                    shifts.append((own, shift))
+        except Refusal as refusal:
+            faults.append(refusal.at(path))
+            continue
+        frames[spec] = _frame(spec, own, vertical, shift, out.ellipsoid)
+    return frames
+
+
+def _frame(
+    spec: FrameSpec, own: CrsParts, vertical: ProjOperation | None, shift: DatumShift | None, cartesian: Ellipsoid
+) -> GroundFrame:
+    """Put one frame together."""
+    plane = ProjOperation(own.core, own.geographic) if own.kind == "projected" and own.core is not None else None
+    return GroundFrame(
+        spec=spec,
+        kind=own.kind,
+        title=own.title,
+        plan_unit=own.units[0],
+        height_unit=own.units[1],
+        plan_factor=own.factors[0],
+        height_factor=own.factors[1],
+        ellipsoid=None if own.kind == "local" else own.ellipsoid,
+        _angle=own.angle if plane is not None else own.factors[0],
+        _plane=plane,
+        _vertical=vertical,
+        _geoid=own.vertical,
+        _shift=shift,
+        _cartesian=cartesian,
+    )
+
+
+# -------------------------------------------------------------------------------- datums and geoids
+
+
+def _same_datum(one: CrsParts, other: CrsParts) -> bool:
+    """Tell whether two frames hang on the same datum, so that no shift lies between them."""
+    pairs = zip(one.ellipsoid, other.ellipsoid, strict=True)
+    if not all(math.isclose(p, q, rel_tol=_SAME_AXIS) for p, q in pairs):
+        return False
+    if one.core is None and other.core is None:
+        return True  # the word `geocentric`, twice: PROJ is not needed to know
+    if one.hub != other.hub:
+        return False
+    if one.datum_is_stated and other.datum_is_stated:
+        return bool(one.geographic.datum == other.geographic.datum)
+    # An ellipsoid alone is no datum: on the Earth, datums of one ellipsoid lie 100 m apart. Other bodies have one each.
+    if one.datum_is_stated != other.datum_is_stated and one.is_earth:
+        return False
+    first, second = (crs.prime_meridian for crs in (one.geographic, other.geographic))
+    return first is not None and second is not None and first.longitude == second.longitude
+
+
+def _datum_shift(spec: FrameSpec, own: CrsParts, target: FrameSpec, out: CrsParts) -> DatumShift:
+    """Find the PROJ operation from one datum to that of the Cartesian frame; refused when there is no sound one."""
+    operation = ProjOperation(own.shift_end, out.shift_end)
+    trouble, missing = trouble_with(operation), missing_own_grids(own) or missing_own_grids(out)
+    if not trouble and not missing:
+        return DatumShift(operation, own.angle, out.angle)
+    message = f"there is no known way from the datum of {spec.name} to that of {target.name}"
+    fix = "give both in one datum"
+    if "celestial body" in trouble:
+        message += ": they lie on different bodies"
+    elif not (own.datum_is_stated and out.datum_is_stated):
+        which = target.name if own.datum_is_stated else spec.name
+        message += f": {which} states an ellipsoid but no datum"
+        fix = "add +towgs84=... (or +datum=...) to it, or use an authority code"
+    elif missing := missing or missing_grids(own.shift_end, out.shift_end):
+        message += f": the grid {missing} is not installed"
+        fix = (
+            "put the grid beside the project file or into PROJ's data directory (`projsync`), or give both in one datum"
+        )
+    raise Refusal(message, code="datum-shift", fix=fix)
+
+
+def _vertical_operation(spec: FrameSpec, own: CrsParts) -> ProjOperation:
+    """Find the PROJ operation from heights above the geoid to heights above the ellipsoid of the same CRS."""
+    if own.whole is None or own.plane is None:
+        raise PhotostripError(f"{spec.name} has no vertical part")
+    operation = ProjOperation(own.whole, own.plane.to_3d())
+    trouble, missing = trouble_with(operation), missing_own_grids(own)
+    if not trouble and not missing:
+        return operation
+    message = f"the heights of {spec.name} ({own.vertical}) cannot be brought to the ellipsoid"
+    if missing := missing or missing_grids(own.whole, own.plane.to_3d()):
+        message += f": the geoid grid {missing} is not installed"
+    elif "invalid" in trouble:
+        message += ": PROJ cannot read the grid"
+    elif not own.datum_is_stated:
+        message += ": a geoid grid refers to WGS 84, and the datum of the plan is not stated (add +towgs84 or +datum)"
+    else:
+        message += ": PROJ knows no geoid for them"
+    raise Refusal(
+        message,
+        code="geoid-grid",
+        fix="put the grid beside the project file or into PROJ's data directory (`projsync`),"
+        " or give the CRS without heights and a constant `geoid_undulation`",
+    )
