@@ -13,7 +13,7 @@ from photostrip.formats.output.result_json import to_json
 from photostrip.formats.output.simulation import project_files
 from photostrip.pipeline import triangulate
 from photostrip.project.loading import load_project
-from photostrip.project.simulation_spec import load_specification
+from photostrip.project.simulation import load_specification
 from photostrip.result.document import document_of
 from tests.source_tree import ROOT
 

@@ -15,7 +15,7 @@ from photostrip.report.page.text import to_markdown
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from photostrip.project.checks.checking import Checked
+    from photostrip.project.checks.check import Checked
 
 SCHEMA = 1
 

@@ -38,7 +38,7 @@ def keys(incomplete: str) -> list[str]:
     list of str
         Keys of the project file, each with ``=`` behind it.
     """
-    from photostrip.project.yaml.schema import json_schema
+    from photostrip.project.schema.project_file import json_schema
 
     schema = json_schema()
     return [f"{path}=" for path in _paths(schema, schema) if path.startswith(incomplete)]

@@ -25,7 +25,10 @@ if TYPE_CHECKING:
     from photostrip.formats.measured.control import ControlTable
     from photostrip.formats.measured.exterior import OrientationTable, PositionTable
     from photostrip.formats.measured.measurements import Measurements
-    from photostrip.project.yaml import schema
+    from photostrip.project.schema.cameras import Camera, Distortion
+    from photostrip.project.schema.ground import CameraPositions as PositionsBlock
+    from photostrip.project.schema.ground import Control, Ellipsoid, GivenList, Orientations, Output
+    from photostrip.project.schema.project_file import ProjectFile
     from photostrip.triangulation.image_coordinates.certificate import Certificate
 
     Floats = NDArray[np.float64]
@@ -44,12 +47,12 @@ class ImageSystem:
     sigma: float | None
 
 
-def cameras(project: schema.ProjectFile) -> dict[str, camera.Camera]:
+def cameras(project: ProjectFile) -> dict[str, camera.Camera]:
     """Return the cameras of a project."""
     return {name: _camera(name, each) for name, each in project.cameras.items()}
 
 
-def certificate_of(given: schema.Camera) -> Certificate | None:
+def certificate_of(given: Camera) -> Certificate | None:
     """Solve the distances between the fiducial marks of a camera.
 
     Returns
@@ -69,25 +72,33 @@ def certificate_of(given: schema.Camera) -> Certificate | None:
     return certificate.solve(distances, nominal=nominal, places=given.fiducial_places)
 
 
-def _camera(name: str, given: schema.Camera) -> camera.Camera:
-    distortion, solved = None, certificate_of(given)
-    if given.distortion is not None:
-        lens = given.distortion
-        distortion = camera.Distortion(
-            lens.model, lens.direction, lens.k, lens.p, lens.b, tuple(lens.radius), tuple(lens.distortion)
-        )
+def _camera(name: str, given: Camera) -> camera.Camera:
+    solved = certificate_of(given)
     return camera.Camera(
-        name,
-        given.principal_distance,
-        given.principal_point,
-        given.format,
-        dict(given.fiducials) if solved is None else solved.marks,
-        given.pixel_size,
-        distortion,
+        name=name,
+        principal_distance=given.principal_distance,
+        principal_point=given.principal_point,
+        format=given.format,
+        fiducials=dict(given.fiducials) if solved is None else solved.marks,
+        pixel_size=given.pixel_size,
+        distortion=None if given.distortion is None else distortion_of(given.distortion),
     )
 
 
-def strips(project: schema.ProjectFile, known: Mapping[str, camera.Camera]) -> tuple[Strip, ...]:
+def distortion_of(given: Distortion) -> camera.Distortion:
+    """Return the lens distortion of a camera."""
+    return camera.Distortion(
+        model=given.model,
+        direction=given.direction,
+        k=given.k,
+        p=given.p,
+        b=given.b,
+        radius=tuple(given.radius),
+        distortion=tuple(given.distortion),
+    )
+
+
+def strips(project: ProjectFile, known: Mapping[str, camera.Camera]) -> tuple[Strip, ...]:
     """Return the strips of a project."""
     usual = project.processing.bundle.self_calibration
     own = {name: each.self_calibration for name, each in project.cameras.items()}
@@ -170,22 +181,23 @@ def _renumbered(ids: Sequence[str], codes: NDArray[np.intp]) -> tuple[tuple[str,
 # --------------------------------------------------------------------------------------------------- the ground
 
 
-def frame_spec(control: schema.Control | schema.CameraPositions | schema.Orientations) -> FrameSpec:
+def frame_spec(control: GivenList) -> FrameSpec:
     """Return the frame of a list of ground coordinates."""
     return FrameSpec(
         str(control.crs),
         control.axes or CARTESIAN_AXES,
         control.height,
         control.geoid_undulation,
-        _semi_axes(control.ellipsoid),
+        semi_axes(control.ellipsoid),
     )
 
 
-def _semi_axes(given: schema.Ellipsoid | None) -> tuple[float, float] | None:
+def semi_axes(given: Ellipsoid | None) -> tuple[float, float] | None:
+    """Return a and b of an ellipsoid."""
     return None if given is None else (given.a, given.b)
 
 
-def first_frame(project: schema.ProjectFile) -> FrameSpec:
+def first_frame(project: ProjectFile) -> FrameSpec:
     """Return the frame that stands in where the output says nothing.
 
     Returns
@@ -199,7 +211,7 @@ def first_frame(project: schema.ProjectFile) -> FrameSpec:
     return FrameSpec("local", GROUND_AXES)
 
 
-def output_spec(output: schema.Output, first: FrameSpec) -> FrameSpec | None:
+def output_spec(output: Output, first: FrameSpec) -> FrameSpec | None:
     """Return the frame of the results.
 
     Parameters
@@ -221,13 +233,13 @@ def output_spec(output: schema.Output, first: FrameSpec) -> FrameSpec | None:
             spec = replace(spec, height=output.height, geoid_undulation=None)
         if output.geoid_undulation is not None:
             spec = replace(spec, geoid_undulation=output.geoid_undulation)
-        return spec if output.ellipsoid is None else replace(spec, ellipsoid=_semi_axes(output.ellipsoid))
+        return spec if output.ellipsoid is None else replace(spec, ellipsoid=semi_axes(output.ellipsoid))
     usual = CARTESIAN_AXES if output.crs == "geocentric" else GROUND_AXES
-    height, ellipsoid = output.height or "ellipsoidal", _semi_axes(output.ellipsoid)
+    height, ellipsoid = output.height or "ellipsoidal", semi_axes(output.ellipsoid)
     return FrameSpec(str(output.crs), output.axes or usual, height, output.geoid_undulation, ellipsoid)
 
 
-def control_points(tables: Sequence[ControlTable], lists: Sequence[schema.Control]) -> ControlPoints:
+def control_points(tables: Sequence[ControlTable], lists: Sequence[Control]) -> ControlPoints:
     """Put all control lists into one table, in the internal order of axes.
 
     Returns
@@ -260,7 +272,7 @@ def _columns(spec: FrameSpec) -> list[int]:
 
 
 def camera_positions(
-    read: PositionTable, given: schema.CameraPositions, photos: Mapping[str, camera.Camera]
+    read: PositionTable, given: PositionsBlock, photos: Mapping[str, camera.Camera]
 ) -> CameraPositions:
     """Return the measured positions of the cameras, in the internal order of axes.
 
@@ -287,7 +299,7 @@ def camera_positions(
 
 
 def given_orientations(
-    read: OrientationTable, given: schema.Orientations, photos: Mapping[str, camera.Camera]
+    read: OrientationTable, given: Orientations, photos: Mapping[str, camera.Camera]
 ) -> GivenOrientations:
     """Return the orientations that are known beforehand, in the internal order of axes and in radians.
 
@@ -319,7 +331,7 @@ def _filled(sigma: Floats, default: Sequence[float] | None) -> Floats:
 # ------------------------------------------------------------------------------------------------- the settings
 
 
-def settings(project: schema.ProjectFile) -> Settings:
+def settings(project: ProjectFile) -> Settings:
     """Return what is to be done.
 
     Returns

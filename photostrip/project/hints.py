@@ -21,15 +21,16 @@ if TYPE_CHECKING:
     from photostrip.formats.measured.exterior import OrientationTable, PositionTable
     from photostrip.formats.measured.measurements import Measurements
     from photostrip.project.models import ModelTables
+    from photostrip.project.schema.cameras import Camera
+    from photostrip.project.schema.project_file import ProjectFile
     from photostrip.project.tables import Tables
-    from photostrip.project.yaml import schema
     from photostrip.project.yaml.document import Node
     from photostrip.triangulation.image_coordinates.certificate import Certificate
 
 NEAR_NAMED = 3
 
 
-def hints(project: schema.ProjectFile, tables: Tables, root: Node) -> Iterator[Note]:
+def hints(project: ProjectFile, tables: Tables, root: Node) -> Iterator[Note]:
     """Explain every row and every definition that is not used.
 
     Parameters
@@ -68,9 +69,7 @@ def hints(project: schema.ProjectFile, tables: Tables, root: Node) -> Iterator[N
             yield from _cameras_not_used(project, name, given_cameras, photos)
 
 
-def _of_models(
-    models: ModelTables, control: Sequence[ControlTable | None], project: schema.ProjectFile
-) -> Iterator[Note]:
+def _of_models(models: ModelTables, control: Sequence[ControlTable | None], project: ProjectFile) -> Iterator[Note]:
     """Name models in no strip, and control that stands in none."""
     photos = [str(photo) for strip in project.strips for photo in strip.photos]
     used = _models_used(models, project, photos)
@@ -98,7 +97,7 @@ def _of_models(
             yield from _never_measured(table, count, given, "in any model")
 
 
-def _models_used(models: ModelTables, project: schema.ProjectFile, photos: Sequence[str]) -> set[str]:
+def _models_used(models: ModelTables, project: ProjectFile, photos: Sequence[str]) -> set[str]:
     """Models that stand in strips: those that are listed, or have the centres of two neighbouring photos."""
     shown = models.centers_of(photos)
     used: set[str] = set()
@@ -113,7 +112,7 @@ def _models_used(models: ModelTables, project: schema.ProjectFile, photos: Seque
 
 
 def _cameras_not_used(
-    project: schema.ProjectFile, name: str, read: PositionTable | OrientationTable, photos: set[str]
+    project: ProjectFile, name: str, read: PositionTable | OrientationTable, photos: set[str]
 ) -> Iterator[Note]:
     """Say which rows of a table of cameras are not used, and that the strip method uses none."""
     what = name.replace("_", " ")
@@ -129,7 +128,7 @@ def _cameras_not_used(
         yield Note("photo-in-no-strip", message, "note", photos=tuple(others), file=file, line=line, key="photo")
 
 
-def _unused_cameras(project: schema.ProjectFile, root: Node) -> Iterator[Note]:
+def _unused_cameras(project: ProjectFile, root: Node) -> Iterator[Note]:
     used = {strip.camera for strip in project.strips}
     unused = [name for name in project.cameras if name not in used]
     if unused:
@@ -140,7 +139,7 @@ def _unused_cameras(project: schema.ProjectFile, root: Node) -> Iterator[Note]:
         yield Note("unused-camera", message, "note", file=place.file, line=place.line, column=place.column, key=key)
 
 
-def _solved_marks(name: str, camera: schema.Camera, solved: Certificate, root: Node) -> Note:
+def _solved_marks(name: str, camera: Camera, solved: Certificate, root: Node) -> Note:
     """Tell how well the distances between the fiducial marks of a camera fit each other."""
     path = ("cameras", name, "fiducial_distances")
     worst = int(np.argmax(np.abs(solved.residuals)))

@@ -10,8 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.formats.text.findings import Findings
+from photostrip.errors import GeometryError, InputError
 from photostrip.formats.text.source import current, seen_from
 from photostrip.geodesy.crs import grid_names
 from photostrip.geodesy.tying import tie_frames
@@ -30,23 +29,25 @@ from photostrip.project.conversion import (
     settings,
     strips,
 )
-from photostrip.project.finding_places import placed
 from photostrip.project.hints import hints
 from photostrip.project.models import check_models, measured_models, named_points
+from photostrip.project.places import places_of
 from photostrip.project.resolved import completed, text_of
+from photostrip.project.schema.cameras import Camera as CameraBlock
+from photostrip.project.schema.ground import CameraPositions as CameraPositionsBlock
+from photostrip.project.schema.ground import Control, GivenList, Orientations, Output
+from photostrip.project.schema.project_file import ProjectFile, json_schema
 from photostrip.project.tables import Tables, check_tables, read_tables
-from photostrip.project.yaml import schema
-from photostrip.project.yaml.document import COMMAND_LINE, Node, fault_at
-from photostrip.project.yaml.merging import override, read_tree, steps
+from photostrip.project.yaml.document import COMMAND_LINE, Node, at_own_key
+from photostrip.project.yaml.reading import Reading
 from photostrip.project.yaml.references import check_references
-from photostrip.project.yaml.schema import json_schema
-from photostrip.project.yaml.validation import valid_section, validate
+from photostrip.project.yaml.validation import valid_section
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from photostrip.camera import Camera
-    from photostrip.geodesy.frame_spec import FrameSpec
+    from photostrip.errors import Fault
     from photostrip.notes import Finding, Note
     from photostrip.pipeline import MeasuredModels, Result
     from photostrip.pipeline.inputs import CameraPositions, GivenOrientations
@@ -84,7 +85,7 @@ class Project:
 
     def placed(self, findings: Iterable[Finding]) -> tuple[Finding, ...]:
         """Give findings the place in the files where they would be put right."""
-        return tuple(placed(findings, self.tree, self.tables, self.inputs.flights))
+        return tuple(places_of(findings, self.tree, self.tables, self.inputs.flights))
 
     def result(self, result: Result) -> Result:
         """Return a result whose findings say where, with files as seen from the project's folder."""
@@ -110,9 +111,9 @@ class Project:
         try:
             yield
         except InputError as error:
-            told = InputError(fault if fault.file else _placed(self.tree, fault) for fault in error.faults)
-            told.findings = self.placed(error.findings)
-            raise told from None
+            placed = InputError(fault if fault.file else at_own_key(fault, self.tree) for fault in error.faults)
+            placed.findings = self.placed(error.findings)
+            raise placed from None
         except GeometryError as error:
             error.findings = self.placed(error.findings)
             raise
@@ -126,29 +127,31 @@ def load_project(path: Path, overrides: Sequence[str] = ()) -> Project:
     InputError
         With every fault of every file.
     """
-    findings, files, name = Findings(), list[str](), str(path)
-    root = read_tree(name, findings, files)
-    if root is None:
-        raise InputError(findings.faults)
-    root = override(root, overrides, findings)
-    project = validate(root, findings)
-    check_references(root, findings)
-    tables = read_tables(root, name, findings, files)
-    check_tables(root, tables, findings)
+    reading = Reading.of(str(path), overrides)
+    root, findings = reading.root, reading.findings
+    checked = reading.checked(ProjectFile)
+    findings.add(*check_references(root))
+    tables = read_tables(reading)
+    findings.add(*check_tables(root, tables))
     placed_models = {} if tables.models is None else check_models(root, tables.models, findings)
     source = current()
-    grid_folder = source.grids if source is not None and source.grids is not None else Path(name).parent
-    _check_certificates(root, findings)
-    _check_frames(root, grid_folder, findings)
-    findings.stop()
-    if project is None:  # cannot be: validate() had a reason, and stop() told it
-        raise InputError(f"{name} is not a valid project")
-    project = completed(project, root, name)
+    grid_folder = source.grids if source is not None and source.grids is not None else path.parent
+    findings.add(*_check_certificates(root), *_check_frames(root, grid_folder))
+    project = completed(reading.complete(checked), root, reading.file)
     inputs, notes = _inputs(project, tables, root, placed_models)
     grids = _grids(inputs)
-    read = (*map(Path, files), *(path.parent / grid for grid in grids if (grid_folder / grid).is_file()))
-    told = (*findings.notes, *notes)
-    return Project(inputs, settings(project), path, read, text_of(project), told, root, tables, grids, grid_folder)
+    return Project(
+        inputs=inputs,
+        settings=settings(project),
+        path=path,
+        files=(*map(Path, reading.files), *(path.parent / grid for grid in grids if (grid_folder / grid).is_file())),
+        resolved=text_of(project),
+        hints=(*findings.notes, *notes),
+        tree=root,
+        tables=tables,
+        grids=grids,
+        grid_folder=grid_folder,
+    )
 
 
 def _grids(inputs: Inputs) -> tuple[str, ...]:
@@ -167,54 +170,41 @@ def _seen_from(file: str, folder: Path) -> str:
         return file
 
 
-def _check_certificates(root: Node, findings: Findings) -> None:
+def _check_certificates(root: Node) -> Iterator[Fault]:
     """Solve the distances between fiducial marks once, to find out whether that can be done."""
     known = root.find("cameras")
     for name, node in (known.entries if known is not None else {}).items():
-        given = valid_section(schema.Camera, node)
+        given = valid_section(CameraBlock, node)
         if given is None:
-            continue  # the schema has told what is wrong with it
+            continue  # the schema says what is wrong with it
         try:
             certificate_of(given)
         except InputError as error:
-            for fault in error.faults:
-                path = ("cameras", name, *steps(fault.key))
-                told = fault_at(root, path, fault.message, fault.code, expected=fault.expected, fix=fault.fix)
-                findings.add(told)
+            yield from (at_own_key(fault, root, "cameras", name) for fault in error.faults)
 
 
-def _check_frames(root: Node, directory: Path, findings: Findings) -> None:
+def _check_frames(root: Node, directory: Path) -> Iterator[Fault]:
     """Tie the ground frames together once, to find out whether that can be done."""
-    node = root.find("control")
-    specs: dict[str, FrameSpec | None] = {}
-    for i, each in enumerate(node.elements if node is not None else []):
-        specs[f"control[{i}]"] = _spec(valid_section(schema.Control, each))
-    if (positions := root.find("camera_positions")) is not None:
-        specs["camera_positions"] = _spec(valid_section(schema.CameraPositions, positions))
-    if (orientations := root.find("orientations")) is not None:
-        specs["orientations"] = _spec(valid_section(schema.Orientations, orientations))
-    output = valid_section(schema.Output, root.find("output"))
-    known = {name: spec for name, spec in specs.items() if spec is not None}
-    if not known or len(known) != len(specs) or output is None:
-        return  # the schema has told what is wrong with them
+    lists = root.find("control")
+    blocks: list[tuple[str, type[GivenList], Node | None]] = [
+        (f"control[{i}]", Control, each) for i, each in enumerate(lists.elements if lists is not None else [])
+    ]
+    blocks += [("camera_positions", CameraPositionsBlock, root.find("camera_positions"))]
+    blocks += [("orientations", Orientations, root.find("orientations"))]
+    given = {name: valid_section(kind, node) for name, kind, node in blocks if node is not None}
+    specs = {name: frame_spec(each) for name, each in given.items() if each is not None}
+    output = valid_section(Output, root.find("output"))
+    if not specs or len(specs) != len(given) or output is None:
+        return  # the schema says what is wrong with them
     try:
-        target = output_spec(output, next(iter(known.values())))
-        tie_frames(list(known.values()), target, directory=directory, keys=list(known))
+        target = output_spec(output, next(iter(specs.values())))
+        tie_frames(list(specs.values()), target, directory=directory, keys=list(specs))
     except InputError as error:
-        findings.add(*(_placed(root, fault) for fault in error.faults))
-
-
-def _spec(given: schema.Control | schema.CameraPositions | schema.Orientations | None) -> FrameSpec | None:
-    return None if given is None else frame_spec(given)
-
-
-def _placed(root: Node, fault: Fault) -> Fault:
-    """Return a fault that only knows its key a place in a file."""
-    return fault_at(root, steps(fault.key), fault.message, fault.code, expected=fault.expected, fix=fault.fix)
+        yield from (at_own_key(fault, root) for fault in error.faults)
 
 
 def _inputs(
-    project: schema.ProjectFile, tables: Tables, root: Node, placed_models: Mapping[int, Sequence[str]]
+    project: ProjectFile, tables: Tables, root: Node, placed_models: Mapping[int, Sequence[str]]
 ) -> tuple[Inputs, list[Note]]:
     """Turn a project without faults into what the pipeline takes."""
     known = cameras(project)
@@ -241,7 +231,7 @@ def _inputs(
     return inputs, list(hints(project, tables, root))
 
 
-def _observations(project: schema.ProjectFile, tables: Tables, photos: dict[str, Camera]) -> PhotoPoints:
+def _observations(project: ProjectFile, tables: Tables, photos: dict[str, Camera]) -> PhotoPoints:
     """Image points of the photos of the strips."""
     given = project.observations
     if given is None or tables.observations is None:
@@ -250,9 +240,7 @@ def _observations(project: schema.ProjectFile, tables: Tables, photos: dict[str,
     return photo_points(tables.observations, system, photos)
 
 
-def _models(
-    project: schema.ProjectFile, tables: Tables, placed_models: Mapping[int, Sequence[str]]
-) -> MeasuredModels | None:
+def _models(project: ProjectFile, tables: Tables, placed_models: Mapping[int, Sequence[str]]) -> MeasuredModels | None:
     """Model coordinates of the strips."""
     if project.models is None or tables.models is None:
         return None
@@ -263,21 +251,21 @@ def _models(
     return measured_models(tables.models, project.models, flights)
 
 
-def _positions(project: schema.ProjectFile, tables: Tables, photos: dict[str, Camera]) -> CameraPositions | None:
+def _positions(project: ProjectFile, tables: Tables, photos: dict[str, Camera]) -> CameraPositions | None:
     """Measured positions of the cameras of the strips."""
     if project.camera_positions is None or tables.positions is None:
         return None
     return camera_positions(tables.positions, project.camera_positions, photos)
 
 
-def _orientations(project: schema.ProjectFile, tables: Tables, photos: dict[str, Camera]) -> GivenOrientations | None:
+def _orientations(project: ProjectFile, tables: Tables, photos: dict[str, Camera]) -> GivenOrientations | None:
     """Return the orientations of photos of the strips that are known beforehand."""
     if project.orientations is None or tables.orientations is None:
         return None
     return given_orientations(tables.orientations, project.orientations, photos)
 
 
-def _fiducials(project: schema.ProjectFile, tables: Tables, photos: dict[str, Camera]) -> PhotoPoints | None:
+def _fiducials(project: ProjectFile, tables: Tables, photos: dict[str, Camera]) -> PhotoPoints | None:
     """Measured fiducial marks of the photos of the strips."""
     given = project.fiducial_measurements
     if given is None or tables.fiducials is None:

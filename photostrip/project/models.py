@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from photostrip.errors import Fault
     from photostrip.formats.measured.models import ModelTable
     from photostrip.formats.text.findings import Findings
-    from photostrip.project.yaml import schema
+    from photostrip.project.schema.measurements import Models
     from photostrip.project.yaml.document import Node
 
     Floats = NDArray[np.float64]
@@ -195,7 +195,7 @@ def _as_listed(
 
 
 def measured_models(
-    tables: ModelTables, given: schema.Models, strips: Sequence[tuple[str, Sequence[str], Sequence[str]]]
+    tables: ModelTables, given: Models, strips: Sequence[tuple[str, Sequence[str], Sequence[str]]]
 ) -> MeasuredModels:
     """Bring model coordinates into millimetres and right-handed axes.
 

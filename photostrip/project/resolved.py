@@ -12,12 +12,15 @@ from pydantic import BaseModel
 from photostrip.formats.text.source import seen_from
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES
 from photostrip.project.conversion import first_frame, output_spec
+from photostrip.project.schema.cameras import Distortion
+from photostrip.project.schema.ground import Ellipsoid
+from photostrip.project.schema.values import Text
 from photostrip.project.yaml.merging import path_of
-from photostrip.project.yaml.schema import Distortion, Ellipsoid, ProjectFile, Text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from photostrip.project.schema.project_file import ProjectFile
     from photostrip.project.yaml.document import Node
 
 HEADER = (

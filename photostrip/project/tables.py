@@ -13,23 +13,23 @@ import numpy as np
 from photostrip.formats.measured.control import ControlTable, read_control, refuse_repeated
 from photostrip.formats.measured.exterior import OrientationTable, PositionTable, read_orientations, read_positions
 from photostrip.formats.measured.observations import Manner, read_measurements
-from photostrip.formats.text.findings import Findings, listed, suggestion
+from photostrip.formats.text.findings import listed, suggestion
 from photostrip.formats.text.numbers import NotANumber
 from photostrip.formats.text.numbers import number as read_number
 from photostrip.geometry.rotation import SYSTEMS
 from photostrip.project.models import ModelTables, model_tables, read_model_points
 from photostrip.project.yaml.document import fault_at
-from photostrip.project.yaml.merging import path_of, told_where_named
 from photostrip.project.yaml.references import listed_photos, marks_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
+    from photostrip.errors import Fault
     from photostrip.formats.measured.measurements import Measurements
+    from photostrip.formats.text.findings import Findings
     from photostrip.project.yaml.document import Node
+    from photostrip.project.yaml.reading import Reading
     from photostrip.project.yaml.references import ListedPhoto
-
-    Path = tuple[str | int, ...]
 
 LOOK_ALIKES = str.maketrans("авеѕіјкмнорстухoil", "abes1jkmh0pctyx011")  # after folding the case
 _ENDINGS = re.compile(r"(?im)\.(?:tiff?|jpe?g|png|jp2|img)$")
@@ -49,33 +49,32 @@ class Tables:
     models: ModelTables | None = None
 
 
-def read_tables(root: Node, project: str, findings: Findings, files: list[str]) -> Tables:
+def read_tables(reading: Reading) -> Tables:
     """Read every table that the project names, whether or not the rest of the project is right."""
+    root = reading.root
     photos = frozenset(photo.id for photo in listed_photos(root))
-    observations = fiducials = None
-    for path, inner in _named(root, ("observations",), project, findings, files):
-        observations = read_measurements(path, inner, _manner(root, "observations", photos))
-    for path, inner in _named(root, ("fiducial_measurements",), project, findings, files):
-        fiducials = read_measurements(path, inner, _manner(root, "fiducial_measurements", photos))
+    observations = fiducials = positions = orientations = points = centers = None
+    for path, findings in reading.named(("observations", "file")):
+        observations = read_measurements(path, findings, _manner(root, "observations", photos))
+    for path, findings in reading.named(("fiducial_measurements", "file")):
+        fiducials = read_measurements(path, findings, _manner(root, "fiducial_measurements", photos))
     control: list[ControlTable | None] = []
     lists = root.find("control")
     for number, node in enumerate(lists.elements if lists is not None else []):
         control.append(None)
-        for path, inner in _named(root, ("control", number), project, findings, files):
+        for path, findings in reading.named(("control", number, "file")):
             up, columns = _height_column(node), _columns(node)
-            control[-1] = read_control(path, up, inner, default_sigma=node.has("sigma"), columns=columns)
-    refuse_repeated(control, findings)
-    positions = orientations = None
-    for path, inner in _named(root, ("camera_positions",), project, findings, files):
+            control[-1] = read_control(path, up, findings, default_sigma=node.has("sigma"), columns=columns)
+    refuse_repeated(control, reading.findings)
+    for path, findings in reading.named(("camera_positions", "file")):
         node = root.entries["camera_positions"]
-        positions = read_positions(path, _height_column(node), inner, default_sigma=node.has("sigma"))
-    for path, inner in _named(root, ("orientations",), project, findings, files):
-        orientations = _orientations(path, root.entries["orientations"], inner)
-    points = centers = None
-    for path, inner in _named(root, ("models",), project, findings, files):
-        points = read_model_points(path, root, inner, centers=False)
-    for path, inner in _named(root, ("models", "centers"), project, findings, files):
-        centers = read_model_points(path, root, inner, centers=True)
+        positions = read_positions(path, _height_column(node), findings, default_sigma=node.has("sigma"))
+    for path, findings in reading.named(("orientations", "file")):
+        orientations = _orientations(path, root.entries["orientations"], findings)
+    for path, findings in reading.named(("models", "file")):
+        points = read_model_points(path, root, findings, centers=False)
+    for path, findings in reading.named(("models", "centers", "file")):
+        centers = read_model_points(path, root, findings, centers=True)
     models = model_tables(points, centers, root)
     return Tables(observations, fiducials, control, positions, orientations, models)
 
@@ -109,22 +108,6 @@ def _orientations(path: str, node: Node, findings: Findings) -> OrientationTable
     return read_orientations(path, system.split("-"), node.word("angles", "unit") or "deg", findings, needs_sigma=needs)
 
 
-def _named(
-    root: Node, owner: Path, project: str, findings: Findings, files: list[str]
-) -> Iterator[tuple[str, Findings]]:
-    """Return the path of a table and findings of its own; faults of the file as a whole are told where it is named."""
-    key = (*owner, "file")
-    node = root.find(*key)
-    if node is None or not node.text:
-        return
-    path = path_of(node, project)
-    inner = Findings(findings.notes)
-    yield path, inner
-    findings.absorb(inner, lambda fault: told_where_named(fault, root, key))
-    if path not in files:
-        files.append(path)
-
-
 def _height_column(node: Node) -> int:
     """Which of the columns x, y, z is the height, as far as the axes say it."""
     axes = node.find("axes")
@@ -132,22 +115,22 @@ def _height_column(node: Node) -> int:
     return next((number for number, name in enumerate(names[:3]) if name in {"up", "z"}), 2)
 
 
-def check_tables(root: Node, tables: Tables, findings: Findings) -> None:
-    """Check what must fit between the tables and the project file."""
+def check_tables(root: Node, tables: Tables) -> Iterator[Fault]:
+    """Return what does not fit between the tables and the project file."""
     photos = list(listed_photos(root))
     if tables.observations is not None:
-        _every_photo(root, photos, tables.observations, "no point", findings)
+        yield from _every_photo(root, photos, tables.observations, "no point")
     if tables.fiducials is not None:
-        _every_photo(root, photos, tables.fiducials, "no fiducial mark", findings)
-        _known_marks(root, photos, tables.fiducials, findings)
+        yield from _every_photo(root, photos, tables.fiducials, "no fiducial mark")
+        yield from _known_marks(root, photos, tables.fiducials)
     for section, read in (("camera_positions", tables.positions), ("orientations", tables.orientations)):
         if read is not None:
-            _some_photo(root, photos, section, read, findings)
+            yield from _some_photo(root, photos, section, read)
 
 
 def _some_photo(
-    root: Node, photos: list[ListedPhoto], section: str, read: PositionTable | OrientationTable, findings: Findings
-) -> None:
+    root: Node, photos: list[ListedPhoto], section: str, read: PositionTable | OrientationTable
+) -> Iterator[Fault]:
     """Refuse a table of cameras that has none of the strips' photos."""
     known = {photo.id for photo in photos}
     if not known or known & set(read.ids) or not len(read.table):
@@ -156,10 +139,10 @@ def _some_photo(
     named = f"; did you mean `{next(iter(near.values()))}`?" if near else ""
     message = f"{read.table.file} has none of the photos of the strips; its photos are {listed(read.ids, 4)}{named}"
     fix = "write the ids of the photos alike in both files"
-    findings.add(fault_at(root, (section, "file"), message, "not-measured", fix=fix))
+    yield fault_at(root, (section, "file"), message, "not-measured", fix=fix)
 
 
-def _every_photo(root: Node, photos: list[ListedPhoto], read: Measurements, nothing: str, findings: Findings) -> None:
+def _every_photo(root: Node, photos: list[ListedPhoto], read: Measurements, nothing: str) -> Iterator[Fault]:
     """Refuse photos of strips on which nothing is measured."""
     file = read.table.file
     known = {photo.id for photo in photos}
@@ -170,17 +153,17 @@ def _every_photo(root: Node, photos: list[ListedPhoto], read: Measurements, noth
     if len(missing) == len(known) > 1:
         message = f"{file} has {nothing} on any photo of the strips; its photos are {listed(strangers, 4)}"
         fix = "write the ids of the photos alike in both files"
-        findings.add(fault_at(root, ("strips",), message, "not-measured", fix=fix))
+        yield fault_at(root, ("strips",), message, "not-measured", fix=fix)
         return
     near = alike([photo.id for photo in missing], strangers)
     for photo in missing:
         twin = near.get(photo.id)
         fix = f"did you mean `{twin}`?" if twin else "measure it, or take it out of the strip"
         message = f"{file} has {nothing} on photo {photo.id}"
-        findings.add(fault_at(root, photo.path, message, "not-measured", fix=fix))
+        yield fault_at(root, photo.path, message, "not-measured", fix=fix)
 
 
-def _known_marks(root: Node, photos: list[ListedPhoto], read: Measurements, findings: Findings) -> None:
+def _known_marks(root: Node, photos: list[ListedPhoto], read: Measurements) -> Iterator[Fault]:
     """Refuse measured marks that the camera of the photo does not have."""
     cameras = list(dict.fromkeys(photo.camera for photo in photos))
     number = {photo.id: cameras.index(photo.camera) for photo in photos}
@@ -195,7 +178,7 @@ def _known_marks(root: Node, photos: list[ListedPhoto], read: Measurements, find
         fix = suggestion(mark, marks.entries)
         expected = f"one of {', '.join(marks.entries)}"
         message = f"camera {camera} has no mark {mark}"
-        findings.add(read.table.fault(row, "mark", message, "unknown-mark", expected=expected, fix=fix))
+        yield read.table.fault(row, "mark", message, "unknown-mark", expected=expected, fix=fix)
 
 
 def loose(names: Sequence[str]) -> list[str]:

@@ -8,15 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 from pydantic import PlainValidator, WithJsonSchema
 
 from photostrip.compare import SetTolerance, Tolerance, Tolerances
-from photostrip.errors import InputError
-from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.numbers import NotANumber, shown
 from photostrip.formats.text.numbers import number as read_number
-from photostrip.project.yaml.merging import read_tree
-from photostrip.project.yaml.schema import Flag, Section, Words, described, key, wrong
-from photostrip.project.yaml.validation import checked
+from photostrip.project.schema.for_editors import described
+from photostrip.project.schema.values import Flag, Section, Words, key, schema_number, wrong
+from photostrip.project.yaml.reading import read_file
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
 SCHEMA_NUMBER = 1
@@ -43,16 +42,14 @@ def _whole(value: object) -> int:
     return int(found)
 
 
-def _schema_number(value: object) -> int:
-    if value != str(SCHEMA_NUMBER):
-        message = f"this version of photostrip does not read schema {shown(str(value))} of tolerances"
-        raise wrong(message, code="schema-number", expected=f"photostrip_tolerances: {SCHEMA_NUMBER}")
-    return SCHEMA_NUMBER
-
-
 Size = Annotated[float, PlainValidator(_size), WithJsonSchema({"type": "number", "minimum": 0})]
 Whole = Annotated[int, PlainValidator(_whole), WithJsonSchema({"type": "integer", "minimum": 0})]
-SchemaNumber = Annotated[int, PlainValidator(_schema_number), WithJsonSchema({"const": SCHEMA_NUMBER})]
+_read_schema_number = schema_number("photostrip_tolerances", SCHEMA_NUMBER, " of tolerances")
+SchemaNumber = Annotated[
+    int,
+    PlainValidator(_read_schema_number),
+    WithJsonSchema({"const": SCHEMA_NUMBER}),
+]
 
 
 class Absolute(Section):
@@ -107,37 +104,15 @@ class ToleranceFile(Section):
 
 
 def tolerance_schema() -> dict[str, Any]:
-    """JSON Schema of a tolerance profile.
-
-    Returns
-    -------
-    dict
-        JSON Schema, draft 2020-12.
-    """
-    for field in ToleranceFile.model_fields.values():
-        if isinstance(field.annotation, type) and issubclass(field.annotation, Section):
-            field.annotation.model_rebuild()  # as for the project file
+    """JSON Schema of a tolerance profile."""
     return described(ToleranceFile, "photostrip tolerance profile")
 
 
-def load_tolerances(path: Path) -> tuple[Tolerances, tuple[str, ...]]:
-    """Read a tolerance profile.
-
-    Raises
-    ------
-    InputError
-        With every fault of the file.
-    """
-    findings, files = Findings(), list[str]()
-    root = read_tree(str(path), findings, files)
-    if root is None:
-        raise InputError(findings.faults)
-    given = checked(ToleranceFile, root, findings)
-    findings.stop()
-    if given is None:  # cannot be: checked() had a reason, and stop() told it
-        raise InputError(f"{path} is not a valid tolerance profile")
+def load_tolerances(path: Path) -> tuple[Tolerances, Sequence[str]]:
+    """Read a tolerance profile and name the files it was read from, or raise every fault of it."""
+    given, reading = read_file(ToleranceFile, str(path))
     kinds = {name: _completed(getattr(USUAL, name), getattr(given, name)) for name in Tolerances.__dataclass_fields__}
-    return Tolerances(**kinds), tuple(files)
+    return Tolerances(**kinds), reading.files
 
 
 def _completed(usual: Tolerance | SetTolerance, given: Section) -> Any:  # noqa: ANN401 (the type of `usual`)

@@ -9,7 +9,7 @@ import pytest
 
 from photostrip.errors import InputError
 from photostrip.pipeline import triangulate
-from photostrip.project.checks.checking import check_project
+from photostrip.project.checks.check import check_project
 from photostrip.project.loading import load_project
 from tests.project.samples import Sample, sample
 

@@ -10,7 +10,7 @@ import pytest
 from photostrip import simulate
 from photostrip.camera import Distortion
 from photostrip.errors import InputError
-from photostrip.project.simulation_spec import Specification, load_specification
+from photostrip.project.simulation import Specification, load_specification
 from photostrip.simulate import (
     DIGITAL,
     Control,
@@ -148,7 +148,7 @@ def test_keys_can_be_set_and_files_extended(tmp_path: Path) -> None:
     read = specification(tmp_path, "extends: base.yaml\nflight: {strips: 2}\n", "seed=9", "image.sigma_um=0")
     assert (read.spec.seed, read.spec.flight.photos, read.spec.flight.strips) == (9, 7, 2)
     assert read.spec.image.sigma_um == 0.0
-    assert [Path(file).name for file in read.files] == ["spec.yaml", "base.yaml"]
+    assert [Path(file).name for file in read.reading.files] == ["spec.yaml", "base.yaml"]
 
 
 @pytest.mark.parametrize(

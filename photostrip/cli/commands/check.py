@@ -29,7 +29,7 @@ def check(
     from photostrip.cli.check_output import print_checked
     from photostrip.cli.garbage import without_garbage_collection
     from photostrip.errors import EXIT_DONE, EXIT_INPUT
-    from photostrip.project.checks.checking import check_project
+    from photostrip.project.checks.check import check_project
     from photostrip.report.page.progress import progress
 
     found = []

@@ -31,9 +31,9 @@ def schema(
     import json
 
     from photostrip.formats.text.writing import write_text
-    from photostrip.project.plans.plan_schemas import plan_schema
-    from photostrip.project.simulation_spec import simulation_schema
-    from photostrip.project.yaml.schema import json_schema
+    from photostrip.project.plans.schemas import plan_schema
+    from photostrip.project.schema.project_file import json_schema
+    from photostrip.project.simulation import simulation_schema
 
     if tolerances:
         from photostrip.project.tolerance_profile import tolerance_schema

@@ -25,13 +25,13 @@ def simulate(
     """
     from photostrip.formats.output.simulation import project_files, summary
     from photostrip.formats.text.writing import make_rule, write_files, write_text
-    from photostrip.project.simulation_spec import load_specification
+    from photostrip.project.simulation import load_specification
 
     specification = load_specification(spec, assignments or [])
     simulation = specification.simulate()
     write_files(output, project_files(simulation))
     target = str(output / "project.yaml")
     if depfile is not None:
-        write_text(depfile, make_rule(target, specification.files))
+        write_text(depfile, make_rule(target, specification.reading.files))
     if not quiet:
         typer.echo(f"{target}: {summary(simulation)}", err=True)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-from io import StringIO
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.formats.output.csv_text import to_csv
 from photostrip.formats.output.plan_strip import along_rows
 from photostrip.planning.camera_efficiency import PRINTED_TABLE, by_efficiency, compare, source_cameras
 from photostrip.planning.model_plan import simple_accuracy
@@ -201,17 +200,7 @@ TABLES = {"model": "points", "cameras": "cameras", "source-table": "cameras"}
 
 
 def plan_csv(document: Document) -> str:
-    """Return the main table of a plan as CSV.
-
-    Returns
-    -------
-    str
-        Header and rows; the columns are the keys of the document's rows.
-    """
+    """Return the main table of a plan as CSV; its columns are the keys of the document's rows."""
     kind = document["kind"]
     rows = along_rows(document) if kind == "strip" else document[TABLES[kind]]
-    stream = StringIO()
-    writer = csv.DictWriter(stream, fieldnames=list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return stream.getvalue()
+    return to_csv(list(rows[0]), (row.values() for row in rows))

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from photostrip.formats.output.csv_text import to_csv
 from photostrip.result.numbers import rounded, significant
 from photostrip.terrestrial import accuracy
 from photostrip.terrestrial.directions import Phototheodolite, directions_from_photo, photo_from_directions
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from photostrip.terrestrial.orientation import Orientation, Settings, Sightings
 
     Floats = NDArray[np.float64]
+    Grid = tuple[Floats, Floats]  # x and z of a table over the photo in mm, from the principal point
 
 SCHEMA = 1
 ANGLE, ARCSEC, MILLIMETRE, MICROMETRE, RATIO = 8, 5, 6, 4, 5  # decimals: finer than any report prints
@@ -28,6 +30,22 @@ PER_RADIAN = {"deg": 180 / np.pi, "gon": 200 / np.pi}
 FULL_CIRCLE = 2 * np.pi
 ROUNDING = 1e-12  # rad
 UM = 1000.0  # in a millimetre
+
+
+class Attitude(NamedTuple):
+    """How a camera looks."""
+
+    angles: tuple[float, float, float]  # alpha, omega, kappa
+    rotation: Floats  # (3, 3): photo to ground
+    unit: str  # in which angles and directions are reported: ``"deg"`` or ``"gon"``
+
+
+class Theodolite(NamedTuple):
+    """Standard errors of directions measured in one round, in arcseconds, and the number of rounds."""
+
+    horizontal: float
+    vertical: float
+    rounds: int
 
 
 def head(kind: str, camera: Phototheodolite | None = None) -> Document:
@@ -60,48 +78,51 @@ def positive(angle: float) -> float:
 # ---------------------------------------------------------------------------------------------------- conversion
 
 
-def conversion(
-    camera: Phototheodolite,
-    angles: Sequence[float],
-    rotation: Floats,
-    points: tuple[Sequence[str], Floats],
-    options: tuple[str, float | None],
-    *,
-    to_photo: bool = False,
+def directions_document(
+    camera: Phototheodolite, attitude: Attitude, ids: Sequence[str], xz: Floats, sigma: float | None
 ) -> Document:
-    """Give photo coordinates with their directions.
+    """Return the directions of image points.
 
     Parameters
     ----------
-    angles : sequence of float
-        alpha, omega, kappa in radians.
-    rotation : ndarray, shape (3, 3)
-        Photo to ground.
-    points : tuple
-        Ids, and image coordinates in mm as measured or directions in radians.
-    options : tuple
-        Unit of angles, and standard deviation of an image coordinate in mm, None without standard deviations.
+    xz : ndarray, shape (n, 2)
+        Image coordinates in mm as measured.
+    sigma : float or None
+        Standard deviation of an image coordinate in mm, for those of the directions.
     """
-    ids, given = points
-    unit, sigma = options
-    f, centre = camera.principal_distance, np.array(camera.principal_point)
-    xz = photo_from_directions(given, f, rotation) if to_photo else given - centre
-    directions = given if to_photo else directions_from_photo(xz, f, rotation)
-    document = head("photo-coordinates" if to_photo else "directions", camera)
-    document["orientation"] = orientation_block(angles, unit)
+    reduced = xz - np.array(camera.principal_point)
+    directions = directions_from_photo(reduced, camera.principal_distance, attitude.rotation)
+    document = _points_and_directions("directions", camera, attitude, ids, reduced, directions)
+    if sigma is not None:
+        document["image_sigma_um"] = rounded(sigma * UM, MICROMETRE)
+        errors = accuracy.required(reduced, camera.principal_distance, sigma, attitude.rotation)
+        for row, angle, vertical in zip(document["points"], errors.angle, errors.vertical, strict=True):
+            row["sigma_lambda_arcsec"] = rounded(angle * ARCSECONDS, ARCSEC)
+            row["sigma_beta_arcsec"] = rounded(vertical * ARCSECONDS, ARCSEC)
+    return document
+
+
+def photo_document(camera: Phototheodolite, attitude: Attitude, ids: Sequence[str], directions: Floats) -> Document:
+    """Return where directions meet the photo."""
+    reduced = photo_from_directions(directions, camera.principal_distance, attitude.rotation)
+    return _points_and_directions("photo-coordinates", camera, attitude, ids, reduced, directions)
+
+
+def _points_and_directions(
+    kind: str, camera: Phototheodolite, attitude: Attitude, ids: Sequence[str], reduced: Floats, directions: Floats
+) -> Document:
+    """Return photo coordinates, which are reduced to the principal point here, with their directions."""
+    document = head(kind, camera)
+    unit = attitude.unit
+    document["orientation"] = orientation_block(attitude.angles, unit)
     document["units"] = {"x": "mm", "z": "mm", "lambda": unit, "beta": unit, "_arcsec": "seconds of arc"}
+    xz = rounded(reduced + np.array(camera.principal_point), MILLIMETRE)
     turned = np.array([[positive(each[0]), each[1]] for each in directions]).reshape(-1, 2)
-    rows = zip(ids, rounded(xz + centre, MILLIMETRE), rounded(turned * PER_RADIAN[unit], ANGLE), strict=True)
+    rows = zip(ids, xz, rounded(turned * PER_RADIAN[unit], ANGLE), strict=True)
     document["points"] = [
         {"id": name, "x": x, "z": z, "lambda": horizontal, "beta": vertical}
         for name, (x, z), (horizontal, vertical) in rows
     ]
-    if sigma is not None:
-        document["image_sigma_um"] = rounded(sigma * UM, MICROMETRE)
-        errors = accuracy.required(xz, f, sigma, rotation)
-        for row, angle, vertical in zip(document["points"], errors.angle, errors.vertical, strict=True):
-            row["sigma_lambda_arcsec"] = rounded(angle * ARCSECONDS, ARCSEC)
-            row["sigma_beta_arcsec"] = rounded(vertical * ARCSECONDS, ARCSEC)
     return document
 
 
@@ -109,29 +130,19 @@ def conversion(
 
 
 def required_accuracy(
-    camera: Phototheodolite,
-    angles: tuple[Sequence[float], Floats, str],
-    sigma: float,
-    grid: tuple[Floats, Floats],
-    *,
-    as_printed: bool = False,
+    camera: Phototheodolite, attitude: Attitude, sigma: float, grid: Grid, *, as_printed: bool = False
 ) -> Document:
     """Return the accuracy over the photo with which directions must be measured.
 
     Parameters
     ----------
-    angles : tuple
-        alpha, omega, kappa in radians, the rotation from photo to ground, and the unit of angles.
     sigma : float
         Standard error of image coordinates and principal distance in mm.
-    grid : tuple of ndarray
-        Coordinates x and z of the table in mm, from the principal point.
     """
-    x, z = (axis.ravel() for axis in np.meshgrid(*grid))
-    xz = np.column_stack([x, z])
-    exact = accuracy.required(xz, camera.principal_distance, sigma, angles[1])
+    xz = _grid_points(grid)
+    exact = accuracy.required(xz, camera.principal_distance, sigma, attitude.rotation)
     document = head("direction-accuracy", camera)
-    document["orientation"] = orientation_block(angles[0], angles[2])
+    document["orientation"] = orientation_block(attitude.angles, attitude.unit)
     document["image_sigma_um"] = rounded(sigma * UM, MICROMETRE)
     document["formulas"] = "as printed" if as_printed else "exact"
     document["units"] = {"x": "mm from the principal point", "z": "mm from the principal point"}
@@ -149,6 +160,10 @@ def required_accuracy(
     return document
 
 
+def _grid_points(grid: Grid) -> Floats:
+    return np.column_stack([axis.ravel() for axis in np.meshgrid(*grid)])
+
+
 def _table(xz: Floats, columns: dict[str, Floats], decimals: int) -> list[Document]:
     names = ("x", "z", *columns)
     values = np.column_stack([rounded(xz, MILLIMETRE), *(rounded(each, decimals) for each in columns.values())])
@@ -156,34 +171,22 @@ def _table(xz: Floats, columns: dict[str, Floats], decimals: int) -> list[Docume
 
 
 def theodolite_accuracy(
-    camera: Phototheodolite,
-    angles: tuple[Sequence[float], Floats, str],
-    theodolite: tuple[float, float, int],
-    sigma: float | None,
-    grid: tuple[Floats, Floats],
+    camera: Phototheodolite, attitude: Attitude, theodolite: Theodolite, sigma: float | None, grid: Grid
 ) -> Document:
     """Return the image accuracy over the photo that a theodolite can vouch for.
 
     Parameters
     ----------
-    angles : tuple
-        alpha, omega, kappa in radians, the rotation from photo to ground, and the unit of angles.
-    theodolite : tuple
-        Standard errors of a horizontal and a vertical direction measured in one round, in arcseconds, and the number of
-        rounds.
     sigma : float, optional
         Image accuracy wanted, mm: the rounds it needs are computed.
-    grid : tuple of ndarray
-        Coordinates x and z of the table in mm, from the principal point.
     """
-    x, z = (axis.ravel() for axis in np.meshgrid(*grid))
-    xz = np.column_stack([x, z])
+    xz = _grid_points(grid)
     horizontal, vertical, rounds = theodolite
     means = [accuracy.of_rounds(each, rounds) for each in (horizontal, vertical)]
     by = (means[0] / ARCSECONDS, means[1] / ARCSECONDS)
-    image = accuracy.supported(xz, camera.principal_distance, *by, angles[1]) * UM
+    image = accuracy.supported(xz, camera.principal_distance, *by, attitude.rotation) * UM
     document = head("theodolite-accuracy", camera)
-    document["orientation"] = orientation_block(angles[0], angles[2])
+    document["orientation"] = orientation_block(attitude.angles, attitude.unit)
     document["theodolite"] = {
         "horizontal_arcsec": rounded(horizontal, ARCSEC),
         "vertical_arcsec": rounded(vertical, ARCSEC),
@@ -197,7 +200,7 @@ def theodolite_accuracy(
         "by_both": rounded(image.max(), MICROMETRE),
     }
     if sigma is not None:
-        needed = accuracy.required(xz, camera.principal_distance, sigma, angles[1])
+        needed = accuracy.required(xz, camera.principal_distance, sigma, attitude.rotation)
         document["wanted"] = {
             "image_sigma_um": rounded(sigma * UM, MICROMETRE),
             "rounds_horizontal": accuracy.rounds_for(horizontal, float(needed.horizontal.min()) * ARCSECONDS),
@@ -324,3 +327,10 @@ def camera_list(cameras: dict[str, Phototheodolite]) -> Document:
         values = rounded([each.principal_distance, *each.principal_point, *size], MILLIMETRE)
         document["cameras"].append({"id": name, **dict(zip(keys, values, strict=True))})
     return document
+
+
+def points_csv(document: Document) -> str:
+    """Return the points, the worked examples or the cameras of a document as CSV."""
+    rows = next(document[key] for key in ("examples", "cameras", "points") if key in document)
+    names = list(rows[0]) if rows else ["id"]
+    return to_csv(["point" if name == "id" else name for name in names], (row.values() for row in rows))

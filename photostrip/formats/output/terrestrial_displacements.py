@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-from io import StringIO
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from photostrip.formats.output.csv_text import to_csv
 from photostrip.formats.output.terrestrial_directions import ARCSEC, MICROMETRE, RATIO, UM, head
 from photostrip.result.numbers import natural_rank, rounded, significant
 from photostrip.statistics import chi2_quantile
@@ -32,27 +31,24 @@ METRE = 6  # decimals: a micrometre on the ground
 COVARIANCES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 
+class ReportFrame(NamedTuple):
+    """Axes and times as the user wants them."""
+
+    axes: tuple[str, str, str]  # names of the ground axes in the user's order
+    order: tuple[int, int, int]  # which internal axis each of them is
+    time_unit: str
+
+
 def displacement_document(
     name: str,
     result: Monitoring,
     cameras: tuple[Phototheodolite, Phototheodolite],
-    frame: tuple[Sequence[str], Sequence[int], str],
+    frame: ReportFrame,
     notes: Iterable[Note] = (),
 ) -> Document:
-    """Return the document of displacements.
-
-    Parameters
-    ----------
-    frame : tuple
-        Names of the ground axes in the user's order, which internal axis each of them is, and the unit of times.
-
-    Returns
-    -------
-    dict
-        The document; numbers rounded, points in natural order.
-    """
-    axes, order, time_unit = frame
-    series, order = result.series, list(order)
+    """Return the document of displacements: numbers rounded, points in natural order."""
+    axes, order = frame.axes, list(frame.order)
+    series = result.series
     times = None if series.times is None else rounded(series.times, METRE)
     document = head("displacements")
     document["name"] = name
@@ -61,7 +57,7 @@ def displacement_document(
         "x, y, z, dx, dy, dz, sigma": f"metres along {', '.join(axes)}",
         "covariance": "square metres: xx, xy, xz, yy, yz, zz",
         "ellipse": "semi-axes in metres; azimuth of the major axis in degrees",
-        "rate": f"metres per {time_unit}",
+        "rate": f"metres per {frame.time_unit}",
         "_um": "micrometres in the photo, normal case",
         "_arcsec": "seconds of arc",
     }
@@ -208,12 +204,9 @@ def _step(result: Monitoring, step: Step, row: int, order: list[int], axes: Sequ
 
 
 def displacements_csv(document: Document) -> str:
-    """Return the displacements of all points and epochs since the first epoch as CSV.
+    """Return the displacements since the first epoch as CSV: a row for each point and later epoch.
 
-    Returns
-    -------
-    str
-        A row for each point and later epoch; cells are empty where a point has no displacement.
+    Cells are empty where a point has no displacement.
     """
     names = ("dx", "dy", "dz", "sigma_x", "sigma_y", "sigma_z", "length", "statistic", "significant")
     rows = []
@@ -241,34 +234,3 @@ def cameras_csv(document: Document) -> str:
         "removed",
     )
     return to_csv(names, ([row.get(name) for name in names] for row in document["cameras"]))
-
-
-def points_csv(document: Document) -> str:
-    """Return the rows ``points`` of a document of directions as CSV.
-
-    Parameters
-    ----------
-    document : dict
-        A document with points, worked examples or cameras that are all alike.
-    """
-    rows = next(document[key] for key in ("examples", "cameras", "points") if key in document)
-    names = list(rows[0]) if rows else ["id"]
-    return to_csv(
-        ["point" if name == "id" else name for name in names], ([row[name] for name in names] for row in rows)
-    )
-
-
-def to_csv(names: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """Write a table as CSV: empty cells for nothing, 1 and 0 for yes and no."""
-    stream = StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(names)
-    writer.writerows([_cell(cell) for cell in row] for row in rows)
-    return stream.getvalue()
-
-
-def _cell(value: object) -> object:
-    """Return a number without an exponent, a truth value as 1 or 0."""
-    if isinstance(value, bool):
-        return int(value)
-    return np.format_float_positional(value, trim="0") if isinstance(value, float) else value

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import os
-import re
-from pathlib import Path
+from dataclasses import replace
+from pathlib import Path as FilePath
 from typing import TYPE_CHECKING
 
 from photostrip.errors import Fault
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.numbers import shown
-from photostrip.project.yaml.document import COMMAND_LINE, Node, Place, fault_at, parse, read_document
+from photostrip.project.yaml.document import COMMAND_LINE, Node, Place, at_key, fault_at, steps
+from photostrip.project.yaml.parsing import parse, read_document
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from photostrip.project.yaml.document import Path
+
 LONGEST_CHAIN = 8
-_STEP = re.compile(r'(?:^|\.)(?:"([^"]*)"|([^."\[\]]+))|\[([0-9]{1,6})\]')
 
 
 def path_of(node: Node, project: str) -> str:
@@ -33,7 +35,7 @@ def path_of(node: Node, project: str) -> str:
         The path as the user could type it: relative to where `project` is relative to.
     """
     owner = project if node.place.file == COMMAND_LINE else node.place.file
-    return str(Path(owner).parent / node.text)  # `..` stays: behind a link it does not cancel the folder before it
+    return str(FilePath(owner).parent / node.text)  # `..` stays: behind a link it does not cancel the folder before it
 
 
 def read_tree(file: str, findings: Findings, files: list[str]) -> Node | None:
@@ -75,24 +77,18 @@ def _parent(root: Node, child: Node, chain: list[str], findings: Findings, files
         return None
     chain.append(real)
     files.append(path)
-    return read_named(path, child, ("extends",), findings)
-
-
-def read_named(path: str, owner: Node, key: tuple[str | int, ...], findings: Findings) -> Node | None:
-    """Read a YAML file that another one names; when the file as a whole is at fault, that place is told."""
     inner = Findings(findings.notes)
     parent = read_document(path, inner)
-    findings.absorb(inner, lambda fault: told_where_named(fault, owner, key))
+    findings.absorb(inner, lambda fault: where_named(fault, child, ("extends",)))
     return parent
 
 
-def told_where_named(fault: Fault, owner: Node, key: tuple[str | int, ...]) -> Fault:
-    """Return a fault of a file as a whole the place where the file is named; others keep their own."""
+def where_named(fault: Fault, owner: Node, key: Path) -> Fault:
+    """Return a fault of a file as a whole with the place where the file is named; others keep their own."""
     if fault.line:
         return fault
-    message = f"{shown(fault.file, 200)} {fault.message}"
     fix = fault.fix if fault.code != "file-directory" else ""  # there a project was looked for
-    return fault_at(owner, key, message, fault.code, expected=fault.expected, fix=fix)
+    return replace(at_key(fault, owner, key), message=f"{shown(fault.file, 200)} {fault.message}", fix=fix)
 
 
 def merge(base: Node, own: Node) -> Node:
@@ -145,19 +141,6 @@ def override(root: Node, assignments: Sequence[str], findings: Findings) -> Node
     return root
 
 
-def steps(name: str) -> tuple[str | int, ...]:
-    """Split ``cameras."RC.30".fiducials.F1[0]`` into its steps; none when it is no path."""
-    steps: list[str | int] = []
-    position = 0
-    while position < len(name):
-        match = _STEP.match(name, position)
-        if match is None:
-            return ()
-        steps.append(int(match[3]) if match[3] else match[1] or match[2])
-        position = match.end()
-    return tuple(steps)
-
-
 def _moved(node: Node, place: Place) -> Node:
     """Return a tree from the command line one place, without a line."""
     if isinstance(node.value, list):
@@ -168,7 +151,7 @@ def _moved(node: Node, place: Place) -> Node:
     return Node(node.value, place)
 
 
-def _assigned(root: Node, path: tuple[str | int, ...], value: Node, name: str, findings: Findings) -> Node:
+def _assigned(root: Node, path: Path, value: Node, name: str, findings: Findings) -> Node:
     """Return a copy of the tree in which one value is replaced."""
     if not path:
         return value

@@ -15,10 +15,8 @@ from photostrip.project.yaml.document import COMMAND_LINE, fault_at
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from photostrip.formats.text.findings import Findings
-    from photostrip.project.yaml.document import Node
-
-    Path = tuple[str | int, ...]
+    from photostrip.errors import Fault
+    from photostrip.project.yaml.document import Node, Path
 
 LEAST_MARKS = 2
 
@@ -42,17 +40,20 @@ def listed_photos(root: Node) -> Iterator[ListedPhoto]:
                 yield ListedPhoto(photo.text, ("strips", i, "photos", j), strip.word("camera"))
 
 
-def check_references(root: Node, findings: Findings) -> None:
-    """Check what refers to something else in the project file."""
-    _kind_of_measurements(root, findings)
-    _strips(root, findings)
-    _photos(root, findings)
-    _cameras(root, findings)
-    _system_of_coordinates(root, findings)
-    _units_of_sigma(root, findings)
-    _curvature(root, findings)
-    _needs_of_the_strip_method(root, findings)
-    _camera_positions(root, findings)
+def check_references(root: Node) -> Iterator[Fault]:
+    """Return what refers wrongly to something else in the project file."""
+    for check in (
+        _only_models if root.has("models") else _only_photos,
+        _strips,
+        _photos,
+        _cameras,
+        _system_of_coordinates,
+        _units_of_sigma,
+        _curvature,
+        _needs_of_the_strip_method,
+        _camera_positions,
+    ):
+        yield from check(root)
 
 
 NEEDED = {
@@ -67,45 +68,37 @@ NEEDS_IMAGES = {
 OF_PHOTOS = ("observations", "fiducial_measurements", "camera_positions", "orientations")
 
 
-def _kind_of_measurements(root: Node, findings: Findings) -> None:
-    """Ask for image coordinates and their cameras, or for models; refuse what needs the other kind."""
-    if root.has("models"):
-        _only_models(root, findings)
-    else:
-        _only_photos(root, findings)
-
-
-def _only_photos(root: Node, findings: Findings) -> None:
+def _only_photos(root: Node) -> Iterator[Fault]:
     """Ask for what image coordinates need."""
     for name, expected in NEEDED.items():
         if not root.has(name):
-            findings.add(fault_at(root, (name,), f"`{name}` is missing", "missing-key", expected=expected))
+            yield fault_at(root, (name,), f"`{name}` is missing", "missing-key", expected=expected)
     strips = root.find("strips")
     for number, strip in enumerate(strips.elements if strips is not None else []):
         if isinstance(strip.value, dict) and not strip.has("camera"):
             expected = "camera of all its photos, a key of `cameras`"
             path = ("strips", number, "camera")
-            findings.add(fault_at(root, path, "`camera` is missing", "missing-key", expected=expected))
+            yield fault_at(root, path, "`camera` is missing", "missing-key", expected=expected)
         if strip.has("models"):
             message, fix = "models are listed, and none are measured", "give their coordinates in `models`"
-            findings.add(fault_at(root, ("strips", number, "models"), message, "no-model", fix=fix))
+            yield fault_at(root, ("strips", number, "models"), message, "no-model", fix=fix)
 
 
-def _only_models(root: Node, findings: Findings) -> None:
+def _only_models(root: Node) -> Iterator[Fault]:
     """Refuse what model coordinates exclude."""
     for name in OF_PHOTOS:
         if root.has(name):
             message = f"`{name}` and `models` exclude each other: a strip is made of photos or of models"
-            findings.add(fault_at(root, (name,), message, "photos-and-models", fix="remove one of the two"))
+            yield fault_at(root, (name,), message, "photos-and-models", fix="remove one of the two")
     for name, (words, expected) in NEEDS_IMAGES.items():
         word = root.word("processing", name)
         if word.casefold() in words:
             message = f"`{name}: {word}` needs image coordinates; the project gives model coordinates"
             path = ("processing", name)
-            findings.add(fault_at(root, path, message, "needs-image-coordinates", expected=expected))
+            yield fault_at(root, path, message, "needs-image-coordinates", expected=expected)
 
 
-def _strips(root: Node, findings: Findings) -> None:
+def _strips(root: Node) -> Iterator[Fault]:
     """Refuse strips of the same name and cameras that do not exist."""
     strips, cameras = root.find("strips"), root.find("cameras")
     known = list(cameras.entries) if cameras is not None else []
@@ -115,15 +108,15 @@ def _strips(root: Node, findings: Findings) -> None:
         if name and first.setdefault(name, number) != number:
             line = root.place_of(("strips", first[name], "id")).line
             message = f"strip {shown(name)} exists already" + (f", in line {line}" if line else "")
-            findings.add(fault_at(root, ("strips", number, "id"), message, "duplicate-strip", fix="give it another id"))
+            yield fault_at(root, ("strips", number, "id"), message, "duplicate-strip", fix="give it another id")
         if camera and known and camera not in known:
             message = f"there is no camera `{shown(camera)}`"
             expected, fix = f"one of {', '.join(known)}", suggestion(camera, known)
             path = ("strips", number, "camera")
-            findings.add(fault_at(root, path, message, "unknown-camera", expected=expected, fix=fix))
+            yield fault_at(root, path, message, "unknown-camera", expected=expected, fix=fix)
 
 
-def _photos(root: Node, findings: Findings) -> None:
+def _photos(root: Node) -> Iterator[Fault]:
     """Refuse a photo that is listed twice, in one strip or in two."""
     first: dict[str, Path] = {}
     for photo in listed_photos(root):
@@ -134,7 +127,7 @@ def _photos(root: Node, findings: Findings) -> None:
         place = root.place_of(before)
         where = f"{place.file}:{place.line}:{place.column}" if place.line else place.file
         message = f"photo {shown(photo.id)} is listed already, in strip {shown(strip)} ({where})"
-        findings.add(fault_at(root, photo.path, message, "duplicate-photo", fix="list every photo once"))
+        yield fault_at(root, photo.path, message, "duplicate-photo", fix="list every photo once")
 
 
 def marks_of(camera: Node) -> Node | None:
@@ -143,7 +136,7 @@ def marks_of(camera: Node) -> Node | None:
     return camera.find("fiducial_places") if marks is None else marks
 
 
-def _cameras(root: Node, findings: Findings) -> None:
+def _cameras(root: Node) -> Iterator[Fault]:
     """Ask cameras for what their photos need: marks to orient by, the size of a pixel."""
     cameras, strips = root.find("cameras"), root.find("strips")
     used = dict.fromkeys(strip.word("camera") for strip in (strips.elements if strips is not None else []))
@@ -156,45 +149,45 @@ def _cameras(root: Node, findings: Findings) -> None:
         marks = marks_of(camera)
         if marks is not None and len(marks.entries) == 1:
             message = "one mark alone does not orient a photo"
-            findings.add(fault_at(root, (*path, "fiducials"), message, "length", expected="at least 2 marks"))
+            yield fault_at(root, (*path, "fiducials"), message, "length", expected="at least 2 marks")
         if name not in used or not isinstance(camera.value, dict):
             continue
         if marked and marks is None:
             message = f"fiducial marks are measured, but camera {shown(name)} has none"
             fix = "give their calibrated coordinates, or remove fiducial_measurements"
-            findings.add(fault_at(root, (*path, "fiducials"), message, "missing-key", fix=fix))
+            yield fault_at(root, (*path, "fiducials"), message, "missing-key", fix=fix)
         if (pixels or origin == "first-pixel") and "pixel_size" not in camera.entries:
             message = f"coordinates are measured in pixels, but camera {shown(name)} has no pixel_size"
             expected = "the size of a pixel in mm"
-            findings.add(fault_at(root, (*path, "pixel_size"), message, "missing-key", expected=expected))
+            yield fault_at(root, (*path, "pixel_size"), message, "missing-key", expected=expected)
         if cornered and "format" not in camera.entries:
             message = f"x and y begin at the {origin.replace('-', ' ')}, but camera {shown(name)} has no format"
             expected = "width and height in mm; or `observations.origin: center`"
-            findings.add(fault_at(root, (*path, "format"), message, "missing-key", expected=expected))
+            yield fault_at(root, (*path, "format"), message, "missing-key", expected=expected)
 
 
-def _system_of_coordinates(root: Node, findings: Findings) -> None:
+def _system_of_coordinates(root: Node) -> Iterator[Fault]:
     """Ask for the direction of y with pixels, and refuse an origin that would mean nothing."""
     if root.word("observations", "unit") == "px" and not root.has("observations", "y_axis"):
         message = "nothing says where y grows; with pixels both are in use"
         expected = "down (rows, as image viewers count) or up"
-        findings.add(fault_at(root, ("observations", "y_axis"), message, "missing-key", expected=expected))
+        yield fault_at(root, ("observations", "y_axis"), message, "missing-key", expected=expected)
     if root.has("fiducial_measurements") and root.has("observations", "origin"):
         message = "an origin means nothing here: the measured fiducial marks say where the photo lies"
-        findings.add(fault_at(root, ("observations", "origin"), message, "origin", fix="remove it"))
+        yield fault_at(root, ("observations", "origin"), message, "origin", fix="remove it")
 
 
-def _units_of_sigma(root: Node, findings: Findings) -> None:
+def _units_of_sigma(root: Node) -> Iterator[Fault]:
     """Refuse a standard deviation that would take its unit from another file, as when a preset changes below it."""
     for section in ("observations", "fiducial_measurements"):
         sigma, unit = root.find(section, "sigma"), root.find(section, "unit")
         if sigma is None or unit is None or sigma.place.file in {unit.place.file, COMMAND_LINE}:
             continue
         message = f"sigma stands in {sigma.place.file}, its unit in {unit.place.file}"
-        findings.add(fault_at(root, (section, "sigma"), message, "unit-elsewhere", fix="write both in one file"))
+        yield fault_at(root, (section, "sigma"), message, "unit-elsewhere", fix="write both in one file")
 
 
-def _curvature(root: Node, findings: Findings) -> None:
+def _curvature(root: Node) -> Iterator[Fault]:
     """Refuse to count the Earth's curvature twice."""
     if root.word("processing", "earth_curvature") not in {"model", "image"}:
         return
@@ -205,10 +198,10 @@ def _curvature(root: Node, findings: Findings) -> None:
         message = f"Earth curvature would be counted twice: coordinates in {shown(curved)} carry it already"
         fix = "remove earth_curvature, or give plane coordinates of an unknown projection as `crs: local`"
         path = ("processing", "earth_curvature")
-        findings.add(fault_at(root, path, message, "curvature-twice", expected="auto", fix=fix))
+        yield fault_at(root, path, message, "curvature-twice", expected="auto", fix=fix)
 
 
-def _needs_of_the_strip_method(root: Node, findings: Findings) -> None:
+def _needs_of_the_strip_method(root: Node) -> Iterator[Fault]:
     """Ask for two photos in each strip and for control, which a bundle adjustment can do without."""
     if root.word("processing", "adjustment") == "bundle":
         return
@@ -218,16 +211,16 @@ def _needs_of_the_strip_method(root: Node, findings: Findings) -> None:
         if photos is not None and len(photos.elements) == 1:
             path, fix = ("strips", number, "photos"), "or `processing.adjustment: bundle`, which takes single photos"
             message = "there is only one photo"
-            findings.add(fault_at(root, path, message, "length", expected="at least 2 photos", fix=fix))
+            yield fault_at(root, path, message, "length", expected="at least 2 photos", fix=fix)
     if control is None:
         expected = "lists of given ground coordinates, each in its own frame"
-        findings.add(fault_at(root, ("control",), "`control` is missing", "missing-key", expected=expected))
+        yield fault_at(root, ("control",), "`control` is missing", "missing-key", expected=expected)
     elif isinstance(control.value, list) and not control.value:
         expected = "at least 1 control list"
-        findings.add(fault_at(root, ("control",), "there is no control list", "length", expected=expected))
+        yield fault_at(root, ("control",), "there is no control list", "length", expected=expected)
 
 
-def _camera_positions(root: Node, findings: Findings) -> None:
+def _camera_positions(root: Node) -> Iterator[Fault]:
     """Refuse curvature by eq. 153 for positions that carry it: they must lie in the control's frame."""
     if root.word("processing", "earth_curvature") not in {"model", "image"}:
         return
@@ -236,4 +229,4 @@ def _camera_positions(root: Node, findings: Findings) -> None:
         if crs not in {"", "local"}:
             message = f"Earth curvature would be counted twice: {section} in {shown(crs)} carry it already"
             fix = "remove earth_curvature, or give the positions in the `local` frame of the control"
-            findings.add(fault_at(root, (section, "crs"), message, "curvature-twice", expected="local", fix=fix))
+            yield fault_at(root, (section, "crs"), message, "curvature-twice", expected="local", fix=fix)

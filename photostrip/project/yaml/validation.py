@@ -10,13 +10,13 @@ from pydantic import BaseModel, ValidationError
 from photostrip.errors import Fault
 from photostrip.formats.text.findings import counted, suggestion
 from photostrip.formats.text.numbers import shown
+from photostrip.project.schema.values import Section
 from photostrip.project.yaml.document import Node, fault_at, key_path, type_names
-from photostrip.project.yaml.schema import ProjectFile, Section
 
 if TYPE_CHECKING:
     from photostrip.formats.text.findings import Findings
+    from photostrip.project.yaml.document import Path
 
-    Path = tuple[str | int, ...]
     Model = type[Section]
 
 T = TypeVar("T", bound=Section)
@@ -27,17 +27,6 @@ EXPECTED = {
     "list_type": "a list ([a, b] or lines `- a`)",
     "tuple_type": "a list of values in brackets",
 }
-
-
-def validate(root: Node, findings: Findings) -> ProjectFile | None:
-    """Check the project against the schema.
-
-    Returns
-    -------
-    ProjectFile or None
-        The project with types and defaults; None when there are faults.
-    """
-    return checked(ProjectFile, root, findings)
 
 
 def checked(kind: type[T], root: Node, findings: Findings) -> T | None:
@@ -68,7 +57,7 @@ def valid_section(kind: type[T], node: Node | None) -> T | None:
     Returns
     -------
     Section or None
-        The section; None when it is at fault itself, which ``validate`` reports.
+        The section; None when it is at fault itself, which ``checked`` reports.
     """
     try:
         return kind.model_validate({} if node is None else node.plain)

@@ -11,7 +11,7 @@ import pyproj
 import pytest
 
 from photostrip.cli.main import main
-from photostrip.project.checks.checking import check_project
+from photostrip.project.checks.check import check_project
 from tests.project.samples import MARKED_FILES, OBSERVATIONS, Sample, sample
 from tests.results import spec, write_project
 from tests.source_tree import ROOT

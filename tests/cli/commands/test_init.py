@@ -12,10 +12,10 @@ import pytest
 from photostrip import __version__
 from photostrip.cli.command_table import COMMANDS
 from photostrip.cli.main import main
-from photostrip.project.checks.checking import check_project
-from photostrip.project.simulation_spec import SimulationFile
+from photostrip.project.checks.check import check_project
+from photostrip.project.schema.project_file import ProjectFile
+from photostrip.project.simulation import SimulationFile
 from photostrip.project.template import template_files
-from photostrip.project.yaml.schema import ProjectFile
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from photostrip.errors import InputError
-from photostrip.project.terrestrial.terrestrial_loading import load_survey
-from photostrip.project.terrestrial.terrestrial_presets import own_presets, read_presets
+from photostrip.project.terrestrial.cameras import own_presets, read_presets
+from photostrip.project.terrestrial.survey import load_survey
 from photostrip.terrestrial.epochs import monitor
 from tests.terrestrial.files import CENTERS, TRUTH, coordinates, project, pseudo_parallaxes, write
 from tests.test_packaging import build
@@ -51,7 +51,7 @@ def test_a_project_says_what_was_simulated(tmp_path: Path) -> None:
     assert survey.series.times is not None
     assert survey.series.times.tolist() == [0, 1, 2]
     assert [camera.name for camera in survey.cameras] == ["long", "wide"]
-    assert (survey.axes, survey.order, survey.name) == (("east", "north", "up"), (0, 1, 2), "quarry")
+    assert (survey.frame.axes, survey.frame.order, survey.name) == (("east", "north", "up"), (0, 1, 2), "quarry")
     assert [file.rpartition("/")[2] for file in survey.files] == ["survey.yaml", "coordinates.csv"]
     assert survey.notes == ()
 
@@ -87,7 +87,7 @@ def test_north_first_axes_gon_micrometres_and_z_downwards(tmp_path: Path) -> Non
     np.testing.assert_allclose(survey.pair.centers, CENTERS)
     np.testing.assert_allclose(survey.series.coordinates, TRUTH.measure(1).coordinates, atol=1e-8)
     np.testing.assert_allclose(survey.series.own, 0.005**2)
-    assert survey.order == (1, 0, 2)
+    assert survey.frame.order == (1, 0, 2)
 
 
 def test_principal_points_are_taken_off(tmp_path: Path) -> None:
@@ -140,7 +140,7 @@ PSEUDO = "point,x,z,p,dx,dz,dx_right\n1,30,-12,80,0.35,-0.2,0.1\n"
 
 def test_the_normal_case_reproduces_the_published_form(tmp_path: Path) -> None:
     survey = load_survey(write(tmp_path, NORMAL, PSEUDO, "pseudo.csv"))
-    assert survey.axes == ("right", "ahead", "up")
+    assert survey.frame.axes == ("right", "ahead", "up")
     assert survey.series.epochs == ("first", "second")
     result = monitor(survey.series, survey.pair, survey.settings)
     np.testing.assert_allclose(result.positions[0].values[0], [18.75, 625.0, -7.5], rtol=1e-12)

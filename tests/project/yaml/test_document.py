@@ -6,10 +6,11 @@ import pytest
 import yaml
 
 from photostrip.formats.text.findings import Findings
-from photostrip.project.yaml import document
-from photostrip.project.yaml.document import Node, Place, fault_at, key_path, parse
+from photostrip.project.yaml import parsing
+from photostrip.project.yaml.document import Node, Place, fault_at, key_path
+from photostrip.project.yaml.parsing import parse
 
-LOADERS = [pytest.param(yaml.BaseLoader, id="python"), pytest.param(document.LOADER, id="c")]
+LOADERS = [pytest.param(yaml.BaseLoader, id="python"), pytest.param(parsing.LOADER, id="c")]
 TEXT = """\
 # a comment
 ключ: Значение
@@ -25,7 +26,7 @@ after: {x: 🛩️, y: yes}
 
 @pytest.fixture(params=LOADERS)
 def _loader(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(document, "LOADER", request.param)
+    monkeypatch.setattr(parsing, "LOADER", request.param)
 
 
 def read(text: str) -> tuple[Node | None, Findings]:

@@ -10,8 +10,8 @@ import pytest
 from photostrip.formats.measured.control import read_control
 from photostrip.formats.measured.observations import Manner, read_measurements
 from photostrip.formats.text.findings import Findings
-from photostrip.project.yaml.document import parse
-from photostrip.project.yaml.schema import ProjectFile
+from photostrip.project.schema.project_file import ProjectFile
+from photostrip.project.yaml.parsing import parse
 from photostrip.project.yaml.validation import checked
 from tests.pages import blocks
 from tests.project.samples import MARKED_FILES, sample

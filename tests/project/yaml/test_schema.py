@@ -10,8 +10,11 @@ import pytest
 
 from photostrip.pipeline import Settings
 from photostrip.project.loading import json_schema
+from photostrip.project.schema.ground import Output
+from photostrip.project.schema.processing import Processing
+from photostrip.project.schema.project_file import ProjectFile, Tolerances
+from photostrip.project.schema.values import Section
 from photostrip.project.yaml import validation
-from photostrip.project.yaml.schema import Output, Processing, ProjectFile, Section, Tolerances
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Self
+from typing import TYPE_CHECKING, Annotated, NamedTuple, Self
 
 import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
 from photostrip.planning import camera_efficiency
-from photostrip.project.plans.plan_reading import SCHEMA_NUMBER, Percent, SigmaUm, read_plan
-from photostrip.project.terrestrial.terrestrial_presets import one_of
-from photostrip.project.yaml.schema import Id, Positive, Section, Words, key, wrong
+from photostrip.project.plans.flown import SCHEMA_NUMBER, Percent, SigmaUm, read_plan
+from photostrip.project.schema.values import Id, Positive, Section, Words, key, one_of, wrong
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -58,28 +56,21 @@ class CameraPlanFile(Section):
         return self
 
 
-@dataclass(frozen=True, eq=False)
-class CameraPlan:
+class CameraPlan(NamedTuple):
     """Cameras to compare."""
 
     name: str
     cameras: tuple[camera_efficiency.Camera, ...]
     reference: camera_efficiency.Camera
-    files: tuple[str, ...]
+    files: Sequence[str]
 
 
 def load_camera_plan(path: Path, assignments: Sequence[str]) -> CameraPlan:
-    """Read a list of cameras to compare.
-
-    Raises
-    ------
-    InputError
-        With every fault.
-    """
-    given, files, _ = read_plan(CameraPlanFile, path, assignments)
+    """Read a list of cameras to compare, or raise every fault of it."""
+    given, reading = read_plan(CameraPlanFile, path, assignments)
     cameras = tuple(_plan_camera(str(name), each, given.end_lap_percent) for name, each in given.cameras.items())
     named = {camera.name: camera for camera in cameras}
-    return CameraPlan(str(given.name), cameras, named.get(str(given.reference), cameras[-1]), files)
+    return CameraPlan(str(given.name), cameras, named.get(str(given.reference), cameras[-1]), reading.files)
 
 
 def _plan_camera(name: str, given: PlanCamera, end_lap: float) -> camera_efficiency.Camera:

@@ -2,35 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import Fault, InputError
-from photostrip.project.yaml.schema import wrong
+from photostrip.project.schema.values import Range
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from photostrip.formats.text.findings import Findings
     from photostrip.formats.text.tables import Table
 
 
-class Range(NamedTuple):
-    """Limits of a quantity."""
-
-    least: float
-    most: float
-    unit: str
-
-    def __str__(self) -> str:
-        """Say what is expected."""
-        return f"{self.least:g} to {self.most:g} {self.unit}".rstrip()
-
-    def holds(self, value: float) -> bool:
-        """Whether a value lies within the limits; never for NaN."""
-        return self.least <= value <= self.most
-
+MILLIMETRES = {"mm": 1.0, "um": 1e-3}  # in a unit of image coordinates
+RADIANS = {"deg": np.pi / 180, "gon": np.pi / 200}  # in a unit of angles
 
 PRINCIPAL_DISTANCE = Range(1.0, 1e5, "mm")
 FORMAT = Range(1.0, 1e4, "mm")
@@ -60,17 +47,6 @@ def within(option: str, value: float, limits: Range) -> float:
     return value
 
 
-def bounded(limits: Range) -> Callable[[float], float]:
-    """Make the check of a key of a project."""
-
-    def check(value: float) -> float:
-        if not limits.holds(value):
-            raise wrong(f"{value:g} is out of range", code="range", expected=str(limits))
-        return value
-
-    return check
-
-
 def refuse_outside(
     table: Table, columns: Sequence[str], limits: Range, findings: Findings, *, scale: float = 1.0, unit: str = ""
 ) -> None:
@@ -83,9 +59,9 @@ def refuse_outside(
     unit : str
         Unit of the table; default: that of the limits.
     """
-    here = Range(limits.least / scale, limits.most / scale, unit or limits.unit)
+    bounds = limits.scaled(scale, unit)
     for name in columns:
         values = table.column(name)
-        for row in np.flatnonzero(~np.isnan(values) & ~((values >= here.least) & (values <= here.most))):
+        for row in np.flatnonzero(~np.isnan(values) & ~((values >= bounds.least) & (values <= bounds.most))):
             message = f"{values[row]:g} is out of range"
-            findings.add(table.fault(int(row), name, message, "range", expected=str(here)))
+            findings.add(table.fault(int(row), name, message, "range", expected=str(bounds)))

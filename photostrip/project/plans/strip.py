@@ -7,29 +7,35 @@ from typing import TYPE_CHECKING, Annotated, Self
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from photostrip.errors import InputError
 from photostrip.formats.text.findings import suggestion
 from photostrip.planning.control_layout import LAYOUTS, USES, Layout, Spot
 from photostrip.planning.ideal_strip import LEAST_PHOTOS, StripGeometry
 from photostrip.planning.placement import Placement, Required
 from photostrip.planning.strip_design import Design, plan_strip
 from photostrip.planning.strip_methods import BUNDLE, METHODS
-from photostrip.project.plans.plan_reading import SCHEMA_NUMBER, Flown, Sigmas, read_plan
-from photostrip.project.simulation_spec import Whole, camera_of
-from photostrip.project.terrestrial.terrestrial_presets import one_of
-from photostrip.project.terrestrial.terrestrial_ranges import Range, bounded
-from photostrip.project.yaml.document import fault_at
-from photostrip.project.yaml.merging import steps
-from photostrip.project.yaml.schema import Flag, Id, Positive, Section, Words, key, wrong
+from photostrip.project.plans.flown import SCHEMA_NUMBER, Flown, Sigmas, read_plan
+from photostrip.project.schema.values import (
+    Flag,
+    Id,
+    Positive,
+    Range,
+    Section,
+    Whole,
+    Words,
+    bounded,
+    key,
+    one_of,
+    wrong,
+)
+from photostrip.project.simulation import camera_of
 from photostrip.simulate import Points
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from photostrip.errors import Fault
     from photostrip.planning.strip_design import Report
-    from photostrip.project.yaml.document import Node
+    from photostrip.project.yaml.reading import Reading
 
 MODELS = Range(LEAST_PHOTOS - 1, 400, "models")
 ROWS = Range(2, 20, "rows")
@@ -75,18 +81,7 @@ def _layout(value: object) -> object:
 
 
 def layout_option(word: str) -> tuple[str, str]:
-    """Return the key and the value that add a layout to a plan.
-
-    Parameters
-    ----------
-    word : str
-        ``corners``, ``corners+centre``, ``bands=3``, ``every=4``.
-
-    Returns
-    -------
-    key, value : str
-        ``layouts."3 bands"``: a name without an equals sign, and the word, ``"bands=3"``.
-    """
+    """Return the key and the value that add a layout to a plan: for ``bands=3`` ``layouts."3 bands"`` and the word."""
     kind, equals, number = word.partition("=")
     name = f"{number} band{'' if number == '1' else 's'}" if kind == "bands" else f"{kind} {number}"
     return f'layouts."{name if equals else word}"', f'"{word}"'
@@ -179,50 +174,31 @@ class StripPlan:
 
     name: str
     design: Design
-    files: tuple[str, ...]
-    root: Node
+    reading: Reading
 
-    def worked_out(self) -> Report:
-        """Work out the design.
+    def computed(self) -> Report:
+        """Compute what the plan asks for.
 
         Raises
         ------
         InputError
             With all that cannot be planned, each fault at its place in the file.
         """
-        try:
+        with self.reading.places(SIMULATED):
             return plan_strip(self.design)
-        except InputError as error:
-            raise InputError(self._placed(fault) for fault in error.faults) from None
-
-    def _placed(self, fault: Fault) -> Fault:
-        key = SIMULATED.get(fault.key, fault.key)
-        return fault_at(self.root, steps(key), fault.message, fault.code, expected=fault.expected, fix=fault.fix)
 
 
 def load_strip_plan(path: Path | None, assignments: Sequence[str]) -> StripPlan:
-    """Read the plan of a strip.
-
-    Parameters
-    ----------
-    path : Path, optional
-        The file; without one the assignments and defaults are the plan.
-
-    Raises
-    ------
-    InputError
-        With every fault.
-    """
-    given, files, root = read_plan(StripPlanFile, path, assignments)
+    """Read the plan of a strip, or raise all its faults; without a file the assignments and defaults are the plan."""
+    given, reading = read_plan(StripPlanFile, path, assignments)
     camera = camera_of(given.camera)
-    points = Points(given.points.rows, given.points.reach_percent, 0.0, given.points.extra_per_model)
     geometry = StripGeometry(
-        camera,
-        given.models + 1,
-        given.end_lap_percent,
-        given.scale_of(camera),
-        points,
-        given.image_sigma_um / 1000.0,
+        camera=camera,
+        photos=given.models + 1,
+        end_lap_percent=given.end_lap_percent,
+        scale=given.scale_of(camera),
+        points=Points(given.points.rows, given.points.reach_percent, 0.0, given.points.extra_per_model),
+        image_sigma=given.image_sigma_um / 1000.0,
     )
     usual = {name: StripLayout.model_validate(_layout(word)) for name, word in DEFAULT_LAYOUTS.items()}
     chosen = (given.layouts or usual).items()
@@ -236,20 +212,19 @@ def load_strip_plan(path: Path | None, assignments: Sequence[str]) -> StripPlan:
         placement = Placement(given.place.points, into, str(given.place.method), str(given.place.use))
     methods = tuple(dict.fromkeys(str(method) for method in given.methods))
     required = Required(given.required.plan, given.required.height)
-    return StripPlan(str(given.name), Design(geometry, layouts, methods, required, placement), files, root)
+    return StripPlan(str(given.name), Design(geometry, layouts, methods, required, placement), reading)
 
 
 def _of_layout(name: str, given: StripLayout, sigma: tuple[float, float, float]) -> Layout:
-    spots = tuple(Spot(spot.at[0], spot.at[1], str(spot.use)) for spot in given.points)
     return Layout(
-        name,
-        str(given.layout),
-        given.bands,
-        given.every,
-        given.per_band,
-        str(given.use),
-        spots,
-        given.sigma or sigma,
-        given.gnss,
-        given.gnss_offset,
+        name=name,
+        kind=str(given.layout),
+        bands=given.bands,
+        every=given.every,
+        per_band=given.per_band,
+        use=str(given.use),
+        spots=tuple(Spot(spot.at[0], spot.at[1], str(spot.use)) for spot in given.points),
+        sigma=given.sigma or sigma,
+        gnss=given.gnss,
+        gnss_offset=given.gnss_offset,
     )

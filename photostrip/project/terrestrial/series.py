@@ -20,8 +20,7 @@ from photostrip.formats.measured.terrestrial import (
 )
 from photostrip.formats.text.findings import counted, listed, suggestion
 from photostrip.notes import Note
-from photostrip.project.terrestrial.terrestrial_file import MILLIMETRES
-from photostrip.project.terrestrial.terrestrial_ranges import COORDINATE, IMAGE_SIGMA, refuse_outside
+from photostrip.project.terrestrial.ranges import COORDINATE, IMAGE_SIGMA, MILLIMETRES, refuse_outside
 from photostrip.terrestrial.monitoring import Series
 
 if TYPE_CHECKING:

@@ -9,66 +9,44 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import AfterValidator, BeforeValidator, PlainValidator, WithJsonSchema
+from pydantic import AfterValidator, BeforeValidator
 
 from photostrip import camera, simulate
-from photostrip.errors import InputError
-from photostrip.formats.text.findings import Findings, suggestion
-from photostrip.formats.text.numbers import NotANumber, shown
-from photostrip.formats.text.numbers import number as read_number
-from photostrip.project.yaml.document import fault_at
-from photostrip.project.yaml.merging import override, read_tree, steps
-from photostrip.project.yaml.schema import (
-    CRS,
+from photostrip.formats.text.findings import suggestion
+from photostrip.formats.text.numbers import shown
+from photostrip.project.conversion import distortion_of, semi_axes
+from photostrip.project.schema.cameras import Distortion
+from photostrip.project.schema.for_editors import described
+from photostrip.project.schema.ground import CRS, UNDULATION, Ellipsoid
+from photostrip.project.schema.measurements import Unit
+from photostrip.project.schema.values import (
     Axes,
-    Distortion,
-    Ellipsoid,
     Flag,
     Height,
     Number,
     Pair,
     Positive,
     Section,
-    Unit,
+    Triple,
+    Whole,
     Words,
     YAxis,
-    described,
     key,
+    schema_number,
     wrong,
 )
-from photostrip.project.yaml.validation import checked
+from photostrip.project.yaml.reading import read_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from photostrip.errors import Fault
-    from photostrip.project.yaml.document import Node
+    from photostrip.project.yaml.reading import Reading
 
 SCHEMA_NUMBER = 1
 USUAL = simulate.Spec()
 USUAL_MODELS = simulate.Models()
 USUAL_FILM, USUAL_GNSS, USUAL_ERROR = simulate.Film(), simulate.Gnss(), simulate.GrossError("image")
-
-
-def _whole(value: object) -> int:
-    expected = "a whole number"
-    if not isinstance(value, str) or not value:
-        raise wrong("no number stands here", code="type", expected=expected)
-    try:
-        result = read_number(value)
-    except NotANumber as why:
-        raise wrong(why.message, code="number", expected=expected, fix=why.fix) from None
-    if result != int(result):
-        raise wrong(f"{shown(value)} is not a whole number", code="number", expected=expected)
-    return int(result)
-
-
-def _schema_number(value: int) -> int:
-    if value != SCHEMA_NUMBER:
-        message = f"this version of photostrip does not read schema {value} of simulations"
-        raise wrong(message, code="schema-number", expected=f"photostrip_simulation: {SCHEMA_NUMBER}")
-    return value
 
 
 def _preset(value: str) -> str:
@@ -84,8 +62,6 @@ def _shares(value: object) -> object:
     return {value: "1"} if isinstance(value, str) and value else value
 
 
-Whole = Annotated[int, PlainValidator(_whole), WithJsonSchema({"type": "integer"})]
-Three = tuple[Number, Number, Number]
 Shares = Annotated[dict[str, Number], BeforeValidator(_shares)]
 
 
@@ -110,9 +86,7 @@ class Ground(Section):
     crs: Words = key(f"{CRS}; in `local` the world is flat", USUAL.ground.crs)
     axes: Axes = key("Order of x, y, z in the tables", USUAL.ground.axes)
     height: Height = key("Heights in the tables", USUAL.ground.height)
-    geoid_undulation: Number | None = key(
-        "Height of the geoid above the ellipsoid, for orthometric heights", None, unit="m"
-    )
+    geoid_undulation: Number | None = UNDULATION
     ellipsoid: Ellipsoid | None = key("Ellipsoid of `geocentric`; default: WGS 84", None)
     center_deg: Pair = key(
         "Longitude and latitude of the middle of the strips", USUAL.ground.center_deg, unit="degrees"
@@ -135,8 +109,8 @@ class Flight(Section):
         USUAL.flight.photo_rotation_deg,
         unit="degrees",
     )
-    attitude_sigma_deg: Three = key("Scatter of alpha, omega, kappa", USUAL.flight.attitude_sigma_deg, unit="degrees")
-    position_sigma: Three | None = key(
+    attitude_sigma_deg: Triple = key("Scatter of alpha, omega, kappa", USUAL.flight.attitude_sigma_deg, unit="degrees")
+    position_sigma: Triple | None = key(
         "Scatter of the cameras along, across, in height; default: 2, 2 and 1 % of the base", None, unit="m"
     )
 
@@ -171,8 +145,8 @@ class Control(Section):
     count: Whole = key("Control points of a strip in the layout `random`", USUAL.control.count)
     use: Shares = key("`xyz`, `xy` or `z`, or the share of each: {xyz: 0.5, z: 0.5}", USUAL.control.use)
     check: Whole | None = key("Check points; default: ten, or half of the points that are left", None)
-    sigma: Three = key("Stated standard deviations east, north, up", USUAL.control.sigma, unit="m")
-    noise: Three | None = key("Errors added, standard deviations; default: as stated", None, unit="m")
+    sigma: Triple = key("Stated standard deviations east, north, up", USUAL.control.sigma, unit="m")
+    noise: Triple | None = key("Errors added, standard deviations; default: as stated", None, unit="m")
     second_crs: Words | None = key("CRS of a second control file, for points east of the boundary", None)
     boundary_longitude_deg: Number | None = key("Boundary; default: the middle of the strips", None, unit="degrees")
 
@@ -212,15 +186,15 @@ class GrossError(Section):
 class Gnss(Section):
     """Measured positions of the cameras."""
 
-    sigma: Three = key("Standard deviations east, north, up", USUAL_GNSS.sigma, unit="m")
+    sigma: Triple = key("Standard deviations east, north, up", USUAL_GNSS.sigma, unit="m")
     use: Flag = key("Name the file in the project", USUAL_GNSS.use)
 
 
 class Models(Section):
     """Independent models measured on a plotter, in place of image coordinates."""
 
-    sigma_um: Three = key("Standard deviations of x, y, z of points at model scale", USUAL_MODELS.sigma_um, unit="um")
-    center_sigma_um: Three = key("The same of perspective centres", USUAL_MODELS.center_sigma_um, unit="um")
+    sigma_um: Triple = key("Standard deviations of x, y, z of points at model scale", USUAL_MODELS.sigma_um, unit="um")
+    center_sigma_um: Triple = key("The same of perspective centres", USUAL_MODELS.center_sigma_um, unit="um")
     scale: Number | None = key("Mean scale number of the models; default: that of the photos", None)
     axes: Words = key("`level`: nearly, turned about the vertical; `any`: lying in any way", USUAL_MODELS.axes)
     hand: Words = key("`right-handed` or `left-handed`", USUAL_MODELS.hand)
@@ -230,7 +204,9 @@ class Models(Section):
 class SimulationFile(Section):
     """A specification: strips of photos to be simulated. Every key has a default."""
 
-    photostrip_simulation: Annotated[Whole, AfterValidator(_schema_number)] = key("Number of this schema")
+    photostrip_simulation: Annotated[
+        Whole, AfterValidator(schema_number("photostrip_simulation", SCHEMA_NUMBER, " of simulations"))
+    ] = key("Number of this schema")
     extends: Words | None = key("Another file whose keys are taken where this one has none", None)
     name: Words = key("Name of the project", USUAL.name)
     seed: Whole = key("Number that all random numbers come from", USUAL.seed)
@@ -253,8 +229,7 @@ class Specification:
     """A specification and where its values stand."""
 
     spec: simulate.Spec
-    files: tuple[str, ...]
-    root: Node
+    reading: Reading
 
     def simulate(self) -> simulate.Simulation:
         """Simulate what is specified.
@@ -264,47 +239,18 @@ class Specification:
         InputError
             With all that cannot be simulated, each fault at its place in the file.
         """
-        try:
+        with self.reading.places():
             return simulate.simulate(self.spec)
-        except InputError as error:
-            raise InputError(self._placed(fault) for fault in error.faults) from None
-
-    def _placed(self, fault: Fault) -> Fault:
-        words = {"expected": fault.expected, "fix": fault.fix}
-        return fault_at(self.root, steps(fault.key), fault.message, fault.code, **words)
 
 
 def load_specification(path: Path, overrides: Sequence[str] = ()) -> Specification:
-    """Read the specification of a simulation.
-
-    Raises
-    ------
-    InputError
-        With every fault of the file.
-    """
-    findings, files = Findings(), list[str]()
-    root = read_tree(str(path), findings, files)
-    if root is None:
-        raise InputError(findings.faults)
-    root = override(root, overrides, findings)
-    given = checked(SimulationFile, root, findings)
-    findings.stop()
-    if given is None:  # cannot be: checked() had a reason, and stop() told it
-        raise InputError(f"{path} is not a valid specification")
-    return Specification(_spec(given), tuple(files), root)
+    """Read the specification of a simulation, or raise every fault of it."""
+    given, reading = read_file(SimulationFile, str(path), overrides)
+    return Specification(_spec(given), reading)
 
 
 def simulation_schema() -> dict[str, Any]:
-    """JSON Schema of the specification, with every key, default and unit.
-
-    Returns
-    -------
-    dict
-        JSON Schema, draft 2020-12.
-    """
-    for field in SimulationFile.model_fields.values():
-        if isinstance(field.annotation, type) and issubclass(field.annotation, Section):
-            field.annotation.model_rebuild()  # as for the project file
+    """JSON Schema of the specification."""
     return described(SimulationFile, "photostrip simulation")
 
 
@@ -314,7 +260,7 @@ def _spec(given: SimulationFile) -> simulate.Spec:
         name=str(given.name),
         seed=given.seed,
         camera=camera_of(given.camera),
-        ground=simulate.Ground(**_fields(given.ground) | {"ellipsoid": _semi_axes(given.ground.ellipsoid)}),
+        ground=simulate.Ground(**_fields(given.ground) | {"ellipsoid": semi_axes(given.ground.ellipsoid)}),
         flight=simulate.Flight(**_fields(given.flight)),
         terrain=simulate.Terrain(**_fields(given.terrain)),
         points=simulate.Points(**_fields(given.points)),
@@ -334,16 +280,9 @@ def _fields(section: Section) -> dict[str, Any]:
     return {name: str(value) if isinstance(value, str) else value for name, value in values.items()}
 
 
-def _semi_axes(given: Ellipsoid | None) -> tuple[float, float] | None:
-    return None if given is None else (given.a, given.b)
-
-
 def camera_of(given: SimulatedCamera) -> camera.Camera:
     """Return the preset with what is said beside it."""
     changed = {name: value for name, value in _fields(given).items() if value is not None and name != "preset"}
     if given.distortion is not None:
-        lens = given.distortion
-        changed["distortion"] = camera.Distortion(
-            lens.model, lens.direction, lens.k, lens.p, lens.b, tuple(lens.radius), tuple(lens.distortion)
-        )
+        changed["distortion"] = distortion_of(given.distortion)
     return replace(simulate.PRESETS[given.preset], **changed)

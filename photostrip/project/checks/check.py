@@ -19,7 +19,7 @@ from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline import overruling
 from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.run import require_whole
-from photostrip.project.checks.model_checking import (
+from photostrip.project.checks.models import (
     counts_of_models,
     links_of_models,
     model_sigma,
@@ -27,7 +27,7 @@ from photostrip.project.checks.model_checking import (
     points_of_strip,
     source_of,
 )
-from photostrip.project.checks.rows import gaps_of, observations_used, table_rows
+from photostrip.project.checks.table_rows import gaps_of, observations_used, table_rows
 from photostrip.project.loading import load_project
 from photostrip.project.yaml.document import fault_at
 from photostrip.triangulation.image_coordinates import corrections, interior

@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from photostrip.errors import Fault, InputError
 from photostrip.formats.measured.terrestrial import DIRECTION_POINTS, IMAGE_POINTS, SIGHTINGS, PointTable, read_points
+from photostrip.formats.output.terrestrial_directions import Attitude, Theodolite
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.numbers import NotANumber, number, shown
-from photostrip.project.terrestrial.terrestrial_file import MILLIMETRES
-from photostrip.project.terrestrial.terrestrial_presets import preset, read_presets
-from photostrip.project.terrestrial.terrestrial_ranges import (
+from photostrip.project.terrestrial.cameras import preset, read_presets
+from photostrip.project.terrestrial.ranges import (
     COORDINATE,
     DEGREES,
     DIRECTION_SIGMA,
     FORMAT,
     GON,
     IMAGE_SIGMA,
+    IMAGE_SIGMA_UM,
+    MILLIMETRES,
     PRINCIPAL_DISTANCE,
-    Range,
+    RADIANS,
     refuse_outside,
     within,
 )
@@ -36,60 +38,62 @@ if TYPE_CHECKING:
 
     from photostrip.formats.text.tables import Column
     from photostrip.notes import Note
+    from photostrip.project.schema.values import Range
 
     Floats = NDArray[np.float64]
 
-RADIANS = {"deg": np.pi / 180, "gon": np.pi / 200}
 STEEPEST = np.radians(89.9999)
 GIMBAL = 1e-6  # cosine of the elevation of the camera below which azimuth and roll are one
 
 
-@dataclass(frozen=True, slots=True)
-class CameraOptions:
-    """Options that say which camera it is."""
-
-    camera: str | None = None
-    presets: str | None = None
-    principal_distance: float | None = None  # f in mm, instead of the list's
-    # principal_point, photo_format: pairs of numbers in mm, likewise
-    principal_point: str | None = None
-    photo_format: str | None = None
-
-
-def chosen_camera(options: CameraOptions, *, with_format: bool = False) -> Phototheodolite:
-    """Return the camera that the options name.
+def chosen_camera(
+    name: str | None,
+    presets: str | None,
+    principal_distance: float | None,
+    *,
+    principal_point: str | None = None,
+    photo_format: str | None = None,
+) -> Phototheodolite:
+    """Return the camera that the options name: one of a list, with what is given instead of the list's numbers.
 
     Raises
     ------
     InputError
         With everything that is wrong with the options.
     """
-    if options.camera is None and options.principal_distance is None:
-        known = ", ".join(read_presets(options.presets))
-        message = "nothing says which camera it is"
-        raise InputError(
-            Fault(message, "no-camera", key="--camera", expected=f"one of {known}, or --principal-distance")
-        )
-    if options.camera is not None:
-        camera = preset(options.camera, read_presets(options.presets), "--camera")
-    else:
-        camera = Phototheodolite("camera", 0.0)
-    if options.principal_distance is not None:
-        distance = within("--principal-distance", options.principal_distance, PRINCIPAL_DISTANCE)
+    if name is None and principal_distance is None:
+        expected = f"one of {', '.join(read_presets(presets))}, or --principal-distance"
+        raise InputError(Fault("nothing says which camera it is", "no-camera", key="--camera", expected=expected))
+    camera = Phototheodolite("camera", 0.0) if name is None else preset(name, read_presets(presets), "--camera")
+    if principal_distance is not None:
+        distance = within("--principal-distance", principal_distance, PRINCIPAL_DISTANCE)
         camera = replace(camera, principal_distance=distance)
-    if options.principal_point is not None:
-        x0, z0 = (
-            within("--principal-point", each, COORDINATE) for each in pair("--principal-point", options.principal_point)
-        )
-        camera = replace(camera, principal_point=(x0, z0))
-    if options.photo_format is not None:
-        width, height = pair("--photo-format", options.photo_format)
-        size = (within("--photo-format", width, FORMAT), within("--photo-format", height, FORMAT))
-        camera = replace(camera, format=size)
-    if with_format and camera.format is None:
+    if principal_point is not None:
+        camera = replace(camera, principal_point=_pair_within("--principal-point", principal_point, COORDINATE))
+    if photo_format is not None:
+        camera = replace(camera, format=_pair_within("--photo-format", photo_format, FORMAT))
+    return camera
+
+
+def require_format(camera: Phototheodolite) -> Phototheodolite:
+    """Refuse a camera without a format."""
+    if camera.format is None:
         message = f"the camera {camera.name} has no format"
         raise InputError(Fault(message, "no-format", key="--photo-format", expected="WIDTH,HEIGHT in mm"))
     return camera
+
+
+def image_sigma(sigma_um: float) -> float:
+    """Return the standard deviation of an image coordinate in mm."""
+    return within("--sigma-um", sigma_um, IMAGE_SIGMA_UM) / 1000
+
+
+def theodolite_sigmas(horizontal: float, vertical: float | None, rounds: int) -> Theodolite:
+    """Return the standard deviations of directions in one round, in arcseconds, and the number of rounds."""
+    horizontal = within("--sigma-arcsec", horizontal, DIRECTION_SIGMA)
+    if vertical is not None:
+        within("--vertical-arcsec", vertical, DIRECTION_SIGMA)
+    return Theodolite(horizontal, horizontal if vertical is None else vertical, rounds)
 
 
 def pair(option: str, text: str) -> tuple[float, float]:
@@ -109,18 +113,13 @@ def pair(option: str, text: str) -> tuple[float, float]:
     raise InputError(Fault(f"`{shown(text)}` is not a pair", "pair", key=option, expected="two numbers A,B"))
 
 
-def looking(alpha: float, omega: float, kappa: float, unit: str) -> tuple[tuple[float, float, float], Floats]:
-    """Return the angles of a camera in radians, and its rotation.
+def _pair_within(option: str, text: str, limits: Range) -> tuple[float, float]:
+    first, second = (within(option, each, limits) for each in pair(option, text))
+    return first, second
 
-    Parameters
-    ----------
-    unit : str
-        ``"deg"`` or ``"gon"``.
 
-    Returns
-    -------
-    ndarray, shape (3, 3)
-        Photo to ground.
+def attitude(alpha: float, omega: float, kappa: float, unit: str) -> Attitude:
+    """Return the attitude of a camera, whose angles are in deg or gon.
 
     Raises
     ------
@@ -133,122 +132,90 @@ def looking(alpha: float, omega: float, kappa: float, unit: str) -> tuple[tuple[
     if abs(np.cos(angles[1])) < GIMBAL:
         message = f"with {omega:g} {unit} the camera looks straight up or down, which leaves it without an azimuth"
         raise InputError(Fault(message, "range", key="--omega", expected="an elevation below 90 degrees"))
-    return angles, ground_from_photo(*angles)
+    return Attitude(angles, ground_from_photo(*angles), unit)
 
 
 # -------------------------------------------------------------------------------------------------------- points
 
 
-def image_points(file: str | None, at: Sequence[str], unit: str) -> tuple[tuple[str, ...], Floats, tuple[Note, ...]]:
-    """Read image points from a table, or from the command line.
+class Points(NamedTuple):
+    """Points of a table or of the command line, where they are numbered."""
 
-    Parameters
-    ----------
-    file : str or None
-        Table ``point,x,z``.
-    unit : str
-        ``"mm"`` or ``"um"``.
+    ids: tuple[str, ...]
+    values: Floats  # (n, 2): coordinates x, z in mm, or directions lambda, beta in radians
+    notes: tuple[Note, ...]
+    table: PointTable | None
 
-    Returns
-    -------
-    ids : tuple of str
-        Points; numbers for those from the command line.
-    xz : ndarray, shape (n, 2)
-        Coordinates in mm.
+
+def image_points(file: str | None, at: Sequence[str], unit: str) -> Points:
+    """Read image points from a table ``point,x,z``, or from the command line.
 
     Raises
     ------
     InputError
         With every fault.
     """
-    _, ids, values, notes = _given(file, at, IMAGE_POINTS, ("x", "z"), (COORDINATE, MILLIMETRES[unit], unit))
-    return ids, values * MILLIMETRES[unit], notes
+    points = _points(file, at, IMAGE_POINTS, COORDINATE.scaled(MILLIMETRES[unit], unit))
+    return points._replace(values=points.values * MILLIMETRES[unit])
 
 
-def direction_points(
-    file: str | None, at: Sequence[str], unit: str, camera: Phototheodolite, rotation: Floats
-) -> tuple[tuple[str, ...], Floats, tuple[Note, ...]]:
-    """Read directions from a table, or from the command line, and refuse what the photo cannot show.
-
-    Parameters
-    ----------
-    file : str or None
-        Table ``point,lambda,beta``.
-    unit : str
-        ``"deg"`` or ``"gon"``.
-    rotation : ndarray, shape (3, 3)
-        Photo to ground.
-
-    Returns
-    -------
-    ids : tuple of str
-        Points; numbers for those from the command line.
-    directions : ndarray, shape (n, 2)
-        Radians.
+def direction_points(file: str | None, at: Sequence[str], camera: Phototheodolite, looking: Attitude) -> Points:
+    """Read directions from a table ``point,lambda,beta``, or from the command line.
 
     Raises
     ------
     InputError
-        With every fault.
+        With every fault; what the photo cannot show is one.
     """
-    table, ids, values, notes = _given(file, at, DIRECTION_POINTS, ("lambda", "beta"), (DEGREES, 1.0, unit))
-    directions = values * RADIANS[unit]
+    points = _points(file, at, DIRECTION_POINTS, DEGREES.scaled(1.0, looking.unit))
+    directions = points.values * RADIANS[looking.unit]
     steep = np.abs(directions[:, 1]) > STEEPEST
-    behind = np.isnan(photo_from_directions(directions, camera.principal_distance, rotation)).any(axis=1)
+    behind = np.isnan(photo_from_directions(directions, camera.principal_distance, looking.rotation)).any(axis=1)
     faults = []
     for row in np.flatnonzero(steep | behind):
-        message = f"the direction to point {ids[row]} is 90 degrees or more from the optical axis"
+        message = f"the direction to point {points.ids[row]} is 90 degrees or more from the optical axis"
         if steep[row]:
-            message = f"the direction to point {ids[row]} is not below the zenith"
-        faults.append(_at(table, int(row), "beta" if steep[row] else "lambda", message))
+            message = f"the direction to point {points.ids[row]} is not below the zenith"
+        faults.append(_outside(points.table, int(row), "beta" if steep[row] else "lambda", message))
     if faults:
         raise InputError(faults)
-    return ids, directions, notes
+    return points._replace(values=directions)
 
 
-def _at(table: PointTable | None, row: int, column: str, message: str) -> Fault:
+def _outside(table: PointTable | None, row: int, column: str, message: str) -> Fault:
     expected = "an elevation between -90 and 90 degrees" if column == "beta" else "a direction into the photo"
     if table is None:
         return Fault(message, "range", key="--at", expected=expected)
     return table.table.fault(row, column, message, "range", expected=expected)
 
 
-def _given(
-    file: str | None,
-    at: Sequence[str],
-    layout: Sequence[Column],
-    names: tuple[str, str],
-    limits: tuple[Range, float, str],
-) -> tuple[PointTable | None, tuple[str, ...], Floats, tuple[Note, ...]]:
-    """Read points from one of the two sources."""
-    bounds, scale, unit = limits
+def _points(file: str | None, at: Sequence[str], layout: Sequence[Column], limits: Range) -> Points:
+    """Read points from one of the two sources, in the unit of the limits."""
+    names = [column.name for column in layout if column.number]
     if (file is None) == (not at):
         message = "points are given twice, in a table and with --at" if at else "no points are given"
         raise InputError(Fault(message, "no-points", key="TABLE", expected=f"a table or --at {','.join(names)}"))
     if file is None:
         values = np.array([pair("--at", text) for text in at])
         for each in values.ravel():
-            within("--at", each, Range(bounds.least / scale, bounds.most / scale, unit))
-        return None, tuple(map(str, range(1, len(at) + 1))), values, ()
+            within("--at", each, limits)
+        return Points(tuple(map(str, range(1, len(at) + 1))), values, (), None)
     findings = Findings()
     read = read_points(file, layout, findings)
     if read is None:
         raise InputError(findings.faults)
-    refuse_outside(read.table, names, bounds, findings, scale=scale, unit=unit)
+    refuse_outside(read.table, names, limits, findings)
     findings.stop()
-    return read, read.ids, read.columns(*names), tuple(findings.notes)
+    return Points(read.ids, read.columns(*names), tuple(findings.notes), read)
 
 
-@dataclass(frozen=True, slots=True)
-class SightingOptions:
+class SightingOptions(NamedTuple):
     """What the numbers of a table of sightings mean."""
 
     unit: str  # unit of image coordinates, ``"mm"`` or ``"um"``
     angles: str  # unit of directions, ``"deg"`` or ``"gon"``
     sigma: float  # standard deviation of image coordinates in mm of rows without one
-    # horizontal, vertical: standard deviations of directions in arcseconds of rows without one
-    horizontal: float
-    vertical: float
+    theodolite: Theodolite  # standard deviations of directions of rows without one
 
 
 def read_sightings(file: str, options: SightingOptions) -> tuple[Sightings, tuple[Note, ...]]:
@@ -290,13 +257,13 @@ def read_sightings(file: str, options: SightingOptions) -> tuple[Sightings, tupl
         findings.add(read.table.fault(int(row), "beta", message, "range", expected=expected))
     findings.stop()
     image, angular = read.columns("sx", "sz") * scale, read.columns("s_lambda", "s_beta")
-    usual = np.array([options.horizontal, options.vertical])
+    usual = np.array([options.theodolite.horizontal, options.theodolite.vertical]) / options.theodolite.rounds**0.5
     sightings = Sightings(
-        read.ids,
-        read.columns("x", "z") * scale,
-        directions * RADIANS[options.angles],
-        np.where(np.isnan(image), options.sigma, image),
-        np.where(np.isnan(angular), usual, angular) / ARCSECONDS,
+        ids=read.ids,
+        xz=read.columns("x", "z") * scale,
+        directions=directions * RADIANS[options.angles],
+        sigma_xz=np.where(np.isnan(image), options.sigma, image),
+        sigma_directions=np.where(np.isnan(angular), usual, angular) / ARCSECONDS,
     )
     return sightings, tuple(findings.notes)
 

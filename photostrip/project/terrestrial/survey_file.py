@@ -7,21 +7,24 @@ from typing import Annotated, Self
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from photostrip.geodesy.frame_spec import GROUND_AXES
-from photostrip.project.terrestrial.terrestrial_presets import Distance, Place, Size, one_of
-from photostrip.project.terrestrial.terrestrial_ranges import (
-    BASE,
-    DEGREES,
-    IMAGE_SIGMA,
-    POSITION,
-    SIGNIFICANCE,
-    TIME,
+from photostrip.project.schema.values import (
+    Axes,
+    Id,
+    Number,
+    Positive,
+    Section,
+    Words,
+    YAxis,
     bounded,
+    key,
+    one_of,
+    wrong,
 )
-from photostrip.project.yaml.schema import Axes, Id, Number, Positive, Section, Words, YAxis, key, wrong
+from photostrip.project.terrestrial.cameras import Distance, Place, Size
+from photostrip.project.terrestrial.ranges import BASE, DEGREES, IMAGE_SIGMA, MILLIMETRES, POSITION, SIGNIFICANCE, TIME
 from photostrip.terrestrial.monitoring import MOVED_CAMERA, Settings
 
 SCHEMA_NUMBER = "1"
-MILLIMETRES = {"mm": 1.0, "um": 1e-3}
 USUAL = Settings()
 Coordinate = Annotated[Number, AfterValidator(bounded(POSITION))]
 Three = tuple[Coordinate, Coordinate, Coordinate]

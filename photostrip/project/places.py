@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.project.yaml.merging import steps
+from photostrip.project.yaml.document import steps
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from photostrip.project.yaml.document import Node
 
 
-def placed(
+def places_of(
     findings: Iterable[Finding], tree: Node, tables: Tables, strips: Sequence[Strip | ModelStrip]
 ) -> Iterator[Finding]:
     """Give findings with the places of what they name.

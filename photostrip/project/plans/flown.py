@@ -13,12 +13,10 @@ from pydantic import AfterValidator, model_validator
 from photostrip.errors import InputError
 from photostrip.formats.text.findings import Findings
 from photostrip.planning.ideal_strip import StripGeometry
-from photostrip.project.simulation_spec import SimulatedCamera, Three
-from photostrip.project.terrestrial.terrestrial_ranges import Range, bounded
+from photostrip.project.schema.values import Positive, Range, Section, Triple, Words, bounded, key, wrong
+from photostrip.project.simulation import SimulatedCamera
 from photostrip.project.yaml.document import COMMAND_LINE, Node, Place, fault_at
-from photostrip.project.yaml.merging import override, read_tree
-from photostrip.project.yaml.schema import Positive, Section, Words, key, wrong
-from photostrip.project.yaml.validation import checked
+from photostrip.project.yaml.reading import Reading
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -48,7 +46,7 @@ def all_positive(value: tuple[float, float, float]) -> tuple[float, float, float
     return value
 
 
-Sigmas = Annotated[Three, AfterValidator(all_positive)]
+Sigmas = Annotated[Triple, AfterValidator(all_positive)]
 
 
 class Flown(Section):
@@ -73,34 +71,23 @@ class Flown(Section):
         return self.scale or by_height or StripGeometry.scale
 
 
-def read_plan(kind: type[T], path: Path | None, assignments: Sequence[str]) -> tuple[T, tuple[str, ...], Node]:
+def read_plan(kind: type[T], path: Path | None, assignments: Sequence[str]) -> tuple[T, Reading]:
     """Read a plan file, or make one of assignments alone.
-
-    Parameters
-    ----------
-    kind : type
-        Schema of the file; one of its keys is the number of the schema.
 
     Raises
     ------
     InputError
         With every fault.
     """
-    findings, files = Findings(), list[str]()
     if path is None:
         place, number = Place(COMMAND_LINE), next(name for name in kind.model_fields if name in NUMBER_KEYS)
-        root: Node | None = Node({number: Node(SCHEMA_NUMBER, place)}, place, {number: place})
+        root = Node({number: Node(SCHEMA_NUMBER, place)}, place, {number: place})
+        reading = Reading(COMMAND_LINE, root, Findings(), [])
     else:
-        root = read_tree(str(path), findings, files)
-    if root is None:
-        raise InputError(findings.faults)
-    _require_kind(kind, root)
-    root = override(root, assignments, findings)
-    given = checked(kind, root, findings)
-    findings.stop()
-    if given is None:  # cannot be: checked() had a reason, and stop() told it
-        raise InputError(f"{path} is not a valid plan")
-    return given, tuple(files), root
+        reading = Reading.of(str(path))
+    _require_kind(kind, reading.root)
+    reading = reading.with_set(assignments)
+    return reading.read(kind), reading
 
 
 def _require_kind(kind: type[Section], root: Node) -> None:

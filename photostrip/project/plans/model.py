@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from pydantic import AfterValidator, BeforeValidator
 
 from photostrip.planning.model_plan import LAYOUTS, ControlPoint, ModelSpec, control_layout
-from photostrip.project.plans.plan_reading import SCHEMA_NUMBER, Flown, Sigmas, read_plan
-from photostrip.project.simulation_spec import Whole, camera_of
-from photostrip.project.terrestrial.terrestrial_presets import one_of
-from photostrip.project.terrestrial.terrestrial_ranges import Range, bounded
-from photostrip.project.yaml.schema import Pair, Positive, Section, Words, key
+from photostrip.project.plans.flown import SCHEMA_NUMBER, Flown, Sigmas, read_plan
+from photostrip.project.schema.values import Pair, Positive, Range, Section, Whole, Words, bounded, key, one_of
+from photostrip.project.simulation import camera_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -76,45 +73,33 @@ class ModelPlanFile(Flown):
     grid: Grid = key("Where errors are computed", Grid.model_construct())
 
 
-@dataclass(frozen=True, eq=False)
-class ModelPlan:
+class ModelPlan(NamedTuple):
     """A plan of one model."""
 
     name: str
     camera: str
     spec: ModelSpec
-    files: tuple[str, ...]
+    files: Sequence[str]
 
 
 def load_model_plan(path: Path | None, assignments: Sequence[str]) -> ModelPlan:
-    """Read the plan of a model.
-
-    Parameters
-    ----------
-    path : Path, optional
-        The file; without one the assignments and defaults are the plan.
-
-    Raises
-    ------
-    InputError
-        With every fault.
-    """
-    given, files, _ = read_plan(ModelPlanFile, path, assignments)
+    """Read the plan of a model, or raise all its faults; without a file the assignments and defaults are the plan."""
+    given, reading = read_plan(ModelPlanFile, path, assignments)
     camera = camera_of(given.camera)
     along, across = camera.format or (230.0, 230.0)
     base = given.base or along * (1.0 - given.end_lap_percent / 100.0)
     width = across / 2.0 * given.reach_percent / 100.0
     points = tuple(ControlPoint(point.at, str(point.use)) for point in given.control.points)
     spec = ModelSpec(
-        camera.principal_distance,
-        base,
-        width,
-        given.scale_of(camera),
-        given.image_sigma_um / 1000.0,
-        given.orientation.zone_points,
-        tuple(given.orientation.points),
-        points or control_layout(str(given.control.layout), base, width),
-        given.control.sigma,
-        (given.grid.columns, given.grid.rows),
+        focal=camera.principal_distance,
+        base=base,
+        width=width,
+        scale=given.scale_of(camera),
+        image_sigma=given.image_sigma_um / 1000.0,
+        zone_points=given.orientation.zone_points,
+        orientation_points=tuple(given.orientation.points),
+        control=points or control_layout(str(given.control.layout), base, width),
+        control_sigma=given.control.sigma,
+        grid=(given.grid.columns, given.grid.rows),
     )
-    return ModelPlan(str(given.name), camera.name, spec, files)
+    return ModelPlan(str(given.name), camera.name, spec, reading.files)

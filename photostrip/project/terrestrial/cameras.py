@@ -10,32 +10,17 @@ from pydantic import AfterValidator, Field
 from photostrip.errors import Fault, InputError
 from photostrip.formats.text.findings import Findings, suggestion
 from photostrip.formats.text.numbers import shown
-from photostrip.project.terrestrial.terrestrial_ranges import COORDINATE, FORMAT, PRINCIPAL_DISTANCE, bounded
-from photostrip.project.yaml.document import parse, read_document
-from photostrip.project.yaml.schema import Id, Number, Section, Words, key, wrong
+from photostrip.project.schema.values import Id, Number, Section, Words, bounded, key, one_of
+from photostrip.project.terrestrial.ranges import COORDINATE, FORMAT, PRINCIPAL_DISTANCE
+from photostrip.project.yaml.parsing import parse, read_document
 from photostrip.project.yaml.validation import checked
 from photostrip.terrestrial.directions import Phototheodolite
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from photostrip.project.yaml.document import Node
 
 OWN_LIST = "phototheodolites.yaml"
 SCHEMA_NUMBER = "1"
-
-
-def one_of(*words: str) -> Callable[[str], str]:
-    """Make the check of a word from a list."""
-
-    def check(value: str) -> str:
-        if value not in words:
-            expected = words[0] if len(words) == 1 else f"one of {', '.join(words)}"
-            fix = suggestion(value, words)
-            raise wrong(f"`{shown(value)}` is not known", code="word", expected=expected, fix=fix)
-        return str(value)
-
-    return check
 
 
 Distance = Annotated[Number, AfterValidator(bounded(PRINCIPAL_DISTANCE))]
@@ -64,19 +49,13 @@ def own_presets() -> dict[str, Phototheodolite]:
     """Return the cameras that come with the program."""
     text = resources.files("photostrip.terrestrial").joinpath(OWN_LIST).read_text(encoding="utf-8")
     findings = Findings()
-    root = parse(text, OWN_LIST, findings)
-    found = _cameras(root, findings)
+    found = listed_cameras(parse(text, OWN_LIST, findings), findings)
     findings.stop()
     return found
 
 
 def read_presets(file: str | None) -> dict[str, Phototheodolite]:
-    """Return all cameras that can be named.
-
-    Parameters
-    ----------
-    file : str, optional
-        A list of the user; its cameras come after those of the program and replace cameras of the same name.
+    """Return all cameras that can be named; those of the user's list replace cameras of the program of the same name.
 
     Raises
     ------
@@ -86,12 +65,13 @@ def read_presets(file: str | None) -> dict[str, Phototheodolite]:
     if file is None:
         return own_presets()
     findings = Findings()
-    found = _cameras(read_document(file, findings), findings)
+    found = listed_cameras(read_document(file, findings), findings)
     findings.stop()
     return own_presets() | found
 
 
-def _cameras(root: Node | None, findings: Findings) -> dict[str, Phototheodolite]:
+def listed_cameras(root: Node | None, findings: Findings) -> dict[str, Phototheodolite]:
+    """Return the cameras of a list; none when it is at fault."""
     given = checked(PresetFile, root, findings) if root is not None else None
     if given is None:
         return {}

@@ -1,0 +1,49 @@
+"""Groups of options that several commands have: declared once as a dataclass, one parameter of each command."""
+
+from __future__ import annotations
+
+import inspect
+from dataclasses import MISSING, fields, is_dataclass
+from functools import wraps
+from inspect import Parameter
+from typing import TYPE_CHECKING, Any, get_type_hints
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    Command = Callable[..., None]
+
+
+def with_groups(command: Command) -> Command:
+    """Let a command that takes groups of options show typer every option of its own.
+
+    A parameter whose type is a dataclass stands for the fields of it, in their order and with their defaults.
+    """
+    hints = get_type_hints(command, include_extras=True)
+    groups = {name: kind for name, kind in hints.items() if is_dataclass(kind) and isinstance(kind, type)}
+    options: list[Parameter] = []
+    for name, parameter in inspect.signature(command).parameters.items():
+        options += _options_of(groups[name]) if name in groups else [_option(name, parameter.default, hints[name])]
+
+    @wraps(command)
+    def run(**given: Any) -> None:  # noqa: ANN401 (what typer read)
+        for name, kind in groups.items():
+            given[name] = kind(**{each.name: given.pop(each.name) for each in fields(kind)})
+        command(**given)
+
+    run.__signature__ = inspect.Signature(options)  # type: ignore[attr-defined]
+    run.__annotations__ = {each.name: each.annotation for each in options}
+    del run.__wrapped__
+    return run
+
+
+def _options_of(group: type) -> list[Parameter]:
+    hints = get_type_hints(group, include_extras=True)
+    return [
+        _option(each.name, Parameter.empty if each.default is MISSING else each.default, hints[each.name])
+        for each in fields(group)
+    ]
+
+
+def _option(name: str, default: object, annotation: object) -> Parameter:
+    return Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=annotation)

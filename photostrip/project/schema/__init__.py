@@ -1,0 +1,7 @@
+"""The keys of the YAML files: what each may be, its unit, its default.
+
+- ``values``: single values, from text to type, and what is wrong with them;
+- ``cameras``, ``measurements``, ``ground``, ``processing``: the blocks of the project file;
+- ``project_file``: the whole of it;
+- ``for_editors``: the same as JSON Schema.
+"""

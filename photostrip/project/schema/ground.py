@@ -1,0 +1,125 @@
+"""The blocks of a project that stand in a ground frame: control, camera positions, orientations, output."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Self
+
+from pydantic import model_validator
+
+from photostrip.geometry.rotation import SYSTEMS
+from photostrip.pipeline import Settings
+from photostrip.project.schema.measurements import COLUMNS, ControlColumns
+from photostrip.project.schema.values import (
+    Axes,
+    Height,
+    Number,
+    Positive,
+    Section,
+    Sigma3,
+    Triple,
+    Words,
+    choice,
+    key,
+    wrong,
+)
+
+USUAL = Settings()
+CRS = "An authority code (`EPSG:32633`), a PROJ string, WKT, `geocentric`, or `local` (right-handed, metres)"
+SIGMA = "Standard deviations of rows without sx, sy, sz, in the order of `axes`"
+UNDULATION: Any = key("Height of the geoid above the ellipsoid, for orthometric heights", None, unit="m")
+ELLIPSOID: Any = key("Ellipsoid of geocentric coordinates; default: WGS 84", None)
+
+
+class Ellipsoid(Section):
+    """Ellipsoid of geocentric coordinates."""
+
+    a: Positive = key("Semi-major axis", unit="m")
+    b: Positive = key("Semi-minor axis", unit="m")
+
+
+class GivenList(Section):
+    """A table of given coordinates and their ground frame."""
+
+    file: Words
+    crs: Words = key(CRS)
+    axes: Axes | None = key(
+        "What the columns x, y, z are: a permutation of east, north, up; required, except for geocentric", None
+    )
+    height: Height = key("`ellipsoidal` or `orthometric`", "ellipsoidal")
+    geoid_undulation: Number | None = UNDULATION
+    ellipsoid: Ellipsoid | None = ELLIPSOID
+
+    @model_validator(mode="after")
+    def _axes_are_given(self) -> Self:
+        if self.axes is None and self.crs != "geocentric":
+            expected = "axes: [east, north, up], or [north, east, up] where x points north"
+            message = "nothing says which of the columns x, y, z is east"
+            raise wrong(message, code="missing-key", at="axes", expected=expected)
+        return self
+
+
+class Control(GivenList):
+    """One list of given ground coordinates."""
+
+    file: Words = key("Table `point,x,y,z[,use][,role][,sx,sy,sz]`, .csv or .csv.gz")
+    columns: ControlColumns = key(COLUMNS, {})
+    sigma: Sigma3 | None = key(SIGMA, None, unit="m")
+
+
+class CameraPositions(GivenList):
+    """Measured positions of the cameras, for the bundle adjustment."""
+
+    file: Words = key("Table `photo,x,y,z[,use][,time][,sx,sy,sz]`, .csv or .csv.gz")
+    sigma: Sigma3 | None = key(SIGMA, None, unit="m")
+    lever_arm: Triple = key(
+        "Antenna as seen from the perspective centre along the image axes: x right, y up, z towards the viewer",
+        (0.0, 0.0, 0.0),
+        unit="m",
+    )
+    correction: Annotated[str, *choice(("none", "offset", "drift"))] = key(
+        "Unknown error that the positions of one strip share: `none`, `offset` (constant) or `drift` (constant and"
+        " linear in `time`; without times in the number of the photo)",
+        "none",
+    )
+
+
+class Angles(Section):
+    """Angles of the exterior orientations."""
+
+    system: Annotated[str, *choice(SYSTEMS)] = key(
+        "`alpha-omega-kappa`, `omega-phi-kappa` or `phi-omega-kappa`", USUAL.angle_system
+    )
+    unit: Annotated[str, *choice(("deg", "gon", "rad"))] = key("`deg`, `gon` or `rad`", USUAL.angle_unit)
+
+
+class Orientations(GivenList):
+    """Given exterior orientations, for the bundle adjustment."""
+
+    file: Words = key(
+        "Table `photo,x,y,z` and the angles by name, as `alpha,omega,kappa`, [,sx,sy,sz][,s_alpha,s_omega,s_kappa]"
+    )
+    angles: Angles = key("System and unit of the angles", Angles.model_construct())
+    role: Annotated[str, *choice(("observed", "approximate"))] = key(
+        "`observed`: observations with their standard deviations; `approximate`: a start, without influence", "observed"
+    )
+    sigma: Sigma3 | None = key(SIGMA, None, unit="m")
+    sigma_angles: Sigma3 | None = key(
+        "Standard deviations of the angles of rows without them, in the order of their system",
+        None,
+        unit="the angles' unit",
+    )
+
+
+class Output(Section):
+    """Frame and angles of the results."""
+
+    crs: Words | None = key(f"{CRS}. Default: that of the first control list", None)
+    axes: Axes | None = key(
+        "Order of x, y, z. Default: that of the first control list; with a crs of its own east, north, up", None
+    )
+    height: Height | None = key(
+        "`ellipsoidal` or `orthometric`; default: that of the first control list, or ellipsoidal", None
+    )
+    geoid_undulation: Number | None = UNDULATION
+    ellipsoid: Ellipsoid | None = ELLIPSOID
+    angles: Angles = key("Angles of the exterior orientations", Angles.model_construct())

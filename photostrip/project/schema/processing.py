@@ -1,0 +1,174 @@
+"""The block `processing` of a project: what is computed and how.
+
+Defaults are those of the settings beside the mathematics; none is repeated.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Self
+
+from pydantic import BeforeValidator, model_validator
+
+from photostrip.formats.text.findings import suggestion
+from photostrip.formats.text.numbers import shown
+from photostrip.pipeline import ADJUSTMENTS, Settings
+from photostrip.project.schema.cameras import Parameter
+from photostrip.project.schema.values import (
+    Flag,
+    Fraction,
+    Id,
+    NumberOrAuto,
+    Positive,
+    PositiveOrAuto,
+    Section,
+    choice,
+    if_empty,
+    key,
+    quoted,
+    wrong,
+)
+from photostrip.triangulation.bundle.settings import CALIBRATION, SCREENINGS, TESTS
+from photostrip.triangulation.gross_errors.pairs.screening import METHODS
+from photostrip.triangulation.independent_models.link_screening import METHODS as LINK_METHODS
+from photostrip.triangulation.polynomial.correction import DEGREES
+from photostrip.triangulation.strip_formation.scale_transfer import SCALE_TRANSFERS
+
+DEFAULTS = Settings()
+
+
+class Relative(Section):
+    """Relative orientation and its search for gross errors."""
+
+    screening: Annotated[str, *choice(METHODS)] = key(
+        f"How gross errors are searched for: {quoted(METHODS)}", DEFAULTS.relative.screening
+    )
+    grubbs_alpha: Fraction = key(
+        "Probability of rejecting a good point of a pair without gross errors", DEFAULTS.relative.grubbs_alpha
+    )
+    parallax_limit: PositiveOrAuto = key(
+        "y parallax that needs no rejection; `auto`: four times its standard deviation",
+        DEFAULTS.relative.parallax_limit,
+        unit="mm",
+    )
+    keep: list[Id] = key("Measurements, `photo/point`, that are used whatever the tests say", [])
+    drop: list[Id] = key("Measurements, `photo/point`, that are left out", [])
+
+
+class Links(Section):
+    """Links of independent models and their search for gross errors."""
+
+    screening: Annotated[str, *choice(LINK_METHODS)] = key(
+        "How gross errors are searched for: `auto` (points of each link one after the other) or `none`",
+        DEFAULTS.links.screening,
+    )
+    alpha: Fraction = key("Probability of rejecting a good point of a link without gross errors", DEFAULTS.links.alpha)
+    keep: list[Id] = key("Coordinates, `model/point` or `model/photo`, that are used whatever the test says", [])
+    drop: list[Id] = key("Coordinates, `model/point` or `model/photo`, that are left out", [])
+
+
+class Polynomial(Section):
+    """Polynomial adjustment of a strip."""
+
+    degree: Annotated[str, *choice(DEGREES)] = key(
+        "`auto` (decided by evidence, which is printed), `1`, `2` or `3`", DEFAULTS.polynomial.degree
+    )
+
+
+class Covariance(Section):
+    """Adjustment of a strip with its own covariance."""
+
+    distances: Flag = key(
+        "Let distances of pass points from the common centers of their models count beside the control",
+        DEFAULTS.covariance.distances,
+    )
+
+
+class Interior(Section):
+    """Interior orientation by fiducial marks."""
+
+    transform: Annotated[str, *choice(("auto", "conformal", "affine", "bilinear", "projective"))] = key(
+        "`auto` (affine from four marks on, else conformal), `conformal`, `affine`, `bilinear` or `projective`",
+        DEFAULTS.interior.transform,
+    )
+    residuals: Annotated[str, *choice(("ignore", "interpolate"))] = key(
+        "What the residuals of the marks do: `ignore`, or `interpolate` them to the points",
+        DEFAULTS.interior.residuals,
+    )
+
+
+class Bundle(Section):
+    """Bundle adjustment of all strips together."""
+
+    screening: Annotated[str, *choice(SCREENINGS)] = key(
+        "How gross errors are searched for: `snooping` (one after the other), `robust` (re-weighted first) or `none`",
+        DEFAULTS.bundle.screening,
+    )
+    test: Annotated[str, *choice(TESTS)] = key(
+        "`tau`: residuals against the sigma0 found; `baarda`: against the stated standard deviations",
+        DEFAULTS.bundle.test,
+    )
+    alpha: Fraction = key("Probability of rejecting one good observation", DEFAULTS.bundle.alpha)
+    power: Fraction = key("Probability with which the minimal detectable errors are found", DEFAULTS.bundle.power)
+    variance_components: Flag = key(
+        "Estimate the standard deviations of image coordinates, control and camera positions",
+        DEFAULTS.bundle.variance_components,
+    )
+    self_calibration: list[Parameter] = key(f"Parameters of the cameras that are estimated: {quoted(CALIBRATION)}", [])
+    calibration_sigma: Annotated[dict[str, Positive], BeforeValidator(if_empty)] = key(
+        "A-priori standard deviations of these parameters, by name; free without one",
+        {},
+        unit="mm, mm^-2 for k1 and so on; 1 for affinity and shear",
+    )
+
+    @model_validator(mode="after")
+    def _known_parameters(self) -> Self:
+        for name in self.calibration_sigma:
+            if name not in CALIBRATION:
+                message = f"`{shown(name)}` is no parameter of a camera"
+                expected, fix = f"one of {', '.join(CALIBRATION)}", suggestion(name, CALIBRATION)
+                raise wrong(message, code="word", at="calibration_sigma", expected=expected, fix=fix)
+        return self
+
+
+class Processing(Section):
+    """What is computed and how."""
+
+    adjustment: Annotated[str, *choice(ADJUSTMENTS)] = key(
+        "`polynomial` (the strip method), `similarity` (without a polynomial), `covariance` (each strip with its own "
+        "covariance) or `bundle` (all strips rigorously)",
+        DEFAULTS.adjustment,
+    )
+    polynomial: Polynomial = key("Polynomial adjustment", Polynomial.model_construct())
+    covariance: Covariance = key("Adjustment of a strip with its own covariance", Covariance.model_construct())
+    bundle: Bundle = key("Bundle adjustment", Bundle.model_construct())
+    relative: Relative = key("Relative orientation", Relative.model_construct())
+    links: Links = key("Links of independent models", Links.model_construct())
+    scale_transfer: Annotated[str, *choice(SCALE_TRANSFERS)] = key(
+        "`least_squares`: all common points with their precision; `distances`: the textbook's mean of ratios",
+        DEFAULTS.formation.scale_transfer,
+    )
+    earth_curvature: Annotated[str, *choice(("auto", "model", "image", "none"))] = key(
+        "`auto` or `none`: the frames carry it, `local` is truly Cartesian; `model`: D^2/2R, for plane map"
+        " coordinates of an unknown projection given as `local`; `image`: the same, photo by photo in the image",
+        DEFAULTS.absolute.earth_curvature,
+    )
+    earth_radius: Positive = key(
+        "Radius of the Earth for `earth_curvature: model` and `image`", DEFAULTS.absolute.earth_radius, unit="m"
+    )
+    precision: Flag = key("Compute standard deviations and covariances of points and photos", DEFAULTS.precision)
+    principal_point: Flag = key(
+        "Reduce image coordinates to the principal point of the camera", DEFAULTS.refinement.principal_point
+    )
+    distortion: Flag = key("Take out the lens distortion of the camera", DEFAULTS.refinement.distortion)
+    refraction: Flag = key("Correct for atmospheric refraction", DEFAULTS.refinement.refraction)
+    flying_height: NumberOrAuto = key(
+        "Mean height of the cameras above sea level, for refraction and curvature; `auto`: derived",
+        DEFAULTS.refinement.flying_height,
+        unit="m",
+    )
+    ground_height: NumberOrAuto = key(
+        "Mean height of the ground above sea level, for refraction and curvature; `auto`: derived",
+        DEFAULTS.refinement.ground_height,
+        unit="m",
+    )
+    interior: Interior = key("Interior orientation", Interior.model_construct())

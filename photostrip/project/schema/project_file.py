@@ -1,0 +1,98 @@
+"""The project file: every key, its unit, its default. Each description ends with the unit."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field
+
+from photostrip.formats.text.findings import suggestion
+from photostrip.formats.text.numbers import shown
+from photostrip.project.schema.cameras import Camera, Strip
+from photostrip.project.schema.for_editors import described
+from photostrip.project.schema.ground import CameraPositions, Control, Orientations, Output
+from photostrip.project.schema.measurements import FiducialMeasurements, Models, Observations
+from photostrip.project.schema.processing import Processing
+from photostrip.project.schema.values import (
+    Positive,
+    Section,
+    Words,
+    if_empty,
+    key,
+    schema_number,
+    single,
+    text,
+    typed,
+    wrong,
+)
+from photostrip.triangulation.plausibility import KINDS
+
+SCHEMA_NUMBER = 1
+_read_schema_number = schema_number("photostrip", SCHEMA_NUMBER)
+SchemaNumber = Annotated[
+    int, *typed(lambda value: _read_schema_number(single(value, str(SCHEMA_NUMBER))), {"const": SCHEMA_NUMBER})
+]
+
+
+def _finding(value: object) -> str:
+    """Read the code of a finding, alone or with the one id that it is accepted for."""
+    expected = "a code such as P201, or P201/1003 for one photo, point or strip"
+    word = single(value, expected)
+    code, _, _ = word.partition("/")
+    if code not in KINDS:
+        message = f"there is no finding `{shown(code)}`"
+        raise wrong(message, code="no-such-finding", expected=expected, fix=suggestion(code, KINDS))
+    return text(word)
+
+
+Accepted = Annotated[str, *typed(_finding, {"type": "string", "pattern": "^P[0-9]{3}(/.+)?$"})]
+
+
+class Tolerances(Section):
+    """Largest allowed values; where one is exceeded the exit code is 1."""
+
+    check_rms_xy: Positive | None = key("Largest rms of the check points in plan", None, unit="m")
+    check_rms_z: Positive | None = key("Largest rms of the check points in height", None, unit="m")
+    check_max_xy: Positive | None = key("Largest difference at a check point in plan", None, unit="m")
+    check_max_z: Positive | None = key("Largest difference at a check point in height", None, unit="m")
+    control_rms_xy: Positive | None = key("Largest rms of the control points in plan", None, unit="m")
+    control_rms_z: Positive | None = key("Largest rms of the control points in height", None, unit="m")
+    sigma0_um: Positive | None = key("Largest sigma0 of the image coordinates", None, unit="um")
+
+
+class ProjectFile(Section):
+    """A project of photostrip: what was measured, what is given, and what is to be done.
+
+    All paths are relative to the file itself. All ids are text, quoted or not.
+    """
+
+    photostrip: SchemaNumber = key("Number of this schema")
+    name: Words | None = key("Name of the project; default: the file's name without its ending", None)
+    extends: Words | None = key("Another file whose keys are taken where this one has none", None)
+    cameras: Annotated[dict[str, Camera], BeforeValidator(if_empty), Field(min_length=1)] = key(
+        "Cameras by name; needed with `observations`", {}
+    )
+    strips: Annotated[list[Strip], Field(min_length=1)] = key("Strips")
+    observations: Observations | None = key("Points measured on photos; or `models`", None)
+    models: Models | None = key("Independent models measured on a plotter, in place of `observations`", None)
+    fiducial_measurements: FiducialMeasurements | None = key("Fiducial marks measured on photos", None)
+    control: list[Control] = key(
+        "Lists of given ground coordinates, each in its own frame; a bundle adjustment may do without", []
+    )
+    camera_positions: CameraPositions | None = key("Measured positions of the cameras, for the bundle adjustment", None)
+    orientations: Orientations | None = key("Given exterior orientations, for the bundle adjustment", None)
+    output: Output = key("Frame and angles of the results", Output.model_construct())
+    processing: Processing = key("What is computed and how", Processing.model_construct())
+    tolerances: Tolerances = key(
+        "Largest allowed values; where one is exceeded the exit code is 1", Tolerances.model_construct()
+    )
+    accept: list[Accepted] = key(
+        "Findings that were looked at and are accepted: codes, or `code/id` for one photo, point or strip",
+        [],
+    )
+
+
+def json_schema() -> dict[str, Any]:
+    """JSON Schema of the project file; the same on every call."""
+    measured = {"anyOf": [{"required": ["cameras", "observations"]}, {"required": ["models"]}]}
+    return described(ProjectFile, "photostrip project") | measured

@@ -1,0 +1,119 @@
+"""One reader of every YAML file: what it extends, what the command line sets, its schema, its faults."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, TypeVar
+
+from photostrip.errors import InputError
+from photostrip.formats.text.findings import Findings
+from photostrip.project.schema.values import Section
+from photostrip.project.yaml.document import at_own_key, fault_at
+from photostrip.project.yaml.merging import override, path_of, read_tree, where_named
+from photostrip.project.yaml.validation import checked
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    from photostrip.errors import Fault
+    from photostrip.project.yaml.document import Node, Path
+
+S = TypeVar("S", bound=Section)
+T = TypeVar("T")
+
+
+@dataclass(eq=False)
+class Reading:
+    """A file that is read, with the files that it extends and names; nothing is raised before all faults are known."""
+
+    file: str
+    root: Node  # the tree of the file: it knows where each value stands
+    findings: Findings
+    files: list[str]  # every file that was read, the file itself first
+
+    @classmethod
+    def of(cls, file: str, assignments: Sequence[str] = ()) -> Reading:
+        """Read a file and apply what the command line sets.
+
+        Raises
+        ------
+        InputError
+            When the file cannot be read as YAML.
+        """
+        findings, files = Findings(), list[str]()
+        root = read_tree(file, findings, files)
+        if root is None:
+            raise InputError(findings.faults)
+        return cls(file, root, findings, files).with_set(assignments)
+
+    def with_set(self, assignments: Sequence[str]) -> Reading:
+        """Apply ``path=value`` assignments."""
+        return replace(self, root=override(self.root, assignments, self.findings))
+
+    def checked(self, kind: type[S]) -> S | None:
+        """Return the file with types and defaults; None when there are faults."""
+        return checked(kind, self.root, self.findings)
+
+    def complete(self, read: T | None) -> T:
+        """Return what was read.
+
+        Raises
+        ------
+        InputError
+            With every fault of every file.
+        """
+        self.findings.stop()
+        if read is None:  # cannot be: whatever is not read has a fault, and stop() raised it
+            raise InputError(f"{self.file} is not valid")
+        return read
+
+    def read(self, kind: type[S]) -> S:
+        """Return the file with types and defaults, or raise all its faults."""
+        return self.complete(self.checked(kind))
+
+    def refuse(self, path: Path, message: str, code: str, *, expected: str = "", fix: str = "") -> None:
+        """Keep a fault of a value of the file."""
+        self.findings.add(fault_at(self.root, path, message, code, expected=expected, fix=fix))
+
+    def named(self, key: Path) -> Iterator[tuple[str, Findings]]:
+        """Return the path of the file that a key names, and findings for it; nothing where the key names none.
+
+        Faults of that file as a whole are reported where it is named, those without a file at their own key.
+        """
+        node = self.root.find(*key)
+        if node is None or not node.text:
+            return
+        path, inner = path_of(node, self.file), Findings(self.findings.notes)
+        yield path, inner
+
+        def placed(fault: Fault) -> Fault:
+            return where_named(fault, self.root, key) if fault.file else at_own_key(fault, self.root)
+
+        self.findings.absorb(inner, placed)
+        if path not in self.files:
+            self.files.append(path)
+
+    @contextmanager
+    def places(self, keys: Mapping[str, str] | None = None) -> Iterator[None]:
+        """Give faults that know only a key the place of that key; `keys` are those of the file for other names."""
+
+        def own(fault: Fault) -> Fault:
+            return replace(fault, key=(keys or {}).get(fault.key, fault.key))
+
+        try:
+            yield
+        except InputError as error:
+            raise InputError(at_own_key(own(fault), self.root) for fault in error.faults) from None
+
+
+def read_file(kind: type[S], file: str, assignments: Sequence[str] = ()) -> tuple[S, Reading]:
+    """Read a file of a kind.
+
+    Raises
+    ------
+    InputError
+        With every fault of every file.
+    """
+    reading = Reading.of(file, assignments)
+    return reading.read(kind), reading
