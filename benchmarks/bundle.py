@@ -28,14 +28,14 @@ import numpy as np  # noqa: E402
 from benchmarks import peers  # noqa: E402
 from photostrip.simulate import Control, Flight, Ground, Points, Spec, Terrain, simulate  # noqa: E402
 from photostrip.simulate.bundle import problem_of  # noqa: E402
-from photostrip.triangulation.bundle.quality.precision import precision  # noqa: E402
+from photostrip.triangulation.bundle.quality.cofactors import cofactors_of  # noqa: E402
 from photostrip.triangulation.bundle.solve import solve  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from photostrip.triangulation.bundle.observations.problem import Problem
-    from photostrip.triangulation.bundle.solution import Precision, Solution
+    from photostrip.triangulation.bundle.observations.problem import BundleProblem
+    from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
 LIMITS = {"whole": 0.5, "block": 1.0, "solver": 0.8, "colmap": 0.25, "covariances": 1.0}
 LARGEST_MEMORY = 350.0  # MB, at 1000 photos with 300 points each
@@ -68,7 +68,7 @@ CASES = {
 LONG = [Case(1, photos, 40) for photos in (1000, 3000, 10_000)]
 
 
-def problem(case: Case) -> Problem:
+def problem(case: Case) -> BundleProblem:
     """Make the problem: the real Earth, 5 micrometres, control every five photos, a start off the truth.
 
     Parameters
@@ -78,7 +78,7 @@ def problem(case: Case) -> Problem:
 
     Returns
     -------
-    Problem
+    BundleProblem
         All points with two rays and more.
     """
     extra = max(round(EXTRA[case.strips > 1] * case.each) - 5, 0)
@@ -92,12 +92,12 @@ def problem(case: Case) -> Problem:
     return problem_of(simulate(spec), shift=SHIFT, turn=TURN)
 
 
-def timed(given: Problem) -> tuple[float, float, Solution, Precision]:
+def timed(given: BundleProblem) -> tuple[float, float, BundleSolution, Cofactors]:
     """Adjust and find all covariances: seconds of the processor for each, and the results."""
     began = time.process_time()
     solution = solve(given)
     solved = time.process_time()
-    cofactors = precision(solution)
+    cofactors = cofactors_of(solution)
     return solved - began, time.process_time() - solved, solution, cofactors
 
 
@@ -117,7 +117,7 @@ class Times:
     steps: tuple[int, int, int]
 
 
-def measure(given: Problem, rounds: int, *, alone: bool) -> Times:
+def measure(given: BundleProblem, rounds: int, *, alone: bool) -> Times:
     """Adjust a problem with all programs, several times."""
     solve(given)  # imports and warms up
     rows = []
@@ -215,14 +215,14 @@ def corridor(cases: Iterable[Case], rounds: int) -> None:
     table(("photos", "rays", "solve", "covariances", "per ray", "to the first"), lines)
 
 
-def _peak(given: Problem) -> tuple[float, float]:
+def _peak(given: BundleProblem) -> tuple[float, float]:
     """Peak memory of a process that adjusts a problem, MB: all of it, and what it had before, the arrays included."""
     import resource
 
     import scipy.linalg.lapack  # noqa: F401  what the adjustment needs
 
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / MEGABYTE
-    precision(solve(given))
+    cofactors_of(solve(given))
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / MEGABYTE, before
 
 

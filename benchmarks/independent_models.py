@@ -127,7 +127,7 @@ def precision(repetitions: int) -> None:
             settings = Settings(
                 "polynomial" if degree else "similarity",
                 polynomial=correction.PolynomialSettings(degree or "auto"),
-                links=link_screening.Settings("none"),
+                links=link_screening.LinkSettings("none"),
             )
             ratios = scatter(models, settings, repetitions)
             cells = " | ".join(f"{r.mean():.3f} ({r.min():.2f} to {r.max():.2f})" for r in ratios)

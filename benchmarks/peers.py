@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import pycolmap
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.bundle.observations.problem import Problem
+    from photostrip.triangulation.bundle.observations.problem import BundleProblem
 
     Floats = NDArray[np.float64]
 
@@ -66,7 +66,7 @@ def available() -> bool:
     return True
 
 
-def poses_of(problem: Problem) -> Floats:
+def poses_of(problem: BundleProblem) -> Floats:
     """Poses as COLMAP counts them: quaternion x, y, z, w and shift, world to camera, shape (m, 7)."""
     from scipy.spatial.transform import Rotation
 
@@ -84,7 +84,7 @@ def centers_of(poses: Floats) -> Floats:
     return found
 
 
-def _image(problem: Problem) -> tuple[Floats, float]:
+def _image(problem: BundleProblem) -> tuple[Floats, float]:
     """Image coordinates and principal distance in units of sigma, y down."""
     sigma = problem.images.sigma
     if np.ptp(sigma) > 0.0 or np.ptp(problem.cameras.focal) > 0.0:
@@ -92,7 +92,7 @@ def _image(problem: Problem) -> tuple[Floats, float]:
     return problem.images.xy / sigma * [1.0, -1.0], float(problem.cameras.focal[0] / sigma[0, 0])
 
 
-def _control(problem: Problem) -> zip[tuple[int, Floats, Floats]]:
+def _control(problem: BundleProblem) -> zip[tuple[int, Floats, Floats]]:
     """Point, position and covariance of each control point."""
     control = problem.control
     covariance = np.einsum("nai,na,naj->nij", control.axes, control.sigma**2, control.axes)
@@ -119,12 +119,12 @@ def pose_manifold() -> pyceres.Manifold:
     return manifold
 
 
-def by_ceres(problem: Problem, linear_solver: str = "SPARSE_SCHUR", tolerance: float = TOLERANCE) -> Peer:
+def by_ceres(problem: BundleProblem, linear_solver: str = "SPARSE_SCHUR", tolerance: float = TOLERANCE) -> Peer:
     """Adjust with Ceres through pyceres.
 
     Parameters
     ----------
-    problem : Problem
+    problem : BundleProblem
         Rays of one camera with one sigma, and control that is given in all coordinates.
     linear_solver : str
         Name of its linear solver.
@@ -170,12 +170,12 @@ def by_ceres(problem: Problem, linear_solver: str = "SPARSE_SCHUR", tolerance: f
     return Peer(built - began, solved - built, ended - began, points, centers, summary.num_successful_steps)
 
 
-def by_colmap(problem: Problem) -> Peer:
+def by_colmap(problem: BundleProblem) -> Peer:
     """Adjust with COLMAP's bundle adjustment through pycolmap, its own choice of a linear solver, one thread.
 
     Parameters
     ----------
-    problem : Problem
+    problem : BundleProblem
         As for ``by_ceres``.
 
     Returns

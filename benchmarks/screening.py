@@ -25,7 +25,7 @@ from photostrip.simulate.simulation import simulate  # noqa: E402
 from photostrip.simulate.spec import Flight, GrossError, Points, Spec  # noqa: E402
 from photostrip.statistics import chi2_quantile  # noqa: E402
 from photostrip.triangulation.gross_errors.pairs import deletion, screening  # noqa: E402
-from photostrip.triangulation.gross_errors.rays import settling  # noqa: E402
+from photostrip.triangulation.gross_errors.rays import screened_formation  # noqa: E402
 from photostrip.triangulation.relative_orientation.orientation import RelativeSettings, orient_unchecked  # noqa: E402
 from photostrip.triangulation.relative_orientation.pairs import Pairs, collect_pairs  # noqa: E402
 from photostrip.triangulation.relative_orientation.solution import linearised_parallaxes  # noqa: E402
@@ -102,10 +102,10 @@ def spoiled(pairs: Pairs, errors: Floats) -> Pairs:
     return replace(pairs, left=left)
 
 
-def screened(pairs: Pairs, settings: RelativeSettings) -> screening.Screened:
+def screened(pairs: Pairs, settings: RelativeSettings) -> screening.ScreenedPairs:
     """Orient and screen pairs; photos have no names here."""
     oriented, _ = orient_unchecked(pairs)
-    return screening.examine(oriented, settings, SIGMA_Q / np.sqrt(2.0))
+    return screening.screen_pairs(oriented, settings, SIGMA_Q / np.sqrt(2.0))
 
 
 # ------------------------------------------------------------------------------------- the published experiment
@@ -137,7 +137,7 @@ def experiment_errors(rng: np.random.Generator, repetitions: int) -> Floats:
     return errors.ravel()
 
 
-def rates(result: screening.Screened, errors: Floats) -> Rates:
+def rates(result: screening.ScreenedPairs, errors: Floats) -> Rates:
     """Count what was found, by stage, and what was lost."""
     wrong = errors != 0
     first = np.zeros(len(errors), bool)
@@ -272,7 +272,7 @@ def times(pairs_of_strip: int = 999, points: int = 30, seed: int = 5) -> list[st
             start = time.process_time()
             oriented, _ = orient_unchecked(given)
             middle = time.process_time()
-            screening.examine(oriented, RelativeSettings(), SIGMA_Q / np.sqrt(2))
+            screening.screen_pairs(oriented, RelativeSettings(), SIGMA_Q / np.sqrt(2))
             best = [min(best[0], middle - start), min(best[1], time.process_time() - middle)]
         each = 1000 * best[1] / pairs_of_strip
         lines.append(f"{100 * share:10.0f}{best[0]:14.3f}{best[1]:14.3f}{best[1] / best[0]:9.2f}{each:15.2f}")
@@ -308,7 +308,7 @@ def stages(inputs: Inputs) -> Floats:
     oriented, converged = orient_unchecked(pairs)
     orient = time.process_time() - begin
     begin = time.process_time()
-    screened = screening.examine(oriented, RelativeSettings(), sigma, converged)
+    screened = screening.screen_pairs(oriented, RelativeSettings(), sigma, converged)
     search = time.process_time() - begin
     scatter = screened.scatter.by_pair
     begin = time.process_time()
@@ -320,9 +320,9 @@ def stages(inputs: Inputs) -> Floats:
     spreads = scale_ratios.spreads(screened.orientation, formed.vectors, places, scatter)
     scale_ratios.screen(joined.ratio, np.ones(len(joined.ratio)), spreads, joined.junction, joints)
     ratios = time.process_time() - begin
-    measured = settling.Measured(observations, strip.photos, pairs.weight, scatter, sigma, nothing)
+    measured = screened_formation.Measurements(observations, strip.photos, pairs.weight, scatter, sigma, nothing)
     begin = time.process_time()
-    settling.settle(screened.orientation, measured, StripFormationSettings(), readmit=True)
+    screened_formation.form_screened(screened.orientation, measured, StripFormationSettings(), readmit=True)
     settle = time.process_time() - begin
     return np.array([orient, search, ratios, settle - form])
 

@@ -189,7 +189,7 @@ class Stopwatch:
 pipeline = import_module("photostrip.pipeline.run")  # the module; the package gives the function
 # functions imported by name are timed where they are called
 of_strips = import_module("photostrip.pipeline.strip")
-settling = import_module("photostrip.triangulation.gross_errors.rays.settling")
+settling = import_module("photostrip.triangulation.gross_errors.rays.screened_formation")
 STAGES = (
     ("image coordinates", corrections, "refine"),
     ("collecting pairs", of_strips, "collect_pairs"),

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.bundle.observations.problem import Positions, Problem
-    from photostrip.triangulation.bundle.solution import Solution
+    from photostrip.triangulation.bundle.observations.problem import BundleProblem, PositionObservations
+    from photostrip.triangulation.bundle.solution import BundleSolution
 
     Floats = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ class Dense:
         return found
 
 
-def misfits(problem: Problem, centers: Floats, rotations: Floats, points: Floats, common: Floats) -> Floats:
+def misfits(problem: BundleProblem, centers: Floats, rotations: Floats, points: Floats, common: Floats) -> Floats:
     """Measured minus computed, of everything, in units of sigma."""
     images, control, attitudes = problem.images, problem.control, problem.attitudes
     names = problem.common_names()
@@ -54,7 +54,7 @@ def misfits(problem: Problem, centers: Floats, rotations: Floats, points: Floats
     )
 
 
-def prior(problem: Problem) -> Floats:
+def prior(problem: BundleProblem) -> Floats:
     """A-priori sigmas of the common parameters."""
     sigma, positions = problem.cameras.sigma, problem.positions
     own = np.zeros(0) if sigma is None else sigma[sigma > 0.0]
@@ -66,7 +66,7 @@ def _calibrated(names: Sequence[str]) -> int:
     return sum(name.startswith("camera") for name in names)
 
 
-def _bent(problem: Problem, common: Floats, camera: NDArray[np.intp]) -> tuple[Floats, Floats]:
+def _bent(problem: BundleProblem, common: Floats, camera: NDArray[np.intp]) -> tuple[Floats, Floats]:
     """Principal distances of the rays and corrections of their coordinates."""
     x, y = problem.images.xy.T
     r2 = x**2 + y**2
@@ -95,7 +95,7 @@ def _bent(problem: Problem, common: Floats, camera: NDArray[np.intp]) -> tuple[F
     return focal, bend
 
 
-def _place_misfits(positions: Positions, centers: Floats, rotations: Floats, drifts: Floats) -> Floats:
+def _place_misfits(positions: PositionObservations, centers: Floats, rotations: Floats, drifts: Floats) -> Floats:
     if not len(positions):
         return np.zeros((0, 3))
     values = iter(drifts.reshape(-1, 3))
@@ -109,7 +109,7 @@ def _place_misfits(positions: Positions, centers: Floats, rotations: Floats, dri
     return found
 
 
-def dense(problem: Problem, solution: Solution) -> Dense:
+def dense(problem: BundleProblem, solution: BundleSolution) -> Dense:
     """Linearise at a solution by differences, and invert; a free network under inner constraints on the points."""
     photos, points, common = problem.photos, problem.points, len(solution.common)
 
@@ -154,7 +154,7 @@ def _difference(at: object, step: Floats, length: float) -> Floats:
     return found
 
 
-def _similarities(solution: Solution) -> Floats:
+def _similarities(solution: BundleSolution) -> Floats:
     """Movements of all parameters by shift, rotation and scale, about the mean of the points."""
     origin = solution.points.mean(axis=0)
     places = np.concatenate([solution.centers, solution.points]) - origin

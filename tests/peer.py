@@ -17,14 +17,14 @@ from photostrip.simulate.bundle import problem_of
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
-    from photostrip.triangulation.bundle.observations.problem import Problem
+    from photostrip.triangulation.bundle.observations.problem import BundleProblem
 
 FILE = ROOT / "tests" / "data" / "bundle_by_ceres.json"
 TIGHT = 1e-16
 SHAPES = {"strip of 6": (6, 1), "block of 3 x 5": (5, 3)}
 
 
-def problem(name: str) -> Problem:
+def problem(name: str) -> BundleProblem:
     """Give one of the problems; they are made, not kept: the simulation always gives the same numbers."""
     photos, strips = SHAPES[name]
     spec = Spec(

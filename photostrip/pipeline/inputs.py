@@ -119,11 +119,11 @@ class Settings:
     adjustment: str = "polynomial"  # one of ``ADJUSTMENTS``
     relative: RelativeSettings = field(default_factory=RelativeSettings)
     formation: StripFormationSettings = field(default_factory=StripFormationSettings)
-    links: link_screening.Settings = field(default_factory=link_screening.Settings)
+    links: link_screening.LinkSettings = field(default_factory=link_screening.LinkSettings)
     absolute: absolute.AbsoluteSettings = field(default_factory=absolute.AbsoluteSettings)
     polynomial: polynomial.PolynomialSettings = field(default_factory=polynomial.PolynomialSettings)
     covariance: conditions.CovarianceSettings = field(default_factory=conditions.CovarianceSettings)
-    bundle: bundle.Settings = field(default_factory=bundle.Settings)
+    bundle: bundle.BundleSettings = field(default_factory=bundle.BundleSettings)
     interior: interior.InteriorSettings = field(default_factory=interior.InteriorSettings)
     refinement: refinement.ImageCorrectionSettings = field(default_factory=refinement.ImageCorrectionSettings)
     precision: bool = True  # whether standard deviations and covariances of points and photos are computed

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.points import PhotoPoints
-    from photostrip.triangulation.gross_errors.pairs.screening import Screened
+    from photostrip.triangulation.gross_errors.pairs.screening import ScreenedPairs
 
     Numbers = NDArray[np.intp]
     Flags = NDArray[np.bool_]
@@ -113,7 +113,7 @@ def touched(entries: Sequence[str], observations: PhotoPoints, rows: Numbers) ->
     return found
 
 
-def restored(screened: Screened, weight: NDArray[np.float64], kept: Flags) -> Screened:
+def restored(screened: ScreenedPairs, weight: NDArray[np.float64], kept: Flags) -> ScreenedPairs:
     """Take rejected measurements back that the user keeps.
 
     Parameters
@@ -125,7 +125,7 @@ def restored(screened: Screened, weight: NDArray[np.float64], kept: Flags) -> Sc
 
     Returns
     -------
-    Screened
+    ScreenedPairs
         The search with those rows in use; their rejections are marked as re-admitted.
     """
     oriented = screened.orientation

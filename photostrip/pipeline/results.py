@@ -17,11 +17,11 @@ if TYPE_CHECKING:
     from photostrip.pipeline.inputs import Inputs, ModelStrip, Settings, Strip
     from photostrip.points import ControlPoints
     from photostrip.triangulation import absolute_orientation as absolute
-    from photostrip.triangulation.bundle.observations.problem import Problem
+    from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.quality import reliability, self_calibration, variance_components
     from photostrip.triangulation.bundle.quality.correlations import Correlation
     from photostrip.triangulation.bundle.selection import Selection
-    from photostrip.triangulation.bundle.snooping import Screened
+    from photostrip.triangulation.bundle.snooping import ScreenedBundle
     from photostrip.triangulation.error_propagation.covariances import CheckTest
     from photostrip.triangulation.gross_errors.control import control_screening, control_significance
     from photostrip.triangulation.gross_errors.pairs import screening
@@ -71,9 +71,9 @@ class PhotoStages:
     strip: Strip
     sigma: float  # median standard deviation of its image coordinates, mm
     # relative orientation of its pairs with the search for gross errors: log, zones, detectable errors
-    screened: screening.Screened
+    screened: screening.ScreenedPairs
     formed: FormedStrip
-    contradictions: strip_screening.Verdict  # measurements that the strip as a whole does not confirm
+    contradictions: strip_screening.RayRejections  # measurements that the strip as a whole does not confirm
     resection: exterior.Resection  # photos oriented on the adjusted points, intermediate frame
     rows: Numbers  # (m,): image points that took part in the resections, rows of the observations
     # the adjustment with the strip's own covariance; None with other adjustments
@@ -85,7 +85,7 @@ class PhotoStages:
         return self.screened.orientation
 
     @property
-    def rejections(self) -> tuple[screening.Rejection, ...]:
+    def rejections(self) -> tuple[screening.PairRejection, ...]:
         """Points taken out of pairs."""
         return self.screened.rejections
 
@@ -120,7 +120,7 @@ class StripResult:
     # control coordinates that were not used; ``control`` says so in its ``use``
     wrong_control: tuple[control_screening.ControlRejection, ...]
     # what the covariance of the strip says of each coordinate of ``control``; None without
-    judged_control: control_significance.Judged | None = None
+    judged_control: control_significance.ControlTests | None = None
     photo_stages: PhotoStages | None = None  # None for independent models
     model_stages: ModelStages | None = None  # None for photos
 
@@ -224,7 +224,7 @@ class BlockStart:
 class BlockProblem:
     """A bundle adjustment with what its rows stand for."""
 
-    problem: Problem  # the arrays; points as numbered in the observations, photos strip by strip
+    problem: BundleProblem  # the arrays; points as numbered in the observations, photos strip by strip
     origin: Floats  # (3,): origin of its frame in the project's Cartesian frame, metres
     begin: Selection
     kept: Flags  # (n,): rays that the user keeps
@@ -250,7 +250,7 @@ class Bundle:
 
     start: BlockStart  # where it started: the strips as the strip method leaves them
     block: BlockProblem  # all observations, with the standard deviations of the last adjustment
-    screened: Screened  # the solution and how it was cleaned
+    screened: ScreenedBundle  # the solution and how it was cleaned
     groups: tuple[reliability.Group, ...]  # observations that took part with their redundancy numbers
     sigma0: reliability.Sigma0Test  # test of sigma0, with the stated standard deviations
     components: tuple[variance_components.Component, ...]  # variance components; empty when none were asked for

@@ -19,7 +19,7 @@ from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.error_propagation import control_errors, covariances, strip_errors
 from photostrip.triangulation.gross_errors.control import control_screening, control_significance
 from photostrip.triangulation.gross_errors.pairs import screening
-from photostrip.triangulation.gross_errors.rays import settling, strip_screening
+from photostrip.triangulation.gross_errors.rays import screened_formation, strip_screening
 from photostrip.triangulation.polynomial import correction as polynomial
 from photostrip.triangulation.relative_orientation.orientation import (
     CONDITION_WARNING,
@@ -74,9 +74,9 @@ class Formed:
 
     strip: Strip
     sigma: float  # median standard deviation of its image coordinates, mm
-    screened: screening.Screened  # the search for gross errors in its pairs
+    screened: screening.ScreenedPairs  # the search for gross errors in its pairs
     formed: FormedStrip
-    contradictions: strip_screening.Verdict  # points whose rays contradict each other from model to model
+    contradictions: strip_screening.RayRejections  # points whose rays contradict each other from model to model
 
 
 def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> Formed:
@@ -103,7 +103,7 @@ def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> F
     pairs = collect_pairs(observations, strip.photos, strip.camera.principal_distance)
     pairs = pairs.without(overruling.touched(settings.relative.drop, observations, pairs.rows))
     first, converged = orient_unchecked(pairs)
-    screened = screening.examine(first, settings.relative, sigma, converged)
+    screened = screening.screen_pairs(first, settings.relative, sigma, converged)
     kept = overruling.touched(settings.relative.keep, observations, pairs.rows)
     screened = overruling.restored(screened, pairs.weight, kept)
     refuse_unusable(screened.orientation, screened.converged, strip.photos)
@@ -131,9 +131,9 @@ def adjust_formed(
     if settings.relative.screening != "none":
         extent = _extent(formed, orientation)
         joint = _joint(strip, observations, screened, formed, (here, rows, frames), intermediate, orientation, sigma)
-        place = control_screening.Setting(formed.xyz[rows], frames, intermediate, spread, *extent, joint)
+        place = control_screening.StripAtControl(formed.xyz[rows], frames, intermediate, spread, *extent, joint)
         given = here
-        here, wrong = control_screening.screen(given, place)
+        here, wrong = control_screening.screen_control(given, place)
         judged = place.judged(given, here)
     if wrong:
         intermediate, orientation, spread = to_ground(strip, formed, (here, rows), frames, spread_at)
@@ -188,13 +188,13 @@ def adjust_formed(
 def _joint(
     strip: Strip,
     observations: PhotoPoints,
-    screened: screening.Screened,
+    screened: screening.ScreenedPairs,
     formed: FormedStrip,
     given: tuple[ControlPoints, Numbers, Sequence[GroundFrame]],
     intermediate: IntermediateFrame,
     orientation: absolute_orientation.AbsoluteOrientation,
     sigma: float,
-) -> control_significance.Joint | None:
+) -> control_significance.ControlCovariance | None:
     """Covariance of all misclosures at the control; None where there are too many to form it as a whole."""
     control, rows, frames = given
     if control.use.sum() > control_significance.LARGEST or len(strip.photos) > control_significance.LONGEST:
@@ -212,7 +212,7 @@ def _joint(
     covariance = covariances.of_parameters(errors, found, np.eye(len(found.point)), factor).parameters * factor
     moved = similarity_derivatives(xyz[found.point], errors.origin)
     design = np.einsum("wi,wij->wj", found.direction, moved)
-    return control_significance.Joint(found.point, found.axis, design, covariance)
+    return control_significance.ControlCovariance(found.point, found.axis, design, covariance)
 
 
 def _extent(formed: FormedStrip, orientation: absolute_orientation.AbsoluteOrientation) -> tuple[float, float]:
@@ -223,17 +223,25 @@ def _extent(formed: FormedStrip, orientation: absolute_orientation.AbsoluteOrien
 
 
 def _form(
-    strip: Strip, observations: PhotoPoints, screened: screening.Screened, settings: Settings, weight: Floats
-) -> tuple[screening.Screened, FormedStrip, strip_screening.Verdict]:
+    strip: Strip, observations: PhotoPoints, screened: screening.ScreenedPairs, settings: Settings, weight: Floats
+) -> tuple[screening.ScreenedPairs, FormedStrip, strip_screening.RayRejections]:
     """Form the strip, and let it decide what its pairs could not."""
     oriented, scatter = screened.orientation, screened.scatter.by_pair
     if settings.relative.screening == "none":
-        return screened, form_from_pairs(oriented, settings.formation, strip.photos, scatter), strip_screening.Verdict()
+        return (
+            screened,
+            form_from_pairs(oriented, settings.formation, strip.photos, scatter),
+            strip_screening.RayRejections(),
+        )
     kept = overruling.rows(settings.relative.keep, observations)
-    measured = settling.Measured(observations, strip.photos, weight, scatter, _sigma(strip, observations), kept)
+    measured = screened_formation.Measurements(
+        observations, strip.photos, weight, scatter, _sigma(strip, observations), kept
+    )
     readmit = settings.relative.screening in screening.SEARCHES
-    oriented, formed, verdict = settling.settle(oriented, measured, settings.formation, readmit=readmit)
-    rejections = settling.taken_back(screened.rejections, oriented.used)
+    oriented, formed, verdict = screened_formation.form_screened(
+        oriented, measured, settings.formation, readmit=readmit
+    )
+    rejections = screened_formation.taken_back(screened.rejections, oriented.used)
     return replace(screened, orientation=oriented, rejections=rejections), formed, verdict
 
 
@@ -471,7 +479,7 @@ def _pair_notes(strip: Strip, oriented: Orientation) -> list[Note]:
     return notes
 
 
-def _screening_notes(strip: Strip, screened: screening.Screened, sigma: float) -> list[Note]:
+def _screening_notes(strip: Strip, screened: screening.ScreenedPairs, sigma: float) -> list[Note]:
     """Say what the search for gross errors could not settle."""
     notes = []
     scatter = screened.scatter

@@ -18,7 +18,7 @@ from photostrip.planning.control_layout import USES, Layout, Spot, numbers_of
 from photostrip.points import ControlPoints
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.bundle.observations import problem as bundle
-from photostrip.triangulation.bundle.quality.precision import precision as bundle_precision
+from photostrip.triangulation.bundle.quality.cofactors import cofactors_of as bundle_precision
 from photostrip.triangulation.bundle.solve import solve
 from photostrip.triangulation.covariance_adjustment import conditions, prediction, system
 from photostrip.triangulation.error_propagation import control_errors, covariances
@@ -234,7 +234,7 @@ def _bundle(strip: IdealStrip, layout: Layout, spots: tuple[Spot, ...], control:
     return Accuracy(BUNDLE, BUNDLE, found.points, numbers, np.where(control.use, detectable, np.nan))
 
 
-def bundle_problem(strip: IdealStrip, layout: Layout, numbers: Numbers, control: ControlPoints) -> bundle.Problem:
+def bundle_problem(strip: IdealStrip, layout: Layout, numbers: Numbers, control: ControlPoints) -> bundle.BundleProblem:
     """Return the strip and its control to the bundle adjustment.
 
     Parameters
@@ -244,7 +244,7 @@ def bundle_problem(strip: IdealStrip, layout: Layout, numbers: Numbers, control:
 
     Returns
     -------
-    bundle.Problem
+    bundle.BundleProblem
         Its points are those of the strip, in their order; it starts at the truth.
     """
     observed = strip.observations
@@ -255,19 +255,21 @@ def bundle_problem(strip: IdealStrip, layout: Layout, numbers: Numbers, control:
     photo = np.array([place[name] for name in observed.photo_ids], np.intp)[observed.photo[seen]]
     axes = np.broadcast_to(np.eye(3), (len(numbers), 3, 3))
     count = len(strip.centers)
-    return bundle.Problem(
-        bundle.Images(photo, point[observed.point[seen]], observed.xy[seen], observed.sigma[seen]),
-        bundle.Cameras(np.zeros(count, np.intp), np.array([strip.geometry.camera.principal_distance])),
-        bundle.Start(strip.centers, strip.rotations, strip.xyz),
-        bundle.Control(numbers, strip.xyz[numbers], axes, np.where(control.use, control.sigma, np.inf)),
-        bundle.Positions() if layout.gnss is None else _positions(strip, layout.gnss, offset=layout.gnss_offset),
+    return bundle.BundleProblem(
+        bundle.ImageObservations(photo, point[observed.point[seen]], observed.xy[seen], observed.sigma[seen]),
+        bundle.BundleCameras(np.zeros(count, np.intp), np.array([strip.geometry.camera.principal_distance])),
+        bundle.StartValues(strip.centers, strip.rotations, strip.xyz),
+        bundle.ControlObservations(numbers, strip.xyz[numbers], axes, np.where(control.use, control.sigma, np.inf)),
+        bundle.PositionObservations()
+        if layout.gnss is None
+        else _positions(strip, layout.gnss, offset=layout.gnss_offset),
     )
 
 
-def _positions(strip: IdealStrip, sigma: tuple[float, float, float], *, offset: bool) -> bundle.Positions:
+def _positions(strip: IdealStrip, sigma: tuple[float, float, float], *, offset: bool) -> bundle.PositionObservations:
     """Return all perspective centres, with a constant offset that is free or absent."""
     count = len(strip.centers)
-    return bundle.Positions(
+    return bundle.PositionObservations(
         np.arange(count),
         strip.centers,
         np.broadcast_to(np.eye(3), (count, 3, 3)),

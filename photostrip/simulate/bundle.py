@@ -8,7 +8,13 @@ import numpy as np
 
 from photostrip.geodesy.tying import tie_frames
 from photostrip.geometry.rotation import from_vector
-from photostrip.triangulation.bundle.observations.problem import Cameras, Control, Images, Problem, Start
+from photostrip.triangulation.bundle.observations.problem import (
+    BundleCameras,
+    BundleProblem,
+    ControlObservations,
+    ImageObservations,
+    StartValues,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -18,20 +24,20 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 
-def truth_of(simulation: Simulation) -> Start:
+def truth_of(simulation: Simulation) -> StartValues:
     """Return the truth of a simulation in the frame of ``problem_of``.
 
     Returns
     -------
-    Start
+    StartValues
         Centres, rotations and points, Cartesian, the origin in the middle of the points, metres.
     """
     truth = simulation.truth
     origin = truth.points.xyz.mean(axis=0)
-    return Start(truth.centers - origin, truth.rotations, truth.points.xyz - origin)
+    return StartValues(truth.centers - origin, truth.rotations, truth.points.xyz - origin)
 
 
-def problem_of(simulation: Simulation, *, shift: float = 1.0, turn: float = 1e-3, seed: int = 1) -> Problem:
+def problem_of(simulation: Simulation, *, shift: float = 1.0, turn: float = 1e-3, seed: int = 1) -> BundleProblem:
     """Make a bundle adjustment of a simulation.
 
     Parameters
@@ -47,14 +53,14 @@ def problem_of(simulation: Simulation, *, shift: float = 1.0, turn: float = 1e-3
 
     Returns
     -------
-    Problem
+    BundleProblem
         Its rays, its control without check points, and a start.
     """
     seen, control, truth = simulation.observations, simulation.control, truth_of(simulation)
     rays = np.bincount(seen.point, minlength=len(seen.point_ids))[seen.point] > 1
     random = np.random.default_rng(seed)
     photos = len(truth.centers)
-    start = Start(
+    start = StartValues(
         truth.centers + shift * random.standard_normal(truth.centers.shape),
         from_vector(turn * random.standard_normal((photos, 3))) @ truth.rotations,
         truth.points + shift * random.standard_normal(truth.points.shape),
@@ -73,11 +79,11 @@ def problem_of(simulation: Simulation, *, shift: float = 1.0, turn: float = 1e-3
         enu = np.where(np.isnan(enu), frame.ground_from_cartesian(true[own]), enu)
         given[own], axes[own] = frame.cartesian_from_ground(enu), frame.axes_at(true[own])
     origin = simulation.truth.points.xyz.mean(axis=0)
-    return Problem(
-        Images(seen.photo[rays], seen.point[rays], seen.xy[rays], seen.sigma[rays]),
-        Cameras(np.zeros(photos, np.intp), np.array([simulation.camera.principal_distance])),
+    return BundleProblem(
+        ImageObservations(seen.photo[rays], seen.point[rays], seen.xy[rays], seen.sigma[rays]),
+        BundleCameras(np.zeros(photos, np.intp), np.array([simulation.camera.principal_distance])),
         start,
-        Control(point, given - origin, axes, np.where(control.use[rows], control.sigma[rows], np.inf)),
+        ControlObservations(point, given - origin, axes, np.where(control.use[rows], control.sigma[rows], np.inf)),
         photo_ids=simulation.truth.photo_ids,
         point_ids=simulation.truth.points.ids,
     )

@@ -14,8 +14,8 @@ from photostrip.pipeline.block import start as block_start
 from photostrip.pipeline.results import Adjusted, Bundle, Precision, SinglePhoto
 from photostrip.triangulation.bundle import snooping
 from photostrip.triangulation.bundle.quality import reliability, self_calibration, variance_components
+from photostrip.triangulation.bundle.quality.cofactors import cofactors_of as precision_of
 from photostrip.triangulation.bundle.quality.correlations import correlations
-from photostrip.triangulation.bundle.quality.precision import precision as precision_of
 from photostrip.triangulation.bundle.selection import restarted, selected, supported
 from photostrip.triangulation.bundle.solve import solve
 from photostrip.triangulation.resection.resection import Resection, project
@@ -30,9 +30,8 @@ if TYPE_CHECKING:
     from photostrip.pipeline.results import BlockProblem, BlockStart, StripResult
     from photostrip.points import ControlPoints, PhotoPoints
     from photostrip.triangulation.bundle.quality.correlations import Correlation
-    from photostrip.triangulation.bundle.snooping import Screened
-    from photostrip.triangulation.bundle.solution import Precision as Cofactors
-    from photostrip.triangulation.bundle.solution import Solution
+    from photostrip.triangulation.bundle.snooping import ScreenedBundle
+    from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -99,7 +98,7 @@ def adjust_block(
     block = block_problem.build(inputs, settings, observations, control, places, start)
     try:
         block = _settled(block, control, of_control)
-        screened = snooping.screen(block.problem, block.begin, settings.bundle, block.kept)
+        screened = snooping.screen_bundle(block.problem, block.begin, settings.bundle, block.kept)
     except GeometryError as error:
         _name_undetermined(block, error)
         raise
@@ -160,8 +159,8 @@ def _name_undetermined(block: BlockProblem, error: GeometryError) -> None:
 
 
 def _components(
-    block: BlockProblem, screened: Screened, settings: Settings
-) -> tuple[BlockProblem, Screened, tuple[variance_components.Component, ...]]:
+    block: BlockProblem, screened: ScreenedBundle, settings: Settings
+) -> tuple[BlockProblem, ScreenedBundle, tuple[variance_components.Component, ...]]:
     """Estimate variance components, then search for gross errors once more with the standard deviations found."""
     found: tuple[variance_components.Component, ...] = ()
     problem, level = block.problem, block.level
@@ -174,9 +173,9 @@ def _components(
         if variance_components.settled(step):
             break
         chosen = selected(problem, screened.selection)
-        done = snooping.screen(chosen, screened.selection, quiet)
+        done = snooping.screen_bundle(chosen, screened.selection, quiet)
     block = replace(block, problem=problem)
-    final = snooping.screen(problem, screened.selection, settings.bundle, block.kept)
+    final = snooping.screen_bundle(problem, screened.selection, settings.bundle, block.kept)
     before = {(each.kind, each.row): each for each in screened.rejections}
     log = tuple(each for each in screened.rejections if each not in final.rejections)
     again = tuple(each for each in final.rejections if (each.kind, each.row) not in before)
@@ -188,7 +187,7 @@ def _bundle(
     settings: Settings,
     start: BlockStart,
     block: BlockProblem,
-    screened: Screened,
+    screened: ScreenedBundle,
     sigma0: reliability.Sigma0Test,
     components: tuple[variance_components.Component, ...],
 ) -> Bundle:
@@ -212,9 +211,9 @@ def _bundle(
     )  # fmt: skip
 
 
-def _correlations(solution: Solution, cofactors: Cofactors) -> tuple[Correlation, ...]:
+def _correlations(solution: BundleSolution, cofactors: Cofactors) -> tuple[Correlation, ...]:
     """Correlations of common parameters, with photos only the largest of each kind; and the largest within photos."""
-    common = set(solution.model.problem.common_names())
+    common = set(solution.prepared.problem.common_names())
     found: dict[tuple[str, str], Correlation] = {}
     within: list[Correlation] = []
     for each in correlations(solution, cofactors):

@@ -11,13 +11,13 @@ from photostrip.geometry.rotation import angle_rates
 from photostrip.pipeline import overruling
 from photostrip.pipeline.results import BlockProblem
 from photostrip.triangulation.bundle.observations.problem import (
-    Attitudes,
-    Cameras,
-    Control,
-    Images,
-    Positions,
-    Problem,
-    Start,
+    AttitudeObservations,
+    BundleCameras,
+    BundleProblem,
+    ControlObservations,
+    ImageObservations,
+    PositionObservations,
+    StartValues,
 )
 from photostrip.triangulation.bundle.quality.self_calibration import sigmas
 from photostrip.triangulation.bundle.selection import Selection
@@ -68,16 +68,16 @@ def build(
     place = {photo: number for number, photo in enumerate(start.photos)}
     photo = np.array([place[name] for name in observations.photo_ids], np.intp)
     rows = np.flatnonzero(~_dropped(settings, observations))
-    images = Images(
+    images = ImageObservations(
         photo[observations.photo[rows]], observations.point[rows], observations.xy[rows], observations.sigma[rows]
     )
     given, control_rows = _control(control, frames[0], observations, start, origin)
     positions = _positions(inputs, frames[1], frames[2], start, origin)
     attitudes = _attitudes(inputs.orientations, frames[2], start)
-    problem = Problem(
+    problem = BundleProblem(
         images,
         _cameras(inputs, settings),
-        Start(start.centers - origin, start.rotations, start.points - origin),
+        StartValues(start.centers - origin, start.rotations, start.points - origin),
         given,
         positions,
         attitudes,
@@ -106,14 +106,14 @@ def _dropped(settings: Settings, observations: PhotoPoints) -> Flags:
     return _named(settings.relative.drop, observations)
 
 
-def _cameras(inputs: Inputs, settings: Settings) -> Cameras:
+def _cameras(inputs: Inputs, settings: Settings) -> BundleCameras:
     """Cameras of all photos, and what is calibrated of them."""
     cameras = {strip.camera.name: strip for strip in inputs.strips}
     number = {name: row for row, name in enumerate(cameras)}
     of_photo = np.array([number[strip.camera.name] for strip in inputs.strips for _ in strip.photos], np.intp)
     focal = np.array([strip.camera.principal_distance for strip in cameras.values()])
     asked = [strip.calibrate for strip in cameras.values()]
-    return Cameras(of_photo, focal, sigmas(asked, settings.bundle.calibration_sigma))
+    return BundleCameras(of_photo, focal, sigmas(asked, settings.bundle.calibration_sigma))
 
 
 # ----------------------------------------------------------------------------------------------- on the ground
@@ -150,7 +150,7 @@ def given_positions(
 
 def _control(
     control: ControlPoints, frames: Sequence[GroundFrame], observations: PhotoPoints, start: BlockStart, origin: Floats
-) -> tuple[Control, Numbers]:
+) -> tuple[ControlObservations, Numbers]:
     """Control as observations; points without start coordinates, which no ray determines, are left out."""
     number = {name: n for n, name in enumerate(observations.point_ids)}
     point = np.array([number[name] for name in control.ids], np.intp)
@@ -165,14 +165,14 @@ def _control(
             xyz[here], axes[here], sigma[here] = given_positions(
                 control.enu[chosen], control.use[chosen], control.sigma[chosen], frame, start.points[point[chosen]], ids
             )
-    return Control(point[rows], xyz - origin, axes, sigma), rows
+    return ControlObservations(point[rows], xyz - origin, axes, sigma), rows
 
 
 def _positions(
     inputs: Inputs, frame: GroundFrame | None, of_orientations: GroundFrame | None, start: BlockStart, origin: Floats
-) -> Positions:
+) -> PositionObservations:
     """Camera positions, and the centres of observed orientations, as observations."""
-    parts: list[Positions] = []
+    parts: list[PositionObservations] = []
     place = {photo: number for number, photo in enumerate(start.photos)}
     if inputs.positions is not None and frame is not None and len(inputs.positions.photos):
         parts.append(_measured(inputs, inputs.positions, frame, start, origin))
@@ -184,9 +184,11 @@ def _positions(
             orientations.enu, use, orientations.sigma, of_orientations, start.centers[photo], orientations.photos
         )
         none = np.zeros((len(photo), 3))
-        parts.append(Positions(photo, xyz - origin, axes, sigma, none, np.full(len(photo), -1), np.zeros(len(photo))))
+        parts.append(
+            PositionObservations(photo, xyz - origin, axes, sigma, none, np.full(len(photo), -1), np.zeros(len(photo)))
+        )
     if len(parts) < 2:
-        return parts[0] if parts else Positions()
+        return parts[0] if parts else PositionObservations()
     names = ("photo", "xyz", "axes", "sigma", "lever", "group", "time")
     joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
     return replace(parts[0], **joined)
@@ -194,7 +196,7 @@ def _positions(
 
 def _measured(
     inputs: Inputs, positions: CameraPositions, frame: GroundFrame, start: BlockStart, origin: Floats
-) -> Positions:
+) -> PositionObservations:
     """Measured positions with lever arm, offset and drift of each strip."""
     place = {photo: number for number, photo in enumerate(start.photos)}
     photo = np.array([place[name] for name in positions.photos], np.intp)
@@ -210,7 +212,7 @@ def _measured(
     wanted = np.where((members > 0) & (positions.correction != NO_CORRECTION), np.inf, 0.0)
     drift = np.where((members > 1) & (positions.correction == DRIFT), np.inf, 0.0)
     group = strip if positions.correction != NO_CORRECTION else np.full(len(photo), -1)
-    return Positions(photo, xyz - origin, axes, sigma, lever, group, time - mean[strip], wanted, drift)
+    return PositionObservations(photo, xyz - origin, axes, sigma, lever, group, time - mean[strip], wanted, drift)
 
 
 def _level_positions(
@@ -225,10 +227,10 @@ def _level_positions(
     return tuple(level)
 
 
-def _attitudes(given: GivenOrientations | None, frame: GroundFrame | None, start: BlockStart) -> Attitudes:
+def _attitudes(given: GivenOrientations | None, frame: GroundFrame | None, start: BlockStart) -> AttitudeObservations:
     """Observed rotations; the standard deviations of the angles become those about the photo's own axes."""
     if given is None or frame is None or not given.observed or not given.photos:
-        return Attitudes()
+        return AttitudeObservations()
     from photostrip.geometry.rotation import from_angles
 
     place = {photo: number for number, photo in enumerate(start.photos)}
@@ -237,7 +239,7 @@ def _attitudes(given: GivenOrientations | None, frame: GroundFrame | None, start
     own = from_angles(given.angles, given.system)
     rates = own.transpose(0, 2, 1) @ angle_rates(given.angles, given.system)
     sigma = np.sqrt(np.einsum("nij,nj->ni", rates**2, given.sigma_angles**2))
-    return Attitudes(photo, frame.axes_at(centers).transpose(0, 2, 1) @ own, sigma)
+    return AttitudeObservations(photo, frame.axes_at(centers).transpose(0, 2, 1) @ own, sigma)
 
 
 def refilled(
@@ -277,7 +279,7 @@ def refilled(
 
 
 def _begin(
-    problem: Problem, rows: Numbers, control: ControlPoints, control_rows: Numbers, start: BlockStart
+    problem: BundleProblem, rows: Numbers, control: ControlPoints, control_rows: Numbers, start: BlockStart
 ) -> Selection:
     """Choose what takes part at first: what the strip method used, and what else fits its result."""
     images = problem.images

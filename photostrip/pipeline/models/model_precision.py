@@ -114,7 +114,7 @@ def joint(
     given: tuple[ControlPoints, Numbers],
     frames: Sequence[GroundFrame],
     intermediate: IntermediateFrame,
-) -> control_significance.Joint | None:
+) -> control_significance.ControlCovariance | None:
     """Covariance of all misclosures at the control; None where there are too many to form it as a whole.
 
     Parameters
@@ -134,7 +134,7 @@ def joint(
     )
     moved = similarity_derivatives(xyz[seen.point], found.origin)
     design = np.einsum("wi,wij->wj", seen.direction, moved)
-    return control_significance.Joint(seen.point, seen.axis, design, covariance + np.diag(seen.variance))
+    return control_significance.ControlCovariance(seen.point, seen.axis, design, covariance + np.diag(seen.variance))
 
 
 def _fit_to_control(

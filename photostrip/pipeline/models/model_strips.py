@@ -15,7 +15,7 @@ from photostrip.pipeline.strip import control_notes, control_of, polynomial_note
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.gross_errors.control import control_screening
 from photostrip.triangulation.independent_models import link_screening, linking, perspective_centers
-from photostrip.triangulation.independent_models.formation import FormedModels, form, require_links
+from photostrip.triangulation.independent_models.formation import FormedModels, form_from_models, require_links
 from photostrip.triangulation.polynomial import correction as polynomial
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from photostrip.geodesy.local_frame import IntermediateFrame
     from photostrip.pipeline.inputs import MeasuredModels, ModelStrip, Settings
     from photostrip.points import ControlPoints, ModelPoints
-    from photostrip.triangulation.independent_models.link_screening import Screened
+    from photostrip.triangulation.independent_models.link_screening import ScreenedLinks
     from photostrip.triangulation.independent_models.linking import StripModels
 
     Floats = NDArray[np.float64]
@@ -67,7 +67,7 @@ def adjust_all(
     return tuple(adjust_models(strip, models.points, control, frames, settings) for strip in models.strips)
 
 
-def require_named(settings: link_screening.Settings, measured: ModelPoints) -> None:
+def require_named(settings: link_screening.LinkSettings, measured: ModelPoints) -> None:
     """Refuse entries of ``keep`` and ``drop`` that name nothing, and those in both.
 
     Raises
@@ -135,9 +135,9 @@ def adjust_models(
     judged = None
     if settings.links.screening != "none":
         joint = model_precision.joint(formed, orientation, (here, rows), frames, intermediate)
-        place = control_screening.Setting(formed.xyz[rows], frames, intermediate, spread, *extent, joint)
+        place = control_screening.StripAtControl(formed.xyz[rows], frames, intermediate, spread, *extent, joint)
         given = here
-        here, wrong = control_screening.screen(given, place)
+        here, wrong = control_screening.screen_control(given, place)
         judged = place.judged(given, here)
     if wrong:
         intermediate, orientation, spread = to_ground(strip, formed, (here, rows), frames, spread_at)
@@ -207,14 +207,14 @@ def form_models(strip: ModelStrip, measured: ModelPoints, settings: Settings) ->
         msg = f"strip {strip.id}: {error}"
         raise GeometryError(msg, photos=strip.photos, code=error.code) from error
     kept = _named(settings.links.keep, strip, measured, models)
-    links = link_screening.screen(shared, models, settings.links, kept[shared.before] | kept[shared.after])
+    links = link_screening.screen_links(shared, models, settings.links, kept[shared.before] | kept[shared.after])
     _refuse_reflected(strip, links)
     number = {photo: node for node, photo in enumerate(measured.photo_ids, len(measured.point_ids))}
     photos = np.array([number.get(photo, -1) for photo in strip.photos], np.intp)
-    return form(models, links, photos)
+    return form_from_models(models, links, photos)
 
 
-def models_of(strip: ModelStrip, measured: ModelPoints, settings: link_screening.Settings) -> StripModels:
+def models_of(strip: ModelStrip, measured: ModelPoints, settings: link_screening.LinkSettings) -> StripModels:
     """Take the models of a strip out of those of the project, without what the user drops.
 
     Returns
@@ -251,7 +251,7 @@ def _named(names: Sequence[str], strip: ModelStrip, measured: ModelPoints, model
     return found
 
 
-def _refuse_reflected(strip: ModelStrip, links: Screened) -> None:
+def _refuse_reflected(strip: ModelStrip, links: ScreenedLinks) -> None:
     """Refuse models that are mirror images of their neighbours; the smaller group is named."""
     if not links.reflected.any():
         return

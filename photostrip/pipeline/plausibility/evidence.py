@@ -109,7 +109,7 @@ def form(strip: Strip, observations: PhotoPoints, settings: Settings) -> Formed 
     try:
         pairs = collect_pairs(observations, strip.photos, strip.camera.principal_distance)
         first, converged = orient_unchecked(pairs)
-        screened = screening.examine(first, settings.relative, sigma, converged)
+        screened = screening.screen_pairs(first, settings.relative, sigma, converged)
         refuse_unusable(screened.orientation, screened.converged, strip.photos)
         scatter = screened.scatter.by_pair
         formed = form_from_pairs(screened.orientation, settings.formation, strip.photos, scatter)

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from photostrip.pipeline import Result
     from photostrip.pipeline.results import Bundle
     from photostrip.result.numbers import Document
-    from photostrip.triangulation.bundle.observations.problem import Problem
-    from photostrip.triangulation.bundle.settings import Settings
-    from photostrip.triangulation.bundle.snooping import Rejection
-    from photostrip.triangulation.bundle.solution import Solution
+    from photostrip.triangulation.bundle.observations.problem import BundleProblem
+    from photostrip.triangulation.bundle.settings import BundleSettings
+    from photostrip.triangulation.bundle.snooping import BundleRejection
+    from photostrip.triangulation.bundle.solution import BundleSolution
 
     Floats = NDArray[np.float64]
 
@@ -106,7 +106,7 @@ def _sigma0(found: Bundle) -> Document:
     }
 
 
-def _convergence(solution: Solution) -> list[Document]:
+def _convergence(solution: BundleSolution) -> list[Document]:
     return [
         {
             "chi_square": step.chi_square,
@@ -119,7 +119,7 @@ def _convergence(solution: Solution) -> list[Document]:
     ]
 
 
-def _screening(found: Bundle, settings: Settings) -> Document:
+def _screening(found: Bundle, settings: BundleSettings) -> Document:
     """Sum up the search for gross errors."""
     screened = found.screened
     out = [each for each in screened.rejections if not each.readmitted]
@@ -293,7 +293,7 @@ def _effect(found: Bundle, kind: str, row: int, external: float) -> float:
     return float(external * np.sqrt(np.linalg.eigvalsh(block)[-1]))
 
 
-def names_of(problem: Problem, kind: str, row: int) -> tuple[str | None, str | None]:
+def names_of(problem: BundleProblem, kind: str, row: int) -> tuple[str | None, str | None]:
     """Return photo and point of an observation, as far as it has them."""
     if kind == reliability.IMAGE:
         images = problem.images
@@ -342,7 +342,7 @@ def with_bundle(result: Result, rejected: list[Document]) -> list[Document]:
     return rows + [_rejection(found, each) for each in found.screened.rejections]
 
 
-def _rejection(found: Bundle, each: Rejection) -> Document:
+def _rejection(found: Bundle, each: BundleRejection) -> Document:
     kind = KINDS[each.kind]
     photo, point = names_of(found.block.problem, each.kind, each.row)
     size = rounded(each.size * kind.factor, DECIMALS_BY_UNIT[kind.unit])

@@ -9,7 +9,7 @@ import numpy as np
 
 from photostrip.result.numbers import DEGREES, EXACT, GROUND, Document, micrometres, natural, rounded, significant
 from photostrip.triangulation.gross_errors.control.control_screening import AXES
-from photostrip.triangulation.gross_errors.rays.strip_screening import BOTH, SEVERAL, TOLD
+from photostrip.triangulation.gross_errors.rays.strip_screening import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.triangulation.relative_orientation.solution import ELEMENTS
 from photostrip.triangulation.strip_formation.scale_ratios import depths
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from photostrip.pipeline import Result, StripResult
     from photostrip.points import PhotoPoints
     from photostrip.triangulation.gross_errors.control.control_screening import ControlRejection
-    from photostrip.triangulation.gross_errors.pairs.screening import Rejection
+    from photostrip.triangulation.gross_errors.pairs.screening import PairRejection
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -31,9 +31,9 @@ if TYPE_CHECKING:
 PPM = 1e6
 RATIO_DECIMALS = 1  # of parts per million
 REASONS = {
-    TOLD: "the other rays of the point meet without it",
-    BOTH: "the two rays of the point contradict each other: neither is used",
-    SEVERAL: "the rays of the point contradict each other, and which is wrong cannot be told: none is used",
+    WRONG_RAY: "the other rays of the point meet without it",
+    TWO_RAYS: "the two rays of the point contradict each other: neither is used",
+    SEVERAL_RAYS: "the rays of the point contradict each other, and which is wrong cannot be told: none is used",
 }
 
 
@@ -229,7 +229,7 @@ def rejected_of(result: Result) -> list[Document]:
     return found
 
 
-def _from_pair(strip: StripResult, rejection: Rejection, observations: PhotoPoints) -> Document:
+def _from_pair(strip: StripResult, rejection: PairRejection, observations: PhotoPoints) -> Document:
     pair = int(strip.of_photos.orientation.pairs.pair[rejection.row])
     left, right = strip.strip.photos[pair : pair + 2]
     size = rejection.size * 1000
@@ -270,7 +270,7 @@ def _from_pair(strip: StripResult, rejection: Rejection, observations: PhotoPoin
 def _told(strip: StripResult) -> list[int]:
     """Rows of the observations that are known to be wrong, of their points' rays."""
     found = strip.of_photos.contradictions
-    return [int(row) for row, kind in zip(found.wrong, found.kind, strict=True) if kind == TOLD]
+    return [int(row) for row, kind in zip(found.wrong, found.kind, strict=True) if kind == WRONG_RAY]
 
 
 def _from_joints(strip: StripResult, ids: Sequence[str]) -> list[Document]:
@@ -342,7 +342,9 @@ def _from_rays(strip: StripResult, observations: PhotoPoints) -> list[Document]:
                 "size": rounded(largest * 1000, 2) if np.isfinite(largest) else None,
                 "size_unit": "um" if np.isfinite(largest) else "",
                 "readmitted": False,
-                "blamed": [observations.photo_ids[observations.photo[found.wrong[number]]]] if kind == TOLD else [],
+                "blamed": [observations.photo_ids[observations.photo[found.wrong[number]]]]
+                if kind == WRONG_RAY
+                else [],
                 "reason": REASONS[kind],
             }
         )

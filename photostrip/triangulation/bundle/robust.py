@@ -17,8 +17,8 @@ from photostrip.triangulation.bundle.solve import solve
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.bundle.observations.problem import Problem
-    from photostrip.triangulation.bundle.solution import Solution
+    from photostrip.triangulation.bundle.observations.problem import BundleProblem
+    from photostrip.triangulation.bundle.solution import BundleSolution
 
     Floats = NDArray[np.float64]
 
@@ -29,12 +29,12 @@ NO_WEIGHT = 1e-3  # weight below which a ray is out
 SMALLEST = 1e-5  # weight that every ray keeps, so that its point stays determined
 
 
-def adjust(problem: Problem) -> tuple[Solution, Floats]:
+def adjust_robustly(problem: BundleProblem) -> tuple[BundleSolution, Floats]:
     """Adjust with weights that fall with the residual.
 
     Parameters
     ----------
-    problem : Problem
+    problem : BundleProblem
         All observations that take part.
 
     Returns

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.triangulation.bundle.observations.problem import Images, Problem, Start
+from photostrip.triangulation.bundle.observations.problem import BundleProblem, ImageObservations, StartValues
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.bundle.solution import Solution
+    from photostrip.triangulation.bundle.solution import BundleSolution
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -32,7 +32,7 @@ class Selection:
     attitudes: Flags
 
     @classmethod
-    def everything(cls, problem: Problem) -> Selection:
+    def everything(cls, problem: BundleProblem) -> Selection:
         """Return the selection of all observations that are given."""
         given = (np.isfinite(each.sigma) for each in (problem.control, problem.positions, problem.attitudes))
         return cls(np.ones(len(problem.images), bool), *given)
@@ -45,7 +45,7 @@ class Selection:
         return replace(self, **{name: flags})
 
 
-def supported(problem: Problem, selection: Selection) -> Selection:
+def supported(problem: BundleProblem, selection: Selection) -> Selection:
     """Take out the rays of points that too few rays are left of.
 
     Returns
@@ -65,16 +65,16 @@ def supported(problem: Problem, selection: Selection) -> Selection:
     return replace(selection, images=images, control=selection.control & seen[problem.control.point][:, None])
 
 
-def selected(problem: Problem, selection: Selection) -> Problem:
+def selected(problem: BundleProblem, selection: Selection) -> BundleProblem:
     """Return the problem with the observations that take part.
 
     Returns
     -------
-    Problem
+    BundleProblem
         Rays taken out are gone; coordinates taken out have an infinite standard deviation.
     """
     images, rows = problem.images, selection.images
-    chosen = Images(images.photo[rows], images.point[rows], images.xy[rows], images.sigma[rows])
+    chosen = ImageObservations(images.photo[rows], images.point[rows], images.xy[rows], images.sigma[rows])
     given = (problem.control.sigma, problem.positions.sigma, problem.attitudes.sigma)
     flags = (selection.control, selection.positions, selection.attitudes)
     sigma = [np.where(yes, each, np.inf) for each, yes in zip(given, flags, strict=True)]
@@ -88,19 +88,19 @@ def selected(problem: Problem, selection: Selection) -> Problem:
     )
 
 
-def restarted(problem: Problem, solution: Solution) -> Problem:
+def restarted(problem: BundleProblem, solution: BundleSolution) -> BundleProblem:
     """Return a problem that starts where another one ended.
 
     Parameters
     ----------
-    solution : Solution
+    solution : BundleSolution
         A solution of it, or of a selection.
 
     Returns
     -------
-    Problem
+    BundleProblem
         The same problem; a point that took no part keeps its start.
     """
     known = np.asarray(np.isfinite(problem.start.points).all(axis=1), bool)
     points = np.where(known[:, None], solution.points, problem.start.points)
-    return replace(problem, start=Start(solution.centers, solution.rotations, points))
+    return replace(problem, start=StartValues(solution.centers, solution.rotations, points))

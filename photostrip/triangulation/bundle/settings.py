@@ -21,7 +21,7 @@ CALIBRATION_UNITS = {
 
 
 @dataclass(frozen=True)
-class Settings:
+class BundleSettings:
     """What is asked of the bundle adjustment."""
 
     # how gross errors are searched for: ``"snooping"`` (one after the other, by the largest test value), ``"robust"``

@@ -9,7 +9,7 @@ import numpy as np
 
 from photostrip.triangulation.bundle import robust
 from photostrip.triangulation.bundle.quality import reliability
-from photostrip.triangulation.bundle.quality.precision import precision as precision_of
+from photostrip.triangulation.bundle.quality.cofactors import cofactors_of as precision_of
 from photostrip.triangulation.bundle.quality.self_calibration import image_shift
 from photostrip.triangulation.bundle.selection import Selection, restarted, selected, supported
 from photostrip.triangulation.bundle.solve import solve
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.bundle.observations.problem import Problem
-    from photostrip.triangulation.bundle.settings import Settings
-    from photostrip.triangulation.bundle.solution import Precision, Solution
+    from photostrip.triangulation.bundle.observations.problem import BundleProblem
+    from photostrip.triangulation.bundle.settings import BundleSettings
+    from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -35,7 +35,7 @@ NEAR = 0.5  # test value of what may go in the same round, in units of the worst
 
 
 @dataclass(frozen=True)
-class Rejection:
+class BundleRejection:
     """One observation that was taken out."""
 
     kind: str  # ``image``, ``control``, ``position`` or ``attitude``
@@ -49,25 +49,27 @@ class Rejection:
 
 
 @dataclass(frozen=True, eq=False)
-class Screened:
+class ScreenedBundle:
     """A solution and how it was cleaned."""
 
-    problem: Problem  # the problem with the observations that took part
+    problem: BundleProblem  # the problem with the observations that took part
     selection: Selection  # which those are
-    solution: Solution
-    precision: Precision
-    rejections: tuple[Rejection, ...]  # what was taken out, in order; re-admitted ones are marked
+    solution: BundleSolution
+    precision: Cofactors
+    rejections: tuple[BundleRejection, ...]  # what was taken out, in order; re-admitted ones are marked
     rounds: int
 
 
-def screen(problem: Problem, begin: Selection, settings: Settings, kept: Flags | None = None) -> Screened:
+def screen_bundle(
+    problem: BundleProblem, begin: Selection, settings: BundleSettings, kept: Flags | None = None
+) -> ScreenedBundle:
     """Adjust a problem and take its gross errors out.
 
     Parameters
     ----------
     begin : Selection
         What takes part at first; the rest is put in at the end where it fits.
-    settings : Settings
+    settings : BundleSettings
         Which search, which test, at which level.
     kept : ndarray of bool, shape (n,), optional
         Rays that stay in whatever the tests say.
@@ -76,7 +78,7 @@ def screen(problem: Problem, begin: Selection, settings: Settings, kept: Flags |
     if settings.screening == "none":
         chosen = supported(problem, Selection.everything(problem))
         done = _Adjusted.of(problem, chosen)
-        return Screened(done.problem, chosen, done.solution, done.precision, (), 1)
+        return ScreenedBundle(done.problem, chosen, done.solution, done.precision, (), 1)
     search = _Search(problem, settings, keep)
     chosen = supported(problem, begin)
     if settings.screening == "robust":
@@ -88,20 +90,20 @@ def screen(problem: Problem, begin: Selection, settings: Settings, kept: Flags |
             break
         done = search.clean(more)
     log = tuple(search.log(done, begin))
-    return Screened(done.problem, done.selection, done.solution, done.precision, log, search.rounds)
+    return ScreenedBundle(done.problem, done.selection, done.solution, done.precision, log, search.rounds)
 
 
 @dataclass(frozen=True, eq=False)
 class _Adjusted:
     """One adjustment on the way."""
 
-    problem: Problem
+    problem: BundleProblem
     selection: Selection
-    solution: Solution
-    precision: Precision
+    solution: BundleSolution
+    precision: Cofactors
 
     @classmethod
-    def of(cls, problem: Problem, selection: Selection) -> _Adjusted:
+    def of(cls, problem: BundleProblem, selection: Selection) -> _Adjusted:
         chosen = selected(problem, selection)
         solution = solve(chosen)
         return cls(chosen, selection, solution, precision_of(solution))
@@ -122,9 +124,9 @@ class _Adjusted:
 class _Search:
     """What is remembered from round to round."""
 
-    def __init__(self, problem: Problem, settings: Settings, kept: Flags) -> None:
+    def __init__(self, problem: BundleProblem, settings: BundleSettings, kept: Flags) -> None:
         self.problem, self.settings, self.kept = problem, settings, kept
-        self.out: dict[tuple[str, int, int], Rejection] = {}
+        self.out: dict[tuple[str, int, int], BundleRejection] = {}
         self.back: set[int] = set()
         self.rounds = 0
 
@@ -138,14 +140,16 @@ class _Search:
     def robust(self, selection: Selection) -> Selection:
         """Take out at once what re-weighting leaves next to no weight."""
         chosen = selected(self.problem, selection)
-        solution, weight = robust.adjust(chosen)
+        solution, weight = robust.adjust_robustly(chosen)
         self.problem = restarted(self.problem, solution)
         self.rounds += robust.ROUNDS
         rows = np.flatnonzero(selection.images)[weight < robust.NO_WEIGHT]
         images = selection.images.copy()
         for row in rows[~self.kept[rows]].tolist():
             images[row] = False
-            self.out[reliability.IMAGE, row, 0] = Rejection(reliability.IMAGE, row, 0, "robust", np.nan, np.nan, np.nan)
+            self.out[reliability.IMAGE, row, 0] = BundleRejection(
+                reliability.IMAGE, row, 0, "robust", np.nan, np.nan, np.nan
+            )
         return supported(self.problem, replace(selection, images=images))
 
     def clean(self, selection: Selection) -> _Adjusted:
@@ -161,14 +165,14 @@ class _Search:
             selection = supported(self.problem, selection)
         return self.adjust(selection)
 
-    def _limit(self, solution: Solution) -> tuple[float, float]:
+    def _limit(self, solution: BundleSolution) -> tuple[float, float]:
         """Limit of the standardised residuals, and what they are divided by."""
         limit = reliability.limit(self.settings.test, self.settings.alpha, solution.redundancy)
         # never sharper than the stated standard deviations: else a good fit would reject its own best observations
         unit = max(solution.sigma0, 1.0) if self.settings.test == "tau" and solution.redundancy > 0 else 1.0
         return limit, unit
 
-    def _worst(self, done: _Adjusted) -> Iterator[Rejection]:
+    def _worst(self, done: _Adjusted) -> Iterator[BundleRejection]:
         """Return the worst observations beyond the limit, no two of which share a point or a photo."""
         limit, unit = self._limit(done.solution)
         beyond = []
@@ -183,7 +187,7 @@ class _Search:
                 size = float(group.gross[row, column])
                 test = self.settings.test
                 beyond.append(
-                    Rejection(group.kind, int(rows[row]), column, test, float(value[row, column]), limit, size)
+                    BundleRejection(group.kind, int(rows[row]), column, test, float(value[row, column]), limit, size)
                 )
         beyond.sort(key=lambda each: (-each.value, each.kind, each.row))
         touched: set[tuple[str, int]] = set()
@@ -195,7 +199,7 @@ class _Search:
             touched |= places
             yield each
 
-    def _places(self, each: Rejection) -> set[tuple[str, int]]:
+    def _places(self, each: BundleRejection) -> set[tuple[str, int]]:
         """Photo and point that an observation belongs to."""
         problem = self.problem
         if each.kind == reliability.IMAGE:
@@ -246,7 +250,7 @@ class _Search:
             points[numbers] = found
             self.problem = replace(self.problem, start=replace(self.problem.start, points=points))
 
-    def log(self, done: _Adjusted, begin: Selection) -> Iterator[Rejection]:
+    def log(self, done: _Adjusted, begin: Selection) -> Iterator[BundleRejection]:
         """Return every observation that was out at some time."""
         limit, unit = self._limit(done.solution)
         outside = np.flatnonzero(~done.selection.images)
@@ -263,11 +267,11 @@ class _Search:
         known = {row for kind, row, _ in self.out if kind == reliability.IMAGE}
         for row in outside[~begin.images[outside]].tolist():
             if row not in known:
-                yield Rejection(reliability.IMAGE, row, 0, "start", float(value[row]), limit, float(size[row]))
+                yield BundleRejection(reliability.IMAGE, row, 0, "start", float(value[row]), limit, float(size[row]))
         for row, axis in np.argwhere(~begin.control & np.isfinite(self.problem.control.sigma)).tolist():
             if not done.selection.control[row, axis]:
                 error = -float(done.solution.control_residuals[row, axis])
-                yield Rejection(reliability.CONTROL, row, axis, "start", np.nan, limit, error)
+                yield BundleRejection(reliability.CONTROL, row, axis, "start", np.nan, limit, error)
 
     @staticmethod
     def _in(selection: Selection, kind: str, row: int, axis: int) -> bool:
@@ -275,7 +279,9 @@ class _Search:
         return bool(part[row, axis])
 
 
-def predicted(problem: Problem, selection: Selection, found: tuple[Solution, Precision]) -> tuple[Floats, Floats]:
+def predicted(
+    problem: BundleProblem, selection: Selection, found: tuple[BundleSolution, Cofactors]
+) -> tuple[Floats, Floats]:
     """Test values of rays that take no part, against what the others give.
 
     Returns
@@ -316,7 +322,7 @@ def predicted(problem: Problem, selection: Selection, found: tuple[Solution, Pre
     return value, size
 
 
-def _meeting(problem: Problem, rows: Numbers, solution: Solution) -> tuple[Numbers, Floats]:
+def _meeting(problem: BundleProblem, rows: Numbers, solution: BundleSolution) -> tuple[Numbers, Floats]:
     """Points that took no part, from their rays and the adjusted photos."""
     images = problem.images
     numbers, point = np.unique(images.point[rows], return_inverse=True)

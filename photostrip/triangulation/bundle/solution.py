@@ -9,13 +9,13 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.bundle.observations.model import Model
+    from photostrip.triangulation.bundle.parameters import PreparedProblem
 
     Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Step:
+class IterationStep:
     """One step of the adjustment."""
 
     chi_square: float  # weighted sum of squares of all residuals before the step
@@ -27,7 +27,7 @@ class Step:
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
+class BundleSolution:
     """The least-squares estimate."""
 
     centers: Floats  # (m, 3): perspective centres, metres, in the frame of the problem
@@ -44,8 +44,8 @@ class Solution:
     # observations (weighted parameters included) minus parameters, plus the datum defect of a free network
     redundancy: int
     free: bool  # true when the datum came from inner constraints on the points: no control, no positions
-    steps: tuple[Step, ...]  # the way from the start, one entry for each step that was taken or refused
-    model: Model  # the problem as it was laid out; spares the precision that work
+    steps: tuple[IterationStep, ...]  # the way from the start, one entry for each step that was taken or refused
+    prepared: PreparedProblem  # the problem as it was laid out; spares the precision that work
 
     @property
     def sigma0(self) -> float:
@@ -54,7 +54,7 @@ class Solution:
 
 
 @dataclass(frozen=True, eq=False)
-class Precision:
+class Cofactors:
     """Cofactors: covariances for a sigma0 of 1. Multiply by sigma0 squared where that is wanted."""
 
     points: Floats  # (q, 3, 3): cofactors of the points, m^2, Cartesian; NaN for a point without rays

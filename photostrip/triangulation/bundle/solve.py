@@ -22,17 +22,17 @@ from photostrip.triangulation.bundle.normal_equations.reduced import (
     reduce,
 )
 from photostrip.triangulation.bundle.observations.linearise import PHOTO, SIGNS, backward
-from photostrip.triangulation.bundle.observations.model import Move, State, model_of, state_of
-from photostrip.triangulation.bundle.solution import Solution, Step
+from photostrip.triangulation.bundle.parameters import Parameters, ParameterStep, parameters_from, prepare
+from photostrip.triangulation.bundle.solution import BundleSolution, IterationStep
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.triangulation.bundle.normal_equations.reduced import Reduced
-    from photostrip.triangulation.bundle.observations.layout import Batch
     from photostrip.triangulation.bundle.observations.linearise import Eliminated
-    from photostrip.triangulation.bundle.observations.model import Model
-    from photostrip.triangulation.bundle.observations.problem import Problem
+    from photostrip.triangulation.bundle.observations.problem import BundleProblem
+    from photostrip.triangulation.bundle.observations.ray_batches import Batch
+    from photostrip.triangulation.bundle.parameters import PreparedProblem
 
     Floats = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ ROUNDING = 1e-9  # part of the sum of squares by which it may seem to grow at th
 
 
 @dataclass(frozen=True)
-class Settings:
+class IterationSettings:
     """How the adjustment is driven."""
 
     iterations: int = 30  # steps after which it is given up
@@ -52,12 +52,12 @@ class Settings:
     converged: float = 1e-6
 
 
-def solve(problem: Problem, settings: Settings | None = None) -> Solution:
+def solve(problem: BundleProblem, settings: IterationSettings | None = None) -> BundleSolution:
     """Adjust a bundle of rays.
 
     Returns
     -------
-    Solution
+    BundleSolution
         Estimate and residuals. Without control and positions the datum comes from inner constraints on the
         points: the adjusted points have no shift, rotation and change of scale against their start.
 
@@ -67,30 +67,32 @@ def solve(problem: Problem, settings: Settings | None = None) -> Solution:
         When points, photos or the datum cannot be determined, by name (``bundle-rays``, ``bundle-rank``), or when
         the steps do not come to an end (``bundle-diverged``).
     """
-    settings = settings or Settings()
+    settings = settings or IterationSettings()
     defects.refuse_repeated(problem)
-    model = model_of(problem)
+    prepared = prepare(problem)
     free = datum.is_free(problem)
-    state, steps = _iterate(model, settings, free=free)
-    return _solution(model, state, steps, free=free)
+    state, steps = _iterate(prepared, settings, free=free)
+    return _solution(prepared, state, steps, free=free)
 
 
-def _iterate(model: Model, settings: Settings, *, free: bool) -> tuple[State, tuple[Step, ...]]:
+def _iterate(
+    prepared: PreparedProblem, settings: IterationSettings, *, free: bool
+) -> tuple[Parameters, tuple[IterationStep, ...]]:
     """Step until a step is short."""
-    start = model.problem.start
-    state = state_of(model, start.centers, start.rotations, start.points, np.zeros(len(model.prior)))
+    start = prepared.problem.start
+    state = parameters_from(prepared, start.centers, start.rotations, start.points, np.zeros(len(prepared.prior)))
     damping, steps = 0.0, []
     if not free:
-        defects.refuse_loose(model, state)
-    best = reduce(model, state)
-    defects.refuse_weak_points(model, best)
+        defects.refuse_loose(prepared, state)
+    best = reduce(prepared, state)
+    defects.refuse_weak_points(prepared, best)
     for _ in range(settings.iterations):
-        move = _move(model, state, best, damping, free=free)
+        move = _move(prepared, state, best, damping, free=free)
         steps.append(_told(best, move, damping))
-        moved = _moved(model, state, move)
+        moved = _moved(prepared, state, move)
         if damping == 0.0 and _still_to_come(steps) < settings.converged:
             return moved, tuple(steps)
-        found = reduce(model, moved)
+        found = reduce(prepared, moved)
         if found.chi_square <= best.chi_square * (1.0 + ROUNDING):
             state, best = moved, found
             damping = 0.0 if damping <= FIRST_DAMPING else damping * LESS
@@ -98,44 +100,46 @@ def _iterate(model: Model, settings: Settings, *, free: bool) -> tuple[State, tu
         damping = max(damping * MORE, FIRST_DAMPING)
         if damping > LARGEST_DAMPING:
             break
-        best = reduce(model, state, damping)
+        best = reduce(prepared, state, damping)
     raise GeometryError(f"the bundle adjustment did not come to an end in {len(steps)} steps", code="bundle-diverged")
 
 
-def _still_to_come(steps: list[Step]) -> float:
+def _still_to_come(steps: list[IterationStep]) -> float:
     """Foretell the length of the next step from the last two."""
     last = steps[-1].length
     before = steps[-2].length if len(steps) > 1 else 1.0
     return last * min(last / before, 1.0) if before > 0.0 else last
 
 
-def _move(model: Model, state: State, reduced: Reduced, damping: float, *, free: bool) -> Move:
+def _move(
+    prepared: PreparedProblem, state: Parameters, reduced: Reduced, damping: float, *, free: bool
+) -> ParameterStep:
     """Find the step of all parameters."""
-    own = reduced.blocks[model.structure.own]
-    anchor = datum.anchor(model, state, own) if free else None
+    own = reduced.blocks[prepared.structure.own]
+    anchor = datum.anchor(prepared, state, own) if free else None
     add = anchor
     if damping:
         add = np.eye(PHOTO) * (damping * own) + (0.0 if anchor is None else anchor)
-    band = factored(model, reduced, add)
+    band = factored(prepared, reduced, add)
     if band is None:
-        defects.refuse_weak_points(model, reduced)
-        defects.refuse_singular(model, reduced, anchor)
+        defects.refuse_weak_points(prepared, reduced)
+        defects.refuse_singular(prepared, reduced, anchor)
     p = len(state.common)
     border = reduced.border.reshape(-1, p + 1)
     solved = band.solve(border)
     rest = reduced.corner[:p] - border[:, :p].T @ solved
-    defects.refuse_common(model, reduced.corner[:p, :p], rest[:, :p])
+    defects.refuse_common(prepared, reduced.corner[:p, :p], rest[:, :p])
     common = np.asarray(np.linalg.solve(rest[:, :p] + damping * np.diag(np.diag(rest)), rest[:, p]), float)
     flat = solved[:, p] - solved[:, :p] @ common
     photos = flat.reshape(-1, PHOTO)
     eliminated_length = sum(float(np.einsum("cs,cs->", each.rows[-1], each.rows[-1])) for each in reduced.points)
     square = eliminated_length + float(border[:, p] @ flat) + float(reduced.corner[:p, p] @ common)
     points = tuple(
-        _shift(batch, eliminated, photos, common[: len(model.calibrated)])
-        for batch, eliminated in zip(model.structure.batches, reduced.points, strict=True)
+        _shift(batch, eliminated, photos, common[: len(prepared.calibrated)])
+        for batch, eliminated in zip(prepared.structure.batches, reduced.points, strict=True)
     )
-    move = Move(photos, common, points, float(np.sqrt(max(square, 0.0))))
-    return datum.centred(model, state, move) if free else move
+    move = ParameterStep(photos, common, points, float(np.sqrt(max(square, 0.0))))
+    return datum.centred(prepared, state, move) if free else move
 
 
 def _shift(batch: Batch, eliminated: Eliminated, photos: Floats, common: Floats) -> Floats:
@@ -155,10 +159,10 @@ def _shift(batch: Batch, eliminated: Eliminated, photos: Floats, common: Floats)
     return shift
 
 
-def _moved(model: Model, state: State, move: Move) -> State:
+def _moved(prepared: PreparedProblem, state: Parameters, move: ParameterStep) -> Parameters:
     """Apply a step."""
-    own = (move.photos * SIGNS)[model.structure.rank]
-    return State(
+    own = (move.photos * SIGNS)[prepared.structure.rank]
+    return Parameters(
         state.centers + np.einsum("nij,nj->ni", state.rotations, own[:, :3]),
         state.rotations @ from_vector(own[:, 3:]),
         tuple(xyz + shift for xyz, shift in zip(state.xyz, move.points, strict=True)),
@@ -166,48 +170,50 @@ def _moved(model: Model, state: State, move: Move) -> State:
     )
 
 
-def _told(reduced: Reduced, move: Move, damping: float) -> Step:
+def _told(reduced: Reduced, move: ParameterStep, damping: float) -> IterationStep:
     """Put a step on record."""
     shift = max(float(np.abs(part).max(initial=0.0)) for part in (move.photos[:, :3], *move.points))
     turn = float(np.abs(move.photos[:, 3:]).max(initial=0.0))
-    return Step(reduced.chi_square, move.length, damping, shift, turn)
+    return IterationStep(reduced.chi_square, move.length, damping, shift, turn)
 
 
-def _solution(model: Model, state: State, steps: tuple[Step, ...], *, free: bool) -> Solution:
+def _solution(
+    prepared: PreparedProblem, state: Parameters, steps: tuple[IterationStep, ...], *, free: bool
+) -> BundleSolution:
     """Collect estimate and residuals."""
-    problem, structure = model.problem, model.structure
+    problem, structure = prepared.problem, prepared.structure
     residuals = np.zeros((len(problem.images), 2))
-    table, chi_square = model.table(state), 0.0
+    table, chi_square = prepared.table(state), 0.0
     for batch, xyz in zip(structure.batches, state.xyz, strict=True):
-        misfit = model.rays(batch, xyz, table, state.common)[0].misfit
+        misfit = prepared.rays(batch, xyz, table, state.common)[0].misfit
         chi_square += float(np.einsum("akr,akr->", misfit, misfit))
         real = batch.real
         residuals[batch.row[:, real].ravel()] = np.moveaxis(misfit[:, :, real], 0, 2).reshape(-1, 2)
     residuals *= problem.images.sigma
-    positions, attitudes = given_at(model, state)
+    positions, attitudes = given_at(prepared, state)
     for linear in (positions, attitudes):
         chi_square += float(((linear.residual * linear.weight) ** 2).sum())
-    chi_square += control_squares(model, state) + float(((state.common / model.prior) ** 2).sum())
-    return Solution(
+    chi_square += control_squares(prepared, state) + float(((state.common / prepared.prior) ** 2).sum())
+    return BundleSolution(
         centers=state.centers,
         rotations=state.rotations,
-        points=points_of(model, state),
+        points=points_of(prepared, state),
         common=state.common,
         image_residuals=residuals,
-        control_residuals=control_residuals(model, state),
+        control_residuals=control_residuals(prepared, state),
         position_residuals=positions.residual,
         attitude_residuals=attitudes.residual,
         chi_square=chi_square,
-        redundancy=_redundancy(model, free=free),
+        redundancy=_redundancy(prepared, free=free),
         free=free,
         steps=steps,
-        model=model,
+        prepared=prepared,
     )
 
 
-def _redundancy(model: Model, *, free: bool) -> int:
+def _redundancy(prepared: PreparedProblem, *, free: bool) -> int:
     """Observations minus parameters."""
-    problem = model.problem
+    problem = prepared.problem
     observed = np.zeros(problem.points, bool)
     observed[problem.images.point] = True
     observations = sum(
@@ -217,8 +223,8 @@ def _redundancy(model: Model, *, free: bool) -> int:
             problem.control.sigma[observed[problem.control.point]],
             problem.positions.sigma,
             problem.attitudes.sigma,
-            model.prior,
+            prepared.prior,
         )
     )
-    unknowns = PHOTO * problem.photos + 3 * int(observed.sum()) + len(model.prior)
+    unknowns = PHOTO * problem.photos + 3 * int(observed.sum()) + len(prepared.prior)
     return observations - unknowns + (datum.DEFECT if free else 0)

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.independent_models.link_screening import Screened
-    from photostrip.triangulation.independent_models.linking import Common, Similarities, StripModels
+    from photostrip.triangulation.independent_models.link_screening import ScreenedLinks
+    from photostrip.triangulation.independent_models.linking import CommonPoints, Similarities, StripModels
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -38,7 +38,7 @@ class FormedModels:
     """A strip of independent models, in the scale of its first one."""
 
     models: StripModels
-    links: Screened
+    links: ScreenedLinks
     places: Similarities  # from each model to the strip
     model_xyz: Floats  # (n, 3): strip coordinates of every row, from its own model
     used: Flags  # (n,): rows that count
@@ -109,7 +109,7 @@ class FormedModels:
         return np.array([middles[0], middles[0] + vt[0]])
 
 
-def require_links(shared: Common, models: StripModels, used: Flags, names: Sequence[str]) -> None:
+def require_links(shared: CommonPoints, models: StripModels, used: Flags, names: Sequence[str]) -> None:
     """Refuse links that do not determine a similarity.
 
     Parameters
@@ -154,7 +154,7 @@ def _neighbours(models: StripModels, link: int, names: Sequence[str]) -> str:
     return ""
 
 
-def form(models: StripModels, links: Screened, photos: Numbers) -> FormedModels:
+def form_from_models(models: StripModels, links: ScreenedLinks, photos: Numbers) -> FormedModels:
     """Form the strip.
 
     Parameters
@@ -216,7 +216,7 @@ def _upright(models: StripModels, xyz: Floats) -> Floats:
     return np.array([x, np.cross(z, x), z])
 
 
-def _counting(models: StripModels, links: Screened, places: Similarities, xyz: Floats) -> Flags:
+def _counting(models: StripModels, links: ScreenedLinks, places: Similarities, xyz: Floats) -> Flags:
     """Rows that make the mean of their point.
 
     A rejected point is wrong in one of its two models. Where other models hold it too, the larger group that agrees
@@ -235,7 +235,7 @@ def _counting(models: StripModels, links: Screened, places: Similarities, xyz: F
     return used
 
 
-def _agreeing(rows: Numbers, models: StripModels, links: Screened, places: Similarities, xyz: Floats) -> Numbers:
+def _agreeing(rows: Numbers, models: StripModels, links: ScreenedLinks, places: Similarities, xyz: Floats) -> Numbers:
     """Group of each row of a point: rows that one link confirms, or that lie together, are of one group."""
     group = np.arange(len(rows))
     shared = links.shared

@@ -20,7 +20,7 @@ from photostrip.triangulation.independent_models import linking
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.independent_models.linking import Common, Solved, StripModels
+    from photostrip.triangulation.independent_models.linking import CommonPoints, SolvedLinks, StripModels
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -38,7 +38,7 @@ POWER = 21.5  # non-centrality of chi-square with three degrees of freedom found
 
 
 @dataclass(frozen=True)
-class Settings:
+class LinkSettings:
     """How models are joined by similarities."""
 
     screening: str = "auto"  # ``"auto"`` or ``"none"``
@@ -49,10 +49,10 @@ class Settings:
 
 
 @dataclass(frozen=True, slots=True)
-class Rejection:
+class LinkRejection:
     """A common point that a link does not use."""
 
-    # link, row: link, and row of ``linking.Common``
+    # link, row: link, and row of ``linking.CommonPoints``
     link: int
     row: int
     # value, limit: test value and its critical value
@@ -63,23 +63,23 @@ class Rejection:
 
 
 @dataclass(frozen=True, eq=False)
-class Screened:
+class ScreenedLinks:
     """Links with their gross errors taken out."""
 
-    shared: Common
+    shared: CommonPoints
     used: Flags  # (t,): rows that took part
-    solved: Solved
+    solved: SolvedLinks
     # value, limit: (t,), (j,): test values of the rows used, and the critical value of each link
     value: Floats
     limit: Floats
-    rejections: tuple[Rejection, ...]  # what was taken out, worst first
+    rejections: tuple[LinkRejection, ...]  # what was taken out, worst first
     doubtful: tuple[tuple[int, ...], ...]  # rows of which one is wrong and which one cannot be told
     # variance of the model coordinates over what is stated, with which the tests were made; 1 unless contradicted
     factor: float
     reflected: Flags = field(default_factory=lambda: np.zeros(0, bool))  # (j,): links whose models fit as mirror images
 
 
-def reflected(shared: Common, models: StripModels, used: Flags) -> Flags:
+def reflected(shared: CommonPoints, models: StripModels, used: Flags) -> Flags:
     """Links whose models fit each other only as mirror images.
 
     Parameters
@@ -101,22 +101,22 @@ def reflected(shared: Common, models: StripModels, used: Flags) -> Flags:
     return np.asarray((squares[:, 0] > CONSPICUOUS * expected) & (squares[:, 1] < REFLECTED * squares[:, 0]), bool)
 
 
-def screen(shared: Common, models: StripModels, settings: Settings, kept: Flags) -> Screened:
+def screen_links(shared: CommonPoints, models: StripModels, settings: LinkSettings, kept: Flags) -> ScreenedLinks:
     """Solve the links of a strip and take out what contradicts the rest.
 
     Parameters
     ----------
-    shared : Common
+    shared : CommonPoints
         Common rows; every link has three that are not on one line.
     kept : ndarray of bool, shape (t,)
         Rows that the user keeps.
 
     Returns
     -------
-    Screened
+    ScreenedLinks
         Links and what was taken out.
     """
-    used, log = np.ones(len(shared.link), bool), list[Rejection]()
+    used, log = np.ones(len(shared.link), bool), list[LinkRejection]()
     mirrored = reflected(shared, models, used)
     solved = linking.solve(shared, models, used)
     value, error, freedom = linking.studentised(shared, solved, used)
@@ -130,7 +130,7 @@ def screen(shared: Common, models: StripModels, settings: Settings, kept: Flags)
         for row in worst.tolist():
             link = int(shared.link[row])
             size = (float(error[row, 0]), float(error[row, 1]), float(error[row, 2]))
-            log.append(Rejection(link, row, float(value[row] / factor), float(limit[link]), size))
+            log.append(LinkRejection(link, row, float(value[row] / factor), float(limit[link]), size))
         used = used.copy()
         used[worst] = False
         solved = linking.solve(shared, models, used)
@@ -138,10 +138,10 @@ def screen(shared: Common, models: StripModels, settings: Settings, kept: Flags)
         factor = _scatter(value, freedom, solved)
     doubtful = _doubtful(shared, value / factor, limit) if settings.screening != "none" else ()
     log.sort(key=lambda each: -each.value)
-    return Screened(shared, used, solved, value / factor, limit, tuple(log), doubtful, factor, mirrored)
+    return ScreenedLinks(shared, used, solved, value / factor, limit, tuple(log), doubtful, factor, mirrored)
 
 
-def _scatter(value: Floats, freedom: Numbers, solved: Solved) -> float:
+def _scatter(value: Floats, freedom: Numbers, solved: SolvedLinks) -> float:
     """Variance factor by the median test value; 1 unless the stated precision is contradicted."""
     known = value[freedom == 3]  # every direction of the point is checked
     independent = solved.redundancy.sum() / 3
@@ -151,7 +151,7 @@ def _scatter(value: Floats, freedom: Numbers, solved: Solved) -> float:
     return ratio if ratio > 1 + SURE * MEDIAN_SPREAD / np.sqrt(independent) else 1.0
 
 
-def _limits(shared: Common, used: Flags, alpha: float) -> Floats:
+def _limits(shared: CommonPoints, used: Flags, alpha: float) -> Floats:
     """Critical value of each link: the level is shared out among its points."""
     count = np.maximum(np.bincount(shared.link[used], minlength=shared.count), 1)
     by_count = {number: chi2_quantile(1 - alpha / number, 3) for number in np.unique(count).tolist()}
@@ -159,7 +159,12 @@ def _limits(shared: Common, used: Flags, alpha: float) -> Floats:
 
 
 def _worst(
-    shared: Common, models: StripModels, flags: tuple[Flags, Flags], value: Floats, limit: Floats, open_links: Flags
+    shared: CommonPoints,
+    models: StripModels,
+    flags: tuple[Flags, Flags],
+    value: Floats,
+    limit: Floats,
+    open_links: Flags,
 ) -> Numbers:
     """One row for each link that must go; a link in which it cannot be told, or that would break, is closed."""
     used, kept = flags
@@ -179,7 +184,7 @@ def _worst(
     return np.array(rows, np.intp)
 
 
-def _doubtful(shared: Common, value: Floats, limit: Floats) -> tuple[tuple[int, ...], ...]:
+def _doubtful(shared: CommonPoints, value: Floats, limit: Floats) -> tuple[tuple[int, ...], ...]:
     """Rows of each link of which one is wrong, the worst first."""
     beyond = np.flatnonzero(value > limit[shared.link])
     found = []
@@ -191,7 +196,7 @@ def _doubtful(shared: Common, value: Floats, limit: Floats) -> tuple[tuple[int, 
     return tuple(found)
 
 
-def detectable(shared: Common, screened: Screened) -> Floats:
+def detectable(shared: CommonPoints, screened: ScreenedLinks) -> Floats:
     """Smallest error of each common point that its link finds in 80 % of cases, mm.
 
     Returns

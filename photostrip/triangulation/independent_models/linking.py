@@ -48,7 +48,7 @@ class StripModels:
 
 
 @dataclass(frozen=True, eq=False)
-class Common:
+class CommonPoints:
     """Points and centres that neighbouring models have in common; link i takes model i + 1 into model i."""
 
     link: Numbers  # (t,): link of each row, ascending
@@ -81,7 +81,7 @@ class Similarities:
 
 
 @dataclass(frozen=True, eq=False)
-class Solved:
+class SolvedLinks:
     """Links after least squares."""
 
     similarities: Similarities  # from the model after each link into the model before it
@@ -97,12 +97,12 @@ class Solved:
     redundancy: Numbers  # (j,): three for every row used, minus seven
 
 
-def common(models: StripModels) -> Common:
+def common(models: StripModels) -> CommonPoints:
     """Find what neighbouring models have in common.
 
     Returns
     -------
-    Common
+    CommonPoints
         Rows by link, then by number of the point; a point of models i and i + 2 alone links nothing.
     """
     order = np.lexsort((models.model, models.node))
@@ -111,10 +111,10 @@ def common(models: StripModels) -> Common:
     before, after = order[both], order[both + 1]
     link = models.model[before]
     by_link = np.argsort(link, kind="stable")
-    return Common(link[by_link], before[by_link], after[by_link], max(models.count - 1, 0))
+    return CommonPoints(link[by_link], before[by_link], after[by_link], max(models.count - 1, 0))
 
 
-def closed_form(shared: Common, models: StripModels, share: Floats) -> tuple[Similarities, Floats]:
+def closed_form(shared: CommonPoints, models: StripModels, share: Floats) -> tuple[Similarities, Floats]:
     """Similarities by singular values, and what a reflected one would leave.
 
     Parameters
@@ -171,7 +171,7 @@ def either_hand(source: Floats, target: Floats) -> tuple[float, float]:
     return float(left[0]), float(left[1])
 
 
-def extents(shared: Common, models: StripModels, used: Flags) -> Floats:
+def extents(shared: CommonPoints, models: StripModels, used: Flags) -> Floats:
     """How far the common points of each link are from a line.
 
     Parameters
@@ -191,19 +191,19 @@ def extents(shared: Common, models: StripModels, used: Flags) -> Floats:
     return np.asarray(np.sqrt(values[:, 1] / np.maximum(values[:, 0], 1e-300)), float)
 
 
-def solve(shared: Common, models: StripModels, used: Flags) -> Solved:
+def solve(shared: CommonPoints, models: StripModels, used: Flags) -> SolvedLinks:
     """Least squares of all links together.
 
     Parameters
     ----------
-    shared : Common
+    shared : CommonPoints
         Common rows; every link has at least three in use that are not on one line.
     used : ndarray of bool, shape (t,)
         Rows that count.
 
     Returns
     -------
-    Solved
+    SolvedLinks
         Similarities, residuals, cofactors.
 
     Notes
@@ -239,7 +239,7 @@ def solve(shared: Common, models: StripModels, used: Flags) -> Solved:
     squares = shared.sums(share * np.einsum("ti,tij,tj->t", residual, weight, residual))
     redundancy = 3 * shared.sums(share).astype(np.intp) - SIMILARITY_PARAMETERS
     cofactors = inverse * unit[:, :, None] * unit[:, None, :]
-    return Solved(found, residual, weight, design, cofactors, centroid, squares, redundancy)
+    return SolvedLinks(found, residual, weight, design, cofactors, centroid, squares, redundancy)
 
 
 def _corrected(found: Similarities, step: Floats, centroid: Floats) -> Similarities:
@@ -252,7 +252,7 @@ def _corrected(found: Similarities, step: Floats, centroid: Floats) -> Similarit
     return Similarities(found.scale * growth, u @ vt, shift)
 
 
-def studentised(shared: Common, solved: Solved, used: Flags) -> tuple[Floats, Floats, Numbers]:
+def studentised(shared: CommonPoints, solved: SolvedLinks, used: Flags) -> tuple[Floats, Floats, Numbers]:
     """Test every common point as a whole: how much of the squares goes when it is left out.
 
     Parameters

@@ -133,7 +133,7 @@ def test_a_wrong_control_point_is_named() -> None:
 
 def test_entries_that_name_nothing_are_refused() -> None:
     given = truth(3)
-    lists = link_screening.Settings(keep=("M1/P001", "M9/P001"), drop=("M1/P001", "M2/104", "M2/102"))
+    lists = link_screening.LinkSettings(keep=("M1/P001", "M9/P001"), drop=("M1/P001", "M2/104", "M2/102"))
     with pytest.raises(InputError) as told:
         triangulate(inputs(given, given.measured()), Settings(links=lists))
     assert [(fault.key, fault.message.split("`")[1]) for fault in told.value.faults] == [
@@ -155,7 +155,7 @@ def test_a_model_alone_is_a_strip() -> None:
 
 def nodes_of(measured: ModelPoints) -> FormedModels:
     strip = ModelStrip("A", measured.photo_ids, measured.model_ids)
-    return form_models(strip, measured, Settings(links=link_screening.Settings("none")))
+    return form_models(strip, measured, Settings(links=link_screening.LinkSettings("none")))
 
 
 def test_covariances_are_those_of_a_numerical_jacobian() -> None:
@@ -216,7 +216,9 @@ def test_centers_follow_the_polynomial_as_a_stiff_body() -> None:
 
 def straight(adjustment: str) -> Settings:
     """Settings in which nothing is decided from the data."""
-    return Settings(adjustment, polynomial=correction.PolynomialSettings("1"), links=link_screening.Settings("none"))
+    return Settings(
+        adjustment, polynomial=correction.PolynomialSettings("1"), links=link_screening.LinkSettings("none")
+    )
 
 
 def test_the_whole_chain_agrees_with_differences() -> None:

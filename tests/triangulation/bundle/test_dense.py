@@ -13,8 +13,13 @@ from photostrip.geometry.rotation import from_vector
 from photostrip.simulate import Control as SimulatedControl
 from photostrip.simulate import Flight, Points, Spec, simulate
 from photostrip.simulate.bundle import problem_of, truth_of
-from photostrip.triangulation.bundle.observations.problem import Attitudes, Control, Positions, Problem
-from photostrip.triangulation.bundle.quality.precision import precision
+from photostrip.triangulation.bundle.observations.problem import (
+    AttitudeObservations,
+    BundleProblem,
+    ControlObservations,
+    PositionObservations,
+)
+from photostrip.triangulation.bundle.quality.cofactors import cofactors_of
 from photostrip.triangulation.bundle.solve import solve
 from tests.bundles import dense
 
@@ -35,7 +40,7 @@ HELD_LENS = np.where(np.isinf(LENS), [[0.02, 0.02, 0.02, 0, 0, 0, 1e-6, 1e-6, 1e
 
 
 @cache
-def strip(photos: int = 6, strips: int = 1) -> Problem:
+def strip(photos: int = 6, strips: int = 1) -> BundleProblem:
     """Make a small strip or block on the real Earth, with noise."""
     spec = Spec(
         flight=Flight(photos=photos, strips=strips),
@@ -45,7 +50,7 @@ def strip(photos: int = 6, strips: int = 1) -> Problem:
     return problem_of(simulate(spec))
 
 
-def with_everything() -> Problem:
+def with_everything() -> BundleProblem:
     """Give the strip camera positions with offset and drift, attitudes and a camera to be calibrated."""
     problem = strip()
     random = np.random.default_rng(1)
@@ -54,7 +59,7 @@ def with_everything() -> Problem:
     truth = truth_of(simulate(spec))
     lever = np.tile([0.1, 0.2, 1.0], (m, 1))
     antenna = truth.centers + np.einsum("nij,nj->ni", truth.rotations, lever)
-    positions = Positions(
+    positions = PositionObservations(
         photo=np.arange(m),
         xyz=antenna + random.normal(0.0, 0.1, (m, 3)) + [1.0, 2.0, 3.0],
         axes=np.tile(problem.control.axes[0], (m, 1, 1)),
@@ -65,7 +70,7 @@ def with_everything() -> Problem:
         offset_sigma=np.array([np.inf, np.inf]),
         drift_sigma=np.array([0.0, 1.0]),
     )
-    attitudes = Attitudes(
+    attitudes = AttitudeObservations(
         np.arange(1, m),
         (truth.rotations @ from_vector(random.normal(0.0, 1e-4, (m, 3))))[1:],
         np.tile([1e-4, 2e-4, np.inf], (m - 1, 1)),
@@ -73,7 +78,7 @@ def with_everything() -> Problem:
     return replace(problem, positions=positions, attitudes=attitudes, cameras=replace(problem.cameras, sigma=LENS))
 
 
-def with_height_only() -> Problem:
+def with_height_only() -> BundleProblem:
     """Let half of the control count in height only, the rest in plan only, one in all."""
     problem = strip()
     sigma = problem.control.sigma.copy()
@@ -82,13 +87,13 @@ def with_height_only() -> Problem:
     return replace(problem, control=replace(problem.control, sigma=sigma))
 
 
-PROBLEMS: dict[str, Callable[[], Problem]] = {
+PROBLEMS: dict[str, Callable[[], BundleProblem]] = {
     "control": strip,
     "block": lambda: strip(4, 2),
     "plan and height apart": with_height_only,
-    "free": lambda: replace(strip(), control=Control()),
+    "free": lambda: replace(strip(), control=ControlObservations()),
     "free block, calibrated": lambda: replace(
-        strip(4, 2), control=Control(), cameras=replace(strip(4, 2).cameras, sigma=HELD_LENS)
+        strip(4, 2), control=ControlObservations(), cameras=replace(strip(4, 2).cameras, sigma=HELD_LENS)
     ),
     "calibrated": lambda: replace(strip(), cameras=replace(strip().cameras, sigma=LENS)),
     "everything": with_everything,
@@ -105,7 +110,7 @@ def against(found: Floats, expected: Floats) -> float:
 def test_estimate_and_cofactors_are_those_of_a_dense_adjustment(name: str) -> None:
     problem = PROBLEMS[name]()
     solution = solve(problem)
-    found, expected = precision(solution), dense(problem, solution)
+    found, expected = cofactors_of(solution), dense(problem, solution)
     m, q, n, p = problem.photos, problem.points, len(problem.images), len(solution.common)
     cofactors = expected.cofactors
     deviations = np.sqrt(np.diag(cofactors))
@@ -131,7 +136,7 @@ def test_estimate_and_cofactors_are_those_of_a_dense_adjustment(name: str) -> No
 def test_redundancy_numbers_are_those_of_a_dense_adjustment(name: str) -> None:
     problem = PROBLEMS[name]()
     solution = solve(problem)
-    found, expected = precision(solution), dense(problem, solution).of_misfits()
+    found, expected = cofactors_of(solution), dense(problem, solution).of_misfits()
     done = 0
     for cofactors, sigma in (
         (found.image_residuals, problem.images.sigma),
@@ -146,8 +151,8 @@ def test_redundancy_numbers_are_those_of_a_dense_adjustment(name: str) -> None:
         both = given[:, :, None] & given[:, None, :]
         np.testing.assert_allclose(scaled[both], block[range(rows), :, range(rows)][both], atol=SAME)
         done += rows * size
-    weighted = np.isfinite(solution.model.prior)
-    parts = found.common_residuals[weighted] / solution.model.prior[weighted] ** 2
+    weighted = np.isfinite(solution.prepared.prior)
+    parts = found.common_residuals[weighted] / solution.prepared.prior[weighted] ** 2
     np.testing.assert_allclose(parts, np.diag(expected)[done:][weighted], atol=SAME)
     every = [
         np.where(np.isfinite(sigma), np.einsum("nii->ni", cofactors) / sigma**2, 0.0).sum()

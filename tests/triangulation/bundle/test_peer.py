@@ -10,7 +10,7 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
-from photostrip.triangulation.bundle.quality.precision import precision
+from photostrip.triangulation.bundle.quality.cofactors import cofactors_of
 from photostrip.triangulation.bundle.solve import solve
 from tests.peer import FILE, SHAPES, problem
 from tests.source_tree import ROOT
@@ -21,7 +21,7 @@ SAME = 1e-6  # of the standard deviations
 def compare(name: str, expected: dict[str, list[list[float]]]) -> None:
     """Compare one problem with a solution by Ceres."""
     solution = solve(problem(name))
-    cofactors = precision(solution)
+    cofactors = cofactors_of(solution)
     seen = ~np.isnan(cofactors.points[:, 0, 0])
     of_points = np.sqrt(np.einsum("nii->ni", cofactors.points[seen]))
     of_photos = np.sqrt(np.einsum("nii->ni", cofactors.photos[:, :3, :3]))

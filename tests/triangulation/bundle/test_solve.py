@@ -16,8 +16,15 @@ from photostrip.geometry.rotation import angle_between, from_vector
 from photostrip.simulate import Control as SimulatedControl
 from photostrip.simulate import Flight, Image, Points, Spec, simulate
 from photostrip.simulate.bundle import problem_of, truth_of
-from photostrip.triangulation.bundle.observations.problem import Cameras, Control, Images, Positions, Problem, Start
-from photostrip.triangulation.bundle.solve import Settings, solve
+from photostrip.triangulation.bundle.observations.problem import (
+    BundleCameras,
+    BundleProblem,
+    ControlObservations,
+    ImageObservations,
+    PositionObservations,
+    StartValues,
+)
+from photostrip.triangulation.bundle.solve import IterationSettings, solve
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -29,7 +36,9 @@ NANORADIAN = 1e-9
 
 
 @cache
-def simulated(photos: int, strips: int, sigma_um: float = 5.0, noise: float | None = None) -> tuple[Problem, Start]:
+def simulated(
+    photos: int, strips: int, sigma_um: float = 5.0, noise: float | None = None
+) -> tuple[BundleProblem, StartValues]:
     """Simulate a strip or block on the real Earth."""
     simulation = simulate(
         Spec(
@@ -42,7 +51,7 @@ def simulated(photos: int, strips: int, sigma_um: float = 5.0, noise: float | No
     return problem_of(simulation), truth_of(simulation)
 
 
-def seen_points(problem: Problem) -> NDArray[np.bool_]:
+def seen_points(problem: BundleProblem) -> NDArray[np.bool_]:
     """Points with rays."""
     return np.bincount(problem.images.point, minlength=problem.points) > 0
 
@@ -69,7 +78,7 @@ def test_the_order_of_rays_and_photos_does_not_matter() -> None:
     images, start = problem.images, problem.start
     shuffled = replace(
         problem,
-        images=Images(number[images.photo[rows]], images.point[rows], images.xy[rows], images.sigma[rows]),
+        images=ImageObservations(number[images.photo[rows]], images.point[rows], images.xy[rows], images.sigma[rows]),
         cameras=replace(problem.cameras, of_photo=problem.cameras.of_photo[photos]),
         start=replace(start, centers=start.centers[photos], rotations=start.rotations[photos]),
     )
@@ -93,8 +102,8 @@ def test_turning_the_frame_turns_the_result(seed: int, vector: list[float], scal
     control, start = problem.control, problem.start
     other = replace(
         problem,
-        start=Start(moved(start.centers), turn @ start.rotations, moved(start.points)),
-        control=Control(control.point, moved(control.xyz), control.axes @ turn.T, scale * control.sigma),
+        start=StartValues(moved(start.centers), turn @ start.rotations, moved(start.points)),
+        control=ControlObservations(control.point, moved(control.xyz), control.axes @ turn.T, scale * control.sigma),
     )
     first, second = solve(problem), solve(other)
     np.testing.assert_allclose(second.points, moved(first.points), atol=10 * MICROMETRE)
@@ -106,7 +115,7 @@ def test_turning_the_frame_turns_the_result(seed: int, vector: list[float], scal
 def test_poor_starts_end_at_the_same_place(shift: float) -> None:
     problem, truth = simulated(8, 1)
     random = np.random.default_rng(2)
-    start = Start(
+    start = StartValues(
         truth.centers + random.normal(0.0, shift, truth.centers.shape),
         from_vector(random.normal(0.0, shift / 1500.0, (problem.photos, 3))) @ truth.rotations,
         truth.points + random.normal(0.0, shift, truth.points.shape),
@@ -119,7 +128,7 @@ def test_poor_starts_end_at_the_same_place(shift: float) -> None:
 
 def test_a_free_network_keeps_the_place_of_its_points() -> None:
     problem, truth = simulated(8, 1, 0.0, 0.0)
-    free = solve(replace(problem, control=Control()))
+    free = solve(replace(problem, control=ControlObservations()))
     seen = seen_points(problem)
     moved = (free.points - problem.start.points)[seen]
     arm = (free.points - free.points[seen].mean(axis=0))[seen]
@@ -144,7 +153,7 @@ def test_positions_with_lever_arm_offset_and_drift_replace_control() -> None:
     offset, drift = np.array([[2.0, -1.0, 0.5], [0.0, 3.0, -2.0]]), np.array([[0.1, 0.0, -0.2], [0.0, 0.0, 0.0]])
     antenna = truth.centers + np.einsum("nij,nj->ni", truth.rotations, lever)
     wrong = -np.einsum("nij,ni->nj", axes, offset[group] + drift[group] * time[:, None])
-    positions = Positions(
+    positions = PositionObservations(
         photo=np.arange(m),
         xyz=antenna + wrong,
         axes=axes,
@@ -188,15 +197,15 @@ def test_the_camera_comes_out_of_the_measurements() -> None:
 # ------------------------------------------------------------------------------------------ what is not determined
 
 
-def _some(problem: Problem, number: int, sigma: list[float] | None = None) -> Control:
+def _some(problem: BundleProblem, number: int, sigma: list[float] | None = None) -> ControlObservations:
     """Control at the first few control points, or at all with another sigma."""
     control = problem.control
     rows = np.arange(number)
     wanted = control.sigma[rows] if sigma is None else np.tile(sigma, (number, 1))
-    return Control(control.point[rows], control.xyz[rows], control.axes[rows], wanted)
+    return ControlObservations(control.point[rows], control.xyz[rows], control.axes[rows], wanted)
 
 
-def _on_a_line(problem: Problem) -> Control:
+def _on_a_line(problem: BundleProblem) -> ControlObservations:
     """Control in the middle of the strip, along the flight."""
     truth = simulated(8, 1)[1]
     flight = truth.centers[-1] - truth.centers[0]
@@ -223,11 +232,13 @@ def test_a_datum_that_is_not_determined_is_named(control: object, said: str) -> 
     assert caught.value.code == "bundle-rank"
 
 
-def _without(problem: Problem, rays: NDArray[np.bool_]) -> Problem:
+def _without(problem: BundleProblem, rays: NDArray[np.bool_]) -> BundleProblem:
     images = problem.images
     several = np.bincount(images.point[~rays], minlength=problem.points)[images.point] > 1
     keep = ~rays & several
-    return replace(problem, images=Images(images.photo[keep], images.point[keep], images.xy[keep], images.sigma[keep]))
+    return replace(
+        problem, images=ImageObservations(images.photo[keep], images.point[keep], images.xy[keep], images.sigma[keep])
+    )
 
 
 def test_a_photo_with_too_few_points_is_named() -> None:
@@ -249,7 +260,7 @@ def test_a_part_without_control_is_named() -> None:
     apart = _without(problem, (of_left & of_right)[problem.images.point])
     control = problem.control
     rows = np.flatnonzero(~of_right[control.point])
-    given_left = Control(control.point[rows], control.xyz[rows], control.axes[rows], control.sigma[rows])
+    given_left = ControlObservations(control.point[rows], control.xyz[rows], control.axes[rows], control.sigma[rows])
     with pytest.raises(GeometryError, match=r"of photos .*: no control and no camera positions") as caught:
         solve(replace(apart, control=given_left))
     assert caught.value.photos == tuple(problem.photo_name(n) for n in range(4, 8))
@@ -262,7 +273,7 @@ def test_points_that_rays_do_not_determine_are_named() -> None:
     keep = np.ones(len(problem.images), bool)
     keep[[np.flatnonzero(problem.images.point == point)[0] for point in two]] = False
     images = problem.images
-    lame = Images(images.photo[keep], images.point[keep], images.xy[keep], images.sigma[keep])
+    lame = ImageObservations(images.photo[keep], images.point[keep], images.xy[keep], images.sigma[keep])
     with pytest.raises(GeometryError) as caught:
         solve(replace(problem, images=lame))
     assert set(caught.value.points) == {problem.point_name(int(point)) for point in two}
@@ -278,8 +289,8 @@ def test_a_point_with_one_ray_and_a_given_height_is_adjusted() -> None:
     images, control = problem.images, problem.control
     lame = replace(
         problem,
-        images=Images(images.photo[keep], images.point[keep], images.xy[keep], images.sigma[keep]),
-        control=Control(
+        images=ImageObservations(images.photo[keep], images.point[keep], images.xy[keep], images.sigma[keep]),
+        control=ControlObservations(
             np.append(control.point, point),
             np.concatenate([control.xyz, truth.points[[point]]]),
             np.concatenate([control.axes, control.axes[:1]]),
@@ -292,7 +303,7 @@ def test_a_point_with_one_ray_and_a_given_height_is_adjusted() -> None:
 def test_a_ray_that_stands_twice_is_refused() -> None:
     problem, _ = simulated(6, 1)
     images = problem.images
-    twice = Images(
+    twice = ImageObservations(
         *(np.concatenate([part, part[:1]]) for part in (images.photo, images.point, images.xy, images.sigma))
     )
     with pytest.raises(InputError, match="is measured twice on photo") as caught:
@@ -304,7 +315,7 @@ def test_parameters_of_a_camera_that_cannot_be_told_apart_are_named() -> None:
     problem, _ = simulated(6, 1)
     sigma = np.zeros((2, 10))
     sigma[:, 0] = np.inf
-    unused = Cameras(problem.cameras.of_photo, np.repeat(problem.cameras.focal, 2), sigma)
+    unused = BundleCameras(problem.cameras.of_photo, np.repeat(problem.cameras.focal, 2), sigma)
     with pytest.raises(GeometryError, match="do not determine camera second: c: hold one of them"):
         solve(replace(problem, cameras=unused, camera_ids=("first", "second")))
 
@@ -312,5 +323,5 @@ def test_parameters_of_a_camera_that_cannot_be_told_apart_are_named() -> None:
 def test_steps_without_end_are_an_error() -> None:
     problem, _ = simulated(6, 1)
     with pytest.raises(GeometryError, match="did not come to an end in 1 steps") as caught:
-        solve(problem, Settings(iterations=1))
+        solve(problem, IterationSettings(iterations=1))
     assert caught.value.code == "bundle-diverged"

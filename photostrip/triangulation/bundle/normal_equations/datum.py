@@ -18,8 +18,8 @@ from photostrip.triangulation.bundle.observations.linearise import PHOTO, SIGNS
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.bundle.observations.model import Model, Move, State
-    from photostrip.triangulation.bundle.observations.problem import Problem
+    from photostrip.triangulation.bundle.observations.problem import BundleProblem
+    from photostrip.triangulation.bundle.parameters import Parameters, ParameterStep, PreparedProblem
 
     Floats = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ DEFECT = 7
 """Parameters of a similarity: shift, rotation, scale."""
 
 
-def is_free(problem: Problem) -> bool:
+def is_free(problem: BundleProblem) -> bool:
     """Whether nothing that is given says where the network is.
 
     Returns
@@ -39,7 +39,7 @@ def is_free(problem: Problem) -> bool:
     return not any(np.isfinite(sigma).any() for sigma in sigmas)
 
 
-def anchor(model: Model, state: State, own: Floats) -> Floats:
+def anchor(prepared: PreparedProblem, state: Parameters, own: Floats) -> Floats:
     """Conditions that hold seven parameters: all of a photo, and its distance from the photo farthest away.
 
     Parameters
@@ -52,7 +52,7 @@ def anchor(model: Model, state: State, own: Floats) -> Floats:
     ndarray, shape (m, 6, 6)
         What is added to these blocks.
     """
-    order = model.structure.order
+    order = prepared.structure.order
     middle = len(order) // 2
     base = state.centers[order] - state.centers[order[middle]]
     far = int(np.argmax((base**2).sum(axis=1)))
@@ -83,7 +83,7 @@ def generators(points: Floats, origin: Floats) -> Floats:
     return np.concatenate([shift, -cross_matrix(arm), arm[:, :, None]], axis=2)
 
 
-def photo_generators(model: Model, state: State, origin: Floats) -> Floats:
+def photo_generators(prepared: PreparedProblem, state: Parameters, origin: Floats) -> Floats:
     """Give moves of the photos by a small similarity, in their own axes and signs.
 
     Parameters
@@ -96,7 +96,7 @@ def photo_generators(model: Model, state: State, origin: Floats) -> Floats:
     ndarray, shape (m, 6, 7)
         Derivatives of the photos' parameters, in the order of the band.
     """
-    order = model.structure.order
+    order = prepared.structure.order
     back = np.swapaxes(state.rotations[order], 1, 2)
     moves = np.zeros((len(order), PHOTO, DEFECT))
     moves[:, :3] = back @ generators(state.centers[order], origin)
@@ -105,22 +105,22 @@ def photo_generators(model: Model, state: State, origin: Floats) -> Floats:
     return moves
 
 
-def centred(model: Model, state: State, move: Move) -> Move:
+def centred(prepared: PreparedProblem, state: Parameters, move: ParameterStep) -> ParameterStep:
     """Take shift, rotation and scale of the points out of a step.
 
     Parameters
     ----------
-    state : State
+    state : Parameters
         Where the step starts.
 
     Returns
     -------
-    Move
+    ParameterStep
         The same step under inner constraints.
     """
-    origin, inverse = inner(model, state)
+    origin, inverse = inner(prepared, state)
     right = np.zeros(DEFECT)
-    for batch, xyz, shift in zip(model.structure.batches, state.xyz, move.points, strict=True):
+    for batch, xyz, shift in zip(prepared.structure.batches, state.xyz, move.points, strict=True):
         moves = generators(xyz[:, batch.real].T, origin)
         right += np.einsum("ncd,nc->d", moves, shift[:, batch.real].T)
     similarity = inverse @ right
@@ -128,10 +128,10 @@ def centred(model: Model, state: State, move: Move) -> Move:
         shift - np.einsum("scd,d->cs", generators(xyz.T, origin), similarity)
         for xyz, shift in zip(state.xyz, move.points, strict=True)
     )
-    return replace(move, photos=move.photos - photo_generators(model, state, origin) @ similarity, points=points)
+    return replace(move, photos=move.photos - photo_generators(prepared, state, origin) @ similarity, points=points)
 
 
-def inner(model: Model, state: State) -> tuple[Floats, Floats]:
+def inner(prepared: PreparedProblem, state: Parameters) -> tuple[Floats, Floats]:
     """Origin and inverse normal matrix of the similarity of the points.
 
     Returns
@@ -141,7 +141,7 @@ def inner(model: Model, state: State) -> tuple[Floats, Floats]:
     inverse : ndarray, shape (7, 7)
         Inverse of G'G with the generators G of all points.
     """
-    pairs = list(zip(model.structure.batches, state.xyz, strict=True))
+    pairs = list(zip(prepared.structure.batches, state.xyz, strict=True))
     total = sum(xyz[:, batch.real].sum(axis=1) for batch, xyz in pairs)
     origin = total / sum(len(batch.real) for batch, _ in pairs)
     normal = np.zeros((DEFECT, DEFECT))

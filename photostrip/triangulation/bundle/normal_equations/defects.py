@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.triangulation.bundle.normal_equations.reduced import Reduced
-    from photostrip.triangulation.bundle.observations.layout import Batch
     from photostrip.triangulation.bundle.observations.linearise import Eliminated
-    from photostrip.triangulation.bundle.observations.model import Model, State
-    from photostrip.triangulation.bundle.observations.problem import Problem
+    from photostrip.triangulation.bundle.observations.problem import BundleProblem
+    from photostrip.triangulation.bundle.observations.ray_batches import Batch
+    from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -39,7 +39,7 @@ NAMED = 8
 MOVES = ("shift along its x", "shift along its y", "shift along its z", "roll about x", "turn about y", "turn about z")
 
 
-def refuse_repeated(problem: Problem) -> None:
+def refuse_repeated(problem: BundleProblem) -> None:
     """Refuse rays that stand twice.
 
     Raises
@@ -63,7 +63,7 @@ def refuse_repeated(problem: Problem) -> None:
         )
 
 
-def refuse_weak_points(model: Model, reduced: Reduced) -> None:
+def refuse_weak_points(prepared: PreparedProblem, reduced: Reduced) -> None:
     """Refuse points whose rays, with their control, do not meet at an angle.
 
     Parameters
@@ -76,13 +76,13 @@ def refuse_weak_points(model: Model, reduced: Reduced) -> None:
     GeometryError
         With all of these points (``bundle-rays``).
     """
-    refuse_weak(model, model.structure.batches, reduced.points)
+    refuse_weak(prepared, prepared.structure.batches, reduced.points)
 
 
-def refuse_weak(model: Model, batches: Sequence[Batch], eliminated: Sequence[Eliminated]) -> None:
+def refuse_weak(prepared: PreparedProblem, batches: Sequence[Batch], eliminated: Sequence[Eliminated]) -> None:
     """Refuse weak points of some batches; see ``refuse_weak_points``."""
     weak = [
-        model.problem.point_name(number)
+        prepared.problem.point_name(number)
         for batch, each in zip(batches, eliminated, strict=True)
         for number in batch.point[batch.real][~(each.strength[batch.real] > PARALLEL)].tolist()
     ]
@@ -126,7 +126,7 @@ class Held:
     control: Floats  # (c, 3): positions that are given at all, of points and photos
 
 
-def refuse_loose(model: Model, state: State) -> None:
+def refuse_loose(prepared: PreparedProblem, state: Parameters) -> None:
     """Refuse parts of the network that what is given does not hold in place.
 
     Raises
@@ -134,24 +134,24 @@ def refuse_loose(model: Model, state: State) -> None:
     GeometryError
         Naming shift, rotation or scale that is not determined (``bundle-rank``).
     """
-    parts = _parts(model)
+    parts = _parts(prepared)
     for photos in parts:
-        held = _held(model, state, photos)
+        held = _held(prepared, state, photos)
         values, vectors = np.linalg.eigh(held.normal)
         loose = vectors[:, values < LOOSE**-2.0]
         if loose.shape[1]:
-            names = [model.problem.photo_name(number) for number in photos.tolist()]
+            names = [prepared.problem.photo_name(number) for number in photos.tolist()]
             whole = "" if len(parts) == 1 else f" of {listed('photo', names)}"
             raise GeometryError(
-                f"what is given does not determine {_moves(model, state, held, loose)}{whole}: {_reason(held)}",
+                f"what is given does not determine {_moves(prepared, state, held, loose)}{whole}: {_reason(held)}",
                 photos=() if len(parts) == 1 else names,
                 code="bundle-rank",
             )
 
 
-def _parts(model: Model) -> list[Numbers]:
+def _parts(prepared: PreparedProblem) -> list[Numbers]:
     """Photos of the parts of the network that share no points."""
-    structure = model.structure
+    structure = prepared.structure
     label = np.arange(len(structure.order))
     while True:
         least = label.copy()
@@ -164,16 +164,16 @@ def _parts(model: Model) -> list[Numbers]:
     return [np.sort(structure.order[label == first]) for first in np.unique(label)]
 
 
-def _held(model: Model, state: State, photos: Numbers) -> Held:
+def _held(prepared: PreparedProblem, state: Parameters, photos: Numbers) -> Held:
     """Sum up how one part is held."""
-    problem = model.problem
+    problem = prepared.problem
     inside = np.zeros(problem.photos, bool)
     inside[photos] = True
     seen = np.zeros(problem.points, bool)
     seen[problem.images.point[inside[problem.images.photo]]] = True
     control = problem.control
     given = seen[control.point] & np.isfinite(control.sigma).any(axis=1)
-    positions, attitudes = given_at(model, state)
+    positions, attitudes = given_at(prepared, state)
     at = inside[positions.photo] & (positions.weight > 0.0).any(axis=1)
     places = np.concatenate([control.xyz[given], problem.positions.xyz[at]])
     around = state.centers[photos]
@@ -184,9 +184,11 @@ def _held(model: Model, state: State, photos: Numbers) -> Held:
     rows = np.einsum("nij,njd->nid", control.axes[given], datum.generators(control.xyz[given], origin)) * units
     rows /= control.sigma[given][:, :, None]
     normal = np.einsum("nad,nae->de", rows, rows)
-    of_photos = datum.photo_generators(model, state, origin)[model.structure.rank] * units
+    of_photos = datum.photo_generators(prepared, state, origin)[prepared.structure.rank] * units
     for linear in (positions, attitudes):
-        normal += _information(linear.by_photo, linear.by_common, linear.weight, of_photos, linear.photo, inside, model)
+        normal += _information(
+            linear.by_photo, linear.by_common, linear.weight, of_photos, linear.photo, inside, prepared
+        )
     return Held(photos, origin, radius, normal, places)
 
 
@@ -197,7 +199,7 @@ def _information(
     moves: Floats,
     photo: Numbers,
     inside: NDArray[np.bool_],
-    model: Model,
+    prepared: PreparedProblem,
 ) -> Floats:
     """Information of given orientations on the similarity, with offsets and drifts unknown."""
     rows = inside[photo]
@@ -206,14 +208,14 @@ def _information(
     whole = np.concatenate([own, common], axis=2).reshape(-1, datum.DEFECT + by_common.shape[2])
     normal = whole.T @ whole
     seven = datum.DEFECT
-    corner = normal[seven:, seven:] + np.diag(model.prior**-2.0)
+    corner = normal[seven:, seven:] + np.diag(prepared.prior**-2.0)
     left: Floats = normal[:seven, :seven] - normal[:seven, seven:] @ np.linalg.pinv(corner) @ normal[seven:, :seven]
     return left
 
 
-def _moves(model: Model, state: State, held: Held, loose: Floats) -> str:
+def _moves(prepared: PreparedProblem, state: Parameters, held: Held, loose: Floats) -> str:
     """Name the movements that are not determined."""
-    flight, across, up = _directions(model, state, held.photos)
+    flight, across, up = _directions(prepared, state, held.photos)
     line = _line(held.control)
     zero = np.zeros(3)
     turns = {"roll about the flight line": flight, "pitch": across, "heading": up}
@@ -233,9 +235,9 @@ def _moves(model: Model, state: State, held: Held, loose: Floats) -> str:
     return ", ".join(dict.fromkeys(found)) or f"{loose.shape[1]} of the seven parameters of shift, rotation and scale"
 
 
-def _directions(model: Model, state: State, photos: Numbers) -> tuple[Floats, Floats, Floats]:
+def _directions(prepared: PreparedProblem, state: Parameters, photos: Numbers) -> tuple[Floats, Floats, Floats]:
     """Direction of flight, across and up of a part: unit vectors."""
-    del model
+    del prepared
     up = state.rotations[photos, :, 2].mean(axis=0)
     up /= np.linalg.norm(up)
     centers = state.centers[photos] - state.centers[photos].mean(axis=0)
@@ -268,7 +270,7 @@ def _reason(held: Held) -> str:
 # ------------------------------------------------------------------------------------ photos and common parameters
 
 
-def refuse_singular(model: Model, reduced: Reduced, extra: Floats | None) -> NoReturn:
+def refuse_singular(prepared: PreparedProblem, reduced: Reduced, extra: Floats | None) -> NoReturn:
     """Refuse normal equations that cannot be factored, naming the photos that are not determined.
 
     Parameters
@@ -281,12 +283,12 @@ def refuse_singular(model: Model, reduced: Reduced, extra: Floats | None) -> NoR
     GeometryError
         Always (``bundle-rank``).
     """
-    own = reduced.blocks[model.structure.own] + (0.0 if extra is None else extra)
+    own = reduced.blocks[prepared.structure.own] + (0.0 if extra is None else extra)
     diagonal = np.maximum(np.einsum("nii->ni", own), 0.0)
     least = TINY * np.where(diagonal > 0.0, diagonal, max(float(diagonal.max()), 1.0))
     add = np.zeros_like(own)
     add[:, range(PHOTO), range(PHOTO)] = least
-    band = factored(model, reduced, add if extra is None else add + extra)
+    band = factored(prepared, reduced, add if extra is None else add + extra)
     photos, names = [], []
     if band is not None:
         vector = np.sqrt(diagonal + least).reshape(-1, 1)
@@ -295,8 +297,8 @@ def refuse_singular(model: Model, reduced: Reduced, extra: Floats | None) -> NoR
             vector /= np.abs(vector).max()
         size = np.abs(vector.reshape(-1, PHOTO)) * np.sqrt(np.maximum(diagonal, least))
         worst = size.max(axis=1)
-        numbers = model.structure.order[worst > SHARE * worst.max()]
-        photos = [model.problem.photo_name(number) for number in np.sort(numbers).tolist()]
+        numbers = prepared.structure.order[worst > SHARE * worst.max()]
+        photos = [prepared.problem.photo_name(number) for number in np.sort(numbers).tolist()]
         names = [MOVES[int(np.argmax(size[int(np.argmax(worst))]))]]
     what = f"; least of all the {names[0]}" if names else ""
     raise GeometryError(
@@ -307,7 +309,7 @@ def refuse_singular(model: Model, reduced: Reduced, extra: Floats | None) -> NoR
     )
 
 
-def refuse_common(model: Model, before: Floats, left: Floats) -> None:
+def refuse_common(prepared: PreparedProblem, before: Floats, left: Floats) -> None:
     """Refuse common parameters that the observations do not determine.
 
     Parameters
@@ -328,7 +330,7 @@ def refuse_common(model: Model, before: Floats, left: Floats) -> None:
     values, vectors = np.linalg.eigh(left / np.outer(scale, scale))
     bad = np.abs(vectors[:, values < LEFT_OVER])
     if bad.shape[1]:
-        all_names = model.problem.common_names()
+        all_names = prepared.problem.common_names()
         names = [all_names[n] for n in np.flatnonzero((bad > SHARE * bad.max(axis=0)).any(axis=1)).tolist()]
         raise GeometryError(
             f"the observations do not determine {', '.join(names)}: hold one of them, or give it an a-priori sigma",

@@ -9,15 +9,15 @@ import numpy as np
 
 from photostrip.triangulation.bundle.normal_equations.band import Band
 from photostrip.triangulation.bundle.normal_equations.sparse import Sparse
-from photostrip.triangulation.bundle.observations import given
+from photostrip.triangulation.bundle.normal_equations.structure import blocks_of
+from photostrip.triangulation.bundle.observations import given_orientations
 from photostrip.triangulation.bundle.observations.linearise import PHOTO, by_photo, eliminate, squares
-from photostrip.triangulation.bundle.observations.structure import blocks_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.triangulation.bundle.observations.linearise import Eliminated
-    from photostrip.triangulation.bundle.observations.model import Model, State
+    from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem
 
     Floats = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ class Reduced:
     points: tuple[Eliminated, ...]  # the eliminated points of each batch
 
 
-def reduce(model: Model, state: State, damping: float = 0.0) -> Reduced:
+def reduce(prepared: PreparedProblem, state: Parameters, damping: float = 0.0) -> Reduced:
     """Linearise everything at a state and eliminate the points.
 
     Parameters
@@ -46,15 +46,15 @@ def reduce(model: Model, state: State, damping: float = 0.0) -> Reduced:
     damping : float
         Part of its diagonal by which the normal matrix of each point is made larger.
     """
-    structure, p, more = model.structure, len(state.common), len(model.calibrated)
+    structure, p, more = prepared.structure, len(state.common), len(prepared.calibrated)
     blocks = np.zeros((len(structure.rows), PHOTO, PHOTO))
     border, corner = np.zeros((len(structure.order), PHOTO, p + 1)), np.zeros((p + 1, p + 1))
     inner = np.r_[0:more, p]
-    table, chi_square, points = model.table(state), 0.0, []
+    table, chi_square, points = prepared.table(state), 0.0, []
     narrow = border if more == p else np.zeros((len(border), PHOTO, more + 1))
     every = zip(structure.batches, state.xyz, structure.pairs, structure.singles, strict=True)
     for batch, xyz, pairs, singles in every:
-        rays, common = model.rays(batch, xyz, table, state.common)
+        rays, common = prepared.rays(batch, xyz, table, state.common)
         eliminated = eliminate(batch, xyz, rays, common, damping)
         partials = by_photo(rays, more)
         if common is not None:
@@ -70,23 +70,23 @@ def reduce(model: Model, state: State, damping: float = 0.0) -> Reduced:
         border[:, :, inner] = narrow
     if not all(np.isfinite(each.strength).all() for each in points):
         chi_square = np.inf  # a step too far: rays that do not meet
-    chi_square += _add_given(model, state, blocks, border, corner)
-    chi_square += control_squares(model, state)
+    chi_square += _add_given(prepared, state, blocks, border, corner)
+    chi_square += control_squares(prepared, state)
     return Reduced(blocks, border, corner, chi_square, tuple(points))
 
 
-def _add_given(model: Model, state: State, blocks: Floats, border: Floats, corner: Floats) -> float:
+def _add_given(prepared: PreparedProblem, state: Parameters, blocks: Floats, border: Floats, corner: Floats) -> float:
     """Add camera positions, attitudes and a-priori values; give their sum of squares."""
-    structure, total = model.structure, 0.0
-    given_too = len(model.problem.positions) or len(model.problem.attitudes)
-    for linear in given_at(model, state) if given_too else ():
+    structure, total = prepared.structure, 0.0
+    given_too = len(prepared.problem.positions) or len(prepared.problem.attitudes)
+    for linear in given_at(prepared, state) if given_too else ():
         by_own, others = linear.scaled()
         place = structure.rank[linear.photo]
         np.add.at(blocks, structure.own[place], by_own.swapaxes(1, 2) @ by_own)
         np.add.at(border, place, by_own.swapaxes(1, 2) @ others)
         corner += np.einsum("gai,gaj->ij", others, others)
         total += float((others[:, :, -1] ** 2).sum())
-    weight = model.prior**-2.0
+    weight = prepared.prior**-2.0
     diagonal = np.arange(len(weight))
     corner[diagonal, diagonal] += weight
     corner[diagonal, -1] -= weight * state.common
@@ -94,47 +94,51 @@ def _add_given(model: Model, state: State, blocks: Floats, border: Floats, corne
     return total + float((weight * state.common**2).sum())
 
 
-def given_at(model: Model, state: State) -> tuple[given.Linear, given.Linear]:
+def given_at(
+    prepared: PreparedProblem, state: Parameters
+) -> tuple[given_orientations.LinearisedOrientations, given_orientations.LinearisedOrientations]:
     """Linearise camera positions and attitudes at a state."""
-    problem = model.problem
+    problem = prepared.problem
     return (
-        given.positions_at(problem.positions, state.centers, state.rotations, state.common, len(model.calibrated)),
-        given.attitudes_at(problem.attitudes, state.rotations, len(state.common)),
+        given_orientations.positions_at(
+            problem.positions, state.centers, state.rotations, state.common, len(prepared.calibrated)
+        ),
+        given_orientations.attitudes_at(problem.attitudes, state.rotations, len(state.common)),
     )
 
 
-def points_of(model: Model, state: State) -> Floats:
+def points_of(prepared: PreparedProblem, state: Parameters) -> Floats:
     """Collect the points from the batches, shape (q, 3); a point without rays keeps its start."""
-    points = np.array(model.problem.start.points, float)
-    for batch, xyz in zip(model.structure.batches, state.xyz, strict=True):
+    points = np.array(prepared.problem.start.points, float)
+    for batch, xyz in zip(prepared.structure.batches, state.xyz, strict=True):
         points[batch.point[batch.real]] = xyz[:, batch.real].T
     return points
 
 
-def control_residuals(model: Model, state: State) -> Floats:
+def control_residuals(prepared: PreparedProblem, state: Parameters) -> Floats:
     """Give adjusted minus given coordinates of control along its axes, metres, shape (c, 3)."""
-    control = model.problem.control
+    control = prepared.problem.control
     if not len(control):
         return np.zeros((0, 3))
-    points = np.array(model.problem.start.points[control.point], float)
-    where = np.zeros(model.problem.points, np.intp)
+    points = np.array(prepared.problem.start.points[control.point], float)
+    where = np.zeros(prepared.problem.points, np.intp)
     where[control.point] = np.arange(len(control))
-    for batch, xyz in zip(model.structure.batches, state.xyz, strict=True):
+    for batch, xyz in zip(prepared.structure.batches, state.xyz, strict=True):
         points[where[batch.point[batch.control]]] = xyz[:, batch.control].T
     points = points[where[control.point]]
     found: Floats = np.einsum("nij,nj->ni", control.axes, points - control.xyz)
     return found
 
 
-def control_squares(model: Model, state: State) -> float:
+def control_squares(prepared: PreparedProblem, state: Parameters) -> float:
     """Weighted sum of squares of the control of points with rays."""
-    control = model.problem.control
+    control = prepared.problem.control
     if not len(control):
         return 0.0
-    return float(((control_residuals(model, state) / control.sigma) ** 2).sum())
+    return float(((control_residuals(prepared, state) / control.sigma) ** 2).sum())
 
 
-def factored(model: Model, reduced: Reduced, add: Floats | None = None) -> Factor | None:
+def factored(prepared: PreparedProblem, reduced: Reduced, add: Floats | None = None) -> Factor | None:
     """Assemble the matrix of the photos and factor it: in a band, or sparse where the band is wide.
 
     Parameters
@@ -147,7 +151,7 @@ def factored(model: Model, reduced: Reduced, add: Floats | None = None) -> Facto
     Band, Sparse or None
         The factor; None when the matrix is not positive definite.
     """
-    structure = model.structure
+    structure = prepared.structure
     blocks = reduced.blocks
     if add is not None:
         blocks = blocks.copy()

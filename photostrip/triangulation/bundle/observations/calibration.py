@@ -12,7 +12,7 @@ from photostrip.triangulation.bundle.observations.problem import CALIBRATION
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.bundle.observations.problem import Cameras
+    from photostrip.triangulation.bundle.observations.problem import BundleCameras
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -34,7 +34,7 @@ class Calibrated:
         return len(self.kind)
 
 
-def parameters(cameras: Cameras) -> Calibrated:
+def parameters(cameras: BundleCameras) -> Calibrated:
     """List the parameters to be calibrated.
 
     Returns

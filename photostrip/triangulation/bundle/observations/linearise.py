@@ -21,7 +21,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.bundle.observations.layout import Batch
+    from photostrip.triangulation.bundle.observations.ray_batches import Batch
 
     Floats = NDArray[np.float64]
 

@@ -43,7 +43,7 @@ def _no_numbers() -> Numbers:
 
 
 @dataclass(frozen=True, eq=False)
-class Images:
+class ImageObservations:
     """Measured rays."""
 
     # photo, point: (n,): photo and point of each ray. A point is measured at most once on a photo. Any order; by photo
@@ -59,7 +59,7 @@ class Images:
 
 
 @dataclass(frozen=True, eq=False)
-class Control:
+class ControlObservations:
     """Given coordinates of points. What is observed are ``axes @ (X - xyz)``, each with its own sigma."""
 
     point: Numbers = field(default_factory=_no_numbers)  # (c,): point of each row; a point may stand in several rows
@@ -78,7 +78,7 @@ class Control:
 
 
 @dataclass(frozen=True, eq=False)
-class Positions:
+class PositionObservations:
     """Given camera positions, of the perspective centre or of an antenna.
 
     What is observed are ``axes @ (S + R @ lever - xyz) - offset - drift * time``, with offset and drift of the group.
@@ -86,7 +86,7 @@ class Positions:
 
     photo: Numbers = field(default_factory=_no_numbers)  # (g,): photo of each row
     xyz: Floats = field(default_factory=lambda: _no_rows(3))  # (g, 3): given position, Cartesian, metres
-    # (g, 3, 3): directions of the three coordinates as rows, as for ``Control``
+    # (g, 3, 3): directions of the three coordinates as rows, as for ``ControlObservations``
     axes: Floats = field(default_factory=lambda: _no_rows(3, 3))
     # (g, 3): standard deviations along the axes, metres; infinite: not given
     sigma: Floats = field(default_factory=lambda: _no_rows(3))
@@ -108,8 +108,8 @@ class Positions:
 
 
 @dataclass(frozen=True, eq=False)
-class Attitudes:
-    """Given attitudes of photos; a given perspective centre is a row of ``Positions``."""
+class AttitudeObservations:
+    """Given attitudes of photos; a given perspective centre is a row of ``PositionObservations``."""
 
     photo: Numbers = field(default_factory=_no_numbers)  # (a,): photo of each row
     # (a, 3, 3): given rotations, photo to Cartesian frame
@@ -123,7 +123,7 @@ class Attitudes:
 
 
 @dataclass(frozen=True, eq=False)
-class Cameras:
+class BundleCameras:
     """Cameras of the photos, and what is to be calibrated."""
 
     of_photo: Numbers  # (m,): camera of each photo
@@ -134,7 +134,7 @@ class Cameras:
 
 
 @dataclass(frozen=True, eq=False)
-class Start:
+class StartValues:
     """Where the adjustment starts."""
 
     centers: Floats  # (m, 3): perspective centres, Cartesian, metres
@@ -143,15 +143,15 @@ class Start:
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class BundleProblem:
     """All observations and all start values of one bundle adjustment."""
 
-    images: Images
-    cameras: Cameras
-    start: Start  # start values; they say how many photos (m) and points (q) there are
-    control: Control = field(default_factory=Control)
-    positions: Positions = field(default_factory=Positions)
-    attitudes: Attitudes = field(default_factory=Attitudes)
+    images: ImageObservations
+    cameras: BundleCameras
+    start: StartValues  # start values; they say how many photos (m) and points (q) there are
+    control: ControlObservations = field(default_factory=ControlObservations)
+    positions: PositionObservations = field(default_factory=PositionObservations)
+    attitudes: AttitudeObservations = field(default_factory=AttitudeObservations)
     # photo_ids, point_ids, camera_ids, group_ids: names for messages; empty: the numbers
     photo_ids: tuple[str, ...] = ()
     point_ids: tuple[str, ...] = ()

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.bundle.solution import Precision, Solution
+    from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
     Floats = NDArray[np.float64]
 
@@ -40,7 +40,7 @@ class Correlation:
     value: float
 
 
-def correlations(solution: Solution, precision: Precision, limit: float = LIMIT) -> tuple[Correlation, ...]:
+def correlations(solution: BundleSolution, precision: Cofactors, limit: float = LIMIT) -> tuple[Correlation, ...]:
     """List correlations above a limit: between common parameters, between these and photos, and within photos.
 
     Returns
@@ -48,7 +48,7 @@ def correlations(solution: Solution, precision: Precision, limit: float = LIMIT)
     tuple of Correlation
         Common parameters first, then with photos, then within photos; each the largest first.
     """
-    problem = solution.model.problem
+    problem = solution.prepared.problem
     names = problem.common_names()
     turn = np.zeros((len(solution.centers), PHOTO, PHOTO))
     turn[:, :3, :3] = turn[:, 3:, 3:] = np.swapaxes(solution.rotations, 1, 2)

@@ -16,8 +16,8 @@ from photostrip.statistics import chi2_quantile, normal_quantile, t_quantile
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.bundle.observations.problem import Problem
-    from photostrip.triangulation.bundle.solution import Precision, Solution
+    from photostrip.triangulation.bundle.observations.problem import BundleProblem
+    from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
     Floats = NDArray[np.float64]
     Flags = NDArray[np.bool_]
@@ -88,7 +88,7 @@ class Group:
             return np.asarray(shift * np.sqrt((1.0 - r) / r), float)
 
 
-def groups_of(problem: Problem, solution: Solution, precision: Precision) -> tuple[Group, ...]:
+def groups_of(problem: BundleProblem, solution: BundleSolution, precision: Cofactors) -> tuple[Group, ...]:
     """Return all observations with their redundancy numbers.
 
     Returns
@@ -178,7 +178,7 @@ class Sigma0Test:
         return self.lower <= self.sigma0 <= self.upper
 
 
-def sigma0_test(solution: Solution) -> Sigma0Test:
+def sigma0_test(solution: BundleSolution) -> Sigma0Test:
     """Test sigma0 against 1.
 
     Returns

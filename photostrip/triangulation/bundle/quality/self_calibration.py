@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.bundle.observations.problem import Problem
-    from photostrip.triangulation.bundle.solution import Precision, Solution
+    from photostrip.triangulation.bundle.observations.problem import BundleProblem
+    from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -127,7 +127,7 @@ def columns(xy: Floats) -> Floats:
     return np.stack([np.stack(by_x, axis=1), np.stack(by_y, axis=1)], axis=1)
 
 
-def values_of(problem: Problem, common: Floats) -> Floats:
+def values_of(problem: BundleProblem, common: Floats) -> Floats:
     """Return the calibration parameters camera by camera.
 
     Parameters
@@ -147,7 +147,7 @@ def values_of(problem: Problem, common: Floats) -> Floats:
     return found
 
 
-def image_shift(problem: Problem, common: Floats, xy: Floats, photo: Numbers) -> Floats:
+def image_shift(problem: BundleProblem, common: Floats, xy: Floats, photo: Numbers) -> Floats:
     """Return the correction that makes ideal image coordinates of the given principal distance.
 
     Parameters
@@ -173,7 +173,7 @@ def image_shift(problem: Problem, common: Floats, xy: Floats, photo: Numbers) ->
     return np.asarray(shifted * (focal / (focal + values[camera, 0]))[:, None] - xy, float)
 
 
-def parameters_of(problem: Problem, solution: Solution, precision: Precision) -> tuple[Parameter, ...]:
+def parameters_of(problem: BundleProblem, solution: BundleSolution, precision: Cofactors) -> tuple[Parameter, ...]:
     """Return every calibration parameter with its precision and significance.
 
     Returns

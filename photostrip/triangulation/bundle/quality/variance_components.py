@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.bundle.observations.problem import Problem
-    from photostrip.triangulation.bundle.solution import Precision, Solution
+    from photostrip.triangulation.bundle.observations.problem import BundleProblem
+    from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
     Floats = NDArray[np.float64]
 
@@ -67,7 +67,7 @@ def labels(kind: str, rows: int, level: Sequence[bool]) -> list[tuple[str, slice
 
 
 def components(
-    problem: Problem, solution: Solution, precision: Precision, level: Mapping[str, Sequence[bool]]
+    problem: BundleProblem, solution: BundleSolution, precision: Cofactors, level: Mapping[str, Sequence[bool]]
 ) -> tuple[Component, ...]:
     """Compare each group's residuals with its standard deviations, once.
 
@@ -105,12 +105,12 @@ def _component(name: str, group: reliability.Group, given: NDArray[np.bool_]) ->
     return Component(name, int(given.sum()), redundancy, factor, sigma, estimated)
 
 
-def scaled(problem: Problem, found: Sequence[Component], level: Mapping[str, Sequence[bool]]) -> Problem:
+def scaled(problem: BundleProblem, found: Sequence[Component], level: Mapping[str, Sequence[bool]]) -> BundleProblem:
     """Multiply the standard deviations of a problem with the factors of their groups.
 
     Returns
     -------
-    Problem
+    BundleProblem
         The same problem with other standard deviations.
     """
     factor = {each.name: each.factor for each in found}

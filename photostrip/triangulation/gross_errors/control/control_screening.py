@@ -76,7 +76,7 @@ class ControlRejection:
 
 
 @dataclass(frozen=True, eq=False)
-class Setting:
+class StripAtControl:
     """Where a strip stands when its control is examined."""
 
     strip: Floats  # (n, 3): strip coordinates of the control points
@@ -87,7 +87,7 @@ class Setting:
     spacing: float
     breadth: float
     # covariance of all misclosures; without it polynomials stand for the strip's deformation
-    joint: control_significance.Joint | None = None
+    joint: control_significance.ControlCovariance | None = None
 
     def problem(self, control: ControlPoints) -> correction.Problem:
         """Fit the similarity, and give what is left to a polynomial."""
@@ -106,14 +106,16 @@ class Setting:
         """Misclosures of all control after a similarity on what is kept, metres along the ground axes."""
         return Targets(control or kept, self.frames, self.intermediate).misclosures(self.placed(kept))
 
-    def judged(self, control: ControlPoints, kept: ControlPoints) -> control_significance.Judged | None:
+    def judged(self, control: ControlPoints, kept: ControlPoints) -> control_significance.ControlTests | None:
         """Judge all control by what is kept with the covariance of the strip; None without one."""
         if self.joint is None or len(self.joint.point) != int(control.use.sum()):
             return None
-        return control_significance.judge(self.joint, self.misclosures(kept, control), kept.use, ALPHA)
+        return control_significance.predict_control(self.joint, self.misclosures(kept, control), kept.use, ALPHA)
 
 
-def screen(control: ControlPoints, setting: Setting) -> tuple[ControlPoints, tuple[ControlRejection, ...]]:
+def screen_control(
+    control: ControlPoints, setting: StripAtControl
+) -> tuple[ControlPoints, tuple[ControlRejection, ...]]:
     """Take wrong coordinates out of the control.
 
     Parameters
@@ -144,7 +146,7 @@ def _without(control: ControlPoints, out: Flags) -> ControlPoints:
     return replace(control, use=control.use & ~out)
 
 
-def _gross(control: ControlPoints, setting: Setting) -> Flags:
+def _gross(control: ControlPoints, setting: StripAtControl) -> Flags:
     """Find coordinates far from a similarity of least absolute misclosures."""
     nothing = np.zeros(control.use.shape, bool)
     targets = Targets(control, setting.frames, setting.intermediate)
@@ -235,7 +237,9 @@ def judged(problem: correction.Problem, fit: correction.Polynomial) -> tuple[Flo
     return np.where(seen, value, 0.0), np.broadcast_to(limit, value.shape), size, redundancy
 
 
-def _snooped(control: ControlPoints, start: ControlPoints, setting: Setting) -> tuple[Setting, ControlPoints]:
+def _snooped(
+    control: ControlPoints, start: ControlPoints, setting: StripAtControl
+) -> tuple[StripAtControl, ControlPoints]:
     """Take out what is wrong; by polynomials where the covariance does not explain the misclosures of most control.
 
     Where neither the covariance nor a polynomial explains what is left, more may be wrong than single tests can find:
@@ -252,12 +256,12 @@ def _snooped(control: ControlPoints, start: ControlPoints, setting: Setting) -> 
     return (bent, by_polynomial) if half is None else (setting, half)
 
 
-def _fit(kept: ControlPoints, setting: Setting) -> float:
+def _fit(kept: ControlPoints, setting: StripAtControl) -> float:
     """Return the standard deviation of unit weight of control by the covariance of the strip."""
-    return control_significance.judge(_joint(setting), setting.misclosures(kept), kept.use, ALPHA).sigma0
+    return control_significance.predict_control(_joint(setting), setting.misclosures(kept), kept.use, ALPHA).sigma0
 
 
-def _smooth(kept: ControlPoints, setting: Setting) -> bool:
+def _smooth(kept: ControlPoints, setting: StripAtControl) -> bool:
     """Whether a polynomial explains the misclosures, or nobody can tell."""
     problem = setting.problem(kept)
     fit = _richest(problem)
@@ -267,7 +271,7 @@ def _smooth(kept: ControlPoints, setting: Setting) -> bool:
     return all(axis.sigma0 < ROUGH * float(expected[k]) for k, axis in enumerate(fit.axes))
 
 
-def _better_half(control: ControlPoints, kept: ControlPoints, setting: Setting) -> ControlPoints | None:
+def _better_half(control: ControlPoints, kept: ControlPoints, setting: StripAtControl) -> ControlPoints | None:
     """Control that agrees with the similarity that suits most of it; None when the covariance does not explain it."""
     targets = Targets(control, setting.frames, setting.intermediate)
     first = absolute_orientation.orient(setting.strip, targets, kept.use.astype(float))
@@ -283,7 +287,7 @@ def _better_half(control: ControlPoints, kept: ControlPoints, setting: Setting) 
     return half if believed else None
 
 
-def _bends(control: ControlPoints, half: ControlPoints, setting: Setting) -> bool:
+def _bends(control: ControlPoints, half: ControlPoints, setting: StripAtControl) -> bool:
     """Whether a whole band of two points or more is rejected, and its misclosures agree: a bend, not an error."""
     gap = setting.misclosures(half, control)
     band = polynomial_terms.bands(setting.placed(half)[:, 0], setting.spacing)
@@ -296,7 +300,7 @@ def _bends(control: ControlPoints, half: ControlPoints, setting: Setting) -> boo
     return False
 
 
-def _snoop(control: ControlPoints, setting: Setting) -> ControlPoints:
+def _snoop(control: ControlPoints, setting: StripAtControl) -> ControlPoints:
     """Take out the worst coordinate, fit again, until none is beyond its limit."""
     kept = control
     while True:
@@ -309,20 +313,20 @@ def _snoop(control: ControlPoints, setting: Setting) -> ControlPoints:
         kept = _without(kept, out)
 
 
-def _by_covariance(kept: ControlPoints, setting: Setting) -> Floats:
+def _by_covariance(kept: ControlPoints, setting: StripAtControl) -> Floats:
     """Test values over limits by the covariance of the strip; 0 for coordinates that take no part."""
-    found = control_significance.judge(_joint(setting), setting.misclosures(kept), kept.use, ALPHA)
+    found = control_significance.predict_control(_joint(setting), setting.misclosures(kept), kept.use, ALPHA)
     return np.where(kept.use, found.value / found.limit, 0.0)
 
 
-def _joint(setting: Setting) -> control_significance.Joint:
+def _joint(setting: StripAtControl) -> control_significance.ControlCovariance:
     if setting.joint is None:
         msg = "no covariance"
         raise ValueError(msg)
     return setting.joint
 
 
-def _by_polynomial(kept: ControlPoints, setting: Setting) -> Floats:
+def _by_polynomial(kept: ControlPoints, setting: StripAtControl) -> Floats:
     """Test values over limits by the richest polynomial, of coordinates that have a witness."""
     problem = setting.problem(kept)
     fit = _richest(problem)
@@ -332,10 +336,12 @@ def _by_polynomial(kept: ControlPoints, setting: Setting) -> Floats:
     return np.where(_witnessed(problem.xyz[:, 0], setting.spacing, kept.use), value / limit, 0.0)
 
 
-def _predicted(control: ControlPoints, kept: ControlPoints, setting: Setting) -> tuple[Floats, Floats, Floats, Floats]:
+def _predicted(
+    control: ControlPoints, kept: ControlPoints, setting: StripAtControl
+) -> tuple[Floats, Floats, Floats, Floats]:
     """Judge all given coordinates, the rejected ones too, by those that are kept."""
     if setting.joint is not None:
-        found = control_significance.judge(setting.joint, setting.misclosures(kept, control), kept.use, ALPHA)
+        found = control_significance.predict_control(setting.joint, setting.misclosures(kept, control), kept.use, ALPHA)
         return found.value, found.limit, found.size, found.redundancy
     problem = setting.problem(kept)
     fit = _richest(problem)
@@ -366,7 +372,7 @@ def _leverages(problem: correction.Problem, terms: Sequence[str], weight: Floats
     return np.asarray(np.einsum("ni,ij,nj->n", columns, cofactors, columns), float)
 
 
-def _taken_back(control: ControlPoints, kept: ControlPoints, setting: Setting) -> ControlPoints:
+def _taken_back(control: ControlPoints, kept: ControlPoints, setting: StripAtControl) -> ControlPoints:
     """Take back coordinates that the final fit predicts after all."""
     value, limit, _, _ = _predicted(control, kept, setting)
     good = np.array(value <= limit, bool)
@@ -374,7 +380,7 @@ def _taken_back(control: ControlPoints, kept: ControlPoints, setting: Setting) -
     return replace(kept, use=kept.use | (control.use & good))
 
 
-def _log(control: ControlPoints, kept: ControlPoints, setting: Setting) -> tuple[ControlRejection, ...]:
+def _log(control: ControlPoints, kept: ControlPoints, setting: StripAtControl) -> tuple[ControlRejection, ...]:
     out = control.use & ~kept.use
     if not out.any():
         return ()
@@ -403,13 +409,13 @@ def _log(control: ControlPoints, kept: ControlPoints, setting: Setting) -> tuple
     return tuple(found)
 
 
-def _detectable(control: ControlPoints, kept: ControlPoints, setting: Setting) -> Floats:
+def _detectable(control: ControlPoints, kept: ControlPoints, setting: StripAtControl) -> Floats:
     """Smallest errors that are found in 80 % of cases, metres; NaN without the strip's covariance."""
     found = setting.judged(control, kept)
     return np.full(control.use.shape, np.nan) if found is None else found.detectable
 
 
-def _exchanges(control: ControlPoints, kept: ControlPoints, setting: Setting, size: Floats) -> dict[int, str]:
+def _exchanges(control: ControlPoints, kept: ControlPoints, setting: StripAtControl, size: Floats) -> dict[int, str]:
     """Find pairs of rejected points that fit when their coordinates are exchanged, by trying the exchange."""
     out = control.use & ~kept.use
     rows = np.flatnonzero(out[:, :2].any(axis=1)).tolist()
@@ -429,7 +435,7 @@ def _exchanges(control: ControlPoints, kept: ControlPoints, setting: Setting, si
     return found
 
 
-def _fit_exchanged(control: ControlPoints, kept: ControlPoints, setting: Setting, rows: tuple[int, int]) -> bool:
+def _fit_exchanged(control: ControlPoints, kept: ControlPoints, setting: StripAtControl, rows: tuple[int, int]) -> bool:
     """Whether two points agree with all others when each has the coordinates of the other."""
     order = np.arange(len(control))
     order[list(rows)] = rows[::-1]

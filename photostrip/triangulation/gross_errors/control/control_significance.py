@@ -32,7 +32,7 @@ BENT = 2.5  # standard deviation of unit weight beyond which the strip is bent b
 
 
 @dataclass(frozen=True, eq=False)
-class Joint:
+class ControlCovariance:
     """Misclosures at the control as one vector."""
 
     # point, axis: (w,): control point and ground axis of each coordinate
@@ -43,7 +43,7 @@ class Joint:
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
+class ControlTests:
     """What all other coordinates say of each one; arrays by control point and axis, shape (n, 3)."""
 
     # value, limit: test values and critical values; value 0 where nothing can be said
@@ -55,12 +55,12 @@ class Judged:
     sigma0: float  # standard deviation of unit weight of the coordinates that took part; NaN without redundancy
 
 
-def judge(joint: Joint, misclosures: Floats, used: Flags, alpha: float) -> Judged:
+def predict_control(joint: ControlCovariance, misclosures: Floats, used: Flags, alpha: float) -> ControlTests:
     """Judge every control coordinate by what the others predict.
 
     Parameters
     ----------
-    joint : Joint
+    joint : ControlCovariance
         Covariance and design of all coordinates.
     misclosures : ndarray, shape (n, 3)
         Strip minus given along the ground axes, metres, after any similarity near the truth.
@@ -77,7 +77,7 @@ def judge(joint: Joint, misclosures: Floats, used: Flags, alpha: float) -> Judge
     limit[:] = detectable[:] = np.inf
     freedom = count - joint.design.shape[1]
     if freedom < LEAST_REDUNDANCY:
-        return Judged(value, limit, size, redundancy, detectable, float("nan"))
+        return ControlTests(value, limit, size, redundancy, detectable, float("nan"))
     tail = alpha / (2 * max(len(w), 1))
     critical = t_quantile(1 - tail, freedom - 1)
     projector = _projector(joint, inside)
@@ -97,10 +97,10 @@ def judge(joint: Joint, misclosures: Floats, used: Flags, alpha: float) -> Judge
         detectable[place] = (critical + POWER) * spread / np.sqrt(weight)
         redundancy[place] = 1.0
     redundancy[joint.point[inside], joint.axis[inside]] = np.diag(projector @ joint.covariance[np.ix_(inside, inside)])
-    return Judged(value, limit, size, redundancy, detectable, float(np.sqrt(max(total, 0.0) / freedom)))
+    return ControlTests(value, limit, size, redundancy, detectable, float(np.sqrt(max(total, 0.0) / freedom)))
 
 
-def _projector(joint: Joint, rows: Numbers) -> Floats:
+def _projector(joint: ControlCovariance, rows: Numbers) -> Floats:
     """Weight matrix of the coordinates after a similarity has taken what it can."""
     weight = np.linalg.inv(joint.covariance[np.ix_(rows, rows)])
     design = joint.design[rows] / np.maximum(np.abs(joint.design[rows]).max(axis=0), 1e-300)
@@ -109,7 +109,7 @@ def _projector(joint: Joint, rows: Numbers) -> Floats:
 
 
 def _of_one(
-    joint: Joint, w: Floats, inside: Numbers, number: int, whole: tuple[Floats, Floats, float]
+    joint: ControlCovariance, w: Floats, inside: Numbers, number: int, whole: tuple[Floats, Floats, float]
 ) -> tuple[float, float, float]:
     """Weight, pull and remaining sum of squares for an error of one coordinate, which may be outside."""
     projector, pulled, total = whole

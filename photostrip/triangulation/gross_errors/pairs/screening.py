@@ -49,7 +49,7 @@ DETECTABLE = 4.13  # shift of a normal variable found in 80 % of cases by a two-
 
 
 @dataclass(frozen=True, slots=True)
-class Rejection:
+class PairRejection:
     """One point taken out of a pair."""
 
     row: int
@@ -67,12 +67,12 @@ class Rejection:
 
 
 @dataclass(frozen=True, eq=False)
-class Screened:
+class ScreenedPairs:
     """Oriented pairs after the search for gross errors, and how far errors can be seen in them."""
 
     orientation: Orientation  # pairs oriented without the rejected points
-    rejections: tuple[Rejection, ...]  # what was rejected, in order; re-admitted points are marked
-    scatter: screening_search.Scatter  # standard deviations of a y parallax of weight one
+    rejections: tuple[PairRejection, ...]  # what was rejected, in order; re-admitted points are marked
+    scatter: screening_search.ParallaxScatter  # standard deviations of a y parallax of weight one
     # (p,): pairs that fail the global test with nothing left to reject: errors that hide each other are suspected
     masked: NDArray[np.bool_]
     converged: NDArray[np.bool_]  # (p,): whether the orientation of each pair converged
@@ -102,7 +102,7 @@ class Screened:
 
 def screen(
     orientation: Orientation, settings: RelativeSettings, sigma: float
-) -> tuple[Orientation, tuple[Rejection, ...]]:
+) -> tuple[Orientation, tuple[PairRejection, ...]]:
     """Reject points with gross errors from all pairs and orient those pairs again.
 
     Parameters
@@ -118,7 +118,7 @@ def screen(
     -------
     Orientation
         Pairs oriented without the rejected points.
-    tuple of Rejection
+    tuple of PairRejection
         What was rejected, in order.
 
     Raises
@@ -126,13 +126,13 @@ def screen(
     InputError
         For a method that does not exist.
     """
-    result = examine(orientation, settings, sigma)
+    result = screen_pairs(orientation, settings, sigma)
     return result.orientation, result.rejections
 
 
-def examine(
+def screen_pairs(
     orientation: Orientation, settings: RelativeSettings, sigma: float, converged: NDArray[np.bool_] | None = None
-) -> Screened:
+) -> ScreenedPairs:
     """Reject points with gross errors, and say what can and what cannot be seen in each pair.
 
     Parameters
@@ -148,7 +148,7 @@ def examine(
 
     Returns
     -------
-    Screened
+    ScreenedPairs
         Oriented pairs, log, zones, scatter and pairs with suspected errors.
 
     Raises
@@ -176,18 +176,21 @@ def examine(
     else:
         result, log = _sequential(orientation, settings, sigma, behind)
     masked = pair_global_test.failing(result, scatter.by_pair)
-    return Screened(result, _completed(log, result), scatter, masked, sound)
+    return ScreenedPairs(result, _completed(log, result), scatter, masked, sound)
 
 
 def _readmitted(
-    orientation: Orientation, scatter: screening_search.Scatter, found: screening_search.Deleted, behind: Flags
-) -> tuple[Orientation, list[Rejection]]:
+    orientation: Orientation,
+    scatter: screening_search.ParallaxScatter,
+    found: screening_search.DeletedPoints,
+    behind: Flags,
+) -> tuple[Orientation, list[PairRejection]]:
     """Take back what the final elements predict well, take out what lies behind a camera, write the log."""
     weight = orientation.pairs.weight
     result, _ = readmission.readmit(found.orientation, found.rows, weight, scatter.by_pair)
     before = np.nan_to_num(orientation.parallax)
     log = [
-        Rejection(int(row), test, float(value), float(limit), float(before[row]))
+        PairRejection(int(row), test, float(value), float(limit), float(before[row]))
         for row, test, value, limit in zip(found.rows, found.tests, found.values, found.limits, strict=True)
     ]
     result, dropped = _drop_behind(result, _behind_now(orientation, result, behind))
@@ -196,7 +199,7 @@ def _readmitted(
 
 def _sequential(
     orientation: Orientation, settings: RelativeSettings, sigma: float, behind: Flags
-) -> tuple[Orientation, list[Rejection]]:
+) -> tuple[Orientation, list[PairRejection]]:
     """Test single residuals, one stage after the other."""
     result, log = _drop_behind(orientation, behind)
     limit = settings.parallax_limit if settings.parallax_limit is not None else LIMIT_FACTOR * sigma * np.sqrt(2.0)
@@ -235,7 +238,7 @@ def spared(orientation: Orientation, rows: NDArray[np.bool_]) -> NDArray[np.bool
     return result
 
 
-def _completed(log: list[Rejection], result: Orientation) -> tuple[Rejection, ...]:
+def _completed(log: list[PairRejection], result: Orientation) -> tuple[PairRejection, ...]:
     """Add to each rejection what only the final orientation can say."""
     if not log:
         return ()
@@ -259,7 +262,7 @@ def _behind_now(before: Orientation, after: Orientation, behind: Flags) -> Flags
     return result
 
 
-def _drop_behind(orientation: Orientation, behind: Flags) -> tuple[Orientation, list[Rejection]]:
+def _drop_behind(orientation: Orientation, behind: Flags) -> tuple[Orientation, list[PairRejection]]:
     """Take out the points that come out behind a camera; no measurement of theirs can be right."""
     pairs, used = orientation.pairs, orientation.used
     rows = np.flatnonzero(behind & used)
@@ -270,7 +273,7 @@ def _drop_behind(orientation: Orientation, behind: Flags) -> tuple[Orientation, 
     rows = rows[most[pairs.pair[rows]]]
     if not len(rows):
         return orientation, []
-    log = [Rejection(int(row), "in front", np.nan, np.nan, float(orientation.parallax[row])) for row in rows]
+    log = [PairRejection(int(row), "in front", np.nan, np.nan, float(orientation.parallax[row])) for row in rows]
     return _without(orientation, rows), log
 
 
@@ -280,10 +283,10 @@ def _without(orientation: Orientation, rows: NDArray[np.intp]) -> Orientation:
     return orient_again(orientation, weight, np.unique(orientation.pairs.pair[rows]))
 
 
-def _stage(orientation: Orientation, test: str, bound: float) -> tuple[Orientation, list[Rejection]]:
+def _stage(orientation: Orientation, test: str, bound: float) -> tuple[Orientation, list[PairRejection]]:
     """Repeat one test, worst point first, until no pair has anything to reject."""
     result = orientation
-    log: list[Rejection] = []
+    log: list[PairRejection] = []
     while True:
         value, limit = _values(result, test, bound)
         value[~result.used] = -np.inf
@@ -295,7 +298,7 @@ def _stage(orientation: Orientation, test: str, bound: float) -> tuple[Orientati
             return result, log
         _, first = np.unique(result.pairs.pair[rows], return_index=True)  # of equal values the first
         rows = rows[first]
-        log += [Rejection(int(r), test, float(value[r]), float(limit[r]), float(result.parallax[r])) for r in rows]
+        log += [PairRejection(int(r), test, float(value[r]), float(limit[r]), float(result.parallax[r])) for r in rows]
         result = _without(result, rows)
 
 

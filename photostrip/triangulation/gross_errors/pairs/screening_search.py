@@ -56,7 +56,7 @@ MILD = 10.0  # root of the sum of squares in units of its variance
 
 
 @dataclass(frozen=True, eq=False)
-class Scatter:
+class ParallaxScatter:
     """Standard deviations of a y parallax of weight one that the tests are made with."""
 
     stated: float  # from the stated standard deviation of image coordinates, mm
@@ -66,7 +66,7 @@ class Scatter:
 
 
 @dataclass(frozen=True, eq=False)
-class Deleted:
+class DeletedPoints:
     """What a search took out."""
 
     orientation: Orientation
@@ -126,7 +126,7 @@ def _share(elements: Floats, pairs: Pairs, scale: Floats) -> Floats:
 
 def search(
     orientation: Orientation, sigma: float, *, start: bool, sets: bool, doubtful: Flags | None = None
-) -> tuple[Scatter, Deleted]:
+) -> tuple[ParallaxScatter, DeletedPoints]:
     """Take gross errors out of all pairs that fail the global test.
 
     The search is made with the stated scatter first. Where what it leaves contradicts that scatter, the scatter is
@@ -147,13 +147,13 @@ def search(
 
     Returns
     -------
-    Scatter
+    ParallaxScatter
         Scatter of the parallaxes that the search was made with.
-    Deleted
+    DeletedPoints
         Pairs oriented without the wrong points, and what was taken out.
     """
     stated = max(float(np.sqrt(2.0)) * sigma, SMALLEST_SIGMA)
-    scatter = Scatter(stated, float("nan"), np.full(orientation.pairs.size, stated))
+    scatter = ParallaxScatter(stated, float("nan"), np.full(orientation.pairs.size, stated))
     lost = np.zeros(orientation.pairs.size, bool) if doubtful is None else doubtful
     todo = np.flatnonzero(failing(orientation, scatter.by_pair) | lost)
     if not len(todo):
@@ -181,7 +181,7 @@ def search(
         scatter = revised
 
 
-def _mildly(part: Orientation, sigma: Floats) -> Deleted | None:
+def _mildly(part: Orientation, sigma: Floats) -> DeletedPoints | None:
     """Search pairs that fail by so little that least squares have turned them by nothing worth speaking of.
 
     They need no robust start. None when there are others among them, or when no set of three points explains one.
@@ -193,7 +193,7 @@ def _mildly(part: Orientation, sigma: Floats) -> Deleted | None:
     return None if failing(result, sigma).any() else log.closed(result)
 
 
-def _whole(orientation: Orientation, todo: Numbers, rows: Numbers, found: Deleted) -> Deleted:
+def _whole(orientation: Orientation, todo: Numbers, rows: Numbers, found: DeletedPoints) -> DeletedPoints:
     """Put searched pairs back among all."""
     return replace(found, orientation=orientation.with_pairs(todo, found.orientation), rows=rows[found.rows])
 
@@ -227,7 +227,7 @@ def _cleaned(seen: Orientation, todo: Numbers, scale: Floats) -> Orientation:
     return orient_again(seen, weight, todo)
 
 
-def _left(given: Orientation, found: Deleted, cleaned: Orientation, sigma: Floats) -> _Sizes:
+def _left(given: Orientation, found: DeletedPoints, cleaned: Orientation, sigma: Floats) -> _Sizes:
     """Return what a search leaves of the pairs that failed.
 
     Pairs from which too many points went, or that still fail, do not speak by what the search chose to leave but by
@@ -242,7 +242,7 @@ def _left(given: Orientation, found: Deleted, cleaned: Orientation, sigma: Float
     )
 
 
-def _revised(scatter: Scatter, pairs: Pairs, left: _Sizes) -> Scatter:
+def _revised(scatter: ParallaxScatter, pairs: Pairs, left: _Sizes) -> ParallaxScatter:
     """Raise the scatter where the residuals left by a search contradict it."""
     sizes = left.size
     tested = np.isfinite(sizes)
@@ -257,7 +257,7 @@ def _revised(scatter: Scatter, pairs: Pairs, left: _Sizes) -> Scatter:
     level = max(level, np.nan_to_num(found_now))
     own = robust.NORMAL * np.nan_to_num(robust.median_by_pair(sizes, pairs, tested))
     proven = np.where(freedom < ENOUGH, 0.0, own / (1 + PROOF * MEDIAN_SCATTER / np.sqrt(np.maximum(freedom, 1.0))))
-    return Scatter(scatter.stated, found_now, np.maximum(level, np.maximum(proven, scatter.by_pair)))
+    return ParallaxScatter(scatter.stated, found_now, np.maximum(level, np.maximum(proven, scatter.by_pair)))
 
 
 def _normalised(orientation: Orientation) -> Floats:
@@ -271,7 +271,7 @@ def _normalised(orientation: Orientation) -> Floats:
 
 def _search_once(
     given: Orientation, seen: Orientation, todo: Numbers, sigma: Floats, *, sets: bool, start: bool
-) -> Deleted:
+) -> DeletedPoints:
     """Search with a given scatter; ``seen`` holds the elements and residuals to begin with."""
     log = _Log([], [], [], [])
     rows = np.isin(given.pairs.pair, todo)
@@ -307,9 +307,9 @@ class _Log:
         self.values.append(value)
         self.limits.append(limit)
 
-    def closed(self, orientation: Orientation) -> Deleted:
+    def closed(self, orientation: Orientation) -> DeletedPoints:
         rows = np.array(self.rows, np.intp)
-        return Deleted(orientation, rows, tuple(self.tests), np.array(self.values), np.array(self.limits))
+        return DeletedPoints(orientation, rows, tuple(self.tests), np.array(self.values), np.array(self.limits))
 
 
 def _seen_from(orientation: Orientation, elements: Floats, todo: Numbers) -> Orientation:

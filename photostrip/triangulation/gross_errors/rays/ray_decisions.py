@@ -35,7 +35,7 @@ GOOD, RAY, PAIR, RAYS, NONE = range(5)
 
 
 @dataclass(frozen=True, eq=False)
-class Decision:
+class RayDecisions:
     """Points judged."""
 
     group: Group
@@ -49,9 +49,9 @@ class Decision:
     size: Floats
     kind: Numbers  # (k,): ``GOOD``, ``RAY``, ``PAIR``, ``RAYS`` or ``NONE``
 
-    def take(self, rows: Flags) -> Decision:
+    def take(self, rows: Flags) -> RayDecisions:
         """Give some of the points."""
-        return Decision(
+        return RayDecisions(
             self.group.take(rows),
             self.weight[rows],
             self.value[rows],
@@ -87,7 +87,7 @@ class _Doubted:
         return self.total - np.einsum("ki,ki->k", right, shift), shift.reshape(-1, len(rays), 2)
 
 
-def decide(group: Group, expected: tuple[Floats, Floats], number: Numbers) -> Decision:
+def decide(group: Group, expected: tuple[Floats, Floats], number: Numbers) -> RayDecisions:
     """Judge points by photos that were oriented without them.
 
     Parameters
@@ -104,7 +104,7 @@ def decide(group: Group, expected: tuple[Floats, Floats], number: Numbers) -> De
     total = np.maximum(np.einsum("ki,ki->k", gap, pulled), 0.0)
     level = 1 - ALPHA / np.maximum(number, 1)[group.window]
     limit = _quantiles(level, 2 * r - 3)
-    start = Decision(
+    start = RayDecisions(
         group, np.ones((k, r)), np.sqrt(total), np.sqrt(limit), np.full((k, r, 2), np.nan), np.zeros(k, np.intp)
     )
     bad = np.flatnonzero(~(total <= limit))
@@ -118,7 +118,7 @@ def _quantiles(level: Floats, freedom: int) -> Floats:
     return found
 
 
-def _of_two(start: Decision, bad: Numbers, gap: Floats) -> Decision:
+def _of_two(start: RayDecisions, bad: Numbers, gap: Floats) -> RayDecisions:
     """Leave both rays of points on two photos out; the y parallax is all that is known of the error."""
     weight, kind, size = start.weight.copy(), start.kind.copy(), start.size.copy()
     weight[bad], kind[bad] = 0.0, PAIR
@@ -127,7 +127,7 @@ def _of_two(start: Decision, bad: Numbers, gap: Floats) -> Decision:
     return replace(start, weight=weight, kind=kind, size=size)
 
 
-def _told(start: Decision, doubted: _Doubted) -> Decision:
+def _told(start: RayDecisions, doubted: _Doubted) -> RayDecisions:
     """Look for the smallest sets of rays without which the others agree."""
     r = start.group.ray.shape[1]
     weight, kind, size = start.weight.copy(), start.kind.copy(), start.size.copy()

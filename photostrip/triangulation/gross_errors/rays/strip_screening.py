@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.triangulation.gross_errors.rays import window_adjustment, window_points, windows
-from photostrip.triangulation.gross_errors.rays.ray_decisions import GOOD, NONE, PAIR, RAY, RAYS, Decision, decide
+from photostrip.triangulation.gross_errors.rays.ray_decisions import GOOD, NONE, PAIR, RAY, RAYS, RayDecisions, decide
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,9 +27,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.points import PhotoPoints
-    from photostrip.triangulation.gross_errors.rays.window_adjustment import Solved
+    from photostrip.triangulation.gross_errors.rays.window_adjustment import AdjustedWindows
     from photostrip.triangulation.gross_errors.rays.window_points import Group
-    from photostrip.triangulation.gross_errors.rays.windows import Rays
+    from photostrip.triangulation.gross_errors.rays.windows import WindowRays
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.strip import FormedStrip
 
@@ -44,20 +44,20 @@ WELSCH = 3.0  # standard deviations
 STILL = 0.3  # standard deviations; the robust start is to find wrong points, not digits
 LEAST_WEIGHT = 1e-9  # keeps a photo in its window
 ROUNDS = 12
-TOLD, BOTH, SEVERAL = "ray", "pair", "rays"
+WRONG_RAY, TWO_RAYS, SEVERAL_RAYS = "ray", "pair", "rays"
 """What was found at a point: its wrong ray; two rays that contradict each other; several of which any may be wrong."""
-KINDS = {GOOD: SEVERAL, RAY: TOLD, PAIR: BOTH, RAYS: SEVERAL, NONE: SEVERAL}
+KINDS = {GOOD: SEVERAL_RAYS, RAY: WRONG_RAY, PAIR: TWO_RAYS, RAYS: SEVERAL_RAYS, NONE: SEVERAL_RAYS}
 
 
 @dataclass(frozen=True, eq=False)
-class Verdict:
+class RayRejections:
     """What the strip says about the points it was asked about."""
 
     judged: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))  # (j,): points that were judged
     # (c,): rows of the observations that must not be used
     wrong: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))
     point: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))  # (c,): their points
-    kind: tuple[str, ...] = ()  # why: ``TOLD``, ``BOTH`` or ``SEVERAL``
+    kind: tuple[str, ...] = ()  # why: ``WRONG_RAY``, ``TWO_RAYS`` or ``SEVERAL_RAYS``
     # value, limit: (c,): test value of the point with all its rays, as the root of a sum of squares, and its critical
     # value
     value: Floats = field(default_factory=lambda: np.zeros(0))
@@ -67,24 +67,26 @@ class Verdict:
     # (c,): whether the y parallaxes of the point are good: it may orient pairs, but has no place
     across: Flags = field(default_factory=lambda: np.zeros(0, bool))
 
-    def of(self, points: Flags) -> Verdict:
+    def of(self, points: Flags) -> RayRejections:
         """Return what was found of some points, a flag for each point of the observations."""
         here = points[self.point]
         kind = tuple(each for each, yes in zip(self.kind, here.tolist(), strict=True) if yes)
         rows = (getattr(self, name)[here] for name in ("value", "limit", "size", "across"))
-        return Verdict(self.judged[points[self.judged]], self.wrong[here], self.point[here], kind, *rows)
+        return RayRejections(self.judged[points[self.judged]], self.wrong[here], self.point[here], kind, *rows)
 
-    def joined(self, other: Verdict) -> Verdict:
+    def joined(self, other: RayRejections) -> RayRejections:
         """Give both together; they know different points."""
         order = np.argsort(np.concatenate([self.wrong, other.wrong]), kind="stable")
         names = ("wrong", "point", "value", "limit", "size", "across")
         rows = {name: np.concatenate([getattr(self, name), getattr(other, name)])[order] for name in names}
         kind = self.kind + other.kind
-        return Verdict(np.union1d(self.judged, other.judged), kind=tuple(kind[number] for number in order), **rows)
+        return RayRejections(
+            np.union1d(self.judged, other.judged), kind=tuple(kind[number] for number in order), **rows
+        )
 
 
 @dataclass(frozen=True, eq=False)
-class Layout:
+class StripRays:
     """Where the image points of a strip are, whatever becomes of them."""
 
     position: Numbers  # (n,): place in the strip of the photo of every image point; -1 for photos of other strips
@@ -94,7 +96,7 @@ class Layout:
     last: Numbers
 
     @classmethod
-    def of(cls, orientation: Orientation, observations: PhotoPoints, photos: Sequence[str]) -> Layout:
+    def of(cls, orientation: Orientation, observations: PhotoPoints, photos: Sequence[str]) -> StripRays:
         """Look up where everything is."""
         place = {photo: number for number, photo in enumerate(photos)}
         position = np.array([place.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo]
@@ -109,13 +111,13 @@ class Layout:
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class MeasuredStrip:
     """A formed strip and its measurements."""
 
     orientation: Orientation
     formed: FormedStrip
     observations: PhotoPoints
-    layout: Layout  # where they are
+    layout: StripRays  # where they are
     sigma: Floats  # (p,): standard deviations of a y parallax of weight one in each pair, mm
     stated: float  # standard deviation of an image coordinate of weight one, mm
 
@@ -125,14 +127,14 @@ class Scene:
         return len(self.formed.centers)
 
 
-def suspects(scene: Scene) -> Numbers:
+def suspects(scene: MeasuredStrip) -> Numbers:
     """Points that were rejected in a pair or at a joint, or stand on one of two photos only."""
     oriented, junctions = scene.orientation, scene.formed.junctions
     out = oriented.point[~oriented.used]
     return np.union1d(out, junctions.point[~junctions.used]).astype(np.intp)
 
 
-def collect(scene: Scene, wanted: Flags | None = None) -> Rays:
+def collect(scene: MeasuredStrip, wanted: Flags | None = None) -> WindowRays:
     """Collect and linearise the rays of the points that have a place in the strip.
 
     Parameters
@@ -142,7 +144,7 @@ def collect(scene: Scene, wanted: Flags | None = None) -> Rays:
 
     Returns
     -------
-    Rays
+    WindowRays
         Ordered by point and photo; points with one ray are left out.
     """
     o, layout = scene.observations, scene.layout
@@ -159,7 +161,9 @@ def collect(scene: Scene, wanted: Flags | None = None) -> Rays:
     return rays.take(np.flatnonzero(sound & several[rays.point]))
 
 
-def _best_start(scene: Scene, place: tuple[Numbers, Numbers, Numbers], image: tuple[Floats, Floats, float]) -> Rays:
+def _best_start(
+    scene: MeasuredStrip, place: tuple[Numbers, Numbers, Numbers], image: tuple[Floats, Floats, float]
+) -> WindowRays:
     """Linearise at that of the places of each point, one from each model, with which most of its rays agree."""
     oriented, formed = scene.orientation, scene.formed
     photos = formed.centers, formed.rotations
@@ -184,9 +188,13 @@ def _best_start(scene: Scene, place: tuple[Numbers, Numbers, Numbers], image: tu
     return windows.linearise(place, image, photos, best[of_ray])
 
 
-def examine(
-    scene: Scene, points: Numbers, kept: Numbers, earlier: Verdict | None = None, moved: Flags | None = None
-) -> Verdict:
+def screen_rays(
+    scene: MeasuredStrip,
+    points: Numbers,
+    kept: Numbers,
+    earlier: RayRejections | None = None,
+    moved: Flags | None = None,
+) -> RayRejections:
     """Judge all points near some suspected ones.
 
     Parameters
@@ -195,7 +203,7 @@ def examine(
         Points that are suspected.
     kept : ndarray of int
         Rows of the observations that the user keeps: their points are not judged.
-    earlier : Verdict, optional
+    earlier : RayRejections, optional
         What was said of the same strip before its last small change.
     moved : ndarray of bool, shape (p,), optional
         Models that this change has turned or stretched by more than the adjustment of a window is linear for; what was
@@ -203,11 +211,11 @@ def examine(
 
     Returns
     -------
-    Verdict
+    RayRejections
         What must not be used, and which points were judged at all.
     """
     if not len(points):
-        return Verdict()
+        return RayRejections()
     begin, last = scene.layout.begin, scene.layout.last
     seen = last >= 0
     reach = int(min((last - begin)[seen].max(initial=1), LONGEST_REACH)) + 1
@@ -229,8 +237,12 @@ def examine(
 
 
 def _examined(
-    scene: Scene, place: tuple[Numbers, int], homes: tuple[Numbers, Numbers], kept: Numbers, earlier: Verdict | None
-) -> Verdict:
+    scene: MeasuredStrip,
+    place: tuple[Numbers, int],
+    homes: tuple[Numbers, Numbers],
+    kept: Numbers,
+    earlier: RayRejections | None,
+) -> RayRejections:
     """Judge the points at home in some windows, given by first photos and length."""
     first, length = place
     home, at = homes
@@ -240,7 +252,7 @@ def _examined(
     out = np.zeros(len(scene.observations), bool)
     if earlier is not None:
         out[earlier.wrong] = True
-    found: list[Decision] = []
+    found: list[RayDecisions] = []
     for part in range(0, len(at), BATCH):
         groups = window_points.groups(rays, first[part : part + BATCH], length)
         start = None if earlier is None else [np.where(out[rays.row[group.ray]], 0.0, 1.0) for group in groups]
@@ -250,7 +262,7 @@ def _examined(
     return _verdict(scene, rays, found, kept)
 
 
-def _adjusted(groups: list[Group], count: int, length: int, start: list[Floats] | None) -> list[Decision]:
+def _adjusted(groups: list[Group], count: int, length: int, start: list[Floats] | None) -> list[RayDecisions]:
     """Adjust windows and judge their points, until the points that take part are those that agree.
 
     Without weights of the rays to start from, which an earlier judgement gives, the start is a robust one.
@@ -277,7 +289,7 @@ def _adjusted(groups: list[Group], count: int, length: int, start: list[Floats] 
     return [each.decided for each in state]
 
 
-def _judged(groups: list[Group], weights: list[Floats], number: Numbers, length: int) -> list[Decision]:
+def _judged(groups: list[Group], weights: list[Floats], number: Numbers, length: int) -> list[RayDecisions]:
     """Adjust windows with the rays that count, and judge each point by an adjustment without it."""
     solved = _least_squares(groups, weights, len(number), length)
     parts = zip(groups, weights, strict=True)
@@ -293,7 +305,7 @@ class _State:
     and had to go again stays out.
     """
 
-    decision: Decision
+    decision: RayDecisions
     weight: Floats
     returned: Flags
     barred: Flags
@@ -303,14 +315,14 @@ class _State:
         return self.decision.group
 
     @property
-    def decided(self) -> Decision:
+    def decided(self) -> RayDecisions:
         return replace(self.decision, weight=self.weight)
 
-    def loses(self, fresh: Decision) -> Flags:
+    def loses(self, fresh: RayDecisions) -> Flags:
         """Whether points lose a ray that takes part."""
         return np.asarray((fresh.weight < self.weight).any(axis=1), bool)
 
-    def after(self, fresh: Decision, worst: Floats) -> _State:
+    def after(self, fresh: RayDecisions, worst: Floats) -> _State:
         """Return the state after one more round."""
         spared = np.asarray(self.loses(fresh) & (fresh.value / fresh.limit < worst[self.group.window]), bool)
         barred = self.barred | (self.returned & (fresh.weight < self.weight) & ~spared[:, None])
@@ -326,7 +338,7 @@ class _State:
         return _State(merged, weight, self.returned | (weight > self.weight), barred)
 
 
-def _robust(groups: list[Group], count: int, length: int) -> Solved:
+def _robust(groups: list[Group], count: int, length: int) -> AdjustedWindows:
     """Adjust windows with weights of the conditions that fall with their misclosures."""
     parts = [(group, group.design, group.closing) for group in groups]
     conditions = window_adjustment.stacked(parts, count, length)
@@ -353,7 +365,7 @@ def _welsch(left: Floats) -> Floats:
     return np.asarray(np.exp(-((left / WELSCH) ** 2)) + LEAST_WEIGHT, float)
 
 
-def _least_squares(groups: list[Group], weights: list[Floats], count: int, length: int) -> Solved:
+def _least_squares(groups: list[Group], weights: list[Floats], count: int, length: int) -> AdjustedWindows:
     """Adjust windows with the rays that count."""
     parts = []
     for group, weight in zip(groups, weights, strict=True):
@@ -369,7 +381,7 @@ def _least_squares(groups: list[Group], weights: list[Floats], count: int, lengt
     return found.solved(np.ones(found.misfit.shape))
 
 
-def _verdict(scene: Scene, rays: Rays, found: list[Decision], kept: Numbers) -> Verdict:
+def _verdict(scene: MeasuredStrip, rays: WindowRays, found: list[RayDecisions], kept: Numbers) -> RayRejections:
     """Put what was found about all points into one list, by rows of the observations."""
     spared = np.unique(scene.observations.point[kept])
     judged, columns = [], []
@@ -384,7 +396,7 @@ def _verdict(scene: Scene, rays: Rays, found: list[Decision], kept: Numbers) -> 
     rows, kind, value, limit, size = (np.concatenate(each) for each in zip(*columns, strict=True))
     order = np.argsort(rows, kind="stable")
     rows = np.asarray(rows[order], np.intp)
-    return Verdict(
+    return RayRejections(
         np.unique(np.concatenate(judged)).astype(np.intp),
         rows,
         np.asarray(scene.observations.point[rows], np.intp),

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.triangulation.gross_errors.rays.window_points import projectors
-from photostrip.triangulation.gross_errors.rays.windows import PARAMETERS
+from photostrip.triangulation.gross_errors.rays.windows import PHOTO_PARAMETERS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,7 +27,7 @@ INVERTIBLE = 1e-9  # keeps a point that holds its photos alone from stopping the
 
 
 @dataclass(frozen=True, eq=False)
-class Solved:
+class AdjustedWindows:
     """Windows adjusted."""
 
     estimate: Floats  # (w, 6 length): changes of the photos
@@ -36,25 +36,27 @@ class Solved:
     def of(self, group: Group) -> tuple[Floats, Floats]:
         """Give changes and cofactors of the photos of each point, shapes (k, 6r) and (k, 6r, 6r)."""
         count, size = self.estimate.shape
-        photos, (k, r) = size // PARAMETERS, group.column.shape
-        blocks = self.cofactors.reshape(count, photos, PARAMETERS, photos, PARAMETERS).transpose(0, 1, 3, 2, 4)
+        photos, (k, r) = size // PHOTO_PARAMETERS, group.column.shape
+        blocks = self.cofactors.reshape(count, photos, PHOTO_PARAMETERS, photos, PHOTO_PARAMETERS).transpose(
+            0, 1, 3, 2, 4
+        )
         column = group.column
         window = group.window[:, None, None]
         chosen = np.ascontiguousarray(blocks)[window, column[:, :, None], column[:, None, :]]
-        cofactors = chosen.transpose(0, 1, 3, 2, 4).reshape(k, PARAMETERS * r, PARAMETERS * r)
+        cofactors = chosen.transpose(0, 1, 3, 2, 4).reshape(k, PHOTO_PARAMETERS * r, PHOTO_PARAMETERS * r)
         return self.estimate[group.window[:, None], group.parameters], cofactors
 
 
 @dataclass(frozen=True, eq=False)
-class Conditions:
+class WindowConditions:
     """Conditions of points on the photos of their windows, padded with zeros to equal numbers."""
 
     design: Floats  # (w, c, 6 length): derivatives by the photos
     misfit: Floats  # (w, c): misclosures
 
-    def take(self, windows: Flags) -> Conditions:
+    def take(self, windows: Flags) -> WindowConditions:
         """Give some of the windows."""
-        return self if windows.all() else Conditions(self.design[windows], self.misfit[windows])
+        return self if windows.all() else WindowConditions(self.design[windows], self.misfit[windows])
 
     def left(self, estimate: Floats) -> Floats:
         """Sizes of what changes of the photos leave of the misclosures, shape (w, c)."""
@@ -66,11 +68,11 @@ class Conditions:
         found: Floats = np.linalg.solve(normal, (right * scale)[:, :, None])[:, :, 0] * scale
         return found
 
-    def solved(self, weight: Floats) -> Solved:
+    def solved(self, weight: Floats) -> AdjustedWindows:
         """Adjust the windows with weights of the conditions, shape (w, c)."""
         normal, right, scale = self._normal(weight)
         cofactors = np.linalg.inv(normal) * scale[:, :, None] * scale[:, None, :]
-        return Solved((cofactors @ right[:, :, None])[:, :, 0], cofactors)
+        return AdjustedWindows((cofactors @ right[:, :, None])[:, :, 0], cofactors)
 
     def _normal(self, weight: Floats) -> tuple[Floats, Floats, Floats]:
         """Scaled normal matrices, right sides, and the scale of the parameters."""
@@ -88,7 +90,7 @@ class Conditions:
         return normal, right, scale
 
 
-def stacked(parts: list[tuple[Group, Floats, Floats]], count: int, length: int) -> Conditions:
+def stacked(parts: list[tuple[Group, Floats, Floats]], count: int, length: int) -> WindowConditions:
     """Put conditions of groups into their windows.
 
     Parameters
@@ -102,7 +104,7 @@ def stacked(parts: list[tuple[Group, Floats, Floats]], count: int, length: int) 
     order = np.argsort(window, kind="stable")
     place = np.empty(len(window), np.intp)
     place[order] = np.arange(len(window)) - np.searchsorted(window[order], window[order])
-    design = np.zeros((count, int(place.max(initial=-1)) + 1, PARAMETERS * length))
+    design = np.zeros((count, int(place.max(initial=-1)) + 1, PHOTO_PARAMETERS * length))
     misfit = np.zeros(design.shape[:2])
     done = 0
     for group, of_points, closing in parts:
@@ -111,7 +113,7 @@ def stacked(parts: list[tuple[Group, Floats, Floats]], count: int, length: int) 
         design[group.window[:, None, None], at[:, :, None], group.parameters[:, None, :]] = of_points
         misfit[group.window[:, None], at] = closing
         done += k * c
-    return Conditions(design, misfit)
+    return WindowConditions(design, misfit)
 
 
 def projected(group: Group, weight: Floats) -> tuple[Floats, Floats]:
@@ -131,7 +133,7 @@ def projected(group: Group, weight: Floats) -> tuple[Floats, Floats]:
     return matrix @ group.by_photo, (matrix @ group.misfit[:, :, None])[:, :, 0]
 
 
-def expected(group: Group, solved: Solved) -> tuple[Floats, Floats]:
+def expected(group: Group, solved: AdjustedWindows) -> tuple[Floats, Floats]:
     """Return what an adjustment that is taken not to know the points leaves of their conditions.
 
     Returns
@@ -143,14 +145,14 @@ def expected(group: Group, solved: Solved) -> tuple[Floats, Floats]:
     return gap, group.gram + spread
 
 
-def _predicted(group: Group, solved: Solved) -> tuple[Floats, Floats]:
+def _predicted(group: Group, solved: AdjustedWindows) -> tuple[Floats, Floats]:
     """Misclosures after the adjustment, and the variances of what it says of them."""
     estimate, cofactors = solved.of(group)
     gap = group.closing - (group.design @ estimate[:, :, None])[:, :, 0]
     return gap, group.design @ cofactors @ group.design.transpose(0, 2, 1)
 
 
-def without(group: Group, weight: Floats, solved: Solved) -> tuple[Floats, Floats]:
+def without(group: Group, weight: Floats, solved: AdjustedWindows) -> tuple[Floats, Floats]:
     """Return what an adjustment of all other points leaves of the conditions of each point.
 
     Parameters
@@ -178,7 +180,7 @@ def without(group: Group, weight: Floats, solved: Solved) -> tuple[Floats, Float
     return gap, variance
 
 
-def _without_some(group: Group, weight: Floats, solved: Solved) -> tuple[Floats, Floats]:
+def _without_some(group: Group, weight: Floats, solved: AdjustedWindows) -> tuple[Floats, Floats]:
     """Take points out of which some rays took part."""
     estimate, cofactors = solved.of(group)
     design, closing = projected(group, weight)

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.triangulation.gross_errors.rays.windows import FEWEST, PARAMETERS
+from photostrip.triangulation.gross_errors.rays.windows import FEWEST, PHOTO_PARAMETERS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.gross_errors.rays.windows import Rays
+    from photostrip.triangulation.gross_errors.rays.windows import WindowRays
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -62,7 +62,9 @@ class Group:
     @property
     def parameters(self) -> Numbers:
         """Place of the parameters of its photos among those of the window, shape (k, 6r)."""
-        found: Numbers = (PARAMETERS * self.column[:, :, None] + np.arange(PARAMETERS)).reshape(len(self.window), -1)
+        found: Numbers = (PHOTO_PARAMETERS * self.column[:, :, None] + np.arange(PHOTO_PARAMETERS)).reshape(
+            len(self.window), -1
+        )
         return found
 
     @cached_property
@@ -93,12 +95,12 @@ class Group:
         return np.asarray(np.linalg.solve(root, joined), float)
 
 
-def groups(rays: Rays, first: Numbers, length: int) -> list[Group]:
+def groups(rays: WindowRays, first: Numbers, length: int) -> list[Group]:
     """Sort the rays of some windows by point, and the points by their number of rays.
 
     Parameters
     ----------
-    rays : Rays
+    rays : WindowRays
         Rays of the strip, ordered by point and photo.
     first : ndarray of int, shape (w,)
         First photo of each window.
@@ -118,7 +120,7 @@ def groups(rays: Rays, first: Numbers, length: int) -> list[Group]:
         place = begin[count == r, None] + np.arange(r)
         of_point, own = ray[place], window[begin[count == r]]
         k = len(own)
-        design = np.zeros((k, r, 2, r, PARAMETERS))
+        design = np.zeros((k, r, 2, r, PHOTO_PARAMETERS))
         design[:, range(r), :, range(r), :] = rays.by_photo[of_point].transpose(1, 0, 2, 3)
         found.append(
             Group(
@@ -126,7 +128,7 @@ def groups(rays: Rays, first: Numbers, length: int) -> list[Group]:
                 of_point,
                 rays.photo[of_point] - first[own, None],
                 rays.by_point[of_point].reshape(k, 2 * r, 3),
-                design.reshape(k, 2 * r, PARAMETERS * r),
+                design.reshape(k, 2 * r, PHOTO_PARAMETERS * r),
                 rays.misfit[of_point].reshape(k, 2 * r),
             )
         )

@@ -27,12 +27,12 @@ if TYPE_CHECKING:
     Numbers = NDArray[np.intp]
     Flags = NDArray[np.bool_]
 
-PARAMETERS = 6  # of a photo: shift of its centre, rotation
+PHOTO_PARAMETERS = 6  # of a photo: shift of its centre, rotation
 FEWEST = 2  # rays
 
 
 @dataclass(frozen=True, eq=False)
-class Rays:
+class WindowRays:
     """Image points of a strip, linearised, in units of their standard deviations."""
 
     row: Numbers  # (n,): row in the observations
@@ -43,9 +43,9 @@ class Rays:
     misfit: Floats  # (n, 2): measured minus computed
     sigma: Floats  # (n, 2): standard deviations of the image coordinates, mm
 
-    def take(self, rows: Numbers) -> Rays:
+    def take(self, rows: Numbers) -> WindowRays:
         """Give some of the rays."""
-        return Rays(
+        return WindowRays(
             self.row[rows],
             self.photo[rows],
             self.point[rows],
@@ -61,7 +61,7 @@ def linearise(
     image: tuple[Floats, Floats, float],
     photos: tuple[Floats, Floats],
     xyz: Floats,
-) -> Rays:
+) -> WindowRays:
     """Linearise the collinearity equations of rays.
 
     Parameters
@@ -77,7 +77,7 @@ def linearise(
 
     Returns
     -------
-    Rays
+    WindowRays
         The rays; not finite where a point lies behind its camera.
     """
     row, photo, point = place
@@ -93,11 +93,11 @@ def linearise(
         slope[:, :, 2] = computed / depth[:, None]
         slope /= sigma[:, :, None]
         by_point = np.einsum("nik,njk->nij", slope, turn)
-        by_photo = np.empty((len(u), 2, PARAMETERS))
+        by_photo = np.empty((len(u), 2, PHOTO_PARAMETERS))
         by_photo[:, :, :3] = -by_point
         by_photo[:, :, 3:] = slope @ cross_matrix(u)
         misfit = (xy - computed) / sigma
-    return Rays(row, photo, point, by_point, by_photo, misfit, sigma)
+    return WindowRays(row, photo, point, by_point, by_photo, misfit, sigma)
 
 
 def size_of(reach: int) -> tuple[int, int]:

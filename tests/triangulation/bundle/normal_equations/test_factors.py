@@ -14,7 +14,7 @@ from photostrip.simulate.bundle import problem_of
 from photostrip.triangulation.bundle.normal_equations import reduced
 from photostrip.triangulation.bundle.normal_equations.band import Band
 from photostrip.triangulation.bundle.normal_equations.sparse import Sparse
-from photostrip.triangulation.bundle.quality.precision import precision
+from photostrip.triangulation.bundle.quality.cofactors import cofactors_of
 from photostrip.triangulation.bundle.solve import solve
 
 if TYPE_CHECKING:
@@ -65,10 +65,10 @@ def test_a_sparse_factor_gives_the_same_adjustment(monkeypatch: pytest.MonkeyPat
     if free:
         problem = type(problem)(problem.images, problem.cameras, problem.start)
     banded = solve(problem)
-    expected = precision(banded)
+    expected = cofactors_of(banded)
     monkeypatch.setattr(reduced, "WIDE", 0.0)
     sparse = solve(problem)
-    found = precision(sparse)
+    found = cofactors_of(sparse)
     np.testing.assert_allclose(sparse.points, banded.points, atol=1e-7)
     for name in ("points", "photos", "image_residuals", "control_residuals"):
         one, other = getattr(found, name), getattr(expected, name)

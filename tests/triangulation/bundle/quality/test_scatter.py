@@ -9,7 +9,7 @@ import pytest
 
 from photostrip.simulate import Control, Flight, Image, Points, Spec, simulate
 from photostrip.simulate.bundle import problem_of, truth_of
-from photostrip.triangulation.bundle.quality.precision import precision
+from photostrip.triangulation.bundle.quality.cofactors import cofactors_of
 from photostrip.triangulation.bundle.solve import solve
 
 SEEDS = 500
@@ -28,7 +28,7 @@ def test_scatter_is_what_was_predicted() -> None:
     exact = problem_of(simulation, shift=0.1, turn=1e-4)
     exact = replace(exact, images=replace(exact.images, sigma=np.full((len(exact.images), 2), 0.005)))
     truth, control = truth_of(simulation), exact.control
-    predicted = precision(solve(exact))
+    predicted = cofactors_of(solve(exact))
     random = np.random.default_rng(1)
     points, centers, chi_squares = [], [], []
     for _ in range(SEEDS):

@@ -28,14 +28,14 @@ SEEDS = st.integers(0, 2**31)
 ALPHA = 0.01
 
 
-def drawn(seed: int, points: int = 8) -> tuple[control_significance.Joint, Floats]:
+def drawn(seed: int, points: int = 8) -> tuple[control_significance.ControlCovariance, Floats]:
     """Give correlated misclosures of a similarity of random design."""
     rng = np.random.default_rng(seed)
     w = 3 * points
     root = rng.normal(0, 0.15, (w, w)) + 2 * np.eye(w)
     design = rng.normal(0, 1, (w, 7)) * [1, 1, 1, 1e3, 1e3, 1e3, 1e2]
     point, axis = np.repeat(np.arange(points), 3), np.tile(np.arange(3), points)
-    joint = control_significance.Joint(point, axis, design, root @ root.T)
+    joint = control_significance.ControlCovariance(point, axis, design, root @ root.T)
     misclosures = root @ rng.normal(0, 1, w) + design @ rng.normal(0, 1, 7)
     return joint, misclosures.reshape(points, 3)
 
@@ -46,7 +46,7 @@ def test_each_coordinate_is_judged_as_by_least_squares_with_its_error_as_an_unkn
     joint, misclosures = drawn(seed)
     used = np.ones(misclosures.shape, bool)
     used[2, 1] = used[5, 2] = False
-    found = control_significance.judge(joint, misclosures, used, ALPHA)
+    found = control_significance.predict_control(joint, misclosures, used, ALPHA)
     for point, axis in ((0, 0), (3, 2), (2, 1), (5, 2)):
         inside = used.copy()
         inside[point, axis] = True
@@ -67,7 +67,7 @@ def test_each_coordinate_is_judged_as_by_least_squares_with_its_error_as_an_unkn
 
 def test_redundancy_numbers_add_up_to_the_redundancy() -> None:
     joint, misclosures = drawn(3)
-    found = control_significance.judge(joint, misclosures, np.ones(misclosures.shape, bool), ALPHA)
+    found = control_significance.predict_control(joint, misclosures, np.ones(misclosures.shape, bool), ALPHA)
     assert found.redundancy.sum() == pytest.approx(24 - 7, rel=1e-6)
 
 
@@ -77,14 +77,16 @@ def test_good_control_is_called_wrong_no_more_often_than_the_level_says(worse: f
     alarms = 0
     for seed in range(2000):
         joint, misclosures = drawn(seed)
-        found = control_significance.judge(joint, worse * misclosures, np.ones(misclosures.shape, bool), ALPHA)
+        found = control_significance.predict_control(
+            joint, worse * misclosures, np.ones(misclosures.shape, bool), ALPHA
+        )
         alarms += bool((found.value > found.limit).any())
     assert fewest <= alarms <= most
 
 
 def test_too_little_control_judges_nothing() -> None:
     joint, misclosures = drawn(1, points=3)
-    found = control_significance.judge(joint, misclosures, np.ones(misclosures.shape, bool), ALPHA)
+    found = control_significance.predict_control(joint, misclosures, np.ones(misclosures.shape, bool), ALPHA)
     assert not (found.value > found.limit).any()
     assert np.isnan(found.sigma0)
 

@@ -19,13 +19,13 @@ from tests.vectors import cases, section
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.gross_errors.pairs.screening import Rejection
+    from photostrip.triangulation.gross_errors.pairs.screening import PairRejection
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from tests.vectors import Vector
 
     Floats = NDArray[np.float64]
     Flags = NDArray[np.bool_]
-    Log = tuple[Rejection, ...]
+    Log = tuple[PairRejection, ...]
 
 SIGMA = 5 * MICROMETRE
 ZONES = (2, 2, 3, 3, 3, 3)  # points of the six zones in the published experiment

@@ -34,9 +34,9 @@ def spoiled(flown: TruePairs, errors: Floats) -> Pairs:
     return replace(flown.pairs, left=left)
 
 
-def examined(pairs: Pairs, settings: RelativeSettings | None = None, sigma: float = SIGMA) -> screening.Screened:
+def examined(pairs: Pairs, settings: RelativeSettings | None = None, sigma: float = SIGMA) -> screening.ScreenedPairs:
     oriented, converged = orient_unchecked(pairs)
-    return screening.examine(oriented, settings or RelativeSettings(), sigma, converged)
+    return screening.screen_pairs(oriented, settings or RelativeSettings(), sigma, converged)
 
 
 def level(seed: int, pairs: int, counts: tuple[int, ...] = (2, 2, 3, 3, 3, 3), sigma: float = SIGMA) -> TruePairs:

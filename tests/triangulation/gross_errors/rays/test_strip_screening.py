@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from photostrip.geometry.rotation import from_vector
 from photostrip.pipeline import Settings, triangulate
 from photostrip.triangulation.gross_errors.rays import ray_decisions, window_adjustment, window_points, windows
-from photostrip.triangulation.gross_errors.rays.strip_screening import BOTH, SEVERAL, TOLD
+from photostrip.triangulation.gross_errors.rays.strip_screening import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY
 from photostrip.triangulation.strip_formation import non_neighbours
 from tests.strips import MICROMETRE, control_points, fly, photograph, project
 
@@ -67,7 +67,7 @@ def told(strip: Flown, result: Result) -> dict[tuple[str, str], str]:
 # --------------------------------------------------------------------------------------------------- linear algebra
 
 
-def some_rays(seed: int, photos: int = 3, points: int = 8) -> tuple[windows.Rays, tuple[Floats, Floats], Floats]:
+def some_rays(seed: int, photos: int = 3, points: int = 8) -> tuple[windows.WindowRays, tuple[Floats, Floats], Floats]:
     """Linearise rays of points that all photos see, ordered by point."""
     rng = np.random.default_rng(seed)
     centers = np.column_stack([np.arange(photos, dtype=float), rng.normal(0, 0.02, (photos, 2))])
@@ -156,7 +156,7 @@ def test_a_point_taken_out_by_formula_is_left_out() -> None:
     rays, _, _ = some_rays(6, photos=4, points=14)
     (group,) = window_points.groups(rays, np.zeros(1, np.intp), 4)
 
-    def solved(weight: Floats) -> window_adjustment.Solved:
+    def solved(weight: Floats) -> window_adjustment.AdjustedWindows:
         conditions = window_adjustment.stacked([(group, *window_adjustment.projected(group, weight))], 1, 4)
         return conditions.solved(np.ones(conditions.misfit.shape))
 
@@ -233,7 +233,7 @@ def test_of_three_rays_the_wrong_one_is_told_across_the_base_and_not_along(
 def test_the_wrong_ray_across_the_base_is_named_and_the_point_kept(photo: str, place: str) -> None:
     strip = spoiled(flown(), {(photo, "p4_1"): (0.0, 0.4)})
     result = adjusted(strip)
-    assert told(strip, result) == {(photo, "p4_1"): TOLD}, place
+    assert told(strip, result) == {(photo, "p4_1"): WRONG_RAY}, place
     size = result.strips[0].of_photos.contradictions.size[0]
     assert size[1] == pytest.approx(0.4, abs=0.05)
     assert "p4_1" not in result.not_determined
@@ -251,14 +251,14 @@ def test_two_rays_that_contradict_each_other_are_both_left_out() -> None:
     photo = strip.observations.photo_ids[strip.observations.photo[rows[0]]]
     strip = spoiled(strip, {(photo, name): (0.0, 0.3)})
     result = adjusted(strip)
-    assert set(told(strip, result).values()) == {BOTH}
+    assert set(told(strip, result).values()) == {TWO_RAYS}
     assert result.not_determined == {name: "its rays contradict each other"}
 
 
 def test_an_error_along_the_base_takes_the_place_and_leaves_the_parallaxes() -> None:
     strip = spoiled(flown(), {("105", "p4_1"): (0.3, 0.0)})
     result = adjusted(strip)
-    assert set(told(strip, result).values()) == {SEVERAL}
+    assert set(told(strip, result).values()) == {SEVERAL_RAYS}
     assert "p4_1" in result.not_determined
     oriented = result.strips[0].of_photos.orientation
     assert oriented.used[oriented.point == strip.at["p4_1"]].all()

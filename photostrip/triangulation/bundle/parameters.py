@@ -7,24 +7,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.triangulation.bundle.normal_equations.structure import band_structure
 from photostrip.triangulation.bundle.observations import calibration
 from photostrip.triangulation.bundle.observations.linearise import view
-from photostrip.triangulation.bundle.observations.structure import build
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from photostrip.triangulation.bundle.normal_equations.structure import BandStructure
     from photostrip.triangulation.bundle.observations.calibration import Calibrated
-    from photostrip.triangulation.bundle.observations.layout import Batch
     from photostrip.triangulation.bundle.observations.linearise import Rays
-    from photostrip.triangulation.bundle.observations.problem import Problem
-    from photostrip.triangulation.bundle.observations.structure import Structure
+    from photostrip.triangulation.bundle.observations.problem import BundleProblem
+    from photostrip.triangulation.bundle.observations.ray_batches import Batch
 
     Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class Parameters:
     """Values of all parameters."""
 
     centers: Floats  # (m, 3): perspective centres in the order of the problem, metres
@@ -34,15 +34,15 @@ class State:
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class PreparedProblem:
     """A problem with everything about it that does not change during the adjustment."""
 
-    problem: Problem
-    structure: Structure
+    problem: BundleProblem
+    structure: BandStructure
     calibrated: Calibrated
     prior: Floats  # (p,): a-priori sigmas of all common parameters
 
-    def table(self, state: State) -> Floats:
+    def table(self, state: Parameters) -> Floats:
         """Columns of ``view`` for all photos in the order of the band, shape (13, m)."""
         cameras, order = self.problem.cameras, self.structure.order
         focal = cameras.focal.astype(float)
@@ -69,7 +69,7 @@ class Model:
 
 
 @dataclass(frozen=True, eq=False)
-class Move:
+class ParameterStep:
     """A step of all parameters."""
 
     photos: Floats  # (m, 6): steps of the photos in the order of the band, in their own axes
@@ -78,21 +78,23 @@ class Move:
     length: float  # length in standard deviations
 
 
-def model_of(problem: Problem) -> Model:
+def prepare(problem: BundleProblem) -> PreparedProblem:
     """Prepare a problem.
 
     Returns
     -------
-    Model
+    PreparedProblem
         The same, with its structure.
     """
     calibrated = calibration.parameters(problem.cameras)
     drifts = (problem.positions.offset_sigma, problem.positions.drift_sigma)
     sigmas = [calibrated.sigma, *(np.repeat(sigma[sigma > 0.0], 3) for sigma in drifts)]
-    return Model(problem, build(problem), calibrated, np.concatenate(sigmas))
+    return PreparedProblem(problem, band_structure(problem), calibrated, np.concatenate(sigmas))
 
 
-def state_of(model: Model, centers: Floats, rotations: Floats, points: Floats, common: Floats) -> State:
-    """Lay parameters out for a model."""
-    xyz = tuple(np.ascontiguousarray(points[batch.point].T) for batch in model.structure.batches)
-    return State(np.asarray(centers, float), np.asarray(rotations, float), xyz, common)
+def parameters_from(
+    prepared: PreparedProblem, centers: Floats, rotations: Floats, points: Floats, common: Floats
+) -> Parameters:
+    """Lay values of all parameters out for a prepared problem."""
+    xyz = tuple(np.ascontiguousarray(points[batch.point].T) for batch in prepared.structure.batches)
+    return Parameters(np.asarray(centers, float), np.asarray(rotations, float), xyz, common)

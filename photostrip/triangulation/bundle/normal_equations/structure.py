@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.triangulation.bundle.observations.layout import Batch, Sorted, arrange, sort_rays
 from photostrip.triangulation.bundle.observations.linearise import PHOTO
+from photostrip.triangulation.bundle.observations.ray_batches import Batch, SortedRays, arrange, sort_rays
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.bundle.observations.problem import Control, Problem
+    from photostrip.triangulation.bundle.observations.problem import BundleProblem, ControlObservations
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -24,7 +24,7 @@ TABLE = 3_000  # photos: up to here pairs are marked in a square table, which is
 
 
 @dataclass(frozen=True, eq=False)
-class Gather:
+class BlockSums:
     """Sum of blocks that go to the same place."""
 
     target: Numbers  # (t,): places, each once
@@ -41,7 +41,7 @@ class Gather:
 
 
 @dataclass(frozen=True, eq=False)
-class Structure:
+class BandStructure:
     """Shape of the normal equations."""
 
     order: Numbers  # (m,): photos in the order of the band
@@ -55,16 +55,16 @@ class Structure:
     batches: tuple[Batch, ...]
     # pairs, singles: for each batch: of its blocks to the pairs (by pair within the set of photos, then group), and of
     # its rays to photos (by ray, then group)
-    pairs: tuple[Gather, ...]
-    singles: tuple[Gather, ...]
+    pairs: tuple[BlockSums, ...]
+    singles: tuple[BlockSums, ...]
 
 
-def build(problem: Problem) -> Structure:
+def band_structure(problem: BundleProblem) -> BandStructure:
     """Find the structure of a problem.
 
     Returns
     -------
-    Structure
+    BandStructure
         Order, pairs and batches.
     """
     m = problem.photos
@@ -82,7 +82,7 @@ def build(problem: Problem) -> Structure:
     rows, columns = np.divmod(key, m)
     control = control_normals(problem.control, problem.points)
     batches = tuple(_with_control(batch, *control) for batch in arrange(problem.images, rays, m))
-    return Structure(
+    return BandStructure(
         order=np.argsort(rank),
         rank=rank,
         rows=rows,
@@ -115,19 +115,19 @@ def _keys(sets: Numbers, photos: int) -> Numbers:
     return keys
 
 
-def _gather(wanted: Numbers, keys: Numbers | None) -> Gather:
+def _gather(wanted: Numbers, keys: Numbers | None) -> BlockSums:
     """Make the sum of blocks with the keys `wanted`, to their places in `keys` (sorted; None: the key is the place)."""
     order = np.argsort(wanted, kind="stable")
     ordered = wanted[order]
     first = np.flatnonzero(np.concatenate([[True], ordered[1:] != ordered[:-1]]))
     if len(first) == len(wanted):
         target = wanted if keys is None else np.searchsorted(keys, wanted)
-        return Gather(target, None, first)
+        return BlockSums(target, None, first)
     target = ordered[first] if keys is None else np.searchsorted(keys, ordered[first])
-    return Gather(target, order, first)
+    return BlockSums(target, order, first)
 
 
-def _pairs(rays: Sorted, photos: int) -> tuple[Numbers, Numbers]:
+def _pairs(rays: SortedRays, photos: int) -> tuple[Numbers, Numbers]:
     """Pairs of photos that share a point, each once, the later photo first; every photo with itself."""
     own = np.arange(photos) * (photos + 1)
     table = np.zeros(photos * photos, bool) if photos <= TABLE else None
@@ -179,7 +179,7 @@ def _with_control(batch: Batch, normal: Floats, right: Floats, where: Numbers) -
     )
 
 
-def control_normals(control: Control, points: int) -> tuple[Floats, Floats, Numbers]:
+def control_normals(control: ControlObservations, points: int) -> tuple[Floats, Floats, Numbers]:
     """Sum the control of each point.
 
     Returns

@@ -13,7 +13,12 @@ import numpy as np
 from photostrip.errors import GeometryError
 from photostrip.triangulation.gross_errors.pairs.zones import MINIMUM_LEFT
 from photostrip.triangulation.gross_errors.rays import strip_screening
-from photostrip.triangulation.gross_errors.rays.strip_screening import SEVERAL, Layout, Scene, Verdict
+from photostrip.triangulation.gross_errors.rays.strip_screening import (
+    SEVERAL_RAYS,
+    MeasuredStrip,
+    RayRejections,
+    StripRays,
+)
 from photostrip.triangulation.relative_orientation.orientation import orient_again
 from photostrip.triangulation.strip_formation import non_neighbours
 from photostrip.triangulation.strip_formation.strip import form_from_pairs, without_rows
@@ -24,7 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.points import PhotoPoints
-    from photostrip.triangulation.gross_errors.pairs.screening import Rejection
+    from photostrip.triangulation.gross_errors.pairs.screening import PairRejection
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
     from photostrip.triangulation.strip_formation.strip import FormedStrip
@@ -38,7 +43,7 @@ STILL = 5e-4  # rad, and relative: the second order of such a change is 0.04 µm
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class Measurements:
     """What a strip is formed from, beside its oriented pairs."""
 
     observations: PhotoPoints
@@ -49,9 +54,9 @@ class Measured:
     kept: Numbers  # rows of the observations that the user keeps
 
 
-def settle(
-    oriented: Orientation, measured: Measured, settings: StripFormationSettings, *, readmit: bool
-) -> tuple[Orientation, FormedStrip, Verdict]:
+def form_screened(
+    oriented: Orientation, measured: Measurements, settings: StripFormationSettings, *, readmit: bool
+) -> tuple[Orientation, FormedStrip, RayRejections]:
     """Form a strip, leave out what its points contradict, take back what they confirm, and form it again.
 
     Parameters
@@ -74,16 +79,16 @@ def settle(
         When a joint is broken.
     """
     of_pairs = oriented
-    layout = Layout.of(oriented, measured.observations, measured.photos)
+    layout = StripRays.of(oriented, measured.observations, measured.photos)
     suspected = np.zeros(0, np.intp)
-    verdict: Verdict | None = None
+    verdict: RayRejections | None = None
     aside = np.zeros(len(oriented.point), bool)
     moved: Flags | None = None
     formed = form_from_pairs(oriented, settings, measured.photos, measured.sigma)
     for _ in range(PASSES):
-        scene = Scene(oriented, formed, measured.observations, layout, measured.sigma, measured.stated)
+        scene = MeasuredStrip(oriented, formed, measured.observations, layout, measured.sigma, measured.stated)
         suspected = np.union1d(suspected, strip_screening.suspects(scene)).astype(np.intp)
-        verdict = strip_screening.examine(scene, suspected, measured.kept, verdict, moved)
+        verdict = strip_screening.screen_rays(scene, suspected, measured.kept, verdict, moved)
         used, outside = _uses(of_pairs, verdict, readmit=readmit)
         if (used == oriented.used).all() and (outside == aside).all():
             break
@@ -93,7 +98,7 @@ def settle(
         except GeometryError:
             break  # nothing would join two models: what joined them before stays
         aside, moved = outside, _moved(before, (oriented, formed))
-    formed, verdict = without_rows(formed, oriented, aside), verdict or Verdict()
+    formed, verdict = without_rows(formed, oriented, aside), verdict or RayRejections()
     return oriented, _bridged(formed, oriented, measured, verdict), verdict
 
 
@@ -101,7 +106,7 @@ def _formed_again(
     before: tuple[Orientation, FormedStrip],
     used: Flags,
     asides: tuple[Flags, Flags],
-    measured: Measured,
+    measured: Measurements,
     settings: StripFormationSettings,
 ) -> tuple[Orientation, FormedStrip]:
     """Orient the pairs whose points changed, and form the strip from there."""
@@ -125,7 +130,7 @@ def _moved(before: tuple[Orientation, FormedStrip], after: tuple[Orientation, Fo
     return np.asarray(turned | np.append(stretched, False) | np.append(False, stretched), bool)
 
 
-def _bridged(formed: FormedStrip, oriented: Orientation, measured: Measured, verdict: Verdict) -> FormedStrip:
+def _bridged(formed: FormedStrip, oriented: Orientation, measured: Measurements, verdict: RayRejections) -> FormedStrip:
     """Add the points whose good rays come from photos that are no neighbours."""
     placed = np.zeros(len(measured.observations.point_ids), bool)
     placed[formed.point] = True
@@ -137,7 +142,7 @@ def _bridged(formed: FormedStrip, oriented: Orientation, measured: Measured, ver
     return non_neighbours.bridge(formed, measured.observations, measured.photos, oriented.pairs.focal, good)
 
 
-def _uses(of_pairs: Orientation, verdict: Verdict, *, readmit: bool) -> tuple[Flags, Flags]:
+def _uses(of_pairs: Orientation, verdict: RayRejections, *, readmit: bool) -> tuple[Flags, Flags]:
     """Rows of the pairs' table that orient their pair, and those of them that must not place their point.
 
     Where it cannot be told which of several rays is wrong, those pairs that found nothing wrong keep the point: its
@@ -150,7 +155,7 @@ def _uses(of_pairs: Orientation, verdict: Verdict, *, readmit: bool) -> tuple[Fl
     judged = flags[of_pairs.point]
     wrong, unclear = np.zeros((2, int(of_pairs.rows.max()) + 1), bool)
     wrong[verdict.wrong] = True
-    several = np.array([kind == SEVERAL for kind in verdict.kind], bool)
+    several = np.array([kind == SEVERAL_RAYS for kind in verdict.kind], bool)
     unclear[verdict.wrong[several & verdict.across]] = True
     gone, aside = (np.asarray(each[of_pairs.rows].any(axis=1), bool) for each in (wrong, unclear))
     used = np.where(judged, np.where(aside, of_pairs.used, ~gone), of_pairs.used)
@@ -169,7 +174,7 @@ def _supported(of_pairs: Orientation, used: Flags) -> Flags:
     return result
 
 
-def taken_back(rejections: Sequence[Rejection], used: Flags) -> tuple[Rejection, ...]:
+def taken_back(rejections: Sequence[PairRejection], used: Flags) -> tuple[PairRejection, ...]:
     """Mark the rejections of pairs that the strip took back.
 
     Parameters
@@ -179,7 +184,7 @@ def taken_back(rejections: Sequence[Rejection], used: Flags) -> tuple[Rejection,
 
     Returns
     -------
-    tuple of Rejection
+    tuple of PairRejection
         The same, re-admitted ones marked.
     """
     return tuple(replace(each, readmitted=bool(used[each.row])) for each in rejections)

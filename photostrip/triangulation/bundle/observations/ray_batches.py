@@ -20,7 +20,7 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.bundle.observations.problem import Images
+    from photostrip.triangulation.bundle.observations.problem import ImageObservations
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -50,7 +50,7 @@ class Batch:
 
 
 @dataclass(frozen=True, eq=False)
-class Sorted:
+class SortedRays:
     """Rays sorted by point, then photo."""
 
     row: Numbers  # (n,): rows of the observations in this order
@@ -59,7 +59,7 @@ class Sorted:
     counts: Numbers  # (q,): number of rays of each point
 
 
-def sort_rays(images: Images, points: int, rank: Numbers) -> Sorted:
+def sort_rays(images: ImageObservations, points: int, rank: Numbers) -> SortedRays:
     """Sort rays by point, then photo.
 
     Parameters
@@ -69,20 +69,20 @@ def sort_rays(images: Images, points: int, rank: Numbers) -> Sorted:
 
     Returns
     -------
-    Sorted
+    SortedRays
         The rays in this order.
     """
     photo = rank[images.photo]
     row = np.argsort(images.point * np.intp(len(rank)) + photo)
-    return Sorted(row, photo[row], images.point[row], np.bincount(images.point, minlength=points))
+    return SortedRays(row, photo[row], images.point[row], np.bincount(images.point, minlength=points))
 
 
-def arrange(images: Images, rays: Sorted, photos: int) -> tuple[Batch, ...]:
+def arrange(images: ImageObservations, rays: SortedRays, photos: int) -> tuple[Batch, ...]:
     """Arrange sorted rays in batches, without control.
 
     Parameters
     ----------
-    rays : Sorted
+    rays : SortedRays
         The same, sorted.
     photos : int
         Number of photos m.
@@ -97,7 +97,7 @@ def arrange(images: Images, rays: Sorted, photos: int) -> tuple[Batch, ...]:
     return tuple(batches)
 
 
-def _batches(images: Images, members: Numbers, photo: Numbers, row: Numbers, photos: int) -> list[Batch]:
+def _batches(images: ImageObservations, members: Numbers, photo: Numbers, row: Numbers, photos: int) -> list[Batch]:
     """Arrange points with the same number of rays; `photo` and `row` have shape (k, points)."""
     order, first, count = _groups(photo, photos)
     pieces = -(-count // LARGEST_GROUP)
@@ -134,7 +134,7 @@ def _groups(photo: Numbers, photos: int) -> tuple[Numbers, Numbers, Numbers]:
 
 
 def _batch(
-    images: Images,
+    images: ImageObservations,
     members: Numbers,
     photo: Numbers,
     row: Numbers,

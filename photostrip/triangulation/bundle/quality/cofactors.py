@@ -16,18 +16,18 @@ from photostrip.errors import GeometryError
 from photostrip.triangulation.bundle.normal_equations import datum
 from photostrip.triangulation.bundle.normal_equations.reduced import factored, given_at, reduce
 from photostrip.triangulation.bundle.observations.linearise import PHOTO, SIGNS, backward, by_photo, by_point, forward
-from photostrip.triangulation.bundle.observations.model import state_of
-from photostrip.triangulation.bundle.solution import Precision
+from photostrip.triangulation.bundle.parameters import parameters_from
+from photostrip.triangulation.bundle.solution import Cofactors
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.triangulation.bundle.normal_equations.reduced import Factor, Reduced
-    from photostrip.triangulation.bundle.observations.given import Linear
-    from photostrip.triangulation.bundle.observations.layout import Batch
+    from photostrip.triangulation.bundle.observations.given_orientations import LinearisedOrientations
     from photostrip.triangulation.bundle.observations.linearise import Eliminated
-    from photostrip.triangulation.bundle.observations.model import Model, State
-    from photostrip.triangulation.bundle.solution import Solution
+    from photostrip.triangulation.bundle.observations.ray_batches import Batch
+    from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem
+    from photostrip.triangulation.bundle.solution import BundleSolution
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -78,7 +78,7 @@ class Inverse:
         return whole
 
 
-def precision(solution: Solution) -> Precision:
+def cofactors_of(solution: BundleSolution) -> Cofactors:
     """Return the cofactors of all parameters and residuals.
 
     Raises
@@ -86,43 +86,43 @@ def precision(solution: Solution) -> Precision:
     GeometryError
         When the normal matrix is singular at the solution (``bundle-rank``).
     """
-    model = solution.model
+    prepared = solution.prepared
     state, reduced, band = _at(solution)
     inverse = _inverse(reduced, band)
-    points = np.full((model.problem.points, 3, 3), np.nan)
-    residuals = np.zeros((len(model.problem.images), 2, 2))
-    table = model.table(state)
-    for batch, xyz, eliminated in zip(model.structure.batches, state.xyz, reduced.points, strict=True):
-        of_points, of_rays = _batch(model, batch, eliminated, inverse, (xyz, table))
+    points = np.full((prepared.problem.points, 3, 3), np.nan)
+    residuals = np.zeros((len(prepared.problem.images), 2, 2))
+    table = prepared.table(state)
+    for batch, xyz, eliminated in zip(prepared.structure.batches, state.xyz, reduced.points, strict=True):
+        of_points, of_rays = _batch(prepared, batch, eliminated, inverse, (xyz, table))
         points[batch.point[batch.real]] = of_points[batch.real]
         residuals[batch.row[:, batch.real].ravel()] = of_rays[:, batch.real].reshape(-1, 2, 2)
     joint = inverse.joint(np.arange(len(table[0]))[:, None], len(state.common))
-    positions, attitudes = (_given(model, linear, joint) for linear in given_at(model, state))
+    positions, attitudes = (_given(prepared, linear, joint) for linear in given_at(prepared, state))
     if solution.free:
-        points, joint = _inner(model, state, (band, reduced), points, joint)
-    photos, cross = _turned(model, state, joint)
-    weights = model.prior**-2.0
-    residuals *= model.problem.images.sigma[:, :, None] * model.problem.images.sigma[:, None, :]
-    return Precision(
+        points, joint = _inner(prepared, state, (band, reduced), points, joint)
+    photos, cross = _turned(prepared, state, joint)
+    weights = prepared.prior**-2.0
+    residuals *= prepared.problem.images.sigma[:, :, None] * prepared.problem.images.sigma[:, None, :]
+    return Cofactors(
         points=points,
         photos=photos,
         common=inverse.common,
         image_residuals=residuals,
-        control_residuals=_control(model, points),
+        control_residuals=_control(prepared, points),
         position_residuals=positions,
         attitude_residuals=attitudes,
-        common_residuals=np.where(weights > 0.0, model.prior**2 - np.diag(inverse.common), 0.0),
+        common_residuals=np.where(weights > 0.0, prepared.prior**2 - np.diag(inverse.common), 0.0),
         photo_common=cross,
     )
 
 
-def _at(solution: Solution) -> tuple[State, Reduced, Factor]:
+def _at(solution: BundleSolution) -> tuple[Parameters, Reduced, Factor]:
     """Linearise and factor at a solution."""
-    model = solution.model
-    state = state_of(model, solution.centers, solution.rotations, solution.points, solution.common)
-    reduced = reduce(model, state)
-    own = reduced.blocks[model.structure.own]
-    band = factored(model, reduced, datum.anchor(model, state, own) if solution.free else None)
+    prepared = solution.prepared
+    state = parameters_from(prepared, solution.centers, solution.rotations, solution.points, solution.common)
+    reduced = reduce(prepared, state)
+    own = reduced.blocks[prepared.structure.own]
+    band = factored(prepared, reduced, datum.anchor(prepared, state, own) if solution.free else None)
     if band is None:
         raise GeometryError("the normal matrix is singular at the solution", code="bundle-rank")
     return state, reduced, band
@@ -139,12 +139,12 @@ def _inverse(reduced: Reduced, band: Factor) -> Inverse:
 
 
 def _batch(
-    model: Model, batch: Batch, eliminated: Eliminated, inverse: Inverse, place: tuple[Floats, Floats]
+    prepared: PreparedProblem, batch: Batch, eliminated: Eliminated, inverse: Inverse, place: tuple[Floats, Floats]
 ) -> tuple[Floats, Floats]:
     """Cofactors of the points (S, 3, 3), m^2, and of the residuals (k, S, 2, 2), in units of sigma."""
     xyz, table = place
-    more, k, slots = len(model.calibrated), *batch.photo.shape
-    rays, common = model.rays(batch, xyz, table, np.zeros(0) if not more else np.zeros(more))
+    more, k, slots = len(prepared.calibrated), *batch.photo.shape
+    rays, common = prepared.rays(batch, xyz, table, np.zeros(0) if not more else np.zeros(more))
     white = by_point(rays)
     forward(eliminated.root, white)
     joint = inverse.joint(batch.sets, more)
@@ -202,27 +202,27 @@ def _quadratic(batch: Batch, joint: Floats, partials: Floats) -> Floats:
     return found
 
 
-def _control(model: Model, points: Floats) -> Floats:
+def _control(prepared: PreparedProblem, points: Floats) -> Floats:
     """Cofactors of the residuals of control, along its axes."""
-    control = model.problem.control
+    control = prepared.problem.control
     found = -control.axes @ points[control.point] @ control.axes.swapaxes(1, 2)
     found[:, range(3), range(3)] += np.where(np.isfinite(control.sigma), control.sigma, 0.0) ** 2
     return found
 
 
-def _given(model: Model, linear: Linear, joint: Floats) -> Floats:
+def _given(prepared: PreparedProblem, linear: LinearisedOrientations, joint: Floats) -> Floats:
     """Cofactors of the residuals of camera positions or attitudes."""
     partials = np.concatenate([linear.by_photo, linear.by_common], axis=2)
-    found: Floats = -partials @ joint[model.structure.rank[linear.photo]] @ partials.swapaxes(1, 2)
+    found: Floats = -partials @ joint[prepared.structure.rank[linear.photo]] @ partials.swapaxes(1, 2)
     with np.errstate(divide="ignore"):
         variance = np.where(linear.weight > 0.0, linear.weight**-2.0, 0.0)
     found[:, range(3), range(3)] += variance
     return found
 
 
-def _turned(model: Model, state: State, joint: Floats) -> tuple[Floats, Floats]:
+def _turned(prepared: PreparedProblem, state: Parameters, joint: Floats) -> tuple[Floats, Floats]:
     """Turn the cofactors of photos (and common parameters) into the Cartesian frame and the problem's order."""
-    rank = model.structure.rank
+    rank = prepared.structure.rank
     turn = np.zeros((len(rank), PHOTO, PHOTO))
     turn[:, :3, :3] = turn[:, 3:, 3:] = state.rotations
     turn *= SIGNS
@@ -231,7 +231,7 @@ def _turned(model: Model, state: State, joint: Floats) -> tuple[Floats, Floats]:
 
 
 def _inner(
-    model: Model, state: State, system: tuple[Factor, Reduced], points: Floats, joint: Floats
+    prepared: PreparedProblem, state: Parameters, system: tuple[Factor, Reduced], points: Floats, joint: Floats
 ) -> tuple[Floats, Floats]:
     """Carry cofactors of points and photos over to inner constraints on the points.
 
@@ -239,13 +239,13 @@ def _inner(
     are Q - G P' - P G' + G (H G'E P) G'.
     """
     band, reduced = system
-    origin, inverse = datum.inner(model, state)
+    origin, inverse = datum.inner(prepared, state)
     p = len(state.common)
     moves = [datum.generators(xyz.T, origin).transpose(1, 2, 0) for xyz in state.xyz]  # (3, 7, S)
-    right = np.zeros((len(model.structure.order), PHOTO, datum.DEFECT))
+    right = np.zeros((len(prepared.structure.order), PHOTO, datum.DEFECT))
     corner = np.zeros((p, datum.DEFECT))
     white = []
-    for batch, eliminated, move in zip(model.structure.batches, reduced.points, moves, strict=True):
+    for batch, eliminated, move in zip(prepared.structure.batches, reduced.points, moves, strict=True):
         pushed = move.copy()
         pushed[..., batch.dummy] = 0.0
         forward(eliminated.root, pushed)
@@ -254,24 +254,24 @@ def _inner(
     photos, common = _solved(reduced, band, right, corner)
     total = np.zeros((datum.DEFECT, datum.DEFECT))
     shifts = []
-    for batch, eliminated, pushed, move in zip(model.structure.batches, reduced.points, white, moves, strict=True):
+    for batch, eliminated, pushed, move in zip(prepared.structure.batches, reduced.points, white, moves, strict=True):
         k = len(batch.photo)
         of_sets = photos[batch.photo]  # (k, S, 6, 7)
         rows = eliminated.rows[: PHOTO * k].reshape(k, PHOTO, 3, -1)
         shift = pushed - np.einsum("kpcs,kspd->cds", rows, of_sets)
-        if len(model.calibrated):
-            shift -= np.einsum("pcs,pd->cds", eliminated.rows[PHOTO * k : -1], common[: len(model.calibrated)])
+        if len(prepared.calibrated):
+            shift -= np.einsum("pcs,pd->cds", eliminated.rows[PHOTO * k : -1], common[: len(prepared.calibrated)])
         backward(eliminated.root, shift)
         total += np.einsum("cas,cbs->ab", move[..., batch.real], shift[..., batch.real])
         shifts.append(shift)
     middle = inverse @ total @ inverse
     found = points.copy()
-    for batch, move, shift in zip(model.structure.batches, moves, shifts, strict=True):
+    for batch, move, shift in zip(prepared.structure.batches, moves, shifts, strict=True):
         real = batch.real
         own, swept = move[..., real].transpose(2, 0, 1), shift[..., real].transpose(2, 0, 1) @ inverse
         found[batch.point[real]] += _carried_over(own, swept, middle)
     turned = np.zeros((len(photos), PHOTO + p, datum.DEFECT))
-    turned[:, :PHOTO] = datum.photo_generators(model, state, origin)
+    turned[:, :PHOTO] = datum.photo_generators(prepared, state, origin)
     swept = np.concatenate([photos, np.broadcast_to(common, (len(photos), *common.shape))], axis=1) @ inverse
     return found, joint + _carried_over(turned, swept, middle)
 

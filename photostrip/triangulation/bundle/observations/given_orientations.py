@@ -13,7 +13,7 @@ from photostrip.triangulation.bundle.observations.linearise import PHOTO, SIGNS
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.bundle.observations.problem import Attitudes, Positions
+    from photostrip.triangulation.bundle.observations.problem import AttitudeObservations, PositionObservations
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -22,7 +22,7 @@ SMALL = 1e-4  # radians: below it the series of the rotation's derivative is exa
 
 
 @dataclass(frozen=True, eq=False)
-class Linear:
+class LinearisedOrientations:
     """Linearised observations of photos, three in each row."""
 
     photo: Numbers  # (g,): photo of each row
@@ -38,7 +38,7 @@ class Linear:
         return whole[:, :, :PHOTO], whole[:, :, PHOTO:]
 
 
-def drift_columns(positions: Positions, first: int) -> tuple[Numbers, Numbers]:
+def drift_columns(positions: PositionObservations, first: int) -> tuple[Numbers, Numbers]:
     """Where offset and drift of each group stand among the common parameters.
 
     Parameters
@@ -59,7 +59,9 @@ def drift_columns(positions: Positions, first: int) -> tuple[Numbers, Numbers]:
     return columns[0], columns[1]
 
 
-def positions_at(positions: Positions, centers: Floats, rotations: Floats, common: Floats, calibrated: int) -> Linear:
+def positions_at(
+    positions: PositionObservations, centers: Floats, rotations: Floats, common: Floats, calibrated: int
+) -> LinearisedOrientations:
     """Linearise camera positions.
 
     Parameters
@@ -85,10 +87,10 @@ def positions_at(positions: Positions, centers: Floats, rotations: Floats, commo
         for axis in range(3):
             by_common[rows, axis, column[rows] + axis] = -factor[rows]
     residual += by_common @ common
-    return Linear(positions.photo, residual, by_photo, by_common, 1.0 / positions.sigma)
+    return LinearisedOrientations(positions.photo, residual, by_photo, by_common, 1.0 / positions.sigma)
 
 
-def attitudes_at(attitudes: Attitudes, rotations: Floats, common: int) -> Linear:
+def attitudes_at(attitudes: AttitudeObservations, rotations: Floats, common: int) -> LinearisedOrientations:
     """Linearise given attitudes.
 
     Parameters
@@ -101,7 +103,7 @@ def attitudes_at(attitudes: Attitudes, rotations: Floats, common: int) -> Linear
     turn = to_vector(np.swapaxes(attitudes.rotations, 1, 2) @ rotations[attitudes.photo])
     by_photo = np.zeros((len(attitudes), 3, PHOTO))
     by_photo[:, :, 3:] = _vector_by_turn(turn)
-    return Linear(
+    return LinearisedOrientations(
         attitudes.photo,
         turn,
         by_photo * SIGNS,
