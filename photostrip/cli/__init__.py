@@ -1,1 +1,8 @@
-"""What a user types: one file per command, and ``main`` that finds them."""
+"""What a user types: a file for each command in ``commands``, and ``main``, which finds and calls them.
+
+- ``command_table``: all commands, and ``photostrip --help``; ``options``: options that several commands share;
+- ``stdout``: what is printed, in which form; ``stderr``: what is said meanwhile;
+- ``failures``: which exit code a failure has, and how it is reported;
+- a job that is too long for the file of its command: ``batch_command``, ``method_comparison``, ``check_output``,
+  ``installation``, ``manual``, ``completion``, ``terrestrial_output``.
+"""

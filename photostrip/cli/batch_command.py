@@ -19,7 +19,7 @@ from photostrip.formats.output import batch as formats
 from photostrip.formats.text.writing import make_rule, write_text
 from photostrip.report.commands.batch import batch_junit, batch_sections, outcome_line
 from photostrip.report.page import messages, text
-from photostrip.report.page.figures import counted
+from photostrip.report.page.numbers import counted
 from photostrip.report.page.progress import batch_table
 
 if TYPE_CHECKING:

@@ -1,9 +1,11 @@
-"""The accuracy report, rendered from the document of a result and from nothing else.
+"""Reports, rendered from the document of a result, a plan, a comparison and from nothing else.
 
-- ``document``: from the document to sections of sentences, facts and tables;
-- ``layout``: sections on a page of a given width;
-- ``text``: plain text and Markdown;
-- ``console``: a terminal, with colours.
+In comes a document of plain values, as JSON has them; out go sections of sentences, facts and tables (``page.parts``),
+and from these text, Markdown, HTML or a coloured terminal. Nothing is computed; numbers are only rounded.
+
+- ``sections``: the accuracy report of a run; ``commands``: the reports of the other commands;
+- ``page``: parts of a page, tables, numbers as they are printed, and the ways to show them;
+- ``html`` with ``templates`` and ``pictures``: the report as one page with pictures.
 """
 
 from photostrip.report.sections.document import chosen_sections, require_complete, sections_of, title_of

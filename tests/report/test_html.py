@@ -19,6 +19,7 @@ from photostrip.formats.output.result_json import to_json
 from photostrip.report import sections_of
 from photostrip.report.html import to_html
 from photostrip.report.page.parts import Facts, Table, Words
+from photostrip.report.pictures import style
 from photostrip.report.pictures.plan_view import plan_of
 from photostrip.report.pictures.strip import LONGEST, strip_pictures
 from photostrip.report.pictures.svg import Axis, nice
@@ -144,6 +145,11 @@ def test_letters_and_marks_stand_out(scheme: int) -> None:
         assert name == "link" or contrast(name, "band") >= 4.5
     for name in ("control", "check", "new", "photo", "ellipse", "c1", "c2", "c3", "c4"):
         assert contrast(name, "paper") >= 3.0
+
+
+def test_pictures_in_files_have_the_colours_of_the_page() -> None:
+    page = dict(re.findall(r"--(\w+): (#[0-9a-f]{6});", CSS[: CSS.index("@media")]))
+    assert {role: page[role] for role in style.ROLES} == style.ROLES
 
 
 def test_ids_cannot_become_elements() -> None:

@@ -1,1 +1,1 @@
-"""One file for each command."""
+"""One file for each command: its arguments, then load, call, print, exit code."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from photostrip.report.commands.compare import NAMES, allowed_words, what
-from photostrip.report.page.figures import short, unit
 from photostrip.report.page.junit import Case
+from photostrip.report.page.numbers import short, unit
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

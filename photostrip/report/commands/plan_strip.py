@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from photostrip.report.page.figures import counted, fixed, listed, metres, micrometres, short
+from photostrip.report.page.numbers import counted, fixed, listed, metres, micrometres, short
 from photostrip.report.page.parts import DASH, Column, Facts, Part, Section, Table, Words
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from photostrip.report.commands.plan_strip import strip_sections
-from photostrip.report.page.figures import counted, fixed, metres, micrometres, short
+from photostrip.report.page.numbers import counted, fixed, metres, micrometres, short
 from photostrip.report.page.parts import Column, Facts, Part, Section, Table, Words
 
 if TYPE_CHECKING:

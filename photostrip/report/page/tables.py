@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from photostrip.report.page.figures import fixed
+from photostrip.report.page.numbers import fixed
 from photostrip.report.page.parts import Column, Table
 
 if TYPE_CHECKING:

@@ -2,49 +2,41 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from photostrip.report.pictures.drawing import new_figure
+from photostrip.report.pictures.style import INK, METHODS, SERIES, SMALL_TEXT, USES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Document = dict[str, Any]
-
-COLOURS = ("#2471a3", "#c0392b", "#229954", "#8e44ad", "#d68910", "#16a085", "#34495e", "#7f8c8d")  # by layout
-STYLES = {  # by method
-    "similarity": ":",
-    "degree 1": (0, (1, 3)),
-    "degree 2": "--",
-    "degree 3": "-.",
-    "covariance": (0, (8, 2)),
-    "bundle": "-",
-}
-MARKS = {"xyz": "^", "xy": "s", "z": "o"}
+    from photostrip.report.page.parts import Document
 
 
-def strip_figure(figure: Figure, document: Document) -> Figure:
+def strip_figure(document: Document) -> Figure:
     """Draw the plan of a strip."""
-    layouts = document["layouts"]
-    figure.set_size_inches(11, 6.0 + 0.45 * len(layouts))
-    figure.suptitle(
+    rows = len(document["layouts"])
+    title = (
         f"{document['name']}: {document['camera']['name']}, 1:{document['geometry']['scale']:g},"
         f" {document['geometry']['photos']} photos, {document['image_sigma_um']:g} µm"
     )
-    parts = figure.add_gridspec(2, 1, height_ratios=[4, 1 + 0.35 * len(layouts)])
+    figure = new_figure(11, 6.0 + 0.45 * rows, title)
+    parts = figure.add_gridspec(2, 1, height_ratios=[4, 1 + 0.35 * rows])
     upper, lower = figure.add_subfigure(parts[0]), figure.add_subfigure(parts[1])
     for place, (name, title) in enumerate((("plan_m", "plan"), ("z_m", "height")), 1):
         axes = upper.add_subplot(1, 2, place, title=f"worst standard deviation in {title}, m")
         _curves(axes, document, name)
         _limit(axes, document["required_m"][title])
         if place == 2:
-            axes.legend(fontsize=6, loc="upper left", bbox_to_anchor=(1.01, 1.0))
+            axes.legend(fontsize=SMALL_TEXT - 1, loc="upper left", bbox_to_anchor=(1.01, 1.0))
     _places(lower.add_subplot(1, 1, 1), document)
     return figure
 
 
 def _curves(axes: Axes, document: Document, name: str) -> None:
     """One curve for each layout and method."""
-    colour = {layout["name"]: COLOURS[k % len(COLOURS)] for k, layout in enumerate(document["layouts"])}
+    colour = {layout["name"]: SERIES[k % len(SERIES)] for k, layout in enumerate(document["layouts"])}
     for row in document["accuracy"]:
         if row["used"] is None:
             continue
@@ -52,21 +44,21 @@ def _curves(axes: Axes, document: Document, name: str) -> None:
             range(1, len(row["along"]) + 1),
             [each[name] for each in row["along"]],
             color=colour[row["layout"]],
-            linestyle=STYLES[row["method"]],
+            linestyle=METHODS[row["method"]],
             linewidth=1.1,
             label=f"{row['layout']}, {row['method']}",
         )
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter("{x:g}")
     axes.yaxis.set_minor_formatter("{x:g}")
-    axes.tick_params(axis="y", which="both", labelsize=7)
+    axes.tick_params(axis="y", which="both", labelsize=SMALL_TEXT)
     axes.set_xlabel("photo")
 
 
 def _limit(axes: Axes, limit: float | None) -> None:
     if limit is not None:
-        axes.axhline(limit, color="black", linewidth=0.8)
-        axes.annotate("required", (1, limit), xytext=(0, 2), textcoords="offset points", fontsize=7)
+        axes.axhline(limit, color=INK, linewidth=0.8)
+        axes.annotate("required", (1, limit), xytext=(0, 2), textcoords="offset points", fontsize=SMALL_TEXT)
 
 
 def _places(axes: Axes, document: Document) -> None:
@@ -76,12 +68,12 @@ def _places(axes: Axes, document: Document) -> None:
     if document["placed"] is not None:
         layouts.append(("places found", document["placed"]["points"]))
     for number, (_, points) in enumerate(layouts):
-        for use, marker in MARKS.items():
-            here = [point for point in points if point["use"] == use]
-            x = [point["photo"] for point in here]
-            y = [-number + 0.3 - 0.6 * (point["row"] - 1) / (rows - 1) for point in here]
-            axes.scatter(x, y, marker=marker, s=18, color=COLOURS[number % len(COLOURS)])
-    axes.set_yticks([-number for number in range(len(layouts))], [name for name, _ in layouts], fontsize=7)
+        for use, (marker, _) in USES.items():
+            of_use = [point for point in points if point["use"] == use]
+            x = [point["photo"] for point in of_use]
+            y = [-number + 0.3 - 0.6 * (point["row"] - 1) / (rows - 1) for point in of_use]
+            axes.scatter(x, y, marker=marker, s=18, color=SERIES[number % len(SERIES)])
+    axes.set_yticks([-number for number in range(len(layouts))], [name for name, _ in layouts], fontsize=SMALL_TEXT)
     axes.set_xlim(0.5, document["geometry"]["photos"] + 0.5)
     axes.set_ylim(-len(layouts) + 0.4, 0.6)
-    axes.set_xlabel("photo (triangles: control in full, squares: in plan, circles: in height)", fontsize=8)
+    axes.set_xlabel("photo (triangles: control in full, squares: in plan, circles: in height)", fontsize=SMALL_TEXT + 1)

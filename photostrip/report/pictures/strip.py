@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from photostrip.report.page.figures import counted, short
+from photostrip.report.page.numbers import counted, short
 from photostrip.report.pictures import svg
 from photostrip.report.pictures.plan_view import plan_of
 

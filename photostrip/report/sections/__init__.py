@@ -1,1 +1,6 @@
-"""Sections of the accuracy report of a run."""
+"""Sections of the accuracy report of a run.
+
+In comes the document of a result (result.json); ``document`` puts the sections in their order, the worst first: verdict
+and findings, project and decisions, how the strips were formed and brought to the ground, what is left at the points.
+Numbers of equations and symbols are those of docs/notation.md.
+"""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-from photostrip.report.page.figures import counted, fixed, power, short, unit
+from photostrip.report.page.numbers import counted, fixed, power, short, unit
 from photostrip.report.page.parts import DASH, Document, Facts, Part, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 

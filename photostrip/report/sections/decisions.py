@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from photostrip.report.page.figures import counted, micrometres, short
+from photostrip.report.page.numbers import counted, micrometres, short
 from photostrip.report.page.parts import Document, Facts, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 

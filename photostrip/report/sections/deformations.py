@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from photostrip.report.page.figures import counted
+from photostrip.report.page.numbers import counted
 from photostrip.report.page.parts import Document, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 from photostrip.report.sections.strip import photos_of

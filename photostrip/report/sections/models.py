@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from photostrip.report.page.figures import counted, joined, micrometres, percent, ratio
+from photostrip.report.page.numbers import counted, joined, micrometres, percent, ratio
 from photostrip.report.page.parts import DASH, Document, Facts, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 from photostrip.report.sections.strip import DIRECTIONS, photos_of, worst_first

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from photostrip.report.page.figures import counted, fixed, metres, micrometres
+from photostrip.report.page.numbers import counted, fixed, metres, micrometres
 from photostrip.report.page.parts import Document, Facts, Section
 from photostrip.report.page.tables import number, tabulated, words
 from photostrip.report.sections.models import measured, of_models, project_rows, scale_word

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from photostrip.report.page.figures import counted, fixed, short, unit
+from photostrip.report.page.numbers import counted, fixed, short, unit
 from photostrip.report.page.parts import Document, Part, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 

@@ -1,4 +1,4 @@
-"""Numbers as the report prints them: fixed decimals for each quantity, a dash where there is none."""
+"""Numbers as they are printed: fixed decimals for each quantity, a dash where there is none; counts with their noun."""
 
 from __future__ import annotations
 
