@@ -12,32 +12,31 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.errors import PhotostripError
+from photostrip.errors import GeometryError
 from photostrip.pipeline.plausibility import evidence
 from photostrip.triangulation.relative_orientation.orientation import orient_unchecked, unusable_pairs
 from photostrip.triangulation.relative_orientation.pairs import collect_pairs
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
+    from photostrip.camera import Camera
     from photostrip.pipeline.inputs import Settings, Strip
     from photostrip.points import PhotoPoints
 
 LEAST_POINTS = 6  # one more than a pair has unknowns
-WORST = 0.01  # sigma0 of a pair over the principal distance: beyond it the base is no better known than by the layout
+MOST_SIGMA0 = 0.01  # of a pair, over the principal distance: beyond it the base is no better known than by the layout
 
 
 def closer_look(
-    strip: Strip, observations: PhotoPoints, settings: Settings
+    strip: Strip, observations: PhotoPoints, cameras: Mapping[str, Camera], settings: Settings
 ) -> Callable[[str, str], tuple[complex, complex] | None]:
-    """Return what tells in which directions two photos of a strip lie from each other.
+    """Return a function that gives the directions in which two photos of a strip lie from each other.
 
     Parameters
     ----------
-    strip : Strip
-        The strip; the order of its photos does not matter.
-    observations : PhotoPoints
-        Image points in the system of the photo, mm.
+    cameras : mapping of str to Camera
+        Camera of every photo that was measured.
 
     Returns
     -------
@@ -50,7 +49,7 @@ def closer_look(
     @cache
     def toward(one: str, other: str) -> tuple[complex, complex] | None:
         if not points:
-            points.append(evidence.ideal(observations, [strip], settings))
+            points.append(evidence.ideal(observations, cameras, settings))
         focal = strip.camera.principal_distance
         try:
             with np.errstate(all="ignore"):
@@ -59,9 +58,9 @@ def closer_look(
                     return None
                 oriented, converged = orient_unchecked(pairs)
                 doubtful = unusable_pairs(oriented, converged)
-        except (PhotostripError, ArithmeticError, ValueError):
+        except (GeometryError, np.linalg.LinAlgError):
             return None
-        if doubtful[0] or not oriented.sigma0[0] < WORST * focal:
+        if doubtful[0] or not oriented.sigma0[0] < MOST_SIGMA0 * focal:
             return None
         base, turn = (each[0] for each in oriented.relative)
         back = -base @ turn

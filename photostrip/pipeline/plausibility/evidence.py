@@ -1,4 +1,7 @@
-"""What the gate looks at: strips formed for evidence alone, and given points as strips see them."""
+"""What the gate looks at: strips formed for evidence alone, and given points in the coordinates of strips.
+
+``steps`` everywhere holds, by photo, the centre of the next photo as it lies on that photo, mm.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +11,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.errors import PhotostripError
+from photostrip.errors import GeometryError, InputError
 from photostrip.triangulation.gross_errors.pairs import screening
 from photostrip.triangulation.image_coordinates import corrections
-from photostrip.triangulation.plausibility.control.control_strip import Rays, Seen
+from photostrip.triangulation.plausibility.control.control_strip import Rays, StripPoints
 from photostrip.triangulation.plausibility.photos import mosaic
 from photostrip.triangulation.relative_orientation.orientation import orient_unchecked, refuse_unusable
 from photostrip.triangulation.relative_orientation.pairs import collect_pairs
@@ -22,6 +25,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from photostrip.camera import Camera
     from photostrip.pipeline.inputs import Settings, Strip
     from photostrip.points import ControlPoints, PhotoPoints
     from photostrip.triangulation.relative_orientation.orientation import Orientation
@@ -30,16 +34,17 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
 
-WINDOW = 10  # photos of a mosaic that is laid on control: a longer one curls
-LONG, STRETCH, STRETCHES = 40, 30, 4  # photos: a longer strip is examined in so many stretches of so many
-BREADTH = 0.95  # of the image points lie within the half breadth of a strip
-SEEN_BY = 2  # photos that must show a given point
+MOSAIC_PHOTOS = 10  # of a mosaic that is laid on control: a longer one curls
+LONG_STRIP = 40  # photos: a longer one is looked at in stretches
+STRETCH_PHOTOS, STRETCHES = 30, 4
+BREADTH_SHARE = 0.95  # of the image points lie within the half breadth of a strip
+LEAST_RAYS = 2  # photos that must show a given point
 MOSAIC_SIGMA = 0.02  # of the flying height: what relief and tilts leave in a mosaic
 
 
 @dataclass(frozen=True, eq=False)
-class Formed:
-    """A strip, formed for evidence."""
+class EvidenceStrip:
+    """A strip with its oriented pairs, formed by the run or for evidence alone."""
 
     strip: Strip  # the strip with its photos in the order in which they were formed
     orientation: Orientation
@@ -63,7 +68,7 @@ class Formed:
         return np.concatenate([centers[:1] - ground[:1], centers[1:] - ground])
 
     @cached_property
-    def whole(self) -> Formed:
+    def whole(self) -> EvidenceStrip:
         """The strip with the points that it has no place for, because their rays contradict each other.
 
         Such a point stands in the middle of where its models put it.
@@ -92,136 +97,49 @@ class Formed:
         return replace(self, formed=whole)
 
 
-def form(strip: Strip, observations: PhotoPoints, settings: Settings) -> Formed | None:
-    """Form a strip as far as that goes, for evidence alone.
-
-    Parameters
-    ----------
-    observations : PhotoPoints
-        Image points in the system of the photo, mm.
-
-    Returns
-    -------
-    Formed or None
-        None when a pair or a joint cannot be determined.
-    """
-    sigma = _sigma(observations, strip)
+def form(strip: Strip, observations: PhotoPoints, settings: Settings) -> EvidenceStrip | None:
+    """Form a strip as far as that goes, for evidence alone; None when a pair or a junction cannot be determined."""
     try:
         pairs = collect_pairs(observations, strip.photos, strip.camera.principal_distance)
         first, converged = orient_unchecked(pairs)
-        screened = screening.screen_pairs(first, settings.relative, sigma, converged)
+        screened = screening.screen_pairs(first, settings.relative, _sigma(observations, strip), converged)
         refuse_unusable(screened.orientation, screened.converged, strip.photos)
         scatter = screened.scatter.by_pair
         formed = form_from_pairs(screened.orientation, settings.formation, strip.photos, scatter)
-    except (PhotostripError, ArithmeticError, ValueError):
+    except (GeometryError, InputError, np.linalg.LinAlgError):
         return None
-    return Formed(strip, screened.orientation, formed)
+    return EvidenceStrip(strip, screened.orientation, formed)
 
 
-def ideal(observations: PhotoPoints, strips: Sequence[Strip], settings: Settings) -> PhotoPoints:
-    """Give image points free of distortion, without refraction, whose heights are not known.
+def ideal(observations: PhotoPoints, cameras: Mapping[str, Camera], settings: Settings) -> PhotoPoints:
+    """Image points free of distortion, without refraction, whose heights are not known; else as they are.
 
     Parameters
     ----------
-    observations : PhotoPoints
-        Image points in the system of the photo, mm.
-
-    Returns
-    -------
-    PhotoPoints
-        Ideal coordinates; as they are where they cannot be corrected.
+    cameras : mapping of str to Camera
+        Camera of every photo that was measured.
     """
-    cameras = {photo: strip.camera for strip in strips for photo in strip.photos}
     try:
         return corrections.refine(observations, cameras, replace(settings.refinement, refraction=False)).observations
-    except (PhotostripError, LookupError):
+    except InputError:
         return observations
 
 
-# ------------------------------------------------------------------------------- given points as a strip sees them
+def _positions(observations: PhotoPoints, photos: Sequence[str]) -> Numbers:
+    """Place in a list of photos of the photo of each image point, shape (n,); -1 for the others."""
+    place = {photo: number for number, photo in enumerate(photos)}
+    return np.array([place.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo]
 
 
-def sighted(
-    formed: Formed, observations: PhotoPoints, control: ControlPoints, steps: Mapping[str, complex]
-) -> tuple[Numbers, Seen]:
-    """Return the points of a formed strip whose ground coordinates are given.
-
-    Parameters
-    ----------
-    steps : mapping of str to complex
-        Centre of the next photo on each photo, mm.
-
-    Returns
-    -------
-    rows : ndarray of int
-        Rows of the given points.
-    Seen
-        The same points in the strip.
-    """
-    strip, depth = formed.formed, float(np.median(formed.depth))
+def _point_numbers(observations: PhotoPoints, ids: Sequence[str]) -> Numbers:
+    """Numbers of points among the measured ones; -1 for those that are not measured."""
     number = {name: n for n, name in enumerate(observations.point_ids)}
-    row_of = {int(n): row for row, n in enumerate(strip.point)}
-    places = np.array([row_of.get(number.get(name, -1), -1) for name in control.ids], np.intp)
-    rows = np.flatnonzero(places >= 0)
-    base = float(np.median(np.linalg.norm(np.diff(strip.centers, axis=0), axis=1)))
-    share = _sigma(observations, formed.strip) / formed.strip.camera.principal_distance
-    seen = Seen(
-        formed.strip.id,
-        strip.xyz[places[rows]],
-        strip.rotations[:, :, 2],
-        strip.centers,
-        (2.0 * share, 2.0 * np.sqrt(2.0) * share * depth / max(base, 1e-12)),
-        depth,
-        _base_angle(formed.strip.photos, steps),
-        partial(_rays, formed, observations),
-    )
-    return rows, seen
-
-
-def _rays(formed: Formed, observations: PhotoPoints, name: str) -> Rays:
-    """Return what the photos of a strip show of a point."""
-    place = {photo: number for number, photo in enumerate(formed.strip.photos)}
-    rows = np.flatnonzero(observations.point == observations.point_ids.index(name))
-    here = np.array([place.get(observations.photo_ids[photo], -1) for photo in observations.photo[rows]], np.intp)
-    rows, here = rows[here >= 0], here[here >= 0]
-    strip, focal = formed.formed, formed.strip.camera.principal_distance
-    sigma = np.sqrt((observations.sigma[rows] ** 2).mean(axis=1))
-    return Rays(observations.xy[rows], sigma, strip.centers[here], strip.rotations[here], focal)
-
-
-def stretches(rows: Numbers, seen: Seen) -> Iterator[tuple[Numbers, Seen]]:
-    """Cut a long strip into stretches that no low polynomial need bend far.
-
-    Parameters
-    ----------
-    rows : ndarray of int, shape (n,)
-        Rows of given points.
-
-    Yields
-    ------
-    Seen
-        The same points in the strip. A strip of up to 40 photos is one stretch; of a longer one four of 30 photos,
-        evenly spread, are given.
-    """
-    photos = len(seen.centers)
-    if photos <= LONG:
-        yield rows, seen
-        return
-    up = seen.axes.mean(axis=0)
-    flat = [each - np.outer(each @ up, up) for each in (seen.xyz, seen.centers)]
-    near = np.array([int(((flat[1] - point) ** 2).sum(axis=1).argmin()) for point in flat[0]], np.intp)
-    starts = np.unique(np.linspace(0, photos - STRETCH, min(STRETCHES, photos // STRETCH)).astype(np.intp))
-    for start in starts.tolist():
-        inside = (near >= start) & (near < start + STRETCH)
-        part = slice(start, start + STRETCH)
-        yield rows[inside], replace(seen, xyz=seen.xyz[inside], axes=seen.axes[part], centers=seen.centers[part])
+    return np.array([number.get(name, -1) for name in ids], np.intp)
 
 
 def _sigma(observations: PhotoPoints, strip: Strip) -> float:
     """Median standard deviation of the image coordinates of a strip, mm."""
-    names = set(strip.photos)
-    members = np.array([photo in names for photo in observations.photo_ids], bool)
-    return float(np.median(observations.sigma[members[observations.photo]]))
+    return float(np.median(observations.sigma[_positions(observations, strip.photos) >= 0]))
 
 
 def _base_angle(photos: Sequence[str], steps: Mapping[str, complex]) -> float:
@@ -231,80 +149,123 @@ def _base_angle(photos: Sequence[str], steps: Mapping[str, complex]) -> float:
     return float(np.angle((known / np.abs(known)).sum())) if len(known) else 0.0
 
 
-def sighted_in_mosaic(
-    strip: Strip, observations: PhotoPoints, control: ControlPoints, steps: Mapping[str, complex]
-) -> tuple[Numbers, Seen] | None:
-    """Return the points of a mosaic of some photos whose ground coordinates are given.
+# ------------------------------------------------------------------------------------ given points in a formed strip
 
-    Parameters
-    ----------
-    observations : PhotoPoints
-        Image points, mm.
-    steps : mapping of str to complex
-        Centre of the next photo on each photo, mm.
 
-    Returns
-    -------
-    rows : ndarray of int
-        Rows of the given points.
-    Seen
-        The same points in the mosaic, without heights; of the ten photos in a row that show most of them.
+def strip_points(
+    formed: EvidenceStrip, observations: PhotoPoints, control: ControlPoints, steps: Mapping[str, complex]
+) -> tuple[Numbers, StripPoints]:
+    """Rows of the given points that a formed strip holds, and the same points in the strip."""
+    strip, depth = formed.formed, float(np.median(formed.depth))
+    row_of = {int(n): row for row, n in enumerate(strip.point)}
+    row = np.array([row_of.get(n, -1) for n in _point_numbers(observations, control.ids).tolist()], np.intp)
+    rows = np.flatnonzero(row >= 0)
+    base = float(np.median(np.linalg.norm(np.diff(strip.centers, axis=0), axis=1)))
+    share = _sigma(observations, formed.strip) / formed.strip.camera.principal_distance
+    return rows, StripPoints(
+        formed.strip.id,
+        xyz=strip.xyz[row[rows]],
+        axes=strip.rotations[:, :, 2],
+        centers=strip.centers,
+        floor=(2.0 * share, 2.0 * np.sqrt(2.0) * share * depth / max(base, 1e-12)),
+        depth=depth,
+        base_angle=_base_angle(formed.strip.photos, steps),
+        rays_of=partial(_rays, formed, observations),
+    )
+
+
+def _rays(formed: EvidenceStrip, observations: PhotoPoints, name: str) -> Rays:
+    """Collect what the photos of a strip show of a point."""
+    position = _positions(observations, formed.strip.photos)
+    rows = np.flatnonzero((observations.point == observations.point_ids.index(name)) & (position >= 0))
+    strip, photo = formed.formed, position[rows]
+    return Rays(
+        xy=observations.xy[rows],
+        sigma=np.sqrt((observations.sigma[rows] ** 2).mean(axis=1)),
+        centers=strip.centers[photo],
+        rotations=strip.rotations[photo],
+        focal=formed.strip.camera.principal_distance,
+    )
+
+
+def stretches(rows: Numbers, on_strip: StripPoints) -> Iterator[tuple[Numbers, StripPoints]]:
+    """Cut a long strip into stretches that no low polynomial need bend far.
+
+    A strip of up to 40 photos is one stretch; of a longer one four of 30 photos, evenly spread, are given: the rows of
+    the given points (some of `rows`, which belong to `on_strip`) with the same points in the strip.
     """
-    photos = _richest(strip, observations, control)
-    links = mosaic.link(observations, photos)
-    layout = mosaic.lay_out(links, len(photos))
-    place = {photo: number for number, photo in enumerate(photos)}
-    position = np.array([place.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo]
+    photos = len(on_strip.centers)
+    if photos <= LONG_STRIP:
+        yield rows, on_strip
+        return
+    up = on_strip.axes.mean(axis=0)
+    points, centers = (each - np.outer(each @ up, up) for each in (on_strip.xyz, on_strip.centers))
+    near = np.array([int(((centers - point) ** 2).sum(axis=1).argmin()) for point in points], np.intp)
+    count = min(STRETCHES, photos // STRETCH_PHOTOS)
+    for start in np.unique(np.linspace(0, photos - STRETCH_PHOTOS, count).astype(np.intp)).tolist():
+        part = slice(start, start + STRETCH_PHOTOS)
+        inside = (near >= part.start) & (near < part.stop)
+        axes, centers = on_strip.axes[part], on_strip.centers[part]
+        yield rows[inside], replace(on_strip, xyz=on_strip.xyz[inside], axes=axes, centers=centers)
+
+
+# ---------------------------------------------------------------------------------------- given points in a mosaic
+
+
+def mosaic_points(
+    strip: Strip, observations: PhotoPoints, control: ControlPoints, steps: Mapping[str, complex]
+) -> tuple[Numbers, StripPoints] | None:
+    """Rows of the given points that a mosaic holds, and the same points in the mosaic, without heights.
+
+    The mosaic is that of the ten photos in a row that show most of them; None where it has no point.
+    """
+    photos = _photos_with_most(strip, observations, control)
+    plane = mosaic.lay_out(mosaic.link(observations, photos), len(photos))
+    position = _positions(observations, photos)
     rows = np.flatnonzero(position >= 0)
-    rows = rows[layout.part[position[rows]] == 0]
+    rows = rows[plane.part[position[rows]] == 0]
     if not len(rows):
         return None
+    photo, point = position[rows], observations.point[rows]
     z = observations.xy[rows, 0] + 1j * observations.xy[rows, 1]
-    z = np.where(layout.mirrored[position[rows]], np.conj(z), z)
-    z = layout.factor[position[rows]] * z + layout.offset[position[rows]]
-    total = np.bincount(observations.point[rows], minlength=len(observations.point_ids))
+    z = plane.factor[photo] * np.where(plane.mirrored[photo], np.conj(z), z) + plane.offset[photo]
+    total = np.bincount(point, minlength=len(observations.point_ids))
     count = np.maximum(total, 1)
-    mean = (
-        np.bincount(observations.point[rows], z.real, len(total)) / count
-        + 1j * np.bincount(observations.point[rows], z.imag, len(total)) / count
+    x, y = (np.bincount(point, part, len(total)) / count for part in (z.real, z.imag))
+    numbers = _point_numbers(observations, control.ids)
+    given = np.flatnonzero((numbers >= 0) & (total[numbers] > 0))
+    held = numbers[given]
+    depth = strip.camera.principal_distance * float(np.median(np.abs(plane.factor)))
+    return given, StripPoints(
+        strip.id,
+        xyz=np.column_stack([x[held], y[held], np.full(len(held), np.nan)]),
+        axes=np.array([[0.0, 0.0, 1.0]]),
+        centers=np.column_stack([plane.offset.real, plane.offset.imag, np.full(len(photos), depth)]),
+        floor=(MOSAIC_SIGMA, MOSAIC_SIGMA),
+        depth=depth,
+        base_angle=_base_angle(photos, steps),
     )
-    number = {name: n for n, name in enumerate(observations.point_ids)}
-    points = np.array([number.get(name, -1) for name in control.ids], np.intp)
-    given = np.flatnonzero((points >= 0) & (total[points] > 0))
-    here = mean[points[given]]
-    depth = strip.camera.principal_distance * float(np.median(np.abs(layout.factor)))
-    xyz = np.column_stack([here.real, here.imag, np.full(len(here), np.nan)])
-    centers = np.column_stack([layout.center.real, layout.center.imag, np.full(len(photos), depth)])
-    up = np.array([[0.0, 0.0, 1.0]])
-    seen = Seen(strip.id, xyz, up, centers, (MOSAIC_SIGMA, MOSAIC_SIGMA), depth, _base_angle(photos, steps))
-    return given, seen
 
 
-def _richest(strip: Strip, observations: PhotoPoints, control: ControlPoints) -> tuple[str, ...]:
+def _photos_with_most(strip: Strip, observations: PhotoPoints, control: ControlPoints) -> tuple[str, ...]:
     """Photos in a row that show most given points in plan."""
-    if len(strip.photos) <= WINDOW:
+    if len(strip.photos) <= MOSAIC_PHOTOS:
         return strip.photos
     given = {name for name, use in zip(control.ids, control.use[:, 0], strict=True) if use}
     wanted = np.array([name in given for name in observations.point_ids], bool)[observations.point]
-    count = dict.fromkeys(observations.photo_ids, 0)
-    for number, hits in enumerate(np.bincount(observations.photo[wanted], minlength=len(observations.photo_ids))):
-        count[observations.photo_ids[number]] = int(hits)
-    sums = np.convolve([count.get(photo, 0) for photo in strip.photos], np.ones(WINDOW), "valid")
-    first = int(sums.argmax())
-    return strip.photos[first : first + WINDOW]
+    position = _positions(observations, strip.photos)[wanted]
+    count = np.bincount(position[position >= 0], minlength=len(strip.photos))
+    first = int(np.convolve(count, np.ones(MOSAIC_PHOTOS), "valid").argmax())
+    return strip.photos[first : first + MOSAIC_PHOTOS]
 
 
-def stations(
+# ------------------------------------------------------------------------------------------- places along a strip
+
+
+def places_along_strip(
     strip: Strip, observations: PhotoPoints, control: ControlPoints, steps: Mapping[str, complex]
 ) -> tuple[Numbers, Floats]:
-    """Give where along a strip given points lie.
-
-    Parameters
-    ----------
-    observations : PhotoPoints
-        Image points, mm.
-    steps : mapping of str to complex
-        Centre of the next photo on each photo, mm.
+    """Say where along a strip given points lie.
 
     Returns
     -------
@@ -313,26 +274,18 @@ def stations(
     place : ndarray, shape (m,)
         Where they lie along the strip in bases, from 0 at the first photo; the mean of what its photos say.
     """
-    rows, along = places(strip, observations, steps)
+    rows, along = places_in_photos(strip, observations, steps)
     size = len(observations.point_ids)
     count = np.bincount(observations.point[rows], minlength=size)
     total = np.bincount(observations.point[rows], along, size)
-    number = {name: n for n, name in enumerate(observations.point_ids)}
-    points = np.array([number.get(name, -1) for name in control.ids], np.intp)
-    seen = np.flatnonzero((points >= 0) & (count[points] >= SEEN_BY))
-    chosen = points[seen]
-    return seen, total[chosen] / count[chosen]
+    numbers = _point_numbers(observations, control.ids)
+    given = np.flatnonzero((numbers >= 0) & (count[numbers] >= LEAST_RAYS))
+    chosen = numbers[given]
+    return given, total[chosen] / count[chosen]
 
 
-def places(strip: Strip, observations: PhotoPoints, steps: Mapping[str, complex]) -> tuple[Numbers, Floats]:
-    """Give where each photo of a strip puts its points along the strip.
-
-    Parameters
-    ----------
-    observations : PhotoPoints
-        Image points, mm.
-    steps : mapping of str to complex
-        Centre of the next photo on each photo, mm.
+def places_in_photos(strip: Strip, observations: PhotoPoints, steps: Mapping[str, complex]) -> tuple[Numbers, Floats]:
+    """Say where each photo of a strip puts its points along the strip.
 
     Returns
     -------
@@ -341,8 +294,7 @@ def places(strip: Strip, observations: PhotoPoints, steps: Mapping[str, complex]
     along : ndarray, shape (m,)
         Their places in bases, from 0 at the first photo.
     """
-    order = {photo: number for number, photo in enumerate(strip.photos)}
-    position = np.array([order.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo]
+    position = _positions(observations, strip.photos)
     rows = np.flatnonzero(position >= 0)
     step = np.array([steps.get(photo, complex("nan")) for photo in strip.photos])
     known = np.isfinite(step) & (step != 0)
@@ -355,24 +307,11 @@ def places(strip: Strip, observations: PhotoPoints, steps: Mapping[str, complex]
 def half_breadth(
     strip: Strip, observations: PhotoPoints, ids: Sequence[str], plan: Floats, steps: Mapping[str, complex]
 ) -> float:
-    """Give half the breadth of a strip.
+    """Half the breadth of a strip, metres; infinite when no photo shows two given points.
 
-    Parameters
-    ----------
-    observations : PhotoPoints
-        Image points, mm.
-    plan : ndarray, shape (n, 2)
-        Their plan coordinates in metres.
-    steps : mapping of str to complex
-        Centre of the next photo on each photo, mm.
-
-    Returns
-    -------
-    float
-        Metres, with the scale of photos that show two given points or more; infinite when there is none.
+    The scale is that of photos that show two given points or more, whose plan coordinates are `plan` (n, 2), metres.
     """
-    members = set(strip.photos)
-    inside = np.array([name in members for name in observations.photo_ids], bool)[observations.photo]
+    inside = _positions(observations, strip.photos) >= 0
     angle = _base_angle(strip.photos, steps)
     across = observations.xy[inside] @ [-np.sin(angle), np.cos(angle)]
     row_of = {name: row for row, name in enumerate(ids)}
@@ -387,4 +326,4 @@ def half_breadth(
     good = image > 0
     if not good.any():
         return float("inf")
-    return float(np.median(ground[good] / image[good]) * np.quantile(np.abs(across), BREADTH))
+    return float(np.median(ground[good] / image[good]) * np.quantile(np.abs(across), BREADTH_SHARE))

@@ -1,4 +1,4 @@
-"""What the gate looks at where models were measured: the strip of models, and given points as it sees them."""
+"""What the gate looks at where models were measured: the strip of models, and given points in it."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.errors import PhotostripError
+from photostrip.errors import GeometryError
 from photostrip.pipeline.models.model_strips import form_models
-from photostrip.triangulation.plausibility.control.control_strip import Seen
+from photostrip.triangulation.plausibility.control.control_strip import StripPoints
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -27,37 +27,33 @@ UP = np.array([0.0, 0.0, 1.0])  # of a strip of models with perspective centres
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
-    """A strip of models with centres, as the gate sees it."""
+class ModelStripEvidence:
+    """A strip of models with centres, and the given points in it."""
 
     strip: ModelStrip
     centers: Floats  # (f, 3): perspective centres of the photos that have one, in strip coordinates
     photos: tuple[str, ...]
     depth: Floats  # (f,): height of each above the points of its models
     rows: Numbers  # rows of the given points that the strip holds
-    seen: Seen
+    on_strip: StripPoints
     place: Floats  # place of each of them along the strip in bases, from 0 at the first photo
     breadth: float  # half breadth of the strip over its length
 
 
-def sights(models: MeasuredModels, control: ControlPoints, settings: Settings) -> Iterator[Sight]:
-    """Form the strips as far as that goes, for evidence alone.
-
-    Yields
-    ------
-    Sight
-        Of each strip that can be formed and has two perspective centres.
-    """
+def model_strips(models: MeasuredModels, control: ControlPoints, settings: Settings) -> Iterator[ModelStripEvidence]:
+    """Form the strips that can be formed and have two perspective centres, for evidence alone."""
     for strip in models.strips:
         try:
             formed = form_models(strip, models.points, settings)
-        except (PhotostripError, ArithmeticError, ValueError):
+        except (GeometryError, np.linalg.LinAlgError):
             continue
         if np.isfinite(formed.centers[:, 0]).sum() > 1:
-            yield _sight(strip, formed, control, models.points.point_ids)
+            yield _evidence(strip, formed, control, models.points.point_ids)
 
 
-def _sight(strip: ModelStrip, formed: FormedModels, control: ControlPoints, point_ids: Sequence[str]) -> Sight:
+def _evidence(
+    strip: ModelStrip, formed: FormedModels, control: ControlPoints, point_ids: Sequence[str]
+) -> ModelStripEvidence:
     known = np.flatnonzero(np.isfinite(formed.centers[:, 0]))
     centers, depth = formed.centers[known], _depths(formed)[known]
     number = {name: n for n, name in enumerate(point_ids)}
@@ -70,12 +66,21 @@ def _sight(strip: ModelStrip, formed: FormedModels, control: ControlPoints, poin
     variance *= (formed.places.scale[formed.models.model] ** 2 * formed.links.factor)[:, None]
     plan, height = np.sqrt(np.median(variance[:, :2])), np.sqrt(np.median(variance[:, 2]))
     floor = 2.0 * float(plan) / abs(middle), 2.0 * float(height) / abs(middle)
-    seen = Seen(strip.id, xyz, np.tile(UP, (len(centers), 1)), centers, floor, abs(middle))
+    axes = np.tile(UP, (len(centers), 1))
+    on_strip = StripPoints(strip.id, xyz, axes=axes, centers=centers, floor=floor, depth=abs(middle))
     along = np.interp(xyz[:, 0], centers[:, 0], known.astype(float))
     length = max(float(np.ptp(centers[:, 0])), 1e-9)
     breadth = float(np.quantile(np.abs(formed.xyz[:, 1] - np.median(formed.xyz[:, 1])), 0.95)) / length
-    photos = tuple(strip.photos[k] for k in known.tolist())
-    return Sight(strip, centers, photos, depth, rows, seen, along, breadth)
+    return ModelStripEvidence(
+        strip=strip,
+        centers=centers,
+        photos=tuple(strip.photos[k] for k in known.tolist()),
+        depth=depth,
+        rows=rows,
+        on_strip=on_strip,
+        place=along,
+        breadth=breadth,
+    )
 
 
 def _depths(formed: FormedModels) -> Floats:

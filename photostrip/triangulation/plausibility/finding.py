@@ -10,8 +10,12 @@ from photostrip.notes import Finding
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
+Evidence = dict[str, float | int | str]  # the numbers behind a finding; names end with the unit
 ERROR = "error"
 WARNING = "warning"
+
+
+MOST_NAMED = 8  # ids in one message
 
 
 class Kind(NamedTuple):
@@ -65,25 +69,14 @@ def found(
     strips: Iterable[str] = (),
     key: str = "",
 ) -> Finding:
-    """Make a finding of a known kind.
-
-    Parameters
-    ----------
-    code : str
-        Its kind, a key of ``KINDS``.
-
-    Returns
-    -------
-    Finding
-        With the title and the severity of its kind.
-    """
+    """Make a finding of a known kind, with its title and severity."""
     kind = KINDS[code]
     names = (tuple(photos), tuple(points), tuple(strips))
     return Finding(code, kind.title, kind.severity, message, fix, dict(evidence or {}), *names, key)
 
 
 def accepted(findings: Iterable[Finding], entries: Sequence[str]) -> tuple[Finding, ...]:
-    """Mark what the user has accepted, and bring all into the order in which they are told.
+    """Mark what the user has accepted, and bring all into the order of the report: every finding once, by code.
 
     Parameters
     ----------
@@ -91,16 +84,17 @@ def accepted(findings: Iterable[Finding], entries: Sequence[str]) -> tuple[Findi
         What was found; the same finding may come from two places.
     entries : sequence of str
         Codes, or ``code/id`` for one photo, point or strip.
-
-    Returns
-    -------
-    tuple of Finding
-        Every finding once, by code, in the order found.
     """
     codes = {entry for entry in entries if "/" not in entry}
     single = {(code, name) for code, _, name in (entry.partition("/") for entry in entries) if name}
-    told: dict[tuple[str, frozenset[str]], Finding] = {}
+    once: dict[tuple[str, frozenset[str]], Finding] = {}
     for each in findings:
-        taken = each.code in codes or any((each.code, name) in single for name in each.names)
-        told.setdefault((each.code, each.names), replace(each, accepted=taken))
-    return tuple(sorted(told.values(), key=lambda each: each.code))
+        is_accepted = each.code in codes or any((each.code, name) in single for name in each.names)
+        once.setdefault((each.code, each.names), replace(each, accepted=is_accepted))
+    return tuple(sorted(once.values(), key=lambda each: each.code))
+
+
+def listed(ids: Sequence[str]) -> str:
+    """Name the first of some photos or points in a message, and say how many more there are."""
+    more = len(ids) - MOST_NAMED
+    return ", ".join(ids[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")

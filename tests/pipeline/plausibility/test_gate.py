@@ -10,14 +10,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from photostrip.camera import Distortion
 from photostrip.cli.main import main
 from photostrip.errors import PhotostripError
 from photostrip.formats.output.simulation import inputs_of, project_files, settings_of
 from photostrip.geometry.rotation import angles
 from photostrip.pipeline import Settings, triangulate
 from photostrip.pipeline.inputs import GivenOrientations
-from photostrip.pipeline.plausibility import evidence, gate
-from photostrip.simulate import DIGITAL, Control, Film, Flight, GrossError, Ground, Image, Spec, Terrain, simulate
+from photostrip.pipeline.plausibility import evidence, gate, image_evidence
+from photostrip.points import PhotoPoints
+from photostrip.simulate import DIGITAL, FILM, Control, Film, Flight, GrossError, Ground, Image, Spec, Terrain, simulate
+from photostrip.triangulation.image_coordinates.corrections import undistort
 from photostrip.triangulation.plausibility.photos import flight_order
 from tests.pipeline.blocks import positions
 
@@ -402,7 +405,7 @@ def test_an_error_fails_a_run_that_is_done(tmp_path: Path, capsys: pytest.Captur
 def test_tilts_as_large_as_bases_are_no_wrong_order(seed: int) -> None:
     lens = Flight(photos=6, end_lap_percent=78.0, attitude_sigma_deg=(3.0, 3.0, 2.0))
     inputs = inputs_of(simulate(Spec(seed=seed, camera=DIGITAL, flight=lens)))
-    (screen,) = flight_order.examine(inputs.observations, "A", inputs.strips[0].photos)[0]
+    (screen,) = flight_order.find_wrong_order(inputs.observations, "A", inputs.strips[0].photos)[0]
     assert screen.code == "P201"  # side by side, the photos look exchanged
     assert gate.of_inputs(inputs, Settings()) == ()
     photos = [*inputs.strips[0].photos]
@@ -415,8 +418,8 @@ def test_tilts_as_large_as_bases_are_no_wrong_order(seed: int) -> None:
 def test_where_a_point_lies_along_a_strip_does_not_depend_on_the_end_lap(end_lap: float) -> None:
     made = simulate(Spec(seed=4, flight=Flight(photos=6, end_lap_percent=end_lap, attitude_sigma_deg=(2.0, 2.0, 2.0))))
     inputs = inputs_of(made)
-    examined = gate.before(inputs, Settings())
-    rows, place = evidence.stations(inputs.strips[0], examined.observations, inputs.control, examined.steps)
+    images = image_evidence.of_images(inputs, Settings())
+    rows, place = evidence.places_along_strip(inputs.strips[0], images.observations, inputs.control, images.steps)
     index = {name: row for row, name in enumerate(made.truth.points.ids)}
     xyz = made.truth.points.xyz[[index[inputs.control.ids[row]] for row in rows]]
     first, last = made.truth.centers[0], made.truth.centers[-1]
@@ -500,3 +503,25 @@ def test_angles_of_a_bundle_in_another_unit_or_sense(observed: bool, read: list[
     )
     findings = told(replace(inputs, orientations=given), replace(settings_of(made), adjustment="bundle"))
     assert codes(findings) == ([] if code is None else [code])
+
+
+def test_evidence_is_free_of_distortion_though_a_photo_stands_twice_in_the_list() -> None:
+    lens = replace(FILM, distortion=Distortion("brown", "image_to_ideal", (1e-8, 0.0, 0.0)))
+    inputs = inputs_of(simulate(replace(strip(), camera=lens)))
+    o, (line,) = inputs.observations, inputs.strips
+    rows = o.photo == o.photo_ids.index(line.photos[2])
+    twin = PhotoPoints(
+        (*o.photo_ids, "twin"),
+        o.point_ids,
+        np.r_[o.photo, np.full(rows.sum(), len(o.photo_ids))],
+        np.r_[o.point, o.point[rows]],
+        np.r_[o.xy, o.xy[rows]],
+        np.r_[o.sigma, o.sigma[rows]],
+    )
+    listed = replace(line, photos=(*line.photos[:3], "twin", *line.photos[3:]))
+    wrong = replace(inputs, strips=(listed,), observations=twin)
+    images = image_evidence.of_images(wrong, Settings())
+    assert images.strips[0].photos == line.photos  # the twin has no place of its own, but a camera
+    ideal = evidence.ideal(images.observations, images.cameras, Settings())
+    assert ideal.xy == pytest.approx(undistort(twin.xy, lens), abs=1e-12)
+    assert codes(told(wrong)) == ["P203"]

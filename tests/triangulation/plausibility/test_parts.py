@@ -15,7 +15,7 @@ from photostrip.formats.output.simulation import inputs_of
 from photostrip.simulate.simulation import simulate
 from photostrip.simulate.spec import Flight, Spec, Terrain
 from photostrip.triangulation.plausibility.control import layout
-from photostrip.triangulation.plausibility.control.control_fit import bend, lay, upright
+from photostrip.triangulation.plausibility.control.control_fit import fit_robustly, fit_similarity, upright
 from photostrip.triangulation.plausibility.control.control_strip import Rays
 from photostrip.triangulation.plausibility.control.digits import slip
 from photostrip.triangulation.plausibility.photos import flight, flight_order, rotations
@@ -86,7 +86,7 @@ def flown(centers: Floats, depth: Floats | None = None) -> list[tuple[str, tuple
     names = [f"{number}" for number in range(len(centers))]
     height = np.full(len(centers), 150.0) if depth is None else depth
     up = np.array([0.0, 0.0, 1.0])
-    return [(each.code, each.photos) for each in flight.examine(centers, height, up, names, "A")]
+    return [(each.code, each.photos) for each in flight.find_odd_centers(centers, height, up, names, "A")]
 
 
 @given(st.integers(0, 10_000))
@@ -104,7 +104,7 @@ def test_a_photo_at_another_scale_is_named_by_the_images_alone(factor: float, ph
     xy = observations.xy.copy()
     xy[observations.photo == observations.photo_ids.index("1003")] *= factor
     strip = inputs_of(done).strips[0]
-    found = list(flight_order.other_scale(replace(observations, xy=xy), strip.id, strip.photos))
+    found = list(flight_order.find_other_scale(replace(observations, xy=xy), strip.id, strip.photos))
     assert [each.photos for each in found] == photos
     assert all(each.evidence["scale_over_neighbours"] == pytest.approx(factor, rel=0.1) for each in found)
 
@@ -132,7 +132,7 @@ def laid_out(along: list[float], across: list[float], photos: int = 8) -> list[s
     plan = np.column_stack([100.0 * np.array(along), 150.0 * np.array(across)])
     names = [f"G{number}" for number in range(len(along))]
     listed = [f"{number}" for number in range(photos)]
-    return [each.code for each in layout.examine(np.array(along), plan, 150.0, listed, "A", names)]
+    return [each.code for each in layout.find_weak_control(np.array(along), plan, 150.0, listed, "A", names)]
 
 
 def test_where_control_lies() -> None:
@@ -161,8 +161,8 @@ def attitudes(count: int = 6) -> tuple[Floats, Floats]:
 def test_angles_in_another_unit(factor: float, word: str) -> None:
     values, matrices = attitudes()
     names = [f"{number}" for number in range(len(values))]
-    assert list(rotations.examine(values, "omega-phi-kappa", matrices, names)) == []
-    (finding,) = rotations.examine(values * factor, "omega-phi-kappa", matrices, names)
+    assert list(rotations.find_wrong_angles(values, "omega-phi-kappa", matrices, names)) == []
+    (finding,) = rotations.find_wrong_angles(values * factor, "omega-phi-kappa", matrices, names)
     assert finding.code == "P601"
     assert f"; as {word} they differ by 0.00" in finding.message
     assert finding.evidence["rms_as_read_otherwise_deg"] == pytest.approx(0.0, abs=1e-6)
@@ -172,9 +172,11 @@ def test_angles_in_another_system() -> None:
     values, matrices = attitudes()
     names = [f"{number}" for number in range(len(values))]
     for wrong in (values * [1, 1, -1], values + np.array([0, 0, np.pi / 2]), values * [-1, 1, 1]):
-        assert [each.code for each in rotations.examine(wrong, "omega-phi-kappa", matrices, names)] == ["P602"]
+        assert [each.code for each in rotations.find_wrong_angles(wrong, "omega-phi-kappa", matrices, names)] == [
+            "P602"
+        ]
     rough = values + np.random.default_rng(1).normal(0, np.radians(3), values.shape)
-    assert list(rotations.examine(rough, "omega-phi-kappa", matrices, names)) == []
+    assert list(rotations.find_wrong_angles(rough, "omega-phi-kappa", matrices, names)) == []
 
 
 # --------------------------------------------------------------------------------------------------------- fits
@@ -188,11 +190,11 @@ def test_a_strip_is_laid_on_control_of_which_a_third_is_wrong(seed: int, mirrore
     turn = 50.0 * np.exp(1j * rng.uniform(-3, 3))
     plan = turn * (np.conj(w) if mirrored else w) + (3e5 + 5e6j)
     plan[:4] += rng.uniform(100, 1e5, 4) * np.exp(1j * rng.uniform(-3, 3, 4))
-    right, wrong = lay(w, plan, mirrored=mirrored), lay(w, plan, mirrored=not mirrored)
+    right, wrong = fit_similarity(w, plan, mirrored=mirrored), fit_similarity(w, plan, mirrored=not mirrored)
     assert right is not None
     assert wrong is not None
-    assert right.middle < 1e-6
-    assert wrong.middle > 1.0
+    assert right.median < 1e-6
+    assert wrong.median > 1.0
     assert right.turn == pytest.approx(turn, rel=1e-9)
 
 
@@ -203,7 +205,7 @@ def test_a_fit_is_not_disturbed_by_wrong_values(seed: int) -> None:
     columns = np.column_stack([np.ones(15), rng.uniform(-1, 1, (15, 2))])
     values = columns @ [3.0, -2.0, 1.0] + rng.normal(0, 0.01, 15)
     values[[2, 7, 11]] += rng.choice([-1, 1], 3) * rng.uniform(5, 1e4, 3)
-    fit = bend(columns, values, np.ones(15, bool), 0.01)
+    fit = fit_robustly(columns, values, np.ones(15, bool), 0.01)
     assert np.flatnonzero(fit.odd).tolist() == [2, 7, 11]
     assert fit.coefficient == pytest.approx([3.0, -2.0, 1.0], abs=0.06)
 

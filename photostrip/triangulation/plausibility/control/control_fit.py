@@ -23,28 +23,29 @@ if TYPE_CHECKING:
     Complex = NDArray[np.complex128]
     Flags = NDArray[np.bool_]
 
-LEAST = 3  # points in plan; two always fit
+LEAST_POINTS = 3  # in plan; two always fit
+PLAN_UNKNOWNS = 2  # complex ones: turn and shift
 MOST_PAIRS = 1500  # tried
-MOST_POINTS = 400  # from which the middle misclosure is taken
-FAR = 0.25  # of the largest distance: two points that give a similarity
+MEDIAN_POINTS = 400  # at most, from which a median misclosure is taken
+LEAST_PAIR_DISTANCE = 0.25  # of the largest distance: two points that give a similarity
 DRAWS = 250  # of as many points as unknowns, for a start that wrong points do not disturb
-WORST = 1e6  # condition number of such a draw
-NORMAL = 1.4826
-STEPS, ROBUST_STEPS = 12, 8
-KEPT = 5.0  # robust standard deviations within which a point goes with the others
-TAIL = 1e-6  # probability that a good point is called odd
-SMALL = 1e-9
+WORST_CONDITION = 1e6  # condition number of such a draw
+SIGMA_OF_MEDIAN = 1.4826  # standard deviation over median of the sizes of normal errors
+PLAN_REFITS = 3
+REWEIGHTINGS, SOFT_REWEIGHTINGS = 12, 8  # of a robust fit: in all, and with weights that fall slowly
+KEPT_SIGMAS = 5.0  # robust standard deviations within which a point goes with the others
+ODD_PROBABILITY = 1e-6  # that a good point is called odd
+TINY = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Laid:
-    """A strip laid on given points in plan."""
+class PlanSimilarity:
+    """Plan from strip: E + iN = turn w + shift, with conj(w) where the strip is mirrored."""
 
-    # turn, shift: plan from strip: E + iN = turn w + shift, with conj(w) where `mirrored`
     turn: complex
     shift: complex
-    mirrored: bool  # whether the strip was mirrored
-    middle: float  # misclosure that a good half of the points does not exceed, metres
+    mirrored: bool
+    median: float  # misclosure that a good half of the points does not exceed, metres
 
     @property
     def matrix(self) -> Floats:
@@ -60,28 +61,20 @@ class Laid:
 
 
 def upright(axes: Floats) -> Floats:
-    """Rotation that turns a strip upright.
-
-    Parameters
-    ----------
-    axes : ndarray, shape (n, 3)
-        Third axes of the photos in the strip's frame: from the ground to the camera.
-
-    Returns
-    -------
-    ndarray, shape (3, 3)
-        Rotation that takes their mean to (0, 0, 1).
-    """
+    """Rotation (3, 3) that takes the mean of the photos' third axes (n, 3), from the ground to the cameras, to up."""
     up = axes.mean(axis=0)
-    up /= max(float(np.linalg.norm(up)), SMALL)
+    up /= max(float(np.linalg.norm(up)), TINY)
     helper = np.eye(3)[int(np.abs(up).argmin())]
     first = np.cross(helper, up)
     first /= np.linalg.norm(first)
     return np.array([first, np.cross(up, first), up])
 
 
-def lay(w: Complex, plan: Complex, *, mirrored: bool = False) -> Laid | None:
+def fit_similarity(w: Complex, plan: Complex, *, mirrored: bool = False) -> PlanSimilarity | None:
     """Lay a strip on given points in plan.
+
+    The similarity through two points whose median misclosure over all points is the smallest of all pairs of points,
+    then fitted to the better half by least squares. Up to nearly half of the points may be wrong.
 
     Parameters
     ----------
@@ -94,11 +87,12 @@ def lay(w: Complex, plan: Complex, *, mirrored: bool = False) -> Laid | None:
 
     Returns
     -------
-    Laid or None
-        The similarity with the smallest middle misclosure; None for fewer than three points, or when all stand at one
-        place.
+    PlanSimilarity or None
+        None for fewer than three points, or when all stand at one place.
+
+    Source: least median of squares (Rousseeuw 1984).
     """
-    if len(w) < LEAST:
+    if len(w) < LEAST_POINTS:
         return None
     z = np.conj(w) if mirrored else w
     i, j = _pairs(z, plan)
@@ -106,12 +100,22 @@ def lay(w: Complex, plan: Complex, *, mirrored: bool = False) -> Laid | None:
         return None
     turn = (plan[j] - plan[i]) / (z[j] - z[i])
     shift = plan[i] - turn * z[i]
-    some = np.unique(np.linspace(0, len(z) - 1, min(len(z), MOST_POINTS)).astype(np.intp))
+    some = _evenly(len(z), MEDIAN_POINTS)
     size = np.abs(turn[:, None] * z[some] + shift[:, None] - plan[some])
-    place = min((len(some) + LEAST) // 2, len(some)) - 1
-    middle = np.partition(size, place, axis=1)[:, place]
-    best = int(middle.argmin())
+    best = int(_median(size, PLAN_UNKNOWNS).argmin())
     return _refined(z, plan, complex(turn[best]), complex(shift[best]), mirrored=mirrored)
+
+
+def _evenly(count: int, most: int) -> NDArray[np.intp]:
+    """Numbers below a count, evenly drawn from all where there are too many."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.intp))
+
+
+def _median(size: Floats, unknowns: int) -> Floats:
+    """Size that a good half does not exceed, row by row; the points that a fit goes through do not count."""
+    count = size.shape[-1]
+    place = min((count + unknowns + 1) // 2, count) - 1
+    return np.asarray(np.partition(size, place, axis=-1)[..., place])
 
 
 def _pairs(z: Complex, plan: Complex) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -123,27 +127,26 @@ def _pairs(z: Complex, plan: Complex) -> tuple[NDArray[np.intp], NDArray[np.intp
     else:
         i, j = np.triu_indices(n, 1)
     far = np.abs(z[j] - z[i])
-    keep = np.flatnonzero((far > FAR * far.max(initial=0.0)) & (far > 0) & (np.abs(plan[j] - plan[i]) > SMALL))
+    enough = far > LEAST_PAIR_DISTANCE * far.max(initial=0.0)
+    keep = np.flatnonzero(enough & (far > 0) & (np.abs(plan[j] - plan[i]) > TINY))
     if len(keep) > MOST_PAIRS:
         keep = keep[np.linspace(0, len(keep) - 1, MOST_PAIRS).astype(np.intp)]
     return i[keep].astype(np.intp), j[keep].astype(np.intp)
 
 
-def _refined(z: Complex, plan: Complex, turn: complex, shift: complex, *, mirrored: bool) -> Laid:
+def _refined(z: Complex, plan: Complex, turn: complex, shift: complex, *, mirrored: bool) -> PlanSimilarity:
     """Fit the better half of the points by least squares."""
-    place = min((len(z) + LEAST) // 2, len(z)) - 1
-    for _ in range(3):
+    for _ in range(PLAN_REFITS):
         size = np.abs(turn * z + shift - plan)
-        middle = float(np.partition(size, place)[place])
-        good = size <= max(2.5 * NORMAL * middle, SMALL)
+        good = size <= max(2.5 * SIGMA_OF_MEDIAN * float(_median(size, PLAN_UNKNOWNS)), TINY)
         d, t = z[good] - z[good].mean(), plan[good] - plan[good].mean()
         squares = float((np.abs(d) ** 2).sum())
-        if squares < SMALL:
+        if squares < TINY:
             break
         turn = complex((np.conj(d) * t).sum() / squares)
         shift = complex(plan[good].mean() - turn * z[good].mean())
     size = np.abs(turn * z + shift - plan)
-    return Laid(turn, shift, mirrored, float(np.partition(size, place)[place]))
+    return PlanSimilarity(turn, shift, mirrored, float(_median(size, PLAN_UNKNOWNS)))
 
 
 def _least_median(columns: NDArray[Any], values: NDArray[Any], rows: NDArray[np.intp]) -> Floats | None:
@@ -155,30 +158,26 @@ def _least_median(columns: NDArray[Any], values: NDArray[Any], rows: NDArray[np.
     chosen = rows[np.argpartition(draw, unknowns - 1, axis=1)[:, :unknowns]]
     with np.errstate(all="ignore"):
         design = columns[chosen]
-        sound = np.linalg.cond(design) < WORST
+        sound = np.linalg.cond(design) < WORST_CONDITION
         if not sound.any():
             return None
         coefficient = np.linalg.solve(design[sound], values[chosen[sound]][:, :, None])[:, :, 0]
-    some = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MOST_POINTS)).astype(np.intp))]
-    size = np.abs(values[some] - coefficient @ columns[some].T)
-    place = min((len(some) + unknowns + 1) // 2, len(some)) - 1
-    best = int(np.partition(size, place, axis=1)[:, place].argmin())
+    some = rows[_evenly(len(rows), MEDIAN_POINTS)]
+    best = int(_median(np.abs(values[some] - coefficient @ columns[some].T), unknowns).argmin())
     result: Floats = np.abs(values - columns @ coefficient[best])
     return result
 
 
 def _robust(size: Floats, unknowns: int) -> float:
     """Robust standard deviation of residuals of a fit; some of them are zero only because it is one."""
-    count = len(size)
-    place = min((count + unknowns + 1) // 2, count) - 1
-    if place < 0:
+    if not len(size):
         return 0.0
-    return NORMAL * float(np.partition(size, place)[place]) * (1.0 + 2.0 / max(count - unknowns, 1))
+    return SIGMA_OF_MEDIAN * float(_median(size, unknowns)) * (1.0 + 2.0 / max(len(size) - unknowns, 1))
 
 
 @dataclass(frozen=True, eq=False)
-class Bent:
-    """What is left at given points after a strip was laid on them and its bending taken out."""
+class RobustFit:
+    """A fit that wrong points do not disturb, for example of the bending of a strip."""
 
     residual: NDArray[Any]  # (n,): given minus predicted, metres; of every point, whether it took part or not
     # (n,): standard deviation of a residual of a point that did not take part, in each direction; metres
@@ -196,7 +195,7 @@ class Bent:
         """Residuals beyond which a point contradicts the others, shape (n,), metres."""
         if self.freedom < 1:
             return np.full(len(self.spread), np.inf)
-        return self.spread * t_quantile(1 - TAIL, self.freedom)
+        return self.spread * t_quantile(1 - ODD_PROBABILITY, self.freedom)
 
     @property
     def odd(self) -> Flags:
@@ -205,8 +204,11 @@ class Bent:
         return found
 
 
-def bend(columns: NDArray[Any], values: NDArray[Any], took_part: Flags, floor: float) -> Bent:
+def fit_robustly(columns: NDArray[Any], values: NDArray[Any], in_fit: Flags, floor: float) -> RobustFit:
     """Fit columns to values, with less and less weight for what does not go with the others.
+
+    It starts from the fit through as many points as unknowns whose median residual is smallest, goes on with weights
+    that fall with the residual, and ends with the points that go with each other, all of one weight.
 
     Parameters
     ----------
@@ -214,32 +216,27 @@ def bend(columns: NDArray[Any], values: NDArray[Any], took_part: Flags, floor: f
         Columns, the same for all points.
     values : ndarray of float or complex, shape (n,)
         Values, metres.
-    took_part : ndarray of bool, shape (n,)
+    in_fit : ndarray of bool, shape (n,)
         Points that may take part.
     floor : float
         Smallest standard deviation that makes sense, metres.
-
-    Returns
-    -------
-    Bent
-        The fit, its residuals, and which points go with it.
     """
-    size = np.maximum(np.abs(columns[took_part]).max(axis=0, initial=SMALL), SMALL)
+    size = np.maximum(np.abs(columns[in_fit]).max(axis=0, initial=TINY), TINY)
     scaled = columns / size
-    weight = took_part.astype(float)
-    first = _least_median(scaled, values, np.flatnonzero(took_part))
+    weight = in_fit.astype(float)
+    first = _least_median(scaled, values, np.flatnonzero(in_fit))
     if first is not None:
-        weight = took_part / np.maximum(first / max(_robust(first[took_part], columns.shape[1]), floor), 0.5) ** 2
+        weight = in_fit / np.maximum(first / max(_robust(first[in_fit], columns.shape[1]), floor), 0.5) ** 2
     coefficient, residual = np.zeros(columns.shape[1], values.dtype), values
-    for step in range(STEPS):
+    for step in range(REWEIGHTINGS):
         root = np.sqrt(weight)
         coefficient = np.linalg.lstsq(scaled * root[:, None], values * root, rcond=1e-9)[0]
         residual = values - scaled @ coefficient
-        middle = max(_robust(np.abs(residual[took_part]), columns.shape[1]), floor)
-        if step < ROBUST_STEPS:  # first by absolute residuals, then without what is far away
-            weight = took_part / np.maximum(np.abs(residual) / middle, 0.5)
+        middle = max(_robust(np.abs(residual[in_fit]), columns.shape[1]), floor)
+        if step < SOFT_REWEIGHTINGS:  # first by absolute residuals, then without what is far away
+            weight = in_fit / np.maximum(np.abs(residual) / middle, 0.5)
         else:
-            weight = (took_part & (np.abs(residual) < KEPT * middle)).astype(float)
+            weight = (in_fit & (np.abs(residual) < KEPT_SIGMAS * middle)).astype(float)
     used = weight > 0
     parts = 2 if np.iscomplexobj(values) else 1
     freedom = parts * (int(used.sum()) - columns.shape[1])
@@ -249,4 +246,4 @@ def bend(columns: NDArray[Any], values: NDArray[Any], took_part: Flags, floor: f
     lever = np.einsum("ni,ij,nj->n", scaled, inverse, scaled.conj()).real
     sigma = np.sqrt(np.maximum(np.diag(inverse).real, 0.0)) * (sigma0 if freedom > 0 else np.inf)
     spread = np.sqrt(1.0 + np.maximum(lever, 0.0)) * (sigma0 if freedom > 0 else np.inf)
-    return Bent(residual, spread, used, coefficient / size, sigma / size, freedom, sigma0)
+    return RobustFit(residual, spread, used, coefficient / size, sigma / size, freedom, sigma0)

@@ -8,18 +8,25 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.statistics import t_quantile
-from photostrip.triangulation.plausibility.control.control_fit import KEPT, LEAST, Bent, bend, lay, upright
+from photostrip.triangulation.plausibility.control.control_fit import (
+    KEPT_SIGMAS,
+    LEAST_POINTS,
+    RobustFit,
+    fit_robustly,
+    fit_similarity,
+    upright,
+)
 from photostrip.triangulation.plausibility.control.control_strip import (
-    FEET_NEAR,
+    FEET_TOLERANCE,
     FOOT,
-    SPARE,
-    Fitted,
-    Given,
-    Level,
-    Seen,
-    levelled,
-    simplest,
-    straightened,
+    LEAST_REDUNDANCY,
+    GivenPoints,
+    LevelStrip,
+    StraightenedStrip,
+    StripPoints,
+    fit_simplest,
+    straighten,
+    turn_level,
 )
 from photostrip.triangulation.plausibility.finding import found
 
@@ -29,31 +36,32 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.notes import Finding
+    from photostrip.triangulation.plausibility.finding import Evidence
 
     Floats = NDArray[np.float64]
     Flags = NDArray[np.bool_]
 
-SURE = 1e-5  # probability of a finding where there is nothing to find
-SCALE_LEAST = 0.03  # of the ratio of heights to plan: a smaller one harms nobody and may be a bent strip
-OFFSET_LEAST = 8.0  # a-priori standard deviations of a height: a smaller constant does no harm
-GROUP_LEAST = 3
-ASIDE = 2  # more points that a bend leaves aside than a constant: it does not explain them
-EXPLAINED_BY_FEET = 0.75  # the same, for a ratio that would be a strange coincidence
-EXPLAINED = 0.5  # of what heights leave without it: what explains a bend of the strip as well explains nothing
+FALSE_ALARM = 1e-5  # probability of a finding where there is nothing to find
+LEAST_SCALE_ERROR = 0.03  # of the ratio of heights to plan: a smaller one harms nobody and may be a bent strip
+LEAST_OFFSET_SIGMAS = 8.0  # a-priori standard deviations of a height: a smaller constant does no harm
+LEAST_GROUP = 3
+MORE_ASIDE = 2  # more points that a bend leaves aside than a constant: it does not explain them
+EXPLAINED_SHARE_IN_FEET = 0.75  # the same, for a ratio that would be a strange coincidence
+EXPLAINED_SHARE = 0.5  # of what heights leave without it: what explains a bend of the strip as well explains nothing
 
 
 @dataclass(frozen=True, eq=False)
-class Heights:
+class HeightComparison:
     """Given heights against those of a strip."""
 
     # usable, took_part: (n,): heights that can be judged, and those that take part in the fit
     usable: Flags
-    took_part: Flags
+    in_fit: Flags
     value: Floats  # (n,): given minus height in the strip, metres
     columns: Floats  # (n, c): tilt and, where it is needed, bending
     whole: list[Floats]  # (n,): all columns of tilt and bending
     deviation: Floats  # (n,): heights in the strip, against their mean
-    scaled: Bent  # fit with the scale of the heights free; its last coefficient is that scale minus one
+    scaled: RobustFit  # fit with the scale of the heights free; its last coefficient is that scale minus one
 
     @property
     def ratio(self) -> tuple[float, float]:
@@ -61,38 +69,33 @@ class Heights:
         return 1.0 + float(self.scaled.coefficient[-1]), float(self.scaled.sigma[-1])
 
 
-def compare(given: Given, fitted: Fitted, judged: Flags) -> Heights | None:
-    """Compare given heights with those of a strip.
+def compare_heights(given: GivenPoints, fitted: StraightenedStrip, consistent: Flags) -> HeightComparison | None:
+    """Compare given heights with those of a strip; None when too few are given.
 
     Parameters
     ----------
-    judged : ndarray of bool, shape (n,)
+    consistent : ndarray of bool, shape (n,)
         Points of lists that go with each other.
-
-    Returns
-    -------
-    Heights or None
-        None when too few are given.
     """
-    usable = given.use[:, 2] & np.isfinite(given.level[:, 2]) & np.isfinite(fitted.height)
-    took_part = usable & ~given.check & judged
-    agreeing = took_part & ~(np.isfinite(fitted.plan.residual) & fitted.plan.odd)
-    took_part = agreeing if agreeing.sum() >= LEAST + SPARE else took_part
-    if took_part.sum() <= LEAST:
+    usable = given.use[:, 2] & np.isfinite(given.xyz[:, 2]) & np.isfinite(fitted.height)
+    in_fit = usable & ~given.check & consistent
+    agreeing = in_fit & ~(np.isfinite(fitted.plan.residual) & fitted.plan.odd)
+    in_fit = agreeing if agreeing.sum() >= LEAST_POINTS + LEAST_REDUNDANCY else in_fit
+    if in_fit.sum() <= LEAST_POINTS:
         return None
     x, y = fitted.along, fitted.across
     whole = [np.where(usable, each, 0.0) for each in (np.ones(len(x)), x, y, x**2, x * y)]
     height = np.where(usable, fitted.height, 0.0)
-    value = np.where(usable, given.level[:, 2], 0.0) - height
-    deviation = height - height[took_part].mean()
+    value = np.where(usable, given.xyz[:, 2], 0.0) - height
+    deviation = height - height[in_fit].mean()
     # a wrong scale of the heights must not pass for a bending strip
-    base, _ = simplest([deviation, *whole], 4, value, took_part, fitted.floor[1])
+    base, _ = fit_simplest([deviation, *whole], 4, value, in_fit, fitted.floor[1])
     base = base[:, 1:]
-    scaled = bend(np.column_stack([base, deviation]), value, took_part, fitted.floor[1])
-    return Heights(usable, took_part, value, base, whole, deviation, scaled)
+    scaled = fit_robustly(np.column_stack([base, deviation]), value, in_fit, fitted.floor[1])
+    return HeightComparison(usable, in_fit, value, base, whole, deviation, scaled)
 
 
-class Stretched(NamedTuple):
+class HeightStretch(NamedTuple):
     """How a strip fits the heights of its control."""
 
     ratio: float  # heights given over heights in the strip
@@ -101,47 +104,41 @@ class Stretched(NamedTuple):
     relief: float
 
 
-def stretched(given: Given, seen: Seen) -> Stretched | None:
-    """Estimate by how much the heights of a strip are stretched, for a trial with another principal distance.
-
-    Returns
-    -------
-    Stretched or None
-        None when that cannot be told.
-    """
-    turn = upright(seen.axes)
-    s = seen.xyz @ turn.T
+def height_stretch(given: GivenPoints, on_strip: StripPoints) -> HeightStretch | None:
+    """Estimate by how much the heights of a strip are stretched, for a trial with another principal distance."""
+    turn = upright(on_strip.axes)
+    s = on_strip.xyz @ turn.T
     w = s[:, 0] + 1j * s[:, 1]
-    took_part = given.use[:, 0] & ~given.check & np.isfinite(given.plan) & np.isfinite(w)
-    laid = lay(w[took_part], given.plan[took_part])
+    in_fit = given.use[:, 0] & ~given.check & np.isfinite(given.plan) & np.isfinite(w)
+    laid = fit_similarity(w[in_fit], given.plan[in_fit])
     if laid is None:
         return None
-    level = levelled(given, Level(w, s[:, 2], laid, turn, seen.depth), seen.floor[1], took_part)
-    fitted = straightened(given, level, seen.floor, took_part)
-    heights = compare(given, fitted, np.ones(len(w), bool))
-    if heights is None or heights.took_part.sum() < LEAST + SPARE:
+    level = turn_level(given, LevelStrip(w, s[:, 2], laid, turn, on_strip.depth), on_strip.floor[1], in_fit)
+    fitted = straighten(given, level, on_strip.floor, in_fit)
+    heights = compare_heights(given, fitted, np.ones(len(w), bool))
+    if heights is None or heights.in_fit.sum() < LEAST_POINTS + LEAST_REDUNDANCY:
         return None
-    tilt = np.column_stack(heights.whole[:LEAST])
-    plain = bend(tilt, heights.value, heights.took_part, fitted.floor[1])
-    free = bend(np.column_stack([tilt, heights.deviation]), heights.value, heights.took_part, fitted.floor[1])
-    size = np.abs(plain.residual[heights.took_part])
-    freedom = max(int(heights.took_part.sum()) - LEAST, 1)
-    misfit = float(np.sqrt((np.minimum(size, KEPT * np.median(size)) ** 2).sum() / freedom)) / fitted.floor[1]
-    whole, here = np.column_stack(heights.whole)[heights.took_part], heights.deviation[heights.took_part]
-    left = here - whole @ np.linalg.lstsq(whole, here, rcond=None)[0]
+    tilt = np.column_stack(heights.whole[:LEAST_POINTS])
+    plain = fit_robustly(tilt, heights.value, heights.in_fit, fitted.floor[1])
+    free = fit_robustly(np.column_stack([tilt, heights.deviation]), heights.value, heights.in_fit, fitted.floor[1])
+    size = np.abs(plain.residual[heights.in_fit])
+    freedom = max(int(heights.in_fit.sum()) - LEAST_POINTS, 1)
+    misfit = float(np.sqrt((np.minimum(size, KEPT_SIGMAS * np.median(size)) ** 2).sum() / freedom)) / fitted.floor[1]
+    whole, deviation = np.column_stack(heights.whole)[heights.in_fit], heights.deviation[heights.in_fit]
+    left = deviation - whole @ np.linalg.lstsq(whole, deviation, rcond=None)[0]
     relief = float(np.sqrt((left**2).mean())) / fitted.floor[1]
-    return Stretched(1.0 + float(free.coefficient[-1]), max(misfit, 1.0), relief)
+    return HeightStretch(1.0 + float(free.coefficient[-1]), max(misfit, 1.0), relief)
 
 
-def examine(given: Given, seen: Seen, heights: Heights, fit: Bent, floor: float) -> Iterator[Finding]:
-    """Examine the heights: their unit and sense, groups that are off by a constant.
+def find_wrong_heights(
+    given: GivenPoints, on_strip: StripPoints, heights: HeightComparison, fit: RobustFit, floor: float
+) -> Iterator[Finding]:
+    """Find heights of another unit or sense, and groups of heights that are off by a constant.
 
     Parameters
     ----------
-    heights : Heights
-        Their heights against those of the strip.
-    fit : Bent
-        What is left of them, tilt and bending taken out.
+    fit : RobustFit
+        What is left of the heights, tilt and bending taken out.
     floor : float
         Smallest standard deviation that makes sense, metres.
 
@@ -150,39 +147,41 @@ def examine(given: Given, seen: Seen, heights: Heights, fit: Bent, floor: float)
     Finding
         P105, P401, P404, P405, at most one.
     """
-    took_part = heights.took_part
+    in_fit = heights.in_fit
     ratio, sigma = heights.ratio
-    feet = min(abs(ratio * each - 1.0) for each in (FOOT, 1 / FOOT)) < FEET_NEAR
-    explains = heights.scaled.sigma0 < (EXPLAINED_BY_FEET if feet else EXPLAINED) * fit.sigma0
-    if explains and _significant(ratio - 1.0, sigma, heights.scaled.freedom, SCALE_LEAST):
-        yield _other_scale(seen, ratio, sigma, took_part)
+    feet = min(abs(ratio * each - 1.0) for each in (FOOT, 1 / FOOT)) < FEET_TOLERANCE
+    explains = heights.scaled.sigma0 < (EXPLAINED_SHARE_IN_FEET if feet else EXPLAINED_SHARE) * fit.sigma0
+    if explains and _significant(ratio - 1.0, sigma, heights.scaled.freedom, LEAST_SCALE_ERROR):
+        yield _other_scale(on_strip, ratio, sigma, in_fit)
         return
-    for names, inside, key in _groups(given, took_part):
-        _, offset = simplest([inside.astype(float), *heights.whole], 4, heights.value, took_part, floor)
+    for names, inside, key in _groups(given, in_fit):
+        _, offset = fit_simplest([inside.astype(float), *heights.whole], 4, heights.value, in_fit, floor)
         size, sigma = float(offset.coefficient[0]), float(offset.sigma[0])
-        bending = simplest(heights.whole, 3, heights.value, took_part, floor)[1]
+        bending = fit_simplest(heights.whole, 3, heights.value, in_fit, floor)[1]
         # a bend may leave all points with more, or some of them aside as if they were wrong
-        aside = int((took_part & ~bending.used).sum()) - int((took_part & ~offset.used).sum())
-        explains = offset.sigma0 < EXPLAINED * bending.sigma0 or aside >= ASIDE
-        if explains and _significant(size, sigma, offset.freedom, OFFSET_LEAST * floor):
-            yield _other_heights(given, seen, names, key, size, sigma, inside & took_part)
+        aside = int((in_fit & ~bending.used).sum()) - int((in_fit & ~offset.used).sum())
+        explains = offset.sigma0 < EXPLAINED_SHARE * bending.sigma0 or aside >= MORE_ASIDE
+        if explains and _significant(size, sigma, offset.freedom, LEAST_OFFSET_SIGMAS * floor):
+            yield _other_heights(given, on_strip, names, key, size, sigma, inside & in_fit)
             return
 
 
 def _significant(value: float, sigma: float, freedom: int, least: float) -> bool:
     if freedom < 1 or not np.isfinite(sigma):
         return False
-    return bool(abs(value) > max(t_quantile(1 - SURE, freedom) * sigma, least))
+    return bool(abs(value) > max(t_quantile(1 - FALSE_ALARM, freedom) * sigma, least))
 
 
-def _other_scale(seen: Seen, ratio: float, sigma: float, took_part: Flags) -> Finding:
+def _other_scale(on_strip: StripPoints, ratio: float, sigma: float, in_fit: Flags) -> Finding:
     """Say why heights are stretched against the plan."""
-    evidence: dict[str, float | int | str] = {
-        "heights_given_over_strip": ratio, "its_standard_deviation": sigma, "points": int(took_part.sum())
-    }  # fmt: skip
-    head = f"strip {seen.strip}: heights of the control are {ratio:.3f} ± {sigma:.3f} times those of the strip"
-    strips = (seen.strip,)
-    near = max(FEET_NEAR, 4.0 * sigma / abs(ratio))
+    evidence: Evidence = {
+        "heights_given_over_strip": ratio,
+        "its_standard_deviation": sigma,
+        "points": int(in_fit.sum()),
+    }
+    head = f"strip {on_strip.strip}: heights of the control are {ratio:.3f} ± {sigma:.3f} times those of the strip"
+    strips = (on_strip.strip,)
+    near = max(FEET_TOLERANCE, 4.0 * sigma / abs(ratio))
     if ratio < 0:
         message = f"{head}: they are counted downwards"
         return found("P401", message, "give heights, positive upwards", evidence, strips=strips, key="control")
@@ -196,23 +195,25 @@ def _other_scale(seen: Seen, ratio: float, sigma: float, took_part: Flags) -> Fi
     return found("P105", message, fix, evidence, strips=strips, key="cameras")
 
 
-def _groups(given: Given, took_part: Flags) -> Iterator[tuple[str, Flags, str]]:
+def _groups(given: GivenPoints, in_fit: Flags) -> Iterator[tuple[str, Flags, str]]:
     """Give groups of heights that may be of another kind: lists, and points without plan."""
-    for number in np.unique(given.group[took_part])[1:].tolist():
+    for number in np.unique(given.group[in_fit])[1:].tolist():
         inside = given.group == number
-        if min((inside & took_part).sum(), (~inside & took_part).sum()) >= GROUP_LEAST:
+        if min((inside & in_fit).sum(), (~inside & in_fit).sum()) >= LEAST_GROUP:
             yield f"control[{number}]", inside, f"control[{number}].height"
     alone = ~given.use[:, 0]
-    if min((alone & took_part).sum(), (~alone & took_part).sum()) >= GROUP_LEAST:
+    if min((alone & in_fit).sum(), (~alone & in_fit).sum()) >= LEAST_GROUP:
         yield "the points given in height only", alone, "control"
 
 
-def _other_heights(given: Given, seen: Seen, names: str, key: str, size: float, sigma: float, rows: Flags) -> Finding:
+def _other_heights(
+    given: GivenPoints, on_strip: StripPoints, names: str, key: str, size: float, sigma: float, rows: Flags
+) -> Finding:
     message = (
-        f"strip {seen.strip}: the heights of {names} differ from the others by a constant {size:+.2f} ± {sigma:.2f} m, "
-        "as ellipsoidal heights differ from those above the geoid"
+        f"strip {on_strip.strip}: the heights of {names} differ from the others by a constant "
+        f"{size:+.2f} ± {sigma:.2f} m, as ellipsoidal heights differ from those above the geoid"
     )
     evidence = {"constant_m": size, "its_standard_deviation_m": sigma, "points": int(rows.sum())}
     fix = "state `height` and `geoid_undulation` of each control list"
     points = tuple(given.ids[row] for row in np.flatnonzero(rows))
-    return found("P404", message, fix, evidence, points=points, strips=(seen.strip,), key=key)
+    return found("P404", message, fix, evidence, points=points, strips=(on_strip.strip,), key=key)

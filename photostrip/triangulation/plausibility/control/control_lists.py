@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.triangulation.plausibility.control.control_fit import Laid, lay
+from photostrip.triangulation.plausibility.control.control_fit import PlanSimilarity, fit_similarity
 from photostrip.triangulation.plausibility.control.control_strip import (
-    FEET_NEAR,
+    FEET_TOLERANCE,
     FOOT,
-    Given,
-    Level,
-    Seen,
-    straightened,
+    KINDS_OF_FEET,
+    GivenPoints,
+    LevelStrip,
+    StripPoints,
+    straighten,
 )
 from photostrip.triangulation.plausibility.finding import found
 
@@ -21,24 +23,27 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.notes import Finding
+    from photostrip.triangulation.plausibility.finding import Evidence
 
-    Complex = NDArray[np.complex128]
     Flags = NDArray[np.bool_]
 
-APART = 0.1  # of the distance from camera to ground: lists that lie nearer to each other go together
-PAIR = 2
-MOST_ODD = 0.6  # of the points of a list: beyond it the list is wrong, not its points
+LEAST_OFFSET = 0.1  # of the distance from camera to ground: lists that lie nearer to each other go together
+MOST_ODD_SHARE = 0.6  # of the points of a list: beyond it the list is wrong, not its points
+UNITS = (  # scale of a list against another, what happened, and the right unit
+    (FOOT, "metres read as feet", "the crs counts in feet, the numbers are metres"),
+    (1 / FOOT, "feet read as metres", f"a crs in feet, or metres in the table; {KINDS_OF_FEET}"),
+)
 
 
-def examine(given: Given, seen: Seen, level: Level, took_part: Flags) -> tuple[list[int], list[Finding]]:
+def find_foreign_lists(
+    given: GivenPoints, on_strip: StripPoints, level: LevelStrip, in_fit: Flags
+) -> tuple[list[int], list[Finding]]:
     """Find control lists that do not go with the largest one.
 
     Parameters
     ----------
-    level : Level
-        The strip, level and laid on them.
-    took_part : ndarray of bool, shape (n,)
-        Points on which it was laid.
+    in_fit : ndarray of bool, shape (n,)
+        Points on which the strip was laid.
 
     Returns
     -------
@@ -47,71 +52,54 @@ def examine(given: Given, seen: Seen, level: Level, took_part: Flags) -> tuple[l
     list of Finding
         P403, P407.
     """
-    numbers, counts = np.unique(given.group[took_part], return_counts=True)
+    numbers, counts = np.unique(given.group[in_fit], return_counts=True)
     if len(numbers) < 2:
         return [], []
-    own = {int(n): _own(given, level, took_part & (given.group == n)) for n in numbers}
+    alone = {int(n): _on_one_list(given, level, in_fit & (given.group == n)) for n in numbers}
     first = int(numbers[int(counts.argmax())])
-    reference = own[first]
+    reference = alone[first]
     if reference is None:
         return [], []
-    base = straightened(given, level._replace(laid=reference), seen.floor, took_part & (given.group == first))
-    wrong, told = [], []
+    on_reference = replace(level, similarity=reference)
+    base = straighten(given, on_reference, on_strip.floor, in_fit & (given.group == first))
+    wrong, findings = [], []
     for number in (int(each) for each in numbers if each != first):
-        rows = took_part & (given.group == number)
+        rows = in_fit & (given.group == number)
         off = base.plan.residual[rows]
-        limit = np.maximum(base.plan.limit[rows], APART * np.abs(reference.turn) * level.depth)
-        if (np.abs(off) > limit).mean() <= MOST_ODD:
+        limit = np.maximum(base.plan.limit[rows], LEAST_OFFSET * np.abs(reference.turn) * level.depth)
+        if (np.abs(off) > limit).mean() <= MOST_ODD_SHARE:
             continue
         wrong.append(number)
-        told.append(_other_frame(given, seen, own[number], reference, number, first, rows, off))
-    return wrong, told
+        scale = None if (own := alone[number]) is None else abs(own.turn) / abs(reference.turn)
+        shift = complex(np.median(off.real), np.median(off.imag))
+        names = tuple(given.ids[row] for row in np.flatnonzero(rows))
+        findings.append(_other_frame(on_strip, names, number, first, shift, scale))
+    return wrong, findings
 
 
-def _own(given: Given, level: Level, rows: Flags) -> Laid | None:
+def _on_one_list(given: GivenPoints, level: LevelStrip, rows: Flags) -> PlanSimilarity | None:
     """Lay the strip on one list alone; of two points their distance says the scale, if nothing else."""
     w, plan = level.w[rows], given.plan[rows]
-    if len(w) == PAIR and min(abs(w[1] - w[0]), abs(plan[1] - plan[0])) > 0:
+    if len(w) == 2 and min(abs(w[1] - w[0]), abs(plan[1] - plan[0])) > 0:
         turn = complex(abs(plan[1] - plan[0]) / abs(w[1] - w[0]))
-        return Laid(turn, 0j, level.laid.mirrored, 0.0)
-    return lay(w, plan, mirrored=level.laid.mirrored)
+        return PlanSimilarity(turn, 0j, level.similarity.mirrored, 0.0)
+    return fit_similarity(w, plan, mirrored=level.similarity.mirrored)
 
 
 def _other_frame(
-    given: Given,
-    seen: Seen,
-    own: Laid | None,
-    reference: Laid,
-    number: int,
-    first: int,
-    rows: Flags,
-    off: Complex,
+    on_strip: StripPoints, names: tuple[str, ...], number: int, first: int, shift: complex, scale: float | None
 ) -> Finding:
-    """Say how a list differs from the largest one."""
-    names = tuple(given.ids[row] for row in np.flatnonzero(rows))
-    shift = complex(np.median(off.real), np.median(off.imag))
-    evidence: dict[str, float | int | str] = {
-        "points": len(names), "offset_east_m": shift.real, "offset_north_m": shift.imag
-    }  # fmt: skip
-    head = f"control[{number}] does not go with control[{first}] on strip {seen.strip}"
+    """Say how a list differs from the largest one: its shift, and its scale where that is known."""
+    evidence: Evidence = {"points": len(names), "offset_east_m": shift.real, "offset_north_m": shift.imag}
+    head = f"control[{number}] does not go with control[{first}] on strip {on_strip.strip}"
     key = f"control[{number}]"
-    if own is not None:
-        ratio = abs(own.turn) / abs(reference.turn)
-        evidence["scale_against_other_list"] = ratio
-        for feet, text, where in ((FOOT, "metres read as feet", "feet"), (1 / FOOT, "feet read as metres", "metres")):
-            if abs(ratio / feet - 1.0) < FEET_NEAR:
-                message = f"{head}: its distances are {ratio:.4f} times as long: {text}"
-                fix = f"name the right unit: {_feet_fix(where)}"
-                return found("P403", message, fix, evidence, points=names, strips=(seen.strip,), key=key)
+    if scale is not None:
+        evidence["scale_against_other_list"] = scale
+        for feet, text, unit in UNITS:
+            if abs(scale / feet - 1.0) < FEET_TOLERANCE:
+                message = f"{head}: its distances are {scale:.4f} times as long: {text}"
+                fix = f"name the right unit: {unit}"
+                return found("P403", message, fix, evidence, points=names, strips=(on_strip.strip,), key=key)
     message = f"{head}: its points lie {abs(shift):.5g} m away ({shift.real:+.5g} m east, {shift.imag:+.5g} m north)"
     fix = "is its crs the right one: zone, datum, false easting?"
-    return found("P407", message, fix, evidence, points=names, strips=(seen.strip,), key=key)
-
-
-def _feet_fix(where: str) -> str:
-    if where == "feet":
-        return "the crs counts in feet, the numbers are metres"
-    return (
-        "a crs in feet, or metres in the table; international feet (0.3048 m) and US survey feet (1200/3937 m) differ "
-        "by 2 ppm, 1.2 m at 600 km"
-    )
+    return found("P407", message, fix, evidence, points=names, strips=(on_strip.strip,), key=key)

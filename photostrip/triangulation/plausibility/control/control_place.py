@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from photostrip.errors import PhotostripError
-from photostrip.triangulation.plausibility.control.control_strip import FOOT
+from photostrip.errors import GeometryError, InputError
+from photostrip.triangulation.plausibility.control.control_strip import FOOT, KINDS_OF_FEET
 from photostrip.triangulation.plausibility.finding import found
 
 if TYPE_CHECKING:
@@ -21,18 +21,20 @@ if TYPE_CHECKING:
 
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.notes import Finding
+    from photostrip.triangulation.plausibility.finding import Evidence
 
     Floats = NDArray[np.float64]
 
 Area = tuple[float, float, float, float]
-MARGIN = (0.6, 0.25)  # of the width and the height of the area: a neighbouring zone is used on purpose at times
-MARGIN_LIMITS = (1.0, 4.0)  # degrees
-ROUND = 360.0  # degrees
-MOST = 0.5  # of the points that may lie outside: single points are slips
+MARGIN_SHARES = (0.6, 0.25)  # of the width and the height of the area: a neighbouring zone is used at times
+MARGIN_LIMITS_DEG = (1.0, 4.0)
+CIRCLE_DEG = 360.0
+MOST_OUTSIDE_SHARE = 0.5  # of the points: single ones are slips
+MOST_ROUND_TRIP = 1.0  # units of the frame between a point and where its geocentric coordinates lead back to
 MILLION = 1e6
 
 
-class Place(NamedTuple):
+class FramePlace(NamedTuple):
     """Where a control list lies."""
 
     findings: list[Finding]  # P401, P402, P403
@@ -42,49 +44,47 @@ class Place(NamedTuple):
     inside: bool  # whether it lies where its coordinate reference system is made for, as far as that is known
 
 
-def examine(frame: GroundFrame, area: Area | None, enu: Floats, number: int) -> Place:
-    """Compare the place of a control list with the area of its coordinate reference system.
+def find_wrong_place(frame: GroundFrame, area: Area | None, enu: Floats, number: int) -> FramePlace:
+    """Compare the place of control list `number` with the area of its coordinate reference system.
 
     Parameters
     ----------
-    frame : GroundFrame
-        Its frame.
-    area : tuple of float or None
-        West, south, east, north in degrees, when it is known.
+    area : Area or None
+        None when it is not known.
     enu : ndarray, shape (n, 3)
         Its points east, north, up, in the units of the frame.
     """
     known = enu[np.isfinite(enu[:, :2]).all(axis=1)]
     if area is None or not len(known) or frame.kind not in {"projected", "geographic"}:
-        return Place([], None, inside=True)
+        return FramePlace([], None, inside=True)
     level = np.column_stack([known[:, :2], np.zeros(len(known))])
     exchanged = level[:, [1, 0, 2]]
     if _inside(frame, area, level):
-        return Place([], None if _inside(frame, area, exchanged) else True, inside=True)
+        return FramePlace([], None if _inside(frame, area, exchanged) else True, inside=True)
     key = f"control[{number}]"
     where = _where(frame, level, known)
-    evidence: dict[str, float | int | str] = {
-        "area_west_deg": area[0], "area_south_deg": area[1], "area_east_deg": area[2], "area_north_deg": area[3]
-    }  # fmt: skip
+    evidence: Evidence = {
+        "area_west_deg": area[0],
+        "area_south_deg": area[1],
+        "area_east_deg": area[2],
+        "area_north_deg": area[3],
+    }
     head = f"{key} {where}, and {frame.title} is made for {area[0]:g} to {area[2]:g} E, {area[1]:g} to {area[3]:g} N"
     if _inside(frame, area, exchanged):
         message = f"{head}; with east and north exchanged it would lie there"
         fix = "put `control.axes` into the order of the columns"
-        return Place([found("P401", message, fix, evidence, key=f"{key}.axes")], sure=False, inside=False)
+        return FramePlace([found("P401", message, fix, evidence, key=f"{key}.axes")], sure=False, inside=False)
     for code, changed, what, fix in _readings(level):
         if _inside(frame, area, changed):
-            told = found(code, f"{head}; {what}", fix, evidence, key=f"{key}.crs")
-            return Place([told], sure=None, inside=False)
+            finding = found(code, f"{head}; {what}", fix, evidence, key=f"{key}.crs")
+            return FramePlace([finding], sure=None, inside=False)
     fix = "is the crs the right one: zone, datum, false easting and northing?"
-    return Place([found("P402", head, fix, evidence, key=f"{key}.crs")], sure=None, inside=False)
+    return FramePlace([found("P402", head, fix, evidence, key=f"{key}.crs")], sure=None, inside=False)
 
 
 def _readings(level: Floats) -> Iterator[tuple[str, Floats, str, str]]:
     """Give readings of coordinates with their code, what happened, and the cure."""
-    feet = (
-        "name a crs in feet, or convert the table; international feet (0.3048 m) and US survey feet (1200/3937 m) "
-        "differ by 2 ppm, 1.2 m at 600 km"
-    )
+    feet = f"name a crs in feet, or convert the table; {KINDS_OF_FEET}"
     yield "P403", level * FOOT, "read as feet it would lie there", feet
     yield "P403", level / FOOT, "read as metres it would lie there: the crs counts in feet", "name a crs in metres"
     yield "P403", level[:, [1, 0, 2]] * FOOT, "read as feet with exchanged axes it would lie there", feet
@@ -108,14 +108,15 @@ def _inside(frame: GroundFrame, area: Area, enu: Floats) -> bool:
     if degrees is None:
         return False
     west, south, east, north = area
-    width = (east - west) % ROUND or ROUND
+    width = (east - west) % CIRCLE_DEG or CIRCLE_DEG
     beside, above = (
-        float(np.clip(part * size, *MARGIN_LIMITS)) for part, size in zip(MARGIN, (width, north - south), strict=True)
+        float(np.clip(part * size, *MARGIN_LIMITS_DEG))
+        for part, size in zip(MARGIN_SHARES, (width, north - south), strict=True)
     )
-    lon = (degrees[:, 0] - west + beside) % ROUND
-    within = (lon <= width + 2.0 * beside) | (width + 2.0 * beside >= ROUND)
+    lon = (degrees[:, 0] - west + beside) % CIRCLE_DEG
+    within = (lon <= width + 2.0 * beside) | (width + 2.0 * beside >= CIRCLE_DEG)
     within &= (degrees[:, 1] >= south - above) & (degrees[:, 1] <= north + above)
-    return bool(within.mean() > MOST)
+    return bool(within.mean() > MOST_OUTSIDE_SHARE)
 
 
 def _degrees(frame: GroundFrame, enu: Floats) -> Floats | None:
@@ -124,10 +125,11 @@ def _degrees(frame: GroundFrame, enu: Floats) -> Floats | None:
         cartesian = frame.cartesian_from_ground(enu)
         degrees = np.degrees(frame.geodetic(cartesian)[:, :2])
         back = frame.difference(frame.ground_from_cartesian(cartesian), enu)
-    except (PhotostripError, ValueError, ArithmeticError):
+    except (GeometryError, InputError):
         return None
     # far from its zone a projection gives places from which no way leads back
-    sound = np.isfinite(degrees).all() and bool((np.abs(back[:, :2]).max(axis=1) < 1.0).mean() > MOST)
+    returned = np.abs(back[:, :2]).max(axis=1) < MOST_ROUND_TRIP
+    sound = np.isfinite(degrees).all() and bool(returned.mean() > MOST_OUTSIDE_SHARE)
     return degrees if sound else None
 
 

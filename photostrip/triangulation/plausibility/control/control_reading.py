@@ -1,28 +1,35 @@
-"""What given coordinates say against themselves, seen from a strip whose own coordinates are known.
+"""What given coordinates say against themselves, compared with a strip whose own coordinates are known.
 
 The strip is laid on its control (``control_fit``) as it is and as a mirror image, then its bending is taken out
 (``control_strip``); what is left says which list (``control_lists``), which kind of heights
-(``control_heights``) and which point (``control_slips``) does not go with the others. Points are judged by what
+(``control_heights``) and which point (``control_slips``) does not go with the others. Points are tested by what
 the others predict, check points too, but no check point ever takes part in a fit.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.triangulation.plausibility.control import control_heights, control_lists, control_slips
-from photostrip.triangulation.plausibility.control.control_fit import LEAST, Laid, bend, lay, upright
-from photostrip.triangulation.plausibility.control.control_slips import Left
+from photostrip.triangulation.plausibility.control.control_fit import (
+    LEAST_POINTS,
+    PlanSimilarity,
+    fit_robustly,
+    fit_similarity,
+    upright,
+)
+from photostrip.triangulation.plausibility.control.control_slips import Misclosures
 from photostrip.triangulation.plausibility.control.control_strip import (
     AXES,
-    Given,
-    Level,
-    Seen,
-    levelled,
-    rotated,
-    straightened,
+    GivenPoints,
+    LevelStrip,
+    StripPoints,
+    straighten,
+    turn_level,
+    upright_coordinates,
 )
 from photostrip.triangulation.plausibility.finding import found
 
@@ -32,20 +39,21 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.notes import Finding
+    from photostrip.triangulation.plausibility.finding import Evidence
 
     Complex = NDArray[np.complex128]
     Flags = NDArray[np.bool_]
 
-MIRRORED = 0.15  # of the plain to the mirrored middle misclosure
-FITS = 0.1  # of the extent of the control: a misclosure above it is no fit
+MIRRORED_SHARE = 0.15  # of the misclosure of the strip as it is, left when it is mirrored
+FIT_SHARE = 0.1  # of the extent of the control: a misclosure above it is no fit
 
 
-def examine(
-    given: Given,
-    seen: Seen,
+def find_wrong_readings(
+    given: GivenPoints,
+    on_strip: StripPoints,
     *,
     axes_are_right: bool | None = None,
-    exchanged: Callable[[], Given | None] = lambda: None,
+    exchanged: Callable[[], GivenPoints | None] = lambda: None,
 ) -> list[Finding]:
     """Compare given points with a strip.
 
@@ -62,68 +70,70 @@ def examine(
     list of Finding
         P103, P105, P401, P403 to P408.
     """
-    turn = upright(seen.axes)
-    s = seen.xyz @ turn.T if np.isfinite(seen.xyz).all() else rotated(seen.xyz, turn)
+    turn = upright(on_strip.axes)
+    s = upright_coordinates(on_strip.xyz, turn)
     w = s[:, 0] + 1j * s[:, 1]
-    took_part = given.use[:, 0] & ~given.check & np.isfinite(given.plan) & np.isfinite(w)
-    normal, mirror = (lay(w[took_part], given.plan[took_part], mirrored=each) for each in (False, True))
+    in_fit = given.use[:, 0] & ~given.check & np.isfinite(given.plan) & np.isfinite(w)
+    normal, mirror = (fit_similarity(w[in_fit], given.plan[in_fit], mirrored=each) for each in (False, True))
     if normal is None or mirror is None:
         return []
-    told: list[Finding] = []
-    extent = float(np.abs(given.plan[took_part] - given.plan[took_part].mean()).max())
+    findings: list[Finding] = []
+    extent = float(np.abs(given.plan[in_fit] - given.plan[in_fit].mean()).max())
     best = normal
-    if mirror.middle < MIRRORED * normal.middle and mirror.middle < FITS * extent:
+    if mirror.median < min(MIRRORED_SHARE * normal.median, FIT_SHARE * extent):
         best = mirror
-        told.append(_mirror(seen, normal, mirror, extent, axes_are_right=axes_are_right))
-    elif normal.middle > FITS * extent:
-        return _columns(given, exchanged(), seen, w, took_part, normal)
-    level = levelled(given, Level(w, s[:, 2], best, turn, seen.depth), seen.floor[1], took_part)
-    wrong_lists, lists = control_lists.examine(given, seen, level, took_part)
-    told += lists
+        findings.append(_mirror(on_strip, normal, mirror, extent, axes_are_right=axes_are_right))
+    elif normal.median > FIT_SHARE * extent:
+        return _columns(given, exchanged(), on_strip, w, in_fit, normal)
+    level = turn_level(given, LevelStrip(w, s[:, 2], best, turn, on_strip.depth), on_strip.floor[1], in_fit)
+    wrong_lists, lists = control_lists.find_foreign_lists(given, on_strip, level, in_fit)
+    findings += lists
     if wrong_lists:
-        took_part = took_part & ~np.isin(given.group, wrong_lists)
-        again = lay(level.w[took_part], given.plan[took_part], mirrored=level.laid.mirrored)
+        in_fit = in_fit & ~np.isin(given.group, wrong_lists)
+        again = fit_similarity(level.w[in_fit], given.plan[in_fit], mirrored=level.similarity.mirrored)
         if again is None:
-            return told
-        level = level._replace(laid=again)
-    fitted = straightened(given, level, seen.floor, took_part)
-    judged = ~np.isin(given.group, wrong_lists)
-    heights = control_heights.compare(given, fitted, judged)
+            return findings
+        level = replace(level, similarity=again)
+    fitted = straighten(given, level, on_strip.floor, in_fit)
+    consistent = ~np.isin(given.group, wrong_lists)
+    heights = control_heights.compare_heights(given, fitted, consistent)
     if heights is None:
-        left = Left(fitted.plan, None, np.zeros(len(judged), bool))
-        return [*told, *control_slips.examine(given, seen, fitted, judged, left)]
-    fit = bend(heights.columns, heights.value, heights.took_part, fitted.floor[1])
-    left = Left(fitted.plan, fit, heights.usable)
-    told += control_slips.examine(given, seen, fitted, judged, left)
-    whole = list(control_heights.examine(given, seen, heights, fit, fitted.floor[1]))
-    return told + (whole or list(control_slips.examine_heights(given, seen, fitted, judged, left)))
+        left = Misclosures(fitted.plan, height=None, usable=np.zeros(len(consistent), bool), consistent=consistent)
+        return [*findings, *control_slips.find_plan_slips(given, on_strip, fitted, left)]
+    fit = fit_robustly(heights.columns, heights.value, heights.in_fit, fitted.floor[1])
+    left = Misclosures(fitted.plan, fit, heights.usable, consistent)
+    findings += control_slips.find_plan_slips(given, on_strip, fitted, left)
+    whole = list(control_heights.find_wrong_heights(given, on_strip, heights, fit, fitted.floor[1]))
+    return findings + (whole or list(control_slips.find_height_slips(given, on_strip, fitted, left)))
 
 
 # ------------------------------------------------------------------------------------------ the strip as a whole
 
 
-def _mirror(seen: Seen, normal: Laid, mirror: Laid, extent: float, *, axes_are_right: bool | None) -> Finding:
-    evidence: dict[str, float | int | str] = {
-        "misclosure_as_given_m": normal.middle,
-        "misclosure_mirrored_m": mirror.middle,
+def _mirror(
+    on_strip: StripPoints, normal: PlanSimilarity, mirror: PlanSimilarity, extent: float, *, axes_are_right: bool | None
+) -> Finding:
+    evidence: Evidence = {
+        "misclosure_as_given_m": normal.median,
+        "misclosure_mirrored_m": mirror.median,
         "extent_of_control_m": extent,
-        "base_direction_on_photos_deg": float(np.degrees(seen.base_angle)),
+        "base_direction_on_photos_deg": float(np.degrees(on_strip.base_angle)),
     }
     fit = (
-        f"strip {seen.strip} fits its control only as a mirror image: middle misclosure in plan {normal.middle:.4g} m "
-        f"as given, {mirror.middle:.3g} m mirrored"
+        f"strip {on_strip.strip} fits its control only as a mirror image: middle misclosure in plan "
+        f"{normal.median:.4g} m as given, {mirror.median:.3g} m mirrored"
     )
     if axes_are_right:
         message = f"{fit}; the control lies where its coordinate reference system is, so the image coordinates are "
-        message += f"mirrored; {_how(seen.base_angle)}"
+        message += f"mirrored; {_how(on_strip.base_angle)}"
         fix = "correct `observations.y_axis`, the columns x and y, or the side from which the photos were measured"
-        return found("P103", message, fix, evidence, strips=(seen.strip,), key="observations.y_axis")
+        return found("P103", message, fix, evidence, strips=(on_strip.strip,), key="observations.y_axis")
     cause = "" if axes_are_right is None else ", and it lies outside its coordinate reference system"
     message = f"{fit}{cause}; the control is left-handed: its axes are exchanged or one of them counts backwards"
     if axes_are_right is None:
-        message += f"; or else the image coordinates are mirrored ({_how(seen.base_angle)})"
+        message += f"; or else the image coordinates are mirrored ({_how(on_strip.base_angle)})"
     fix = "put `control.axes` into the order of the columns, [north, east, up] where x points north"
-    return found("P401", message, fix, evidence, strips=(seen.strip,), key="control")
+    return found("P401", message, fix, evidence, strips=(on_strip.strip,), key="control")
 
 
 def _how(angle: float) -> str:
@@ -134,25 +144,38 @@ def _how(angle: float) -> str:
 
 
 def _columns(
-    given: Given, exchanged: Given | None, seen: Seen, w: Complex, took_part: Flags, normal: Laid
+    given: GivenPoints,
+    exchanged: GivenPoints | None,
+    on_strip: StripPoints,
+    w: Complex,
+    in_fit: Flags,
+    normal: PlanSimilarity,
 ) -> list[Finding]:
     """Try other orders of the columns, when the strip fits the control neither way."""
-    full = took_part & given.use.all(axis=1)
+    full = in_fit & given.use.all(axis=1)
     orders = [(given, order) for order in ((2, 1, 0), (0, 2, 1), (1, 2, 0), (2, 0, 1))]
     if exchanged is not None:
         orders.insert(0, (exchanged, (0, 1, 2)))
     for read, order in orders:
-        plan = read.level[full][:, order[0]] + 1j * read.level[full][:, order[1]]
-        fits = [lay(w[full], plan, mirrored=each) for each in (False, True)]
-        middle = min((each.middle for each in fits if each is not None), default=np.inf)
+        plan = read.xyz[full][:, order[0]] + 1j * read.xyz[full][:, order[1]]
+        fits = [fit_similarity(w[full], plan, mirrored=each) for each in (False, True)]
+        middle = min((each.median for each in fits if each is not None), default=np.inf)
         spread = float(np.abs(plan - plan.mean()).max(initial=0.0)) if len(plan) else 0.0
-        if middle < MIRRORED * normal.middle and middle < FITS * FITS * spread and full.sum() > LEAST:
+        if (
+            middle < MIRRORED_SHARE * normal.median
+            and middle < FIT_SHARE * FIT_SHARE * spread
+            and full.sum() > LEAST_POINTS
+        ):
             names = [AXES[each] for each in (order if read is given else (1, 0, 2))]
             message = (
-                f"strip {seen.strip} does not fit its control in plan (middle misclosure {normal.middle:.4g} m), but "
-                f"fits within {middle:.3g} m when what is called east, north, up is read as {', '.join(names)}"
+                f"strip {on_strip.strip} does not fit its control in plan (middle misclosure {normal.median:.4g} m), "
+                f"but fits within {middle:.3g} m when what is called east, north, up is read as {', '.join(names)}"
             )
-            evidence = {"misclosure_as_given_m": normal.middle, "misclosure_m": middle, "extent_of_control_m": spread}
+            evidence = {
+                "misclosure_as_given_m": normal.median,
+                "misclosure_m": middle,
+                "extent_of_control_m": spread,
+            }
             fix = "put `control.axes` into the order of the columns"
-            return [found("P401", message, fix, evidence, strips=(seen.strip,), key="control")]
+            return [found("P401", message, fix, evidence, strips=(on_strip.strip,), key="control")]
     return []

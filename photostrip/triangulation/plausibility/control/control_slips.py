@@ -16,48 +16,47 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.notes import Finding
-    from photostrip.triangulation.plausibility.control.control_fit import Bent
-    from photostrip.triangulation.plausibility.control.control_strip import Fitted, Given, Seen
+    from photostrip.triangulation.plausibility.control.control_fit import RobustFit
+    from photostrip.triangulation.plausibility.control.control_strip import GivenPoints, StraightenedStrip, StripPoints
 
     Floats = NDArray[np.float64]
     Flags = NDArray[np.bool_]
 
 SCALE_CHANGE = 3e-4  # of a large error: the scale of a map is not the same where the point came to lie
 LEAST_RAYS = 2
-CLEARER = 6.0  # times as large as otherwise a slip must be where a wrong image coordinate explains it as well
-NEAR = 3.5  # standard deviations within which the slip must fit where a wrong image coordinate explains it as well
-SOUND = 4.5  # standard deviations within which the other coordinates of a point with a slip of the pen lie
-RIDGE = 1e-9  # of a variance: no computer knows them better
-UNKNOWN = 1e3  # standard deviations in plan: that of a height that is not given
+CLEARER_SIGMAS = 6.0  # times as large as otherwise a slip must be where a wrong image coordinate explains it as well
+NEAR_SIGMAS = (
+    3.5  # standard deviations within which the slip must fit where a wrong image coordinate explains it as well
+)
+SOUND_SIGMAS = 4.5  # within which the other coordinates of a point with a slip of the pen lie
+RIDGE_SHARE = 1e-9  # of a variance: no computer knows them better
+UNKNOWN_HEIGHT_SIGMAS = 1e3  # standard deviations in plan: that of a height that is not given
 EARTH_RADIUS = 6.37e6  # metres
 
 
-class Left(NamedTuple):
+class Misclosures(NamedTuple):
     """What is left at given points after a strip was laid on them."""
 
-    plan: Bent
-    height: Bent | None  # in height; None where too few heights are given to say
-    usable: Flags  # (n,): points whose height can be judged
+    plan: RobustFit
+    height: RobustFit | None  # None where too few heights are given to say
+    usable: Flags  # (n,): points whose height can be tested
+    consistent: Flags  # (n,): points of lists that go with each other
 
     def heights(self) -> tuple[Floats, Floats]:
-        """Give residual and standard deviation of each height, NaN where it cannot be judged, shape (n,), metres."""
+        """Residual and standard deviation of each height, NaN where it cannot be tested, shape (n,), metres."""
         if self.height is None:
             unknown = np.full(len(self.usable), np.nan)
             return unknown, unknown
-        parts = self.height.residual, self.height.spread
-        return np.where(self.usable, parts[0], np.nan), np.where(self.usable, parts[1], np.nan)
+        residual, spread = (np.where(self.usable, x, np.nan) for x in (self.height.residual, self.height.spread))
+        return residual, spread
 
 
-def examine(given: Given, seen: Seen, fitted: Fitted, judged: Flags, left: Left) -> Iterator[Finding]:
-    """Name points that do not go with the others in plan, and the slip that explains it.
-
-    Parameters
-    ----------
-    judged : ndarray of bool, shape (n,)
-        Points of lists that go with each other.
-    """
+def find_plan_slips(
+    given: GivenPoints, on_strip: StripPoints, fitted: StraightenedStrip, left: Misclosures
+) -> Iterator[Finding]:
+    """Name points that do not go with the others in plan, and the slip that explains it."""
     fit = left.plan
-    odd = judged & given.use[:, 0] & np.isfinite(fit.residual) & fit.odd
+    odd = left.consistent & given.use[:, 0] & np.isfinite(fit.residual) & fit.odd
     rows = np.flatnonzero(odd).tolist()
     exchanged = _exchanged(given, fit, rows)
     for one, other in exchanged:
@@ -68,56 +67,60 @@ def examine(given: Given, seen: Seen, fitted: Fitted, judged: Flags, left: Left)
             "misclosure_exchanged_m": _after_exchange(given, fit, one, other),
         }
         fix = "were their ids exchanged, in the table or on the photos?"
-        yield found("P408", message, fix, evidence, points=names, strips=(seen.strip,))
+        yield found("P408", message, fix, evidence, points=names, strips=(on_strip.strip,))
     done = {row for pair in exchanged for row in pair}
     height, spread = left.heights()
     for row in rows:
         far = _curved(fitted, abs(fit.residual[row]))
-        if row in done or abs(height[row]) > SOUND * spread[row] + far:
+        if row in done or abs(height[row]) > SOUND_SIGMAS * spread[row] + far:
             continue  # a wrong measurement along the base moves both
         difference = np.array([fit.residual[row].real, fit.residual[row].imag, 0.0])
-        if not _one_ray_is_wrong(given, seen, fitted, left, row):
-            yield from _slips(given, seen, row, difference, (float(fit.spread[row]), float(fit.limit[row])), (0, 1))
+        if not _one_ray_is_wrong(given, on_strip, fitted, left, row):
+            yield from _slips(given, on_strip, row, difference, (float(fit.spread[row]), float(fit.limit[row])), (0, 1))
 
 
-def examine_heights(given: Given, seen: Seen, fitted: Fitted, judged: Flags, left: Left) -> Iterator[Finding]:
+def find_height_slips(
+    given: GivenPoints, on_strip: StripPoints, fitted: StraightenedStrip, left: Misclosures
+) -> Iterator[Finding]:
     """Name points that do not go with the others in height only, and the slip that explains it."""
     fit, plan = left.height, left.plan
     if fit is None:
         return
-    for row in np.flatnonzero(left.usable & judged & fit.odd).tolist():
+    for row in np.flatnonzero(left.usable & left.consistent & fit.odd).tolist():
         far = _curved(fitted, abs(fit.residual[row]))
-        if abs(plan.residual[row]) > SOUND * plan.spread[row] + far:
+        if abs(plan.residual[row]) > SOUND_SIGMAS * plan.spread[row] + far:
             continue  # a wrong measurement along the base moves both
         difference = np.array([0.0, 0.0, fit.residual[row]])
         spread, limit, doubt = float(fit.spread[row]), float(fit.limit[row]), ""
-        if _one_ray_is_wrong(given, seen, fitted, left, row):
-            if seen.rays_of(given.ids[row]).count > LEAST_RAYS:
+        if _one_ray_is_wrong(given, on_strip, fitted, left, row):
+            if on_strip.rays_of(given.ids[row]).count > LEAST_RAYS:
                 continue
             # below a photo a wrong height goes with that photo's ray too: two rays cannot tell
-            limit, spread = min(limit, NEAR * spread), CLEARER * spread
+            limit, spread = min(limit, NEAR_SIGMAS * spread), CLEARER_SIGMAS * spread
             doubt = "; or a coordinate along the base is wrong on one of its photos"
-        yield from _slips(given, seen, row, difference, (spread, limit), (2,), doubt)
+        yield from _slips(given, on_strip, row, difference, (spread, limit), (2,), doubt)
 
 
-def _one_ray_is_wrong(given: Given, seen: Seen, fitted: Fitted, left: Left, row: int) -> bool:
+def _one_ray_is_wrong(
+    given: GivenPoints, on_strip: StripPoints, fitted: StraightenedStrip, left: Misclosures, row: int
+) -> bool:
     """Whether all rays of a point but one go with it as it is given."""
-    rays = seen.rays_of(given.ids[row])
+    rays = on_strip.rays_of(given.ids[row])
     if rays.count < LEAST_RAYS:
         return False
     plan, (height, spread) = left.plan.residual[row], left.heights()
     off = np.array([plan.real, plan.imag, height[row]])
-    place = seen.xyz[row] + fitted.strip_from_level @ np.nan_to_num(off)
+    place = on_strip.xyz[row] + fitted.strip_from_level @ np.nan_to_num(off)
     if not rays.shown(place):
         return False  # off by more than the flying height
     residual, jacobian = rays.residuals(place)
     of_plan = float(left.plan.spread[row])
-    of_height = float(spread[row]) if np.isfinite(spread[row]) else UNKNOWN * of_plan
+    of_height = float(spread[row]) if np.isfinite(spread[row]) else UNKNOWN_HEIGHT_SIGMAS * of_plan
     # what chance moves all rays of a point by: the strip under it; and each ray by itself
     common = (jacobian @ fitted.strip_from_level).reshape(-1, 3) * [of_plan, of_plan, of_height]
     covariance = common @ common.T + np.diag(np.repeat(rays.sigma**2, 2))
     size = np.sqrt(np.diag(covariance))
-    test, within = residual.ravel() / size, covariance / np.outer(size, size) + RIDGE * np.eye(len(size))
+    test, within = residual.ravel() / size, covariance / np.outer(size, size) + RIDGE_SHARE * np.eye(len(size))
     limit = float(left.plan.limit[row] / of_plan) ** 2
     for ray in range(rays.count):
         others = np.delete(np.arange(2 * rays.count), [2 * ray, 2 * ray + 1])
@@ -126,12 +129,12 @@ def _one_ray_is_wrong(given: Given, seen: Seen, fitted: Fitted, left: Left, row:
     return False
 
 
-def _curved(fitted: Fitted, off: float) -> float:
+def _curved(fitted: StraightenedStrip, off: float) -> float:
     """How much an error of one coordinate moves the others, metres: the ground is curved."""
     return off * (off + float(np.ptp(fitted.along[np.isfinite(fitted.along)]))) / EARTH_RADIUS
 
 
-def _exchanged(given: Given, fit: Bent, rows: list[int]) -> list[tuple[int, int]]:
+def _exchanged(given: GivenPoints, fit: RobustFit, rows: list[int]) -> list[tuple[int, int]]:
     pairs = []
     for place, one in enumerate(rows):
         for other in rows[place + 1 :]:
@@ -141,14 +144,14 @@ def _exchanged(given: Given, fit: Bent, rows: list[int]) -> list[tuple[int, int]
     return pairs
 
 
-def _after_exchange(given: Given, fit: Bent, one: int, other: int) -> float:
+def _after_exchange(given: GivenPoints, fit: RobustFit, one: int, other: int) -> float:
     step = given.plan[other] - given.plan[one]
     return float(max(abs(fit.residual[one] + step), abs(fit.residual[other] - step)))
 
 
 def _slips(
-    given: Given,
-    seen: Seen,
+    given: GivenPoints,
+    on_strip: StripPoints,
     row: int,
     difference: Floats,
     spread: tuple[float, float],
@@ -178,12 +181,7 @@ def _slips(
             f"{role} point {given.ids[row]} is off by {off:+.2f} m in {AXES[axis]}: looks like {fits.text}; "
             f"{fits.meant:.10g} would fit within {abs(fits.meant - written + off / unit) * unit:.2g} m{doubt}"
         )
-        evidence = {
-            "given": written,
-            "off_m": off,
-            "would_fit": fits.meant,
-            "standard_deviation_m": spread[0],
-        }
+        evidence = {"given": written, "off_m": off, "would_fit": fits.meant, "standard_deviation_m": spread[0]}
         fix = f"look {given.ids[row]} up in the records"
-        yield found("P406", message, fix, evidence, points=(given.ids[row],), strips=(seen.strip,))
+        yield found("P406", message, fix, evidence, points=(given.ids[row],), strips=(on_strip.strip,))
         return

@@ -6,11 +6,19 @@ In plan the bending is taken out by a conformal polynomial, with as few terms as
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photostrip.triangulation.plausibility.control.control_fit import LEAST, SMALL, Bent, Laid, bend, lay, upright
+from photostrip.triangulation.plausibility.control.control_fit import (
+    LEAST_POINTS,
+    TINY,
+    PlanSimilarity,
+    RobustFit,
+    fit_robustly,
+    fit_similarity,
+    upright,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,21 +30,22 @@ if TYPE_CHECKING:
     Flags = NDArray[np.bool_]
     Numbers = NDArray[np.intp]
 
-FOOT, SURVEY_FOOT = 0.3048, 1200.0 / 3937.0  # metres; they differ by 2 ppm
-FEET_NEAR = 0.04  # relative, of a ratio to that of foot and metre
-SIMPLE = 2.5  # times what makes sense that a fit may leave before bending is taken out
-SPARE = 2  # redundancy that must be left then
-FRONT = 0.1  # of the distance of a point from a photo, along its axis: within 84 degrees of it
+FOOT = 0.3048  # metres
+KINDS_OF_FEET = "international feet (0.3048 m) and US survey feet (1200/3937 m) differ by 2 ppm, 1.2 m at 600 km"
+FEET_TOLERANCE = 0.04  # relative, of a ratio to that of foot and metre
+SIMPLE_SIGMAS = 2.5  # times what makes sense that a fit may leave before bending is taken out
+LEAST_REDUNDANCY = 2  # redundancy that must be left then
+LEAST_AHEAD = 0.1  # of the distance of a point from a photo, along its axis: within 84 degrees of it
 AXES = ("east", "north", "up")
 
 
 @dataclass(frozen=True, eq=False)
-class Given:
+class GivenPoints:
     """Given points that a strip shows."""
 
     ids: tuple[str, ...]
     # (n, 3): east, north, up in metres in a level frame in the middle of the control; NaN where not given
-    level: Floats
+    xyz: Floats
     use: Flags  # (n, 3): which coordinates count
     check: Flags  # (n,): check points
     group: Numbers  # (n,): control list of each
@@ -49,7 +58,7 @@ class Given:
     @property
     def plan(self) -> Complex:
         """Given places E + iN, metres."""
-        result: Complex = self.level[:, 0] + 1j * self.level[:, 1]
+        result: Complex = self.xyz[:, 0] + 1j * self.xyz[:, 1]
         return result
 
 
@@ -69,29 +78,13 @@ class Rays:
         return len(self.xy)
 
     def shown(self, xyz: Floats) -> bool:
-        """Whether a place in the strip lies in front of all photos, within 84 degrees of their axes.
-
-        Parameters
-        ----------
-        xyz : ndarray, shape (3,)
-            A place in the strip.
-
-        Returns
-        -------
-        bool
-            True where all photos could show it.
-        """
+        """Whether a place (3,) in the strip lies in front of all photos, within 84 degrees of their axes."""
         away = xyz - self.centers
         ahead = -np.einsum("rj,rj->r", self.rotations[:, :, 2], away)
-        return bool((ahead > FRONT * np.linalg.norm(away, axis=1)).all())
+        return bool((ahead > LEAST_AHEAD * np.linalg.norm(away, axis=1)).all())
 
     def residuals(self, xyz: Floats) -> tuple[Floats, Floats]:
-        """Give image residuals of a place, and how a step of it moves its images.
-
-        Parameters
-        ----------
-        xyz : ndarray, shape (3,)
-            A place in the strip.
+        """Image residuals of a place (3,) in the strip, and how a step of it moves its images.
 
         Returns
         -------
@@ -101,9 +94,9 @@ class Rays:
             Millimetres on each photo for a step in the strip.
         """
         back = self.rotations.transpose(0, 2, 1)
-        seen = np.einsum("rij,rj->ri", back, xyz - self.centers)
-        depth = np.minimum(seen[:, 2], -SMALL)[:, None]
-        image = -self.focal * seen[:, :2] / depth
+        on_strip = np.einsum("rij,rj->ri", back, xyz - self.centers)
+        depth = np.minimum(on_strip[:, 2], -TINY)[:, None]
+        image = -self.focal * on_strip[:, :2] / depth
         jacobian = -(self.focal * back[:, :2] + image[:, :, None] * back[:, 2:]) / depth[:, :, None]
         return image - self.xy, jacobian
 
@@ -112,8 +105,8 @@ NO_RAYS = Rays(np.zeros((0, 2)), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3, 
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
-    """The same points as a strip sees them."""
+class StripPoints:
+    """The same points in the coordinates of a strip."""
 
     strip: str
     xyz: Floats  # (n, 3): strip coordinates; the third may be NaN, when only a mosaic is known
@@ -128,156 +121,133 @@ class Seen:
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class StraightenedStrip:
     """A strip on its control, bending taken out."""
 
-    laid: Laid
     # along, across: (n,): places of the points along and across the strip, metres
     along: Floats
     across: Floats
     height: Floats  # (n,): heights in the strip, metres
     floor: tuple[float, float]  # a-priori standard deviations in plan and height, metres
-    plan: Bent
+    plan: RobustFit
     strip_from_level: Floats  # (3, 3): steps in the strip from steps in the level frame, metres
 
 
-def rotated(xyz: Floats, turn: Floats) -> Floats:
-    """Turn coordinates of a mosaic, which are upright already, or of a strip with points that have none.
-
-    Parameters
-    ----------
-    xyz : ndarray, shape (n, 3)
-        Strip coordinates; points of a mosaic have no third one.
-    turn : ndarray, shape (3, 3)
-        Rotation that sets the strip upright.
-
-    Returns
-    -------
-    ndarray, shape (n, 3)
-        Coordinates of the upright strip.
-    """
+def upright_coordinates(xyz: Floats, turn: Floats) -> Floats:
+    """Turn strip coordinates (n, 3) upright; points of a mosaic have no third one and are upright already."""
     flat = np.isfinite(xyz[:, :2]).all(axis=1) & ~np.isfinite(xyz[:, 2])
     result = xyz @ turn.T
     result[flat] = xyz[flat]
     return result
 
 
-class Level(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class LevelStrip:
     """A strip, turned level."""
 
     w: Complex  # (n,): places of its points
     z: Floats  # (n,): their heights, in the same unit
-    laid: Laid  # the strip on its control in plan
+    similarity: PlanSimilarity  # the strip on its control in plan
     turn: Floats  # (3, 3): steps of the level strip from steps of the strip as it was formed
     depth: float  # distance from camera to ground, in the unit of `w`
 
+    @property
+    def scale(self) -> float:
+        """Metres in a unit of `w`."""
+        return abs(self.similarity.turn)
 
-def levelled(given: Given, level: Level, floor: float, took_part: Flags) -> Level:
+
+def turn_level(given: GivenPoints, level: LevelStrip, floor: float, in_fit: Flags) -> LevelStrip:
     """Turn a strip by the tilt that the heights of its control show; the cameras look down within degrees only.
 
     Relief times that tilt is a displacement in plan. Where the heights do not help, all stays as it is.
 
     Parameters
     ----------
-    level : Level
+    level : LevelStrip
         The strip, set upright by its cameras.
     floor : float
         Smallest standard deviation of a height that makes sense, as a share of the distance from camera to ground.
-    took_part : ndarray of bool, shape (n,)
+    in_fit : ndarray of bool, shape (n,)
         Points on which the strip is laid in plan.
-
-    Returns
-    -------
-    Level
-        The strip, level.
     """
-    w, z, laid, turn, depth = level
-    scale = abs(laid.turn)
-    place, height = laid(w), scale * z
-    usable = given.use[:, 2] & ~given.check & np.isfinite(given.level[:, 2]) & np.isfinite(height) & np.isfinite(place)
-    if usable.sum() <= LEAST:
+    similarity = level.similarity
+    place, height = similarity(level.w), level.scale * level.z
+    usable = given.use[:, 2] & ~given.check & np.isfinite(given.xyz[:, 2]) & np.isfinite(height) & np.isfinite(place)
+    if usable.sum() <= LEAST_POINTS:
         return level
     mean = float(height[usable].mean())
-    columns = [np.ones(len(w)), place.real, place.imag]
-    columns += [height - mean] if usable.sum() >= LEAST + 2 * SPARE else []  # a wrong unit of the heights is no tilt
+    columns = [np.ones(len(place)), place.real, place.imag]
+    columns += (
+        [height - mean] if usable.sum() >= LEAST_POINTS + 2 * LEAST_REDUNDANCY else []
+    )  # a wrong unit of the heights is no tilt
     design = np.where(usable[:, None], np.column_stack(columns), 0.0)
-    value = np.where(usable, given.level[:, 2] - height, 0.0)
-    least = max(floor * depth * scale, given.sigma[1], SMALL)
-    tilt = bend(design, value, usable, least).coefficient[1:3]
+    value = np.where(usable, given.xyz[:, 2] - height, 0.0)
+    depth = level.depth * level.scale
+    least = max(floor * depth, given.sigma[1], TINY)
+    tilt = fit_robustly(design, value, usable, least).coefficient[1:3]
     leaning = upright(np.array([[tilt[0], tilt[1], 1.0]]))
     turned = np.column_stack([place.real, place.imag, height]) @ leaning.T
-    here = turned[:, 0] + 1j * turned[:, 1]
-    again = lay(here[took_part], given.plan[took_part])
-    if again is None or again.middle > laid.middle:
+    w = turned[:, 0] + 1j * turned[:, 1]
+    again = fit_similarity(w[in_fit], given.plan[in_fit])
+    if again is None or again.median > similarity.median:
         return level
-    return Level(here, turned[:, 2], again, leaning @ laid.matrix @ turn, depth * scale)
+    return LevelStrip(w, turned[:, 2], again, turn=leaning @ similarity.matrix @ level.turn, depth=depth)
 
 
-def straightened(given: Given, level: Level, floor: tuple[float, float], took_part: Flags) -> Fitted:
-    """Take the bending out of the plan.
+def straighten(given: GivenPoints, level: LevelStrip, floor: tuple[float, float], in_fit: Flags) -> StraightenedStrip:
+    """Take the bending out of the plan: a conformal polynomial of degree 0 to 2 along the strip.
 
     Parameters
     ----------
-    level : Level
-        The strip, level and laid on them.
     floor : tuple of float
-        Smallest standard deviations that make sense in plan and height, as shares of the distance from camera to
-        ground.
-    took_part : ndarray of bool, shape (n,)
+        Smallest standard deviations that make sense in plan and height, as shares of the distance of camera and ground.
+    in_fit : ndarray of bool, shape (n,)
         Points that may say how the strip bends.
     """
-    w, z, laid, turn, depth = level
-    scale = abs(laid.turn)
-    distance = depth * scale
+    distance = level.depth * level.scale
     least = (
-        max(float(np.hypot(floor[0] * distance, given.sigma[0])), SMALL),
-        max(float(np.hypot(floor[1] * distance, given.sigma[1])), SMALL),
+        max(float(np.hypot(floor[0] * distance, given.sigma[0])), TINY),
+        max(float(np.hypot(floor[1] * distance, given.sigma[1])), TINY),
     )
-    place = laid(w)
-    axis = _direction(place[took_part])
-    middle = place[took_part].mean()
+    place = level.similarity(level.w)
+    axis = _direction(place[in_fit])
+    middle = place[in_fit].mean()
     local = (place - middle) / axis
     known = np.isfinite(given.plan)
     columns = [np.where(np.isfinite(local), local, 0.0) ** k for k in range(3)]
-    bent = simplest(columns, 2, np.where(known, given.plan, 0.0), took_part, least[0])[1]
-    residual = np.where(known & np.isfinite(w), bent.residual, np.nan)
-    back = np.asarray(np.linalg.inv(laid.matrix @ turn), float)
-    return Fitted(laid, local.real, local.imag, scale * z, least, replace(bent, residual=residual), back)
+    bent = fit_simplest(columns, 2, np.where(known, given.plan, 0.0), in_fit, least[0])[1]
+    residual = np.where(known & np.isfinite(level.w), bent.residual, np.nan)
+    return StraightenedStrip(
+        along=local.real,
+        across=local.imag,
+        height=level.scale * level.z,
+        floor=least,
+        plan=replace(bent, residual=residual),
+        strip_from_level=np.asarray(np.linalg.inv(level.similarity.matrix @ level.turn), float),
+    )
 
 
-def simplest(
+def fit_simplest(
     columns: list[NDArray[Any]],
     least: int,
     values: NDArray[Any],
-    took_part: Flags,
+    in_fit: Flags,
     floor: float,
-) -> tuple[NDArray[Any], Bent]:
-    """Fit as few columns as leave no more than makes sense, at least some of them.
-
-    Parameters
-    ----------
-    columns : list of ndarray, shape (n,)
-        Columns, the simplest first.
-    least : int
-        Number of them that are always taken.
-    values : ndarray of float or complex, shape (n,)
-        Values, metres.
-    took_part : ndarray of bool, shape (n,)
-        Points that may take part.
-    floor : float
-        Smallest standard deviation that makes sense, metres.
+) -> tuple[NDArray[Any], RobustFit]:
+    """Fit as few columns, the simplest first, as leave no more than makes sense; `least` of them are always taken.
 
     Returns
     -------
     columns : ndarray, shape (n, c)
-        Those taken.
+        Those that were fitted.
     """
     number = least
     while True:
         chosen = np.column_stack(columns[:number])
-        fit = bend(chosen, values, took_part, floor)
-        spare = int(took_part.sum()) - number - 1
-        if number == len(columns) or spare < SPARE or fit.sigma0 <= SIMPLE * floor:
+        fit = fit_robustly(chosen, values, in_fit, floor)
+        spare = int(in_fit.sum()) - number - 1
+        if number == len(columns) or spare < LEAST_REDUNDANCY or fit.sigma0 <= SIMPLE_SIGMAS * floor:
             return chosen, fit
         number += 1
 
@@ -286,4 +256,4 @@ def _direction(place: Complex) -> complex:
     """Direction of the largest extent, of length one."""
     d = place - place.mean()
     axis = complex(np.sqrt((d**2).sum()))
-    return axis / abs(axis) if abs(axis) > SMALL else 1.0 + 0.0j
+    return axis / abs(axis) if abs(axis) > TINY else 1.0 + 0.0j

@@ -8,10 +8,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 ORDINALS = ("first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
-SURE = 6.0  # scatters that a slip must have at least
-CLEAR = 2.0  # scatters that a unit of the digit must have: below, any error looks like a slip of it
-LONGEST = 8  # digits of the largest coordinate
-NEAR = 0.3  # of the correction, within which the corrected coordinate must lie at most
+LEAST_SLIP_SIGMAS = 6.0  # scatters that a slip must have at least
+LEAST_DIGIT_SIGMAS = 2.0  # scatters that a unit of the digit must have: below, any error looks like a slip of it
+MOST_DIGITS = 8  # digits of the largest coordinate
+NEAR_SHARE = 0.3  # of the correction, within which the corrected coordinate must lie at most
 MOST_DECIMALS = 4
 
 
@@ -27,10 +27,8 @@ def slip(given: float, predicted: float, scatter: float, tolerance: float) -> Sl
 
     Parameters
     ----------
-    given : float
-        The coordinate as it is written, in its own unit.
-    predicted : float
-        What everything else lets expect, in the same unit.
+    given, predicted : float
+        The coordinate as it is written, and what everything else lets expect, in its own unit.
     scatter : float
         Standard deviation of the prediction.
     tolerance : float
@@ -41,12 +39,12 @@ def slip(given: float, predicted: float, scatter: float, tolerance: float) -> Sl
     Slip or None
         The slip that brings the coordinate nearest to the prediction; None when none brings it near.
     """
-    if abs(given - predicted) < SURE * scatter:
+    if abs(given - predicted) < LEAST_SLIP_SIGMAS * scatter:
         return None
     fits = [
         each
         for each in _slips(given, scatter)
-        if abs(each.meant - predicted) <= min(tolerance, max(NEAR * abs(each.meant - given), scatter))
+        if abs(each.meant - predicted) <= min(tolerance, max(NEAR_SHARE * abs(each.meant - given), scatter))
     ]
     return min(fits, key=lambda each: abs(each.meant - predicted), default=None)
 
@@ -61,10 +59,10 @@ def _slips(given: float, scatter: float) -> Iterator[Slip]:
     digits = [(place, int(sign_)) for place, sign_ in enumerate(text) if sign_ != "."]
     for number, (place, digit) in enumerate(digits):
         worth = 10.0 ** (point - place - (1 if place < point else 0))
-        if worth < CLEAR * scatter:
+        if worth < LEAST_DIGIT_SIGMAS * scatter:
             break
         for other in range(10):
-            if other != digit and abs(other - digit) * worth > SURE * scatter:
+            if other != digit and abs(other - digit) * worth > LEAST_SLIP_SIGMAS * scatter:
                 change = sign * (other - digit) * worth
                 what = f"a typing error in the {_ordinal(number)} digit ({digit} for {other})"
                 yield Slip(given + change, what)
@@ -81,7 +79,7 @@ def _slips(given: float, scatter: float) -> Iterator[Slip]:
 
 def _lost(given: float, sign: float, length: int) -> Iterator[Slip]:
     """Give coordinates that had one digit more in front, or zeros after it."""
-    for power in range(length, LONGEST):
+    for power in range(length, MOST_DIGITS):
         for digit in range(1, 10):
             what = (
                 f"a leading {digit} is missing" if power == length else f"a leading {digit} with its zeros is missing"

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.errors import PhotostripError
-from photostrip.triangulation.plausibility.control.control_strip import Given
+from photostrip.errors import GeometryError, InputError
+from photostrip.triangulation.plausibility.control.control_strip import GivenPoints
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,22 +23,13 @@ if TYPE_CHECKING:
 USUAL_SIGMA = 0.1  # metres, of coordinates without one
 
 
-def level(control: ControlPoints, frames: Sequence[GroundFrame], *, as_written: bool = False) -> Given | None:
-    """Bring given points into one level frame.
+def level(control: ControlPoints, frames: Sequence[GroundFrame], *, as_written: bool = False) -> GivenPoints | None:
+    """Bring given points into one level frame; None when none of them has a plan position.
 
     Parameters
     ----------
-    control : ControlPoints
-        The points; unused coordinates do not matter.
-    frames : sequence of GroundFrame
-        Ground frames they refer to.
     as_written : bool
         Take the numbers as plain coordinates in metres, when their frames cannot be right.
-
-    Returns
-    -------
-    Given or None
-        The points; None when none of them has a plan position.
     """
     plan = np.asarray(control.use[:, :2].all(axis=1), bool)
     height = control.use[:, 2]
@@ -59,7 +50,7 @@ def level(control: ControlPoints, frames: Sequence[GroundFrame], *, as_written: 
     usual = [
         float(np.nanmedian(part)) if np.isfinite(part).any() else USUAL_SIGMA for part in (sigma[:, :2], sigma[:, 2])
     ]
-    return Given(
+    return GivenPoints(
         control.ids,
         np.where(known, xyz, np.nan),
         known,
@@ -101,7 +92,7 @@ def _decoded(
         middle = np.median(cartesian[plan], axis=0)
         first = frames[int(control.frame[int(np.argmax(plan))])]
         turn = first.level_axes_at(middle[None, :])[0]
-    except (PhotostripError, ValueError, ArithmeticError):
+    except (GeometryError, InputError):
         return None
     if not np.isfinite(cartesian).all():
         return None

@@ -14,52 +14,42 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.notes import Finding
+    from photostrip.triangulation.plausibility.finding import Evidence
 
     Floats = NDArray[np.float64]
 
-ONE_END = 0.4  # of the strip's length: control that spans less, all in one half, is at one end
-HALF = 0.55
-BEYOND = 0.5  # of the control's length: what lies farther out is extrapolated by more than half of it
-NARROW = 0.08  # rms distance of the control from a line, in half breadths of the strip: errors grow 12-fold
-FEWEST = 4  # photos of a strip that has ends
-LEAST = 2
+ONE_END_SHARE = 0.4  # of the strip's length: control that spans less, all in one half, is at one end
+HALF_SHARE = 0.55
+BEYOND_SHARE = 0.5  # of the control's length: what lies farther out is extrapolated by more than half of it
+LEAST_BREADTH = 0.08  # rms distance of the control from a line, in half breadths of the strip: errors grow 12-fold
+LEAST_PHOTOS = 4  # photos of a strip that has ends
+LEAST_POINTS = 2
 
 
-def examine(
+def find_weak_control(
     place: Floats, plan: Floats, half_breadth: float, photos: Sequence[str], strip: str, ids: Sequence[str]
 ) -> Iterator[Finding]:
-    """Judge where the control of a strip lies.
-
-    Parameters
-    ----------
-    place : ndarray, shape (n,)
-        Place of each control point along the strip in bases, from 0 at the first photo.
-    plan : ndarray, shape (n, 2)
-        Its given plan coordinates, metres.
-    half_breadth : float
-        Half the breadth of the strip, metres.
-    photos : sequence of str
-        Photos of the strip in order.
+    """Find control of a strip that lies at one end, on one line or far from an end.
 
     Yields
     ------
     Finding
         P501, P502, P503.
     """
-    if len(ids) < LEAST:
+    if len(ids) < LEAST_POINTS:
         return
     yield from _on_a_line(plan, half_breadth, ids, strip)
     last = len(photos) - 1
-    if len(photos) < FEWEST:
+    if len(photos) < LEAST_PHOTOS:
         return
     low, high = float(np.clip(place, 0, last).min()), float(np.clip(place, 0, last).max())
-    evidence: dict[str, float | int | str] = {
+    evidence: Evidence = {
         "first_control_at_photo": low + 1,
         "last_control_at_photo": high + 1,
         "photos": len(photos),
     }
-    at_begin, at_end = high <= HALF * last, low >= (1 - HALF) * last
-    if high - low < ONE_END * last and (at_begin or at_end):
+    at_begin, at_end = high <= HALF_SHARE * last, low >= (1 - HALF_SHARE) * last
+    if high - low < ONE_END_SHARE * last and (at_begin or at_end):
         end = "beginning" if at_begin else "end"
         message = (
             f"strip {strip}: all control lies at its {end}, within {high - low:.1f} of {last} bases; from there the "
@@ -69,7 +59,7 @@ def examine(
         yield found("P501", message, fix, evidence, points=ids, strips=(strip,))
         return
     for gap, end in ((low, photos[0]), (last - high, photos[-1])):
-        if gap > max(BEYOND * (high - low), 1.0):
+        if gap > max(BEYOND_SHARE * (high - low), 1.0):
             message = (
                 f"strip {strip}: its end at photo {end} lies {gap:.1f} bases beyond the control, which spans "
                 f"{high - low:.1f}; what is there is extrapolated"
@@ -80,11 +70,13 @@ def examine(
 
 def _on_a_line(plan: Floats, half_breadth: float, ids: Sequence[str], strip: str) -> Iterator[Finding]:
     """Tell control that stands on one line: nothing holds the rotation about it."""
-    if len(ids) <= LEAST or half_breadth <= 0:  # points measured along one line only: there is nothing to compare with
+    if (
+        len(ids) <= LEAST_POINTS or half_breadth <= 0
+    ):  # points measured along one line only: there is nothing to compare with
         return
     values = np.linalg.svd(plan - plan.mean(axis=0), compute_uv=False)
-    breadth = float(values[-1] / np.sqrt(len(ids) - LEAST) / half_breadth)
-    if breadth > NARROW:
+    breadth = float(values[-1] / np.sqrt(len(ids) - LEAST_POINTS) / half_breadth)
+    if breadth > LEAST_BREADTH:
         return
     message = (
         f"strip {strip}: its control stands on one line, {100 * breadth:.2g} % of half the breadth of the strip to "

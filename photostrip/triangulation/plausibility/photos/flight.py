@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.triangulation.plausibility.finding import found
+from photostrip.triangulation.plausibility.finding import found, listed
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -22,17 +22,18 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Flags = NDArray[np.bool_]
 
-HIGH = 0.2  # of the flying height, from the line of the neighbours
-LONG, SHORT = 1.75, 0.5  # of the usual base
+MOST_HEIGHT_OFF = 0.2  # of the flying height, from the line of the neighbours
+LONG_BASE, SHORT_BASE = 1.75, 0.5  # of the usual base
 TURNED_DEG = 30.0  # of a base against its neighbours
-WINDOW = 3  # bases on either side that say what is usual
-FEWEST = 4  # photos
-FEW_STEPS = 0.3  # of a limit: what goes beyond it within the window has a step of that size somewhere
-NAMED = 8
+BESIDE = 3  # bases on either side that say what is usual
+LEAST_PHOTOS = 4
+STEP_SHARE = 0.3  # of a limit: what goes beyond it among the neighbours has a step of that size somewhere
 SHORT_FLIGHT = 30  # photos of which each is looked at
 
 
-def examine(centers: Floats, depth: Floats, up: Floats, photos: Sequence[str], strip: str) -> Iterator[Finding]:
+def find_odd_centers(
+    centers: Floats, depth: Floats, up: Floats, photos: Sequence[str], strip: str
+) -> Iterator[Finding]:
     """Look for perspective centres that do not go with their neighbours.
 
     Parameters
@@ -43,12 +44,17 @@ def examine(centers: Floats, depth: Floats, up: Floats, photos: Sequence[str], s
         Height of each above the points it shows, in that unit.
     up : ndarray, shape (3,)
         Direction from the ground to the cameras.
+
+    Yields
+    ------
+    Finding
+        P204 to P207.
     """
     names = (strip,)
     below = np.flatnonzero(depth <= 0)
     if len(below):
         yield _below([photos[number] for number in below.tolist()], depth, below, names)
-    if len(photos) < FEWEST:
+    if len(photos) < LEAST_PHOTOS:
         return
     flying = float(np.median(np.abs(depth)))
     yield from _heights(centers @ up, flying, photos, names)
@@ -60,11 +66,10 @@ def examine(centers: Floats, depth: Floats, up: Floats, photos: Sequence[str], s
 
 def _below(photos: Sequence[str], depth: Floats, below: NDArray[np.intp], names: tuple[str, ...]) -> Finding:
     """Say which perspective centres lie below the ground."""
-    several = ", ".join(photos[:NAMED]) + (f" and {len(photos) - NAMED} more" if len(photos) > NAMED else "")
     message = (
-        f"the perspective centre of photo {several} lies below the points that it shows"
+        f"the perspective centre of photo {photos[0]} lies below the points that it shows"
         if len(photos) == 1
-        else f"the perspective centres of photos {several} lie below the points that they show"
+        else f"the perspective centres of photos {listed(photos)} lie below the points that they show"
     )
     fix = "are x and y of the image coordinates or the axes of the control exchanged?"
     evidence = {"lowest_over_usual": float(depth[below].min() / np.median(np.abs(depth)))}
@@ -74,12 +79,12 @@ def _below(photos: Sequence[str], depth: Floats, below: NDArray[np.intp], names:
 def _heights(height: Floats, flying: float, photos: Sequence[str], names: tuple[str, ...]) -> Iterator[Finding]:
     bend = np.zeros(len(height))
     bend[1:-1] = height[1:-1] - (height[:-2] + height[2:]) / 2.0
-    for number in _worth_a_look(np.abs(bend) > FEW_STEPS * HIGH * flying):
-        near = [k for k in range(max(number - WINDOW, 0), min(number + WINDOW + 1, len(photos))) if k != number]
+    for number in _worth_a_look(np.abs(bend) > STEP_SHARE * MOST_HEIGHT_OFF * flying):
+        near = _beside(number, len(photos))
         line = _robust_line(np.array(near, float), height[near])
         off = float(height[number] - line[0] - line[1] * number) / flying
         inside = near[0] < number < near[-1]  # at an end a line is extended
-        if abs(off) > (HIGH if inside else 2.0 * HIGH):
+        if abs(off) > (MOST_HEIGHT_OFF if inside else 2.0 * MOST_HEIGHT_OFF):
             message = (
                 f"the perspective centre of photo {photos[number]} lies {100 * abs(off):.0f} % of the flying height "
                 f"{'above' if off > 0 else 'below'} those of its neighbours"
@@ -93,8 +98,13 @@ def _worth_a_look(conspicuous: Flags) -> list[int]:
     """Return what stands near something conspicuous; everything of a short flight."""
     if len(conspicuous) <= SHORT_FLIGHT:
         return list(range(len(conspicuous)))
-    around = np.convolve(conspicuous, np.ones(2 * WINDOW + 1), "same")
+    around = np.convolve(conspicuous, np.ones(2 * BESIDE + 1), "same")
     return [int(number) for number in np.flatnonzero(np.round(around))]
+
+
+def _beside(number: int, count: int) -> list[int]:
+    """Neighbours of one of `count` photos or bases, itself left out."""
+    return [k for k in range(max(number - BESIDE, 0), min(number + BESIDE + 1, count)) if k != number]
 
 
 def _robust_line(x: Floats, y: Floats) -> tuple[float, float]:
@@ -106,11 +116,10 @@ def _robust_line(x: Floats, y: Floats) -> tuple[float, float]:
 
 def _lengths(length: Floats, photos: Sequence[str], names: tuple[str, ...]) -> Iterator[Finding]:
     step = np.abs(np.diff(np.log(np.maximum(length, 1e-12))))
-    for number in _worth_a_look(np.append(step, 0.0) > FEW_STEPS * np.log(LONG)):
-        near = [k for k in range(max(number - WINDOW, 0), min(number + WINDOW + 1, len(length))) if k != number]
-        usual = float(np.median(length[near]))
+    for number in _worth_a_look(np.append(step, 0.0) > STEP_SHARE * np.log(LONG_BASE)):
+        usual = float(np.median(length[_beside(number, len(length))]))
         ratio = float(length[number]) / max(usual, 1e-12)
-        if SHORT < ratio < LONG:
+        if SHORT_BASE < ratio < LONG_BASE:
             continue
         pair = (photos[number], photos[number + 1])
         message = f"the base of photos {pair[0]} and {pair[1]} is {ratio:.2f} times as long as those beside it"
@@ -121,9 +130,8 @@ def _lengths(length: Floats, photos: Sequence[str], names: tuple[str, ...]) -> I
 def _directions(bases: Floats, up: Floats, photos: Sequence[str], names: tuple[str, ...]) -> Iterator[Finding]:
     unit = bases / np.maximum(np.linalg.norm(bases, axis=1, keepdims=True), 1e-12)
     cosine = (unit[1:] * unit[:-1]).sum(axis=1)
-    for number in _worth_a_look(np.append(cosine, 1.0) < np.cos(np.radians(FEW_STEPS * TURNED_DEG))):
-        near = [k for k in range(max(number - WINDOW, 0), min(number + WINDOW + 1, len(bases))) if k != number]
-        usual = np.median(unit[near], axis=0)
+    for number in _worth_a_look(np.append(cosine, 1.0) < np.cos(np.radians(STEP_SHARE * TURNED_DEG))):
+        usual = np.median(unit[_beside(number, len(bases))], axis=0)
         turn = np.degrees(np.arctan2(np.cross(usual, bases[number]) @ up, usual @ bases[number]))
         if abs(turn) <= TURNED_DEG:
             continue

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.triangulation.plausibility.finding import found
+from photostrip.triangulation.plausibility.finding import MOST_NAMED, found, listed
 from photostrip.triangulation.plausibility.photos import mosaic
 from photostrip.triangulation.plausibility.photos.units import reading_of
 
@@ -30,15 +30,14 @@ if TYPE_CHECKING:
 TURNED_BACK = 0.3  # cosine between the directions to both neighbours; -1 in a straight flight
 SURE_COUNT = 3  # common points of a link that may speak against the list
 SURE_MISFIT = 0.35  # of its base
-SAME_PLACE = 0.03  # of the median base: two photos from one place
-NAMED = 8
-LOOKED_AT = 24  # photos that are looked at closer; a list that is wrong at more places needs no closer look
-FEWEST = 3  # photos that have an order
+SAME_PLACE_SHARE = 0.03  # of the median base: two photos from one place
+MOST_LOOKED_AT = 24  # photos that are looked at closer; a list that is wrong at more places needs no closer look
+LEAST_PHOTOS = 3  # photos that have an order
 OTHER_SCALE = 1.25  # ratio to both neighbours that tilts and relief do not make
 
 
 @dataclass(frozen=True)
-class Arranged:
+class PhotoOrder:
     """A strip as its photos lie, for the evidence that needs them in order."""
 
     photos: tuple[str, ...]  # photos in the order in which they lie, each place once
@@ -46,12 +45,11 @@ class Arranged:
     steps: tuple[complex, ...]
     mirrored: frozenset[str]  # photos that are mirror images of the others
     size: dict[str, float]  # photos whose coordinates are larger than those of the others, and how many times
-    changed: bool  # whether anything of this differs from what is given
 
 
-def examine(
+def find_wrong_order(
     observations: PhotoPoints, strip: str, photos: Sequence[str], closer: Closer = lambda _one, _other: None
-) -> tuple[list[Finding], Arranged]:
+) -> tuple[list[Finding], PhotoOrder]:
     """Compare the list of a strip's photos with what their common points say.
 
     Parameters
@@ -66,44 +64,35 @@ def examine(
     -------
     list of Finding
         P102, P104, P201, P202, P203.
-    Arranged
+    PhotoOrder
         The strip as its photos lie.
     """
     links = mosaic.link(observations, photos)
-    layout = mosaic.lay_out(links, len(photos))
-    told = [*_scaled(layout, strip, photos), *_mirrored(layout, strip, photos)]
+    plane = mosaic.lay_out(links, len(photos))
+    findings = [*_scaled(plane, strip, photos), *_mirrored(plane, strip, photos)]
     twice = _twice(links)
-    told += [_twin(links, pair, strip, photos) for pair in twice]
+    findings += [_twin(links, pair, strip, photos) for pair in twice]
     left = [number for number in range(len(photos)) if number not in {other for _, other in twice}]
     against = partial(turned_back, links, closer=_by_number(closer, photos))
-    order = _order(links, layout, left, against)
+    order = _order(links, plane, left, against)
     moved = _moved(order, left)
     if moved:
-        told.append(_out_of_order(links, order, moved, strip, photos, against))
-    told += _gaps(links, order, strip, photos)
-    mirrored = frozenset(photos[number] for number in np.flatnonzero(layout.mirrored).tolist())
-    size = {photos[number]: float(layout.size[number]) for number in _other_size(layout)}
-    changed = bool(twice or moved or mirrored or size)
-    return told, Arranged(tuple(photos[number] for number in order), _steps(links, order), mirrored, size, changed)
+        findings.append(_out_of_order(links, order, moved, strip, photos, against))
+    findings += _gaps(links, order, strip, photos)
+    mirrored = frozenset(photos[number] for number in np.flatnonzero(plane.mirrored).tolist())
+    size = {photos[number]: float(plane.size[number]) for number in _other_size(plane)}
+    return findings, PhotoOrder(tuple(photos[number] for number in order), _steps(links, order), mirrored, size)
 
 
-def other_scale(observations: PhotoPoints, strip: str, photos: Sequence[str]) -> Iterator[Finding]:
-    """Look for photos at another scale than both their neighbours, by the images alone: for strips that are not formed.
-
-    Parameters
-    ----------
-    observations : PhotoPoints
-        Image points of the project, in any unit.
-    photos : sequence of str
-        Its photos in flight order.
-    """
+def find_other_scale(observations: PhotoPoints, strip: str, photos: Sequence[str]) -> Iterator[Finding]:
+    """Look for photos at another scale than both their neighbours by the images alone, where a strip is not formed."""
     links = mosaic.link(observations, photos)
     for number in range(1, len(photos) - 1):
         rows = [links.index.get((number - 1, number)), links.index.get((number, number + 1))]
         if rows[0] is None or rows[1] is None:
             continue
         before, after = abs(links.turn[rows[0]]), abs(links.turn[rows[1]])
-        ratio = np.array([before, 1.0 / max(after, mosaic.SMALL)])  # of this photo to both
+        ratio = np.array([before, 1.0 / max(after, mosaic.TINY)])  # of this photo to both
         if (ratio > OTHER_SCALE).all() or (ratio < 1 / OTHER_SCALE).all():
             size = float(np.sqrt(ratio.prod()))
             message = f"things are {size:.2f} times as large on photo {photos[number]} as on both its neighbours"
@@ -112,7 +101,7 @@ def other_scale(observations: PhotoPoints, strip: str, photos: Sequence[str]) ->
             yield found("P205", message, fix, evidence, photos=(photos[number],), strips=(strip,))
 
 
-def _steps(links: mosaic.Links, order: Sequence[int]) -> tuple[complex, ...]:
+def _steps(links: mosaic.PhotoLinks, order: Sequence[int]) -> tuple[complex, ...]:
     """Way to the next photo on each photo: slope of the line through the centres of all photos linked with it.
 
     A tilt moves single centres by as much as a base; those of photos farther on say more of it.
@@ -138,13 +127,13 @@ def _steps(links: mosaic.Links, order: Sequence[int]) -> tuple[complex, ...]:
 # ------------------------------------------------------------------------------- photos unlike their neighbours
 
 
-def _other_size(layout: mosaic.Layout) -> list[int]:
-    return [int(number) for number in np.flatnonzero(np.abs(np.log(layout.size)) > np.log(mosaic.JUMP))]
+def _other_size(plane: mosaic.Mosaic) -> list[int]:
+    return [int(number) for number in np.flatnonzero(np.abs(np.log(plane.size)) > np.log(mosaic.SCALE_JUMP))]
 
 
-def _scaled(layout: mosaic.Layout, strip: str, photos: Sequence[str]) -> Iterator[Finding]:
-    for number in _other_size(layout):
-        size = float(layout.size[number])
+def _scaled(plane: mosaic.Mosaic, strip: str, photos: Sequence[str]) -> Iterator[Finding]:
+    for number in _other_size(plane):
+        size = float(plane.size[number])
         reading = reading_of(size, (0.5, 2.0))
         message = f"the coordinates on photo {photos[number]} are {size:.4g} times as large as on its neighbours"
         if reading.name:
@@ -153,8 +142,8 @@ def _scaled(layout: mosaic.Layout, strip: str, photos: Sequence[str]) -> Iterato
         yield found("P102", message, fix, {"times": size}, photos=(photos[number],), strips=(strip,))
 
 
-def _mirrored(layout: mosaic.Layout, strip: str, photos: Sequence[str]) -> Iterator[Finding]:
-    for number in np.flatnonzero(layout.mirrored).tolist():
+def _mirrored(plane: mosaic.Mosaic, strip: str, photos: Sequence[str]) -> Iterator[Finding]:
+    for number in np.flatnonzero(plane.mirrored).tolist():
         message = (
             f"photo {photos[number]} fits its neighbours only as a mirror image: a negative read as a positive, its x "
             "and y exchanged, or its y counted the other way"
@@ -163,18 +152,23 @@ def _mirrored(layout: mosaic.Layout, strip: str, photos: Sequence[str]) -> Itera
         yield found("P104", message, fix, {}, photos=(photos[number],), strips=(strip,))
 
 
-def _twice(links: mosaic.Links) -> list[tuple[int, int]]:
+def _twice(links: mosaic.PhotoLinks) -> list[tuple[int, int]]:
     """Photos taken from one place: the same photo under two names."""
     base = np.abs(links.bases[1])
     if not len(base):
         return []
     usual = float(np.median(base))
-    like = np.abs(np.log(np.maximum(np.abs(links.turn), mosaic.SMALL))) < np.log(mosaic.JUMP)
-    same = like & (base < SAME_PLACE * usual) & (links.misfit < SAME_PLACE * usual) & (links.count >= SURE_COUNT)
+    like = np.abs(np.log(np.maximum(np.abs(links.turn), mosaic.TINY))) < np.log(mosaic.SCALE_JUMP)
+    same = (
+        like
+        & (base < SAME_PLACE_SHARE * usual)
+        & (links.misfit < SAME_PLACE_SHARE * usual)
+        & (links.count >= SURE_COUNT)
+    )
     return [(int(a), int(b)) for a, b in links.photo[same]]
 
 
-def _twin(links: mosaic.Links, pair: tuple[int, int], strip: str, photos: Sequence[str]) -> Finding:
+def _twin(links: mosaic.PhotoLinks, pair: tuple[int, int], strip: str, photos: Sequence[str]) -> Finding:
     row = links.index[pair]
     one, other = photos[pair[0]], photos[pair[1]]
     usual = float(np.median(np.abs(links.bases[1])))
@@ -195,7 +189,7 @@ def _twin(links: mosaic.Links, pair: tuple[int, int], strip: str, photos: Sequen
 # ------------------------------------------------------------------------------------------------- the order
 
 
-def _sure(links: mosaic.Links) -> Flags:
+def _sure(links: mosaic.PhotoLinks) -> Flags:
     """Links that are good enough to speak against the list."""
     base = np.abs(links.bases[1])
     sure: Flags = (links.count >= SURE_COUNT) & (links.misfit < SURE_MISFIT * base)
@@ -212,20 +206,10 @@ def _by_number(closer: Closer, photos: Sequence[str]) -> Toward:
     return toward
 
 
-def turned_back(links: mosaic.Links, order: Sequence[int], closer: Toward = lambda _of, _other: None) -> list[int]:
-    """Find photos whose two neighbours lie on the same side.
+def turned_back(links: mosaic.PhotoLinks, order: Sequence[int], closer: Toward = lambda _of, _other: None) -> list[int]:
+    """Find photos, listed in an order, whose two neighbours lie on the same side.
 
-    Parameters
-    ----------
-    order : sequence of int
-        Photos in an order.
-    closer : callable
-        Gives the direction of a photo on another, tilts taken into account, or None where that is not known.
-
-    Returns
-    -------
-    list of int
-        Those photos; none is told where a link is missing or doubtful.
+    None is named where a link is missing or doubtful, or where `closer`, which takes tilts into account, contradicts.
     """
     sure = _sure(links)
     found: list[int] = []
@@ -238,7 +222,7 @@ def turned_back(links: mosaic.Links, order: Sequence[int], closer: Toward = lamb
         if not _same_side(one, two):
             continue
         looked_at += 1
-        near = [closer(here, other) for other in (before, after)] if looked_at <= LOOKED_AT else [None, None]
+        near = [closer(here, other) for other in (before, after)] if looked_at <= MOST_LOOKED_AT else [None, None]
         if near[0] is None or near[1] is None or _same_side(near[0], near[1]):
             found.append(here)
     return found
@@ -248,33 +232,33 @@ def _same_side(one: complex, two: complex) -> bool:
     return (one * two.conjugate()).real > TURNED_BACK * abs(one) * abs(two)
 
 
-def _unlinked(links: mosaic.Links, order: Sequence[int]) -> int:
+def _unlinked(links: mosaic.PhotoLinks, order: Sequence[int]) -> int:
     return sum((min(pair), max(pair)) not in links.index for pair in pairwise(order))
 
 
-def _order(links: mosaic.Links, layout: mosaic.Layout, listed: list[int], contradictions: Against) -> list[int]:
+def _order(links: mosaic.PhotoLinks, plane: mosaic.Mosaic, listed: list[int], contradictions: Against) -> list[int]:
     """Photos as they lie, where the list is contradicted; else as listed."""
     against = len(contradictions(listed)) + _unlinked(links, listed)
-    if not against or len(listed) < FEWEST:
+    if not against or len(listed) < LEAST_PHOTOS:
         return listed
     order: list[int] = []
-    for part in range(int(layout.part.max()) + 1):
-        inside = [number for number in listed if layout.part[number] == part]
-        order += _along(layout, inside)
-    order.sort(key=lambda number: listed.index(_first_of(layout, listed, number)))  # parts as they are listed
+    for part in range(int(plane.part.max()) + 1):
+        inside = [number for number in listed if plane.part[number] == part]
+        order += _along(plane, inside)
+    order.sort(key=lambda number: listed.index(_first_of(plane, listed, number)))  # parts as they are listed
     left = len(contradictions(order)) + _unlinked(links, order)
     return order if left < against else listed
 
 
-def _first_of(layout: mosaic.Layout, listed: Sequence[int], number: int) -> int:
-    return next(other for other in listed if layout.part[other] == layout.part[number])
+def _first_of(plane: mosaic.Mosaic, listed: Sequence[int], number: int) -> int:
+    return next(other for other in listed if plane.part[other] == plane.part[number])
 
 
-def _along(layout: mosaic.Layout, inside: list[int]) -> list[int]:
+def _along(plane: mosaic.Mosaic, inside: list[int]) -> list[int]:
     """Photos of one part along its longest direction, in the sense in which fewer are out of the list's order."""
-    if len(inside) < FEWEST:
+    if len(inside) < LEAST_PHOTOS:
         return inside
-    center = layout.center[inside]
+    center = plane.offset[inside]
     d = center - center.mean()
     axis = np.sqrt((d**2).sum())  # direction of the largest extent
     along = (d * np.conj(axis)).real
@@ -302,7 +286,7 @@ def _moved(order: Sequence[int], listed: Sequence[int]) -> list[int]:
 
 
 def _out_of_order(
-    links: mosaic.Links,
+    links: mosaic.PhotoLinks,
     order: Sequence[int],
     moved: Sequence[int],
     strip: str,
@@ -321,16 +305,15 @@ def _out_of_order(
         where = f"between {near[0]} and {near[1]}" if len(near) > 1 else f"beside {near[0]}"
         message = f"strip {strip}: photo {wrong[0]} is not where it is listed; its points put it {where}"
     else:
-        text = ", ".join(wrong[:NAMED]) + (f" and {len(wrong) - NAMED} more" if len(wrong) > NAMED else "")
-        message = f"strip {strip}: photos {text} are not where they are listed"
+        message = f"strip {strip}: photos {listed(wrong)} are not where they are listed"
     concerned = _window(names, wrong)
     message += f"; the photos lie in the order {', '.join(concerned)}"
-    listed = [number for number in range(len(photos)) if number in set(order)]
+    given = [number for number in range(len(photos)) if number in set(order)]
     evidence = {
         "photos_moved": len(moved),
-        "turned_back_as_listed": len(contradictions(listed)),
+        "turned_back_as_listed": len(contradictions(given)),
         "turned_back_as_found": len(contradictions(order)),
-        "neighbours_without_link_as_listed": _unlinked(links, listed),
+        "neighbours_without_link_as_listed": _unlinked(links, given),
     }
     fix = "list the photos in flight order, or correct the photo ids in the table"
     return found("P201", message, fix, evidence, photos=tuple(wrong), strips=(strip,))
@@ -356,10 +339,10 @@ def _window(names: Sequence[str], wrong: Sequence[str]) -> list[str]:
     """Return the part of the order that shows where wrong photos belong."""
     places = [names.index(each) for each in wrong]
     low, high = max(min(places) - 2, 0), min(max(places) + 3, len(names))
-    return list(names[low:high]) if high - low <= 2 * NAMED else [*names[low : low + 2 * NAMED], "..."]
+    return list(names[low:high]) if high - low <= 2 * MOST_NAMED else [*names[low : low + 2 * MOST_NAMED], "..."]
 
 
-def _gaps(links: mosaic.Links, order: Sequence[int], strip: str, photos: Sequence[str]) -> Iterator[Finding]:
+def _gaps(links: mosaic.PhotoLinks, order: Sequence[int], strip: str, photos: Sequence[str]) -> Iterator[Finding]:
     """Neighbours, in the order in which the photos lie, without two common points."""
     for a, b in pairwise(order):
         if (min(a, b), max(a, b)) in links.index:

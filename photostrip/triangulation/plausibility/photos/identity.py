@@ -22,19 +22,25 @@ if TYPE_CHECKING:
     Numbers = NDArray[np.intp]
     Flags = NDArray[np.bool_]
 
-ALONG_BASE = 5.0  # times the y parallax: how large an error of the x parallax may be
-APART = 0.05  # of the distance from camera to ground: no bending of a strip moves a point by it
-SAME_PLACE = 8.0  # standard deviations of an image coordinate, at photo scale, in plan
-SAME_DEPTH = 3.0  # times that in height, times height over base
-CHANCE = 0.01  # points that may stand at one place by chance in the whole strip; else nothing is said
-FAR = 2.0  # bases between two places of one id: tilts move them by less
-SEEN_BY = 2  # photos that must agree
-SMALL = 1e-12
-SAME_IMAGE = 3.5  # standard deviations of the mean difference of image coordinates on common photos
+MOST_X_OVER_Y = 5.0  # times the y parallax: how large an error of the x parallax may be
+LEAST_APART_SHARE = 0.05  # of the distance from camera to ground: no bending of a strip moves a point by it
+SAME_PLACE_SIGMAS = 8.0  # standard deviations of an image coordinate, at photo scale, in plan
+SAME_HEIGHT_FACTOR = 3.0  # times that in height, times height over base
+MOST_BY_CHANCE = 0.01  # points that may stand at one place by chance in the whole strip; else nothing is said
+FAR_BASES = 2.0  # bases between two places of one id: tilts move them by less
+LEAST_RAYS = 2  # photos that must agree
+TINY = 1e-12
+SAME_IMAGE_SIGMAS = 3.5  # standard deviations of the mean difference of image coordinates on common photos
 
 
-def one_id(orientation: Orientation, formed: FormedStrip, names: Sequence[str], strip: Sequence[str], sigma: float,
-           strip_id: str) -> Iterator[Finding]:  # fmt: skip
+def find_shared_ids(
+    orientation: Orientation,
+    formed: FormedStrip,
+    names: Sequence[str],
+    photos: Sequence[str],
+    sigma: float,
+    strip_id: str,
+) -> Iterator[Finding]:
     """Find ids that stand for two points: two pairs without a common photo put it at two places.
 
     What a pair says is believed within what its y parallax lets expect along the base.
@@ -43,7 +49,7 @@ def one_id(orientation: Orientation, formed: FormedStrip, names: Sequence[str], 
     ----------
     names : sequence of str
         Ids of the points by number.
-    strip : sequence of str
+    photos : sequence of str
         Photos of the strip in order.
     sigma : float
         Standard deviation of an image coordinate, mm.
@@ -56,18 +62,18 @@ def one_id(orientation: Orientation, formed: FormedStrip, names: Sequence[str], 
     apart = np.flatnonzero((point[1:] == point[:-1]) & (pair[1:] > pair[:-1] + 1))
     distance = np.linalg.norm(formed.model_xyz[rows[apart + 1]] - formed.model_xyz[rows[apart]], axis=1)
     depth = np.linalg.norm(formed.model_xyz[rows[apart]] - formed.centers[pair[apart]], axis=1)
-    told: set[int] = set()
+    done: set[int] = set()
     parallax = np.maximum(np.abs(orientation.parallax[rows]), sigma)
     base = np.linalg.norm(np.diff(formed.centers, axis=0), axis=1)[pair]
-    doubt = ALONG_BASE * parallax / orientation.pairs.focal  # of an x parallax, in units of the distance
-    believed = APART * (pair[apart + 1] - pair[apart]) * depth
+    doubt = MOST_X_OVER_Y * parallax / orientation.pairs.focal  # of an x parallax, in units of the distance
+    believed = LEAST_APART_SHARE * (pair[apart + 1] - pair[apart]) * depth
     believed += sum(doubt[each] * depth**2 / base[each] for each in (apart, apart + 1))
     for k in np.flatnonzero(distance > believed).tolist():
         number = int(point[apart[k]])
-        if number in told:
+        if number in done:
             continue
-        told.add(number)
-        one, two = (tuple(strip[int(pair[apart[k] + more]) :][:2]) for more in (0, 1))
+        done.add(number)
+        one, two = (tuple(photos[int(pair[apart[k] + more]) :][:2]) for more in (0, 1))
         share = float(distance[k] / depth[k])
         message = (
             f"point {names[number]} stands for two points: photos {' and '.join(one)} put it {100 * share:.0f} % of "
@@ -82,35 +88,26 @@ def one_id(orientation: Orientation, formed: FormedStrip, names: Sequence[str], 
         yield found("P301", message, fix, evidence, points=(names[number],), photos=(*one, *two), strips=(strip_id,))
 
 
-def two_ids(observations: PhotoPoints, formed: FormedStrip, focal: float, strip: Sequence[str], strip_id: str,
-            sigma: float) -> Iterator[Finding]:  # fmt: skip
-    """Find points that stand at one place and are on no photo two different points.
-
-    Parameters
-    ----------
-    focal : float
-        Principal distance, mm.
-    strip : sequence of str
-        Photos of the strip in order.
-    sigma : float
-        Standard deviation of an image coordinate, mm.
-    """
+def find_double_ids(
+    observations: PhotoPoints, formed: FormedStrip, focal: float, photos: Sequence[str], strip_id: str, sigma: float
+) -> Iterator[Finding]:
+    """Find points that stand at one place of the formed strip and are on no photo two different points."""
     bases = np.linalg.norm(np.diff(formed.centers, axis=0), axis=1)
     depth = _depth(formed)
-    reach = SAME_PLACE * sigma / focal * depth
-    tall = SAME_DEPTH * reach * depth / max(float(np.median(bases)), 1e-12)
+    reach = SAME_PLACE_SIGMAS * sigma / focal * depth
+    tall = SAME_HEIGHT_FACTOR * reach * depth / max(float(np.median(bases)), 1e-12)
     one, two = _near(formed.xyz, reach)
     apart = len(formed.xyz) ** 2 * reach**2 * np.pi / 2.0 / max(_area(formed.xyz), 1e-12)
-    near = SAME_IMAGE / SAME_PLACE * reach  # two points farther apart are seen as two on their photos
+    near = SAME_IMAGE_SIGMAS / SAME_PLACE_SIGMAS * reach  # two points farther apart are seen as two on their photos
     expected = len(formed.xyz) ** 2 * near**2 * np.pi / 2.0 / max(_area(formed.xyz), 1e-12)
-    if expected > CHANCE:
+    if expected > MOST_BY_CHANCE:
         return
     for a, b in zip(one.tolist(), two.tolist(), strict=True):
         if abs(formed.xyz[a, 2] - formed.xyz[b, 2]) > tall:
             continue
         numbers = (int(formed.point[a]), int(formed.point[b]))
-        together = _together(observations, numbers, strip)
-        if together is False or (together is None and apart > CHANCE):
+        together = _together(observations, numbers, photos)
+        if together is False or (together is None and apart > MOST_BY_CHANCE):
             continue
         names = tuple(observations.point_ids[number] for number in numbers)
         gap = float(np.linalg.norm(formed.xyz[a, :2] - formed.xyz[b, :2]) / depth * focal)
@@ -123,29 +120,27 @@ def two_ids(observations: PhotoPoints, formed: FormedStrip, focal: float, strip:
         yield found("P302", message, fix, evidence, points=names, strips=(strip_id,))
 
 
-def far_apart(
-    observations: PhotoPoints, rows: Numbers, along: Floats, strip: Sequence[str], strip_id: str
+def find_shared_ids_in_images(
+    observations: PhotoPoints, rows: Numbers, along: Floats, photos: Sequence[str], strip_id: str
 ) -> Iterator[Finding]:
     """Find ids that two groups of photos put at places far from each other along the strip.
 
     Parameters
     ----------
     rows : ndarray of int, shape (m,)
-        Those of the strip.
+        Image points of the strip.
     along : ndarray, shape (m,)
         Where the photo of each puts its point along the strip, bases.
-    strip : sequence of str
-        Photos of the strip in order.
     """
     order = np.lexsort((along, observations.point[rows]))
     rows, along = rows[order], along[order]
     point = observations.point[rows]
-    for k in np.flatnonzero((point[1:] == point[:-1]) & (np.diff(along) > FAR)).tolist():
-        here = np.flatnonzero(point == point[k])
-        groups = [rows[here[here <= k]], rows[here[here > k]]]
-        if min(len(each) for each in groups) < SEEN_BY:
+    for k in np.flatnonzero((point[1:] == point[:-1]) & (np.diff(along) > FAR_BASES)).tolist():
+        same = np.flatnonzero(point == point[k])
+        groups = [rows[same[same <= k]], rows[same[same > k]]]
+        if min(len(each) for each in groups) < LEAST_RAYS:
             continue  # a wrong coordinate on one photo
-        names = set(strip)
+        names = set(photos)
         one, two = (
             tuple(name for name in (observations.photo_ids[n] for n in observations.photo[each]) if name in names)
             for each in groups
@@ -161,24 +156,16 @@ def far_apart(
                     strips=(strip_id,))  # fmt: skip
 
 
-def on_top(observations: PhotoPoints, rows: Numbers, strip_id: str) -> Iterator[Finding]:
-    """Find points that stand at one place on every photo that shows both, two photos at least.
-
-    Parameters
-    ----------
-    observations : PhotoPoints
-        Image points, mm.
-    rows : ndarray of int, shape (m,)
-        Those of the strip.
-    """
+def find_double_ids_in_images(observations: PhotoPoints, rows: Numbers, strip_id: str) -> Iterator[Finding]:
+    """Find points at one place on all photos of a strip (image points `rows`) that show both, at least two."""
     if not len(rows):
         return
     o = observations
-    reach = SAME_IMAGE * float(np.median(o.sigma[rows])) * np.sqrt(2.0)
+    reach = SAME_IMAGE_SIGMAS * float(np.median(o.sigma[rows])) * np.sqrt(2.0)
     photos = len(np.unique(o.photo[rows]))
     area = float(np.prod(np.ptp(o.xy[rows], axis=0)))
     pairs = len(rows) ** 2 / photos / 2.0  # of points on one photo, each counted on two photos at least
-    if pairs / SEEN_BY * (2.0 * reach) ** 2 / max(area, SMALL) > CHANCE:
+    if pairs / LEAST_RAYS * (2.0 * reach) ** 2 / max(area, TINY) > MOST_BY_CHANCE:
         return
     rows = rows[np.lexsort((o.xy[rows, 0], o.photo[rows]))]
     near: dict[tuple[int, int], list[float]] = {}
@@ -192,7 +179,7 @@ def on_top(observations: PhotoPoints, rows: Numbers, strip_id: str) -> Iterator[
             near.setdefault((a, b), []).append(float(np.hypot(*step[k])))
     for (a, b), gaps in near.items():
         both = np.intersect1d(o.photo[rows[o.point[rows] == a]], o.photo[rows[o.point[rows] == b]])
-        if a == b or len(gaps) < max(SEEN_BY, len(both)):
+        if a == b or len(gaps) < max(LEAST_RAYS, len(both)):
             continue
         names = (o.point_ids[a], o.point_ids[b])
         gap = float(np.mean(gaps))
@@ -234,9 +221,9 @@ def _near(xyz: Floats, reach: float) -> tuple[Numbers, Numbers]:
     return np.concatenate(ones), np.concatenate(twos)
 
 
-def _together(observations: PhotoPoints, numbers: tuple[int, int], strip: Sequence[str]) -> bool | None:
+def _together(observations: PhotoPoints, numbers: tuple[int, int], photos: Sequence[str]) -> bool | None:
     """Whether two points stand at one place on the photos that show both; None when there is no such photo."""
-    inside = np.array([name in set(strip) for name in observations.photo_ids], bool)[observations.photo]
+    inside = np.array([name in set(photos) for name in observations.photo_ids], bool)[observations.photo]
     rows = [np.flatnonzero((observations.point == number) & inside) for number in numbers]
     _, one, two = np.intersect1d(observations.photo[rows[0]], observations.photo[rows[1]], return_indices=True)
     if not len(one):
@@ -244,4 +231,4 @@ def _together(observations: PhotoPoints, numbers: tuple[int, int], strip: Sequen
     a, b = rows[0][one], rows[1][two]
     difference = (observations.xy[a] - observations.xy[b]).mean(axis=0)
     variance = (observations.sigma[a] ** 2 + observations.sigma[b] ** 2).sum(axis=0) / len(a) ** 2
-    return bool((np.abs(difference) <= SAME_IMAGE * np.sqrt(variance)).all())
+    return bool((np.abs(difference) <= SAME_IMAGE_SIGMAS * np.sqrt(variance)).all())

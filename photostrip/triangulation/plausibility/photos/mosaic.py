@@ -9,9 +9,9 @@ Links do not depend on the principal distance, on the unit, on the order of the 
 from __future__ import annotations
 
 import heapq
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -28,18 +28,18 @@ if TYPE_CHECKING:
     Flags = NDArray[np.bool_]
 
 LARGEST_LAG = 12  # photos on which a point is followed on; a strip with 90 % end lap has 10
-STEPS = 6  # of the reweighting: a gross error must not turn a link
-LEAST = 2  # common points of a link
-MIRROR_LEAST = 5  # common points that tell a mirror image
-MIRROR_RATIO = 0.25  # of the mirrored to the plain misfit
-MIRROR_ABSOLUTE = 0.12  # of the spread of the points; relief and tilts leave less
-NARROW = 0.15  # breadth over length of the common points: mirror images of a line fit as well
-JUMP = 2.5  # ratio of the scales of two photos that no change of the flying height explains
-SMALL = 1e-12
+REWEIGHTINGS = 6  # of the reweighting: a gross error must not turn a link
+LEAST_COMMON = 2  # common points of a link
+LEAST_COMMON_OF_MIRROR = 5  # common points that tell a mirror image
+MIRROR_MISFIT_SHARE = 0.25  # of the mirrored to the plain misfit
+MOST_MIRROR_MISFIT = 0.12  # of the spread of the points; relief and tilts leave less
+LEAST_BREADTH = 0.15  # breadth over length of the common points: mirror images of a line fit as well
+SCALE_JUMP = 2.5  # ratio of the scales of two photos that no change of the flying height explains
+TINY = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Links:
+class PhotoLinks:
     """Photos of one strip that share points, two and two."""
 
     photo: Numbers  # (l, 2): places of the two photos in the strip's list, the smaller first
@@ -59,7 +59,7 @@ class Links:
     def bases(self) -> tuple[Complex, Complex]:
         """Centre of the second photo as it would lie on the first, and of the first on the second."""
         with np.errstate(invalid="ignore"):
-            back = -self.shift / np.where(np.abs(self.turn) > SMALL, self.turn, np.nan)
+            back = -self.shift / np.where(np.abs(self.turn) > TINY, self.turn, np.nan)
         return np.where(self.mirrored, np.conj(back), back), self.shift
 
     @cached_property
@@ -75,8 +75,8 @@ class Links:
         return complex(self.bases[0 if of < other else 1][row])
 
 
-def link(observations: PhotoPoints, photos: Sequence[str]) -> Links:
-    """Link the photos of a strip by their common points.
+def link(observations: PhotoPoints, photos: Sequence[str]) -> PhotoLinks:
+    """Link every two photos of a strip that have at least two common points.
 
     Parameters
     ----------
@@ -84,40 +84,50 @@ def link(observations: PhotoPoints, photos: Sequence[str]) -> Links:
         Image points of the project, in any unit.
     photos : sequence of str
         Photos of the strip; a photo that is listed twice counts where it stands first.
-
-    Returns
-    -------
-    Links
-        One for every two photos with at least two common points.
     """
-    key, z_a, z_b = _common(observations, photos)
-    order = np.argsort(key, kind="stable")
-    key, z_a, z_b = key[order], z_a[order], z_b[order]
-    pairs, starts, count = np.unique(key, return_index=True, return_counts=True)
-    enough = count >= LEAST
-    rows = np.repeat(enough, count)
-    key, z_a, z_b = key[rows], z_a[rows], z_b[rows]
+    pair, z_a, z_b = _common_points(observations, photos)
+    order = np.argsort(pair, kind="stable")
+    pairs, count = np.unique(pair, return_counts=True)
+    enough = count >= LEAST_COMMON
+    rows = order[np.repeat(enough, count)]
+    z_a, z_b = z_a[rows], z_b[rows]
     pairs, count = pairs[enough], count[enough]
     if not len(pairs):
         none, nowhere = np.zeros(0), np.zeros(0, complex)
-        return Links(np.zeros((0, 2), np.intp), np.zeros(0, np.intp), nowhere, nowhere, none, none, np.zeros(0, bool))
+        return PhotoLinks(
+            np.zeros((0, 2), np.intp), np.zeros(0, np.intp), nowhere, nowhere, none, none, np.zeros(0, bool)
+        )
     starts = np.concatenate([[0], np.cumsum(count)[:-1]])
     plain, mirror = _similar(z_a, z_b, starts, count), _similar(np.conj(z_a), z_b, starts, count)
     spread, narrow = _shape(z_b, starts, count)
-    turned = (
-        (mirror[2] < MIRROR_RATIO * plain[2])
-        & (mirror[2] < MIRROR_ABSOLUTE * spread)
-        & (count >= MIRROR_LEAST)
+    mirrored = (
+        (mirror.misfit < MIRROR_MISFIT_SHARE * plain.misfit)
+        & (mirror.misfit < MOST_MIRROR_MISFIT * spread)
+        & (count >= LEAST_COMMON_OF_MIRROR)
         & ~narrow
     )
-    turn, shift = np.where(turned, mirror[0], plain[0]), np.where(turned, mirror[1], plain[1])
-    misfit = np.where(turned, mirror[2], plain[2])
-    photo = np.column_stack(np.divmod(pairs, len(photos))).astype(np.intp)
-    return Links(photo, count.astype(np.intp), turn, shift, misfit, spread, turned)
+    return PhotoLinks(
+        photo=np.column_stack(np.divmod(pairs, len(photos))).astype(np.intp),
+        count=count.astype(np.intp),
+        turn=np.where(mirrored, mirror.turn, plain.turn),
+        shift=np.where(mirrored, mirror.shift, plain.shift),
+        misfit=np.where(mirrored, mirror.misfit, plain.misfit),
+        spread=spread,
+        mirrored=mirrored,
+    )
 
 
-def _common(observations: PhotoPoints, photos: Sequence[str]) -> tuple[Numbers, Complex, Complex]:
-    """Rows of two photos that show the same point: number of the pair of photos, coordinates on both."""
+class _CommonPoints(NamedTuple):
+    """Points of two photos, one row for each point of each two photos."""
+
+    pair: Numbers  # first photo times the number of photos, plus the second
+    # z_a, z_b: complex image coordinates on the first and on the second photo
+    z_a: Complex
+    z_b: Complex
+
+
+def _common_points(observations: PhotoPoints, photos: Sequence[str]) -> _CommonPoints:
+    """Follow every point from photo to photo."""
     place: dict[str, int] = {}
     for number, name in enumerate(photos):
         place.setdefault(name, number)
@@ -126,36 +136,42 @@ def _common(observations: PhotoPoints, photos: Sequence[str]) -> tuple[Numbers, 
     order = inside[np.lexsort((position[inside], observations.point[inside]))]
     point, position = observations.point[order], position[order]
     z = observations.xy[order, 0] + 1j * observations.xy[order, 1]
-    keys, first, second = [], [], []
+    parts = []
     for lag in range(1, LARGEST_LAG + 1):
         rows = np.flatnonzero((point[lag:] == point[:-lag]) & (position[lag:] > position[:-lag]))
         if not len(rows):
             break
-        keys.append(position[rows] * len(photos) + position[rows + lag])
-        first.append(z[rows])
-        second.append(z[rows + lag])
-    if not keys:
-        return np.zeros(0, np.intp), np.zeros(0, complex), np.zeros(0, complex)
-    return np.concatenate(keys), np.concatenate(first), np.concatenate(second)
+        parts.append((position[rows] * len(photos) + position[rows + lag], z[rows], z[rows + lag]))
+    if not parts:
+        return _CommonPoints(np.zeros(0, np.intp), np.zeros(0, complex), np.zeros(0, complex))
+    return _CommonPoints(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
-def _similar(z_a: Complex, z_b: Complex, starts: Numbers, count: Numbers) -> tuple[Complex, Complex, Floats]:
-    """Plane similarity of each segment, with weights that fall with the residual: turn, shift, mean residual."""
+class _Similarities(NamedTuple):
+    """Plane similarities z_b = turn z_a + shift, one for each pair of photos."""
+
+    turn: Complex
+    shift: Complex
+    misfit: Floats  # mean residual
+
+
+def _similar(z_a: Complex, z_b: Complex, starts: Numbers, count: Numbers) -> _Similarities:
+    """Fit a plane similarity to each segment of points, with weights that fall with the residual."""
     segment = np.repeat(np.arange(len(count)), count)
     weight = np.ones(len(z_a))
     turn, shift = np.zeros(len(count), complex), np.zeros(len(count), complex)
     misfit = np.zeros(len(count))
-    for _ in range(STEPS):
+    for _ in range(REWEIGHTINGS):
         total = np.add.reduceat(weight, starts)
         mean_a, mean_b = (np.add.reduceat(weight * z, starts) / total for z in (z_a, z_b))
         d_a, d_b = z_a - mean_a[segment], z_b - mean_b[segment]
         squares = np.add.reduceat(weight * np.abs(d_a) ** 2, starts)
-        turn = np.asarray(np.add.reduceat(weight * np.conj(d_a) * d_b, starts) / np.maximum(squares, SMALL**2), complex)
+        turn = np.asarray(np.add.reduceat(weight * np.conj(d_a) * d_b, starts) / np.maximum(squares, TINY**2), complex)
         shift = mean_b - turn * mean_a
         size = np.abs(d_b - turn[segment] * d_a)
         misfit = np.add.reduceat(weight * size, starts) / total
-        weight = 1.0 / np.maximum(size / np.maximum(misfit, SMALL)[segment], 0.5)
-    return turn, shift, misfit
+        weight = 1.0 / np.maximum(size / np.maximum(misfit, TINY)[segment], 0.5)
+    return _Similarities(turn, shift, misfit)
 
 
 def _shape(z: Complex, starts: Numbers, count: Numbers) -> tuple[Floats, Flags]:
@@ -166,75 +182,74 @@ def _shape(z: Complex, starts: Numbers, count: Numbers) -> tuple[Floats, Flags]:
     skew = np.abs(np.add.reduceat(d**2, starts))  # length squared minus breadth squared
     with np.errstate(divide="ignore", invalid="ignore"):
         breadth = np.sqrt((squares - skew) / (squares + skew))
-    return np.sqrt(squares / count), ~(breadth > NARROW)
+    return np.sqrt(squares / count), ~(breadth > LEAST_BREADTH)
 
 
 @dataclass(frozen=True, eq=False)
-class Layout:
-    """Photos of a strip in one plane."""
+class Mosaic:
+    """Photos of a strip in one plane: Z = factor z + offset, with conj(z) for mirrored photos."""
 
     part: Numbers  # (n,): which connected part each photo belongs to; the largest part is 0
-    center: Complex  # (n,): centre of each photo in the plane of its part
-    # factor, offset: (n,): plane from photo: Z = factor z + offset, with conj(z) for mirrored photos
-    factor: Complex
-    offset: Complex
+    factor: Complex  # (n,)
+    offset: Complex  # (n,): centre of each photo in the plane of its part
     mirrored: Flags  # (n,): photos that are mirror images of most of the others of their part
     # (n,): how many times larger the coordinates of a photo are than those of most others; changes of a few ten percent
     # from photo to photo, which are changes of the flying height, do not count
     size: Floats
 
 
-def lay_out(links: Links, photos: int) -> Layout:
+def lay_out(links: PhotoLinks, photos: int) -> Mosaic:
     """Bring the photos of a strip into one plane, along the links with most points."""
     around: list[list[tuple[int, int]]] = [[] for _ in range(photos)]
     for row, (a, b) in enumerate(links.photo.tolist()):
         around[a].append((row, b))
         around[b].append((row, a))
-    factor, offset = np.ones(photos, complex), np.zeros(photos, complex)
-    part, odd, size = np.full(photos, -1, np.intp), np.zeros(photos, bool), np.ones(photos)
+    plane = Mosaic(
+        part=np.full(photos, -1, np.intp),
+        factor=np.ones(photos, complex),
+        offset=np.zeros(photos, complex),
+        mirrored=np.zeros(photos, bool),
+        size=np.ones(photos),
+    )
     for start in range(photos):
-        if part[start] < 0:
-            part[start] = part.max() + 1
-            _grow(start, around, links, (part, factor, offset, odd, size))
-    for number in range(int(part.max(initial=-1)) + 1):
-        inside = part == number
-        if 2 * odd[inside].sum() > inside.sum():  # the majority is taken as not mirrored: turn the plane over
-            factor[inside], offset[inside] = np.conj(factor[inside]), np.conj(offset[inside])
-            odd[inside] = ~odd[inside]
-        size[inside] /= np.median(size[inside])
-    sizes = np.bincount(part, minlength=1)
+        if plane.part[start] < 0:
+            plane.part[start] = plane.part.max() + 1
+            _grow(start, around, links, plane)
+    for number in range(int(plane.part.max(initial=-1)) + 1):
+        inside = plane.part == number
+        if 2 * plane.mirrored[inside].sum() > inside.sum():  # most photos count as not mirrored: turn the plane over
+            plane.factor[inside], plane.offset[inside] = np.conj(plane.factor[inside]), np.conj(plane.offset[inside])
+            plane.mirrored[inside] = ~plane.mirrored[inside]
+        plane.size[inside] /= np.median(plane.size[inside])
+    sizes = np.bincount(plane.part, minlength=1)
     rank = np.empty(len(sizes), np.intp)
     rank[np.argsort(-sizes, kind="stable")] = np.arange(len(sizes))
-    return Layout(rank[part], offset.copy(), factor, offset, odd, size)
+    return replace(plane, part=rank[plane.part])
 
 
-def _grow(
-    start: int,
-    around: Sequence[Sequence[tuple[int, int]]],
-    links: Links,
-    plane: tuple[Numbers, Complex, Complex, Flags, Floats],
-) -> None:
-    """Place all photos that hang together with one, strongest links first."""
-    part, factor, offset, odd, size = plane
+def _grow(start: int, around: Sequence[Sequence[tuple[int, int]]], links: PhotoLinks, plane: Mosaic) -> None:
+    """Place all photos that hang together with one, strongest links first; the rows of `plane` are filled in."""
     queue = [(-int(links.count[row]), row, start, other) for row, other in around[start]]
     heapq.heapify(queue)
     while queue:
         _, row, known, new = heapq.heappop(queue)
-        if part[new] >= 0:
+        if plane.part[new] >= 0:
             continue
-        part[new] = part[known]
+        plane.part[new] = plane.part[known]
         turn, shift, mirrored = complex(links.turn[row]), complex(links.shift[row]), bool(links.mirrored[row])
         if known < new:  # z_new = turn z_known + shift, so z_known = (z_new - shift) / turn
-            turn, shift = (1.0 / turn, -shift / turn) if abs(turn) > SMALL else (0j, 0j)
+            turn, shift = (1.0 / turn, -shift / turn) if abs(turn) > TINY else (0j, 0j)
             if mirrored:
                 turn, shift = turn.conjugate(), shift.conjugate()
         # z_known = turn z_new + shift, or of conj(z_new)
-        if odd[known]:  # the plane takes conj(z_known)
+        if plane.mirrored[known]:  # the plane takes conj(z_known)
             turn, shift = turn.conjugate(), shift.conjugate()
-        odd[new] = odd[known] ^ mirrored
-        size[new] = size[known] * (1.0 if 1 / JUMP < abs(turn) < JUMP else 1 / max(abs(turn), SMALL))
-        factor[new] = factor[known] * turn
-        offset[new] = factor[known] * shift + offset[known]
+        plane.mirrored[new] = plane.mirrored[known] ^ mirrored
+        plane.size[new] = plane.size[known] * (
+            1.0 if 1 / SCALE_JUMP < abs(turn) < SCALE_JUMP else 1 / max(abs(turn), TINY)
+        )
+        plane.factor[new] = plane.factor[known] * turn
+        plane.offset[new] = plane.factor[known] * shift + plane.offset[known]
         for link_row, other in around[new]:
-            if part[other] < 0:
+            if plane.part[other] < 0:
                 heapq.heappush(queue, (-int(links.count[link_row]), link_row, new, other))

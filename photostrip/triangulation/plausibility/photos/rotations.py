@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-FEWEST = 3  # photos
+LEAST_PHOTOS = 3  # photos
 HARMLESS_DEG = 0.3  # rms difference: start values need not be better
-BETTER = 0.25  # of the rms difference that another reading may leave
+BETTER_SHARE = 0.25  # of the rms difference that another reading may leave
 DEGREES, GONS = 180.0 / np.pi, 200.0 / np.pi
 UNITS = (
     (DEGREES / GONS, "gons read as degrees"),
@@ -33,15 +33,13 @@ UNITS = (
 )
 
 
-def examine(angles: Floats, system: str, rotations: Floats, photos: Sequence[str]) -> Iterator[Finding]:
+def find_wrong_angles(angles: Floats, system: str, rotations: Floats, photos: Sequence[str]) -> Iterator[Finding]:
     """Compare given angles with the rotations that the photos turned out to have.
 
     Parameters
     ----------
     angles : ndarray, shape (n, 3)
-        Given angles as they were read, radians.
-    system : str
-        Their system as stated, one of ``geometry.rotation.SYSTEMS``.
+        Given angles as they were read, radians, of the stated `system` (``geometry.rotation.SYSTEMS``).
     rotations : ndarray, shape (n, 3, 3)
         Rotations found, image axes to east, north, up.
 
@@ -50,7 +48,7 @@ def examine(angles: Floats, system: str, rotations: Floats, photos: Sequence[str
     Finding
         P601 or P602, at most one.
     """
-    if len(photos) < FEWEST:
+    if len(photos) < LEAST_PHOTOS:
         return
     stated = _rms(from_angles(angles, system), rotations)
     best, text, code = stated, "", ""
@@ -58,7 +56,7 @@ def examine(angles: Floats, system: str, rotations: Floats, photos: Sequence[str
         left = _rms(other, rotations)
         if left < best:
             best, text, code = left, what, kind
-    if stated < HARMLESS_DEG or best > BETTER * stated:
+    if stated < HARMLESS_DEG or best > BETTER_SHARE * stated:
         return
     message = (
         f"the given angles of {len(photos)} photos differ from those found by {stated:.2f} degrees (rms); {text} they "

@@ -32,7 +32,7 @@ MOST_LIKELY = 0.5  # of the upper end of such a range; below it other readings c
 LIKELY_PIXELS = 2.2  # counted from a corner they reach twice as far
 HALF_DIAGONAL = (0.2, 3.5)  # of the principal distance: fields of 23 to 148 degrees
 USUAL_HALF_DIAGONAL = (0.24, 1.9)  # a 610 mm lens and an 85 mm lens on 23 cm film
-MARKS = (0.5, 2.0)  # calibrated over measured distances; a scan is known to a percent
+MARKS_RATIO = (0.5, 2.0)  # calibrated over measured distances; a scan is known to a percent
 READINGS = (
     (1e-3, "micrometres read as millimetres"),
     (1e3, "millimetres read as micrometres"),
@@ -45,28 +45,18 @@ READINGS = (
 )
 
 
-class Reading(NamedTuple):
+class UnitReading(NamedTuple):
     """What would bring image coordinates to a likely size."""
 
     factor: float  # what they would have to be multiplied by
     name: str  # what may have happened; empty when nothing is known that explains it
 
 
-def reading_of(ratio: float, likely: tuple[float, float], pixel_size: float | None = None) -> Reading:
-    """Find the unit that explains a size.
+def reading_of(ratio: float, likely: tuple[float, float], pixel_size: float | None = None) -> UnitReading:
+    """Find the unit that brings a ratio into the likely range.
 
-    Parameters
-    ----------
-    likely : tuple of float
-        Range in which the ratio should lie.
-    pixel_size : float, optional
-        Size of a pixel of the camera in mm.
-
-    Returns
-    -------
-    Reading
-        The first that brings the ratio into the upper half of its range, or into the rest of it, pixels first; factor 1
-        when none does.
+    The first reading that brings it into the upper half of the range, or else into the rest of it, pixels first;
+    factor 1 when none does.
     """
     pixels = (
         []
@@ -77,19 +67,14 @@ def reading_of(ratio: float, likely: tuple[float, float], pixel_size: float | No
             (1 / pixel_size, "millimetres read as pixels"),
         ]
     )
-    fits = [Reading(factor, name) for factor, name in pixels if likely[0] < ratio * factor < LIKELY_PIXELS]
+    fits = [UnitReading(factor, name) for factor, name in pixels if likely[0] < ratio * factor < LIKELY_PIXELS]
     for least in (MOST_LIKELY * likely[1], likely[0]):
-        fits += [Reading(factor, name) for factor, name in READINGS if least < ratio * factor < likely[1]]
-    return fits[0] if fits else Reading(1.0, "")
+        fits += [UnitReading(factor, name) for factor, name in READINGS if least < ratio * factor < likely[1]]
+    return fits[0] if fits else UnitReading(1.0, "")
 
 
 def reaches(observations: PhotoPoints, cameras: Mapping[str, Camera]) -> dict[str, tuple[float, bool]]:
     """Measure how far image points reach, camera by camera.
-
-    Parameters
-    ----------
-    observations : PhotoPoints
-        Image points, mm.
 
     Returns
     -------
@@ -109,20 +94,19 @@ def reaches(observations: PhotoPoints, cameras: Mapping[str, Camera]) -> dict[st
     return size_of
 
 
-def examine(observations: PhotoPoints, cameras: Mapping[str, Camera]) -> tuple[list[Finding], dict[str, float]]:
+def find_wrong_units(
+    observations: PhotoPoints, cameras: Mapping[str, Camera]
+) -> tuple[list[Finding], dict[str, float]]:
     """Look for image coordinates in another unit, and for principal distances that no lens has.
-
-    Parameters
-    ----------
-    observations : PhotoPoints
-        Image points in the system of the photo, mm.
 
     Returns
     -------
+    list of Finding
+        P101, P105.
     dict of str to float
         Factor by camera that would bring its image coordinates to a likely size; 1 where nothing is wrong.
     """
-    told, factors = [], {}
+    findings, factors = [], {}
     by_name = {each.name: each for each in cameras.values()}
     for name, (reach, known) in reaches(observations, cameras).items():
         camera = by_name[name]
@@ -133,33 +117,22 @@ def examine(observations: PhotoPoints, cameras: Mapping[str, Camera]) -> tuple[l
             reading = reading_of(reach, likely, camera.pixel_size)
             factors[name] = reading.factor
             photos = [photo for photo in observations.photo_ids if photo in cameras and cameras[photo].name == name]
-            told.append(_wrong_unit(camera, reach, reading, photos))
+            findings.append(_wrong_unit(camera, reach, reading, photos))
     for camera in by_name.values():
         wrong = _unlikely_lens(camera)
         if wrong is not None:
-            told.append(wrong)
-    return told, factors
+            findings.append(wrong)
+    return findings, factors
 
 
-def of_marks(scales: Floats, photos: Sequence[str]) -> list[Finding]:
-    """Look for fiducial marks that are measured in another unit.
-
-    Parameters
-    ----------
-    scales : ndarray, shape (p,)
-        Calibrated over measured distances of the marks of each photo.
-
-    Returns
-    -------
-    list of Finding
-        P106, at most one.
-    """
-    odd = (scales < MARKS[0]) | (scales > MARKS[1])
+def find_wrong_mark_units(scales: Floats, photos: Sequence[str]) -> list[Finding]:
+    """Look for fiducial marks in another unit (P106), by calibrated over measured distances of each photo, (p,)."""
+    odd = (scales < MARKS_RATIO[0]) | (scales > MARKS_RATIO[1])
     if not odd.any():
         return []
     scale = float(np.median(scales[odd]))
     names = tuple(photo for photo, each in zip(photos, odd, strict=True) if each)
-    reading = reading_of(1.0 / scale, MARKS)
+    reading = reading_of(1.0 / scale, MARKS_RATIO)
     message = (
         f"the fiducial marks of {len(names)} photos are measured {1 / scale:.4g} times as far apart as they are "
         "calibrated"
@@ -171,7 +144,7 @@ def of_marks(scales: Floats, photos: Sequence[str]) -> list[Finding]:
     return [found("P106", message, fix, evidence, photos=names, key="fiducial_measurements.unit")]
 
 
-def _wrong_unit(camera: Camera, reach: float, reading: Reading, photos: Sequence[str]) -> Finding:
+def _wrong_unit(camera: Camera, reach: float, reading: UnitReading, photos: Sequence[str]) -> Finding:
     what = "half the format" if camera.format is not None else "the principal distance"
     message = f"image coordinates of camera {camera.name} reach to {reach:.3g} times {what}"
     if reading.name:

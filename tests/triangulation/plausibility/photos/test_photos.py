@@ -32,7 +32,7 @@ def simulation(heading: float = 70.0, end_lap: float = 62.0) -> Simulation:
 
 def found(observations: PhotoPoints, photos: Sequence[str]) -> list[Finding]:
     """Examine a strip."""
-    return flight_order.examine(observations, "A", photos)[0]
+    return flight_order.find_wrong_order(observations, "A", photos)[0]
 
 
 def codes(findings: Sequence[Finding]) -> list[str]:
@@ -58,7 +58,7 @@ def test_a_sound_strip_has_no_finding_in_either_direction(heading: float, lap: f
     turned = changed(made.observations, photos[2], np.exp(1j * turn))  # a photo turned in the comparator is no mistake
     assert found(turned, photos) == []
     assert found(turned, photos[::-1]) == []
-    assert flight_order.examine(turned, "A", photos)[1].photos == photos
+    assert flight_order.find_wrong_order(turned, "A", photos)[1].photos == photos
 
 
 @pytest.mark.parametrize("place", range(PHOTOS - 1))
@@ -66,7 +66,7 @@ def test_two_photos_in_the_wrong_order_are_both_named(place: int) -> None:
     made = simulation()
     photos = made.strips[0][1]
     wrong = [*photos[:place], photos[place + 1], photos[place], *photos[place + 2 :]]
-    findings, arranged = flight_order.examine(made.observations, "A", wrong)
+    findings, arranged = flight_order.find_wrong_order(made.observations, "A", wrong)
     assert codes(findings) == ["P201"]
     assert set(findings[0].photos) == {photos[place], photos[place + 1]}
     assert arranged.photos in {photos, photos[::-1]}
@@ -95,7 +95,9 @@ def test_an_end_of_the_strip_that_is_listed_at_the_other_is_named_alone(count: i
 def test_a_mirrored_photo_is_named_however_it_was_mirrored(by: complex) -> None:
     made = simulation()
     photos = made.strips[0][1]
-    findings, arranged = flight_order.examine(changed(made.observations, photos[3], by, mirror=True), "A", photos)
+    findings, arranged = flight_order.find_wrong_order(
+        changed(made.observations, photos[3], by, mirror=True), "A", photos
+    )
     assert codes(findings) == ["P104"]
     assert findings[0].photos == (photos[3],)
     assert arranged.mirrored == {photos[3]}
@@ -125,7 +127,7 @@ def test_the_same_photo_twice() -> None:
         xy=np.r_[o.xy, o.xy[rows] + noise],
         sigma=np.r_[o.sigma, o.sigma[rows]],
     )
-    findings, arranged = flight_order.examine(twice, "A", [*photos[:3], "copy", *photos[3:]])
+    findings, arranged = flight_order.find_wrong_order(twice, "A", [*photos[:3], "copy", *photos[3:]])
     assert codes(findings) == ["P203"]
     assert set(findings[0].photos) == {photos[2], "copy"}
     assert arranged.photos == photos
@@ -169,7 +171,7 @@ def test_a_wrong_unit_of_all_coordinates_is_named(factor: float, word: str) -> N
     made = simulation()
     cameras = dict.fromkeys(made.strips[0][1], made.camera)
     wrong = replace(made.observations, xy=made.observations.xy * factor)
-    (finding,), factors = units.examine(wrong, cameras)
+    (finding,), factors = units.find_wrong_units(wrong, cameras)
     assert finding.code == "P101"
     assert word in finding.message
     assert factors == {made.camera.name: pytest.approx(1 / factor)}
@@ -178,7 +180,7 @@ def test_a_wrong_unit_of_all_coordinates_is_named(factor: float, word: str) -> N
 @pytest.mark.parametrize(("measured", "word"), [(1000.0, "micrometres"), (1e-3, "millimetres"), (1 / 25.4, "inches")])
 def test_marks_in_another_unit_are_named_with_the_unit(measured: float, word: str) -> None:
     scales = np.array([1.0, 1.002, 1.0 / measured, 0.998 / measured])  # calibrated over measured distances
-    (finding,) = units.of_marks(scales, ["1", "2", "3", "4"])
+    (finding,) = units.find_wrong_mark_units(scales, ["1", "2", "3", "4"])
     assert (finding.code, finding.severity, finding.photos) == ("P106", "warning", ("3", "4"))
     assert finding.evidence["measured_over_calibrated"] == pytest.approx(measured, rel=0.002)
     assert word in finding.message
@@ -187,14 +189,14 @@ def test_marks_in_another_unit_are_named_with_the_unit(measured: float, word: st
 
 @given(st.lists(st.floats(0.6, 1.6), min_size=1, max_size=8))
 def test_scans_and_old_paper_are_no_other_unit(scales: list[float]) -> None:
-    assert units.of_marks(np.array(scales), [f"{number}" for number in range(len(scales))]) == []
+    assert units.find_wrong_mark_units(np.array(scales), [f"{number}" for number in range(len(scales))]) == []
 
 
 def test_pixels_read_as_millimetres() -> None:
     made = simulation()
     camera = replace(made.camera, pixel_size=0.006)
     wrong = replace(made.observations, xy=(made.observations.xy + np.array([115.0, -115.0])) / 0.006)
-    (finding,), _ = units.examine(wrong, dict.fromkeys(made.strips[0][1], camera))
+    (finding,), _ = units.find_wrong_units(wrong, dict.fromkeys(made.strips[0][1], camera))
     assert "pixels read as millimetres" in finding.message
 
 
@@ -202,7 +204,7 @@ def test_pixels_read_as_millimetres() -> None:
 def test_a_principal_distance_off_by_a_power_of_ten(factor: float) -> None:
     made = simulation()
     camera = replace(made.camera, principal_distance=made.camera.principal_distance * factor)
-    (finding,), _ = units.examine(made.observations, dict.fromkeys(made.strips[0][1], camera))
+    (finding,), _ = units.find_wrong_units(made.observations, dict.fromkeys(made.strips[0][1], camera))
     assert (finding.code, finding.fix) == ("P105", "is it 153 mm?")
 
 
@@ -210,6 +212,6 @@ def test_units_without_a_format_are_seen_by_the_principal_distance() -> None:
     made = simulation()
     camera = replace(made.camera, format=None)
     cameras = dict.fromkeys(made.strips[0][1], camera)
-    assert units.examine(made.observations, cameras)[0] == []
+    assert units.find_wrong_units(made.observations, cameras)[0] == []
     wrong = replace(made.observations, xy=made.observations.xy * 1e3)
-    assert [each.code for each in units.examine(wrong, cameras)[0]] == ["P101"]
+    assert [each.code for each in units.find_wrong_units(wrong, cameras)[0]] == ["P101"]

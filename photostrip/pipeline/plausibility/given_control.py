@@ -1,0 +1,178 @@
+"""Given coordinates: where they lie on the Earth, how they go with each strip, how they hold it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+
+from photostrip.geodesy.crs import area_of_use
+from photostrip.pipeline.plausibility import distance_trial, evidence
+from photostrip.triangulation.plausibility.control import (
+    control_heights,
+    control_place,
+    control_reading,
+    given_points,
+    layout,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from photostrip.geodesy.ground_frame import GroundFrame
+    from photostrip.notes import Finding
+    from photostrip.pipeline.inputs import Inputs, ModelStrip, Strip
+    from photostrip.pipeline.plausibility.evidence import EvidenceStrip
+    from photostrip.pipeline.plausibility.image_evidence import ImageEvidence
+    from photostrip.pipeline.plausibility.model_evidence import ModelStripEvidence
+    from photostrip.points import ControlPoints
+    from photostrip.triangulation.plausibility.control.control_strip import GivenPoints, StripPoints
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class GivenControl:
+    """Control and check points with their frames, and what their place on the Earth says of how to read them."""
+
+    points: ControlPoints
+    frames: Sequence[GroundFrame]
+    findings: tuple[Finding, ...]  # P401, P402, P403, by the place alone
+    as_written: bool  # whether the frames cannot be right, so that the numbers count as plain metres
+    axes_are_right: bool | None  # None where the place does not say
+
+    @classmethod
+    def placed(cls, inputs: Inputs, frames: Sequence[GroundFrame], directory: Path | None) -> Self:
+        """Find out where given points lie on the Earth, list by list."""
+        control = inputs.control
+        places = [
+            control_place.find_wrong_place(
+                frame,
+                area_of_use(inputs.frames[number], directory=directory),
+                control.enu[(control.frame == number) & control.use[:, 0]],
+                number,
+            )
+            for number, frame in enumerate(frames)
+        ]
+        sure = {place.sure for place in places}
+        return cls(
+            control,
+            frames,
+            findings=tuple(finding for place in places for finding in place.findings),
+            as_written=not all(place.inside for place in places),
+            axes_are_right=sure.pop() if len(sure) == 1 else None,
+        )
+
+    def compared(self, rows: Numbers, on_strip: StripPoints) -> list[Finding]:
+        """Compare the given points of some rows with the same points in a strip."""
+        points = self.points.take(rows)
+        given = given_points.level(points, self.frames, as_written=self.as_written)
+        if given is None:
+            return []
+
+        def exchanged() -> GivenPoints | None:
+            order = [1, 0, 2]
+            other = replace(points, enu=points.enu[:, order], use=points.use[:, order])
+            return given_points.level(other, self.frames)
+
+        return control_reading.find_wrong_readings(
+            given, on_strip, axes_are_right=self.axes_are_right, exchanged=exchanged
+        )
+
+
+def by_strip(
+    control: GivenControl,
+    images: ImageEvidence,
+    strips: Sequence[Strip],
+    formed: Sequence[EvidenceStrip | None],
+    *,
+    trials: bool = True,
+) -> list[Finding]:
+    """Compare given coordinates with each strip: the formed one, or else the mosaic of its photos.
+
+    Parameters
+    ----------
+    formed : sequence of EvidenceStrip or None
+        The same strips, as far as they could be formed.
+    trials : bool
+        Whether strips may be formed anew with other principal distances.
+    """
+    findings: list[Finding] = []
+    for strip, each in zip(strips, formed, strict=True):
+        of_strip = _of_strip(strip, each, images, control)
+        if trials and not any(finding.is_error for finding in of_strip):
+            # where the distance is wrong, single points prove nothing
+            of_strip = _of_distance(strip, each, images, control) or of_strip
+        findings += of_strip
+    return findings
+
+
+def _of_strip(
+    strip: Strip, formed: EvidenceStrip | None, images: ImageEvidence, control: GivenControl
+) -> list[Finding]:
+    if formed is None:
+        held = evidence.mosaic_points(strip, images.observations, control.points, images.steps)
+        return [] if held is None else control.compared(*held)
+    rows, on_strip = evidence.strip_points(formed, images.observations, control.points, images.steps)
+    return [finding for part in evidence.stretches(rows, on_strip) for finding in control.compared(*part)]
+
+
+def _of_distance(
+    strip: Strip, formed: EvidenceStrip | None, images: ImageEvidence, control: GivenControl
+) -> list[Finding]:
+    compare = partial(_compared_in_height, images=images, control=control)
+    if formed is not None:
+        return distance_trial.find_wrong_distance(formed, images.observations, images.settings, compare)
+    if images.findings:
+        return []
+    return distance_trial.find_distance_without_pairs(strip, images.observations, images.settings, compare)
+
+
+def _compared_in_height(
+    formed: EvidenceStrip, images: ImageEvidence, control: GivenControl
+) -> control_heights.HeightStretch | None:
+    rows, on_strip = evidence.strip_points(formed, images.observations, control.points, images.steps)
+    given = given_points.level(control.points.take(rows), control.frames)
+    return None if given is None else control_heights.height_stretch(given, on_strip)
+
+
+def weak_layout(strip: Strip, images: ImageEvidence, control: GivenControl) -> list[Finding]:
+    """Look where the control of a strip lies along it and across."""
+    rows, place = evidence.places_along_strip(strip, images.observations, control.points, images.steps)
+
+    def half_breadth(ids: Sequence[str], plan: Floats) -> float:
+        return evidence.half_breadth(strip, images.observations, ids, plan, images.steps)
+
+    return _weak_layout(strip, control, rows, place, half_breadth)
+
+
+def weak_layout_of_models(held: ModelStripEvidence, control: GivenControl) -> list[Finding]:
+    """Look where the control of a strip of models lies along it and across."""
+
+    def half_breadth(_ids: Sequence[str], plan: Floats) -> float:
+        return float(held.breadth * np.linalg.norm(np.ptp(plan, axis=0)))
+
+    return _weak_layout(held.strip, control, held.rows, held.place, half_breadth)
+
+
+def _weak_layout(
+    strip: Strip | ModelStrip,
+    control: GivenControl,
+    rows: Numbers,
+    place: Floats,
+    half_breadth: Callable[[Sequence[str], Floats], float],
+) -> list[Finding]:
+    counts = control.points.use[rows, 0] & ~control.points.check[rows]
+    points = control.points.take(rows[counts])
+    given = given_points.level(points, control.frames)
+    if given is None:
+        return []
+    plan = given.xyz[:, :2]
+    breadth = half_breadth(points.ids, plan)
+    return list(layout.find_weak_control(place[counts], plan, breadth, strip.photos, strip.id, points.ids))

@@ -1,0 +1,102 @@
+"""What the image coordinates alone say: units, mirror images, the order of the photos."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import GeometryError, InputError
+from photostrip.pipeline.plausibility.base_directions import closer_look
+from photostrip.triangulation.image_coordinates import interior
+from photostrip.triangulation.plausibility.photos import flight_order, units
+
+if TYPE_CHECKING:
+    from photostrip.camera import Camera
+    from photostrip.notes import Finding
+    from photostrip.pipeline.inputs import Inputs, Settings, Strip
+    from photostrip.points import PhotoPoints
+
+
+@dataclass(frozen=True, eq=False)
+class ImageEvidence:
+    """What the image coordinates alone say."""
+
+    findings: tuple[Finding, ...]
+    observations: PhotoPoints  # image points with what was found put right, for further evidence only; mm, y up
+    cameras: dict[str, Camera]  # camera of every photo
+    strips: tuple[Strip, ...]  # the strips with their photos as they lie, each place once
+    steps: dict[str, complex]  # centre of the next photo, as the photos lie, on each photo; mm, y up
+    settings: Settings
+
+
+def of_images(inputs: Inputs, settings: Settings) -> ImageEvidence:
+    """Look at image coordinates as far as that goes without adjusting anything."""
+    cameras = {photo: strip.camera for strip in inputs.strips for photo in strip.photos}
+    observations, findings = _photo_coordinates(inputs, cameras, settings)
+    of_units, of_camera = units.find_wrong_units(observations, cameras)
+    findings += of_units
+    factor = {name: of_camera[cameras[name].name] for name in observations.photo_ids}
+    in_unit = _put_right(observations, factor, frozenset())
+    orders = []
+    for strip in inputs.strips:
+        closer = closer_look(strip, in_unit, cameras, settings)
+        of_order, order = flight_order.find_wrong_order(observations, strip.id, strip.photos, closer)
+        findings += of_order
+        orders.append(order)
+    for order in orders:
+        factor |= {name: factor[name] / size for name, size in order.size.items()}
+    mirrored = frozenset(name for order in orders for name in order.mirrored)
+    steps = {
+        name: factor.get(name, 1.0) * (step.conjugate() if name in mirrored else step)
+        for order in orders
+        for name, step in zip(order.photos, order.steps, strict=True)
+    }
+    return ImageEvidence(
+        tuple(findings),
+        _put_right(observations, factor, mirrored),
+        cameras,
+        tuple(replace(strip, photos=order.photos) for strip, order in zip(inputs.strips, orders, strict=True)),
+        steps,
+        settings,
+    )
+
+
+def _photo_coordinates(
+    inputs: Inputs, cameras: dict[str, Camera], settings: Settings
+) -> tuple[PhotoPoints, list[Finding]]:
+    """Image points in the system of the photo, and what the fiducial marks say."""
+    measured = _on_listed_photos(inputs.observations, cameras)
+    if inputs.fiducials is None:
+        return measured, []
+    try:
+        oriented = interior.orient(_on_listed_photos(inputs.fiducials, cameras), cameras, settings.interior)
+        observations = interior.transform(measured, oriented)
+    except (GeometryError, InputError):
+        return measured, []  # what is wrong with the marks stops the run
+    return observations, units.find_wrong_mark_units(oriented.scale_x, oriented.photo_ids)
+
+
+def _on_listed_photos(measured: PhotoPoints, cameras: dict[str, Camera]) -> PhotoPoints:
+    """Leave out photos of no strip, whose camera nobody knows."""
+    listed = [photo in cameras for photo in measured.photo_ids]
+    if all(listed):
+        return measured
+    number, rows = np.cumsum(listed) - 1, np.flatnonzero(np.array(listed)[measured.photo])
+    return replace(
+        measured,
+        photo_ids=tuple(photo for photo in measured.photo_ids if photo in cameras),
+        photo=number[measured.photo[rows]],
+        point=measured.point[rows],
+        xy=measured.xy[rows],
+        sigma=measured.sigma[rows],
+    )
+
+
+def _put_right(observations: PhotoPoints, factor: dict[str, float], mirrored: frozenset[str]) -> PhotoPoints:
+    """Image points in millimetres and from the right side, as far as that is known."""
+    by_photo = np.array([[factor[name], -factor[name] if name in mirrored else factor[name]] for name in factor])
+    if not len(by_photo) or (by_photo == 1.0).all():
+        return observations
+    return replace(observations, xy=observations.xy * by_photo[observations.photo])
