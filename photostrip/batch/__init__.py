@@ -1,11 +1,12 @@
-"""Many projects: each computed in a process of its own pool, each result written whole or not at all.
+"""Many projects: each computed in a process of its own, each result written whole or not at all.
 
-One walk again::
+::
 
     arguments -> projects and the names of their results (selection)
-       -> unchanged since last time? (records, folder)
-       -> tasks -> workers: processes here (pool, worker) or on other machines (cluster, remote)
-       -> answers: files and one line of the summary (work, tasks) -> written by this process alone (folder)
+       -> unchanged since last time? (result_folder)
+       -> tasks -> processes of this machine (local_pool, worker_process) or of others (cluster, cluster_worker, parcel)
+       -> answers: files and a line of the summary (evaluation, outcomes)
+       -> written by this process alone (result_folder)
        -> summary (run)
 
 Workers compute and never write: whatever happens to one of them, there is nothing half done on the disk. Whatever

@@ -21,10 +21,11 @@ from urllib.parse import urlsplit
 
 from photostrip.batch.cluster_worker import compute
 from photostrip.batch.evaluation import evaluate
-from photostrip.batch.local_pool import TICK, ignored
+from photostrip.batch.local_pool import TICK_SECONDS, do_nothing
+from photostrip.batch.outcomes import BROKEN, failure
 from photostrip.batch.parcel import pack
 from photostrip.batch.result_folder import program
-from photostrip.batch.tasks import BROKEN, Answer, failure
+from photostrip.batch.tasks import Answer
 from photostrip.batch.worker_process import WORK
 from photostrip.errors import Fault, InputError
 
@@ -34,14 +35,14 @@ if TYPE_CHECKING:
     from photostrip.batch.tasks import Limits, Task
 
 LOCAL = "local"
-PATIENCE = 5.0  # seconds for a scheduler to answer
+CONNECT_SECONDS = 5.0  # seconds for a scheduler to answer
 AHEAD = 2  # tasks sent for each thread of the cluster
 LEAST_AHEAD = 4
-PARTING = 1.0  # seconds that an orderly end may take
-COUNTED_EVERY = 1.0  # seconds between two looks at how many workers there are
+CLOSING_SECONDS = 1.0  # seconds that an orderly end may take
+COUNT_INTERVAL = 1.0  # seconds between two looks at how many workers there are
 
 
-def unsaid(_: str) -> None:
+def say_nothing(_: str) -> None:
     """Say nothing."""
 
 
@@ -53,7 +54,7 @@ def _dask() -> Any:  # noqa: ANN401 (a module without types)
     except ImportError:
         raise executor_fault("Dask is not installed", "pip install 'photostrip[dask]'") from None
     # a worker that cannot be reached is not worth the half minute that is the default
-    dask.config.set({"distributed.comm.timeouts.connect": PATIENCE})
+    dask.config.set({"distributed.comm.timeouts.connect": CONNECT_SECONDS})
     return distributed
 
 
@@ -65,13 +66,13 @@ class Cluster:
         client: object,
         limits: Limits,
         work: str = WORK,
-        begun: Callable[[Task], None] = ignored,
-        say: Callable[[str], None] = unsaid,
+        begun: Callable[[Task], None] = do_nothing,
+        say: Callable[[str], None] = say_nothing,
     ) -> None:
         self.client: Any = client
         self.limits, self.work, self.begun, self.say = limits, work, begun, say
         self._sent: dict[str, tuple[Any, Task]] = {}
-        self._room, self._counted = LEAST_AHEAD, -COUNTED_EVERY
+        self._room, self._counted = LEAST_AHEAD, -COUNT_INTERVAL
         self._heard_of = time.monotonic()
         self._done: queue.SimpleQueue[str] = queue.SimpleQueue()
 
@@ -90,7 +91,7 @@ class Cluster:
                     looking = False
                 if not more and not self._sent:
                     return
-                yield from self._heard(0.0 if looking else TICK)
+                yield from self._heard(0.0 if looking else TICK_SECONDS)
                 self._require_connection()
         finally:
             for future, _ in self._sent.values():
@@ -100,7 +101,7 @@ class Cluster:
     def _ahead(self) -> int:
         """Return the number of tasks that may be under way: workers come and go."""
         now = time.monotonic()
-        if now - self._counted > COUNTED_EVERY:
+        if now - self._counted > COUNT_INTERVAL:
             workers = self.client.scheduler_info(n_workers=-1)["workers"].values()
             if not workers and self._counted < 0.0:
                 self.say("the cluster has no workers yet; waiting for them")
@@ -121,16 +122,16 @@ class Cluster:
         future.add_done_callback(lambda each: self._done.put(each.key))
 
     def _heard(self, patience: float) -> Iterator[Answer]:
-        """Take the next answer, if there is one."""
+        """Return the next answer, if there is one within the seconds of patience."""
         try:
             key = self._done.get(timeout=patience) if patience else self._done.get_nowait()
         except queue.Empty:
             return
         if key in self._sent:
             future, task = self._sent.pop(key)
-            yield self._taken(future, task)
+            yield self._answer_of(future, task)
 
-    def _taken(self, future: Any, task: Task) -> Answer:  # noqa: ANN401 (without types)
+    def _answer_of(self, future: Any, task: Task) -> Answer:  # noqa: ANN401 (without types)
         distributed = _dask()
         try:
             answer, theirs = future.result()
@@ -150,25 +151,25 @@ class Cluster:
         now = time.monotonic()
         if self.client.status == "running":
             self._heard_of = now
-        elif now - self._heard_of > PATIENCE:
+        elif now - self._heard_of > CONNECT_SECONDS:
             raise lost(self.client.status)
 
 
 def require_same(theirs: dict[str, str]) -> None:
-    """Refuse answers of another program: results would depend on which machine computed them.
+    """Refuse answers of another program: results would depend on the machine that computed them.
 
     Raises
     ------
     InputError
         When it is not what is installed here.
     """
-    own = program()
-    different = [name for name in own if theirs.get(name) != own[name]]
+    local = program()
+    different = [name for name in local if theirs.get(name) != local[name]]
     if different:
-        told = ", ".join(
-            f"{name} {theirs.get(name, 'none')[:12]} there and {own[name][:12]} here" for name in different
+        names = ", ".join(
+            f"{name} {theirs.get(name, 'none')[:12]} there and {local[name][:12]} here" for name in different
         )
-        raise executor_fault(f"a worker of the cluster has another program: {told}", "install the same versions there")
+        raise executor_fault(f"a worker of the cluster has another program: {names}", "install the same versions there")
 
 
 def executor_fault(message: str, fix: str) -> InputError:
@@ -189,9 +190,9 @@ def cluster(
     address: str,
     jobs: int,
     limits: Limits,
-    begun: Callable[[Task], None] = ignored,
+    begun: Callable[[Task], None] = do_nothing,
     work: str = WORK,
-    say: Callable[[str], None] = unsaid,
+    say: Callable[[str], None] = say_nothing,
 ) -> Iterator[Cluster]:
     """Connect to a cluster, or start one on this machine.
 
@@ -210,25 +211,25 @@ def cluster(
         stack.enter_context(_quiet())
         where: Any = address
         if address == LOCAL:
-            with _deaf_children():
+            with _children_ignore_interrupts():
                 where = distributed.LocalCluster(
                     n_workers=jobs, threads_per_worker=1, dashboard_address=None, silence_logs="CRITICAL"
                 )
-            stack.callback(_end, where)
+            stack.callback(_end_local, where)
         else:
             _require_scheduler(address)
         try:
-            client = distributed.Client(where, timeout=PATIENCE, set_as_default=False)
+            client = distributed.Client(where, timeout=CONNECT_SECONDS, set_as_default=False)
         except (OSError, TimeoutError, ValueError) as error:
             reason = str(error).partition("\n")[0]
             raise _unreachable(address, reason) from None
-        stack.callback(_part, client)
+        stack.callback(_close_client, client)
         yield Cluster(client, limits, work, begun, say)
 
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep the library from telling with a traceback what is told here in a sentence."""
+    """Keep the library from printing a traceback where a sentence says the same."""
     logs = [logging.getLogger(name) for name in ("distributed", "distributed.client")]  # each has a level of its own
     before = [log.level for log in logs]
     for log in logs:
@@ -240,26 +241,26 @@ def _quiet() -> Iterator[None]:
             log.setLevel(level)
 
 
-def _part(client: Any) -> None:  # noqa: ANN401 (without types)
-    """Take leave of a scheduler, which may be gone."""
+def _close_client(client: Any) -> None:  # noqa: ANN401 (without types)
+    """Close the connection to a scheduler, which may be gone."""
     with suppress(TimeoutError, OSError):
-        client.close(timeout=PARTING)
+        client.close(timeout=CLOSING_SECONDS)
 
 
-def _end(local: Any) -> None:  # noqa: ANN401 (without types)
+def _end_local(local: Any) -> None:  # noqa: ANN401 (without types)
     """End a cluster of this machine at once: nothing that its workers still compute is wanted."""
     for nanny in local.workers.values():
         nanny.auto_restart = False
         with suppress(OSError, TypeError):  # it is gone already
             os.kill(nanny.pid, signal.SIGKILL)
     with suppress(TimeoutError):
-        local.close(timeout=PARTING)
+        local.close(timeout=CLOSING_SECONDS)
 
 
 @contextmanager
-def _deaf_children() -> Iterator[None]:
-    """Start processes that do not hear Ctrl-C, which reaches every process of the terminal: this one ends them."""
-    if threading.current_thread() is not threading.main_thread():  # only there can it be said
+def _children_ignore_interrupts() -> Iterator[None]:
+    """Start processes that ignore Ctrl-C, which reaches every process of the terminal: this one ends them."""
+    if threading.current_thread() is not threading.main_thread():  # signals can be set there only
         yield
         return
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # what a process starts with, its children start with
@@ -270,7 +271,7 @@ def _deaf_children() -> Iterator[None]:
 
 
 def _require_scheduler(address: str) -> None:
-    """Knock at the door, because the library itself goes on knocking for a long time."""
+    """Try the address once: the library itself goes on trying for a long time."""
     try:
         parts = urlsplit(address)
         host, port = parts.hostname, parts.port
@@ -280,7 +281,7 @@ def _require_scheduler(address: str) -> None:
         message = f"`dask:{address}` is no address of a scheduler"
         raise InputError(Fault(message, "executor", "--executor", expected="dask:tcp://HOST:PORT or dask:local"))
     try:
-        socket.create_connection((host, port), timeout=PATIENCE).close()
+        socket.create_connection((host, port), timeout=CONNECT_SECONDS).close()
     except OSError as error:
         raise _unreachable(address, (error.strerror or str(error)).lower()) from None
 

@@ -1,15 +1,17 @@
-"""The work itself: one project from its files to the texts of its result. It runs in a worker and never writes."""
+"""One project from its files to the texts of its result, as a worker computes it; nothing is written."""
 
 from __future__ import annotations
 
 import tempfile
 import time
 import traceback
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from photostrip.batch.outcomes import BROKEN, FAULTY, WEAK, failure, out_of_memory, outcome_of
 from photostrip.batch.parcel import unpack_grids
-from photostrip.batch.tasks import BROKEN, FAULTY, WEAK, Answer, failure, out_of_memory, outcome_of
+from photostrip.batch.tasks import Answer
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.output.result_files import result_files
 from photostrip.formats.text.source import Source, digest, reading_from
@@ -19,41 +21,34 @@ from photostrip.report.page.messages import result_findings
 from photostrip.result.document import document_of
 
 if TYPE_CHECKING:
-    from photostrip.batch.tasks import Document, Task
+    from photostrip.batch.parcel import Parcel
+    from photostrip.batch.tasks import Task
     from photostrip.project.loading import Project
 
 
 def evaluate(task: Task) -> Answer:
-    """Compute a project.
-
-    Returns
-    -------
-    Answer
-        Its result, or why there is none; nothing is raised.
-    """
+    """Compute a project: its result, or why there is none; nothing is raised."""
     start = time.perf_counter()
-    trace = ""
+    return replace(_answer(task), seconds=time.perf_counter() - start)
+
+
+def _answer(task: Task) -> Answer:
     try:
-        outcome, files, inputs = _from_parcel(task) if task.parcel is not None else _computed(task, Source())
+        return _from_parcel(task, task.parcel) if task.parcel is not None else _computed(task, Source())
     except InputError as error:
-        outcome, files, inputs = failure(FAULTY, error), {}, {}
+        return Answer(task.number, failure(FAULTY, error))
     except GeometryError as error:
-        outcome, files, inputs = failure(WEAK, error), {}, {}
+        return Answer(task.number, failure(WEAK, error))
     except MemoryError:
-        outcome, files, inputs = out_of_memory(), {}, {}
+        return Answer(task.number, out_of_memory())
     except Exception as error:  # noqa: BLE001 (a bug that one project meets must not end the others)
-        trace = traceback.format_exc()
         message = f"internal error (a bug): {type(error).__name__}: {error}"
         fault = Fault(message, "internal", fix="`photostrip run PROJECT --debug` shows where")
-        outcome, files, inputs = failure(BROKEN, fault), {}, {}
-    return Answer(task.number, outcome, files, inputs, time.perf_counter() - start, trace=trace)
+        return Answer(task.number, failure(BROKEN, fault), trace=traceback.format_exc())
 
 
-def _from_parcel(task: Task) -> tuple[Document, dict[str, str], dict[str, str | None]]:
+def _from_parcel(task: Task, parcel: Parcel) -> Answer:
     """Compute a project whose files came along with it."""
-    parcel = task.parcel
-    if parcel is None:  # cannot be: evaluate() looked
-        raise InputError("there is no parcel")
     if not parcel.grids:
         return _computed(task, Source(parcel.files, parcel.folder, Path("no-such-folder")))
     with tempfile.TemporaryDirectory() as folder:
@@ -61,7 +56,7 @@ def _from_parcel(task: Task) -> tuple[Document, dict[str, str], dict[str, str | 
         return _computed(task, Source(parcel.files, parcel.folder, Path(folder)))
 
 
-def _computed(task: Task, source: Source) -> tuple[Document, dict[str, str], dict[str, str | None]]:
+def _computed(task: Task, source: Source) -> Answer:
     """Read, adjust and render a project."""
     with reading_from(source):
         project = load_project(Path(task.project), task.overrides)
@@ -69,7 +64,8 @@ def _computed(task: Task, source: Source) -> tuple[Document, dict[str, str], dic
             result = triangulate(project.inputs, project.settings, directory=project.grid_folder)
         document = document_of(result, project.remarks)
         files = result_files(document, project.resolved)
-    return outcome_of(document, result_findings(document)), files, _inputs(project, source)
+    outcome = outcome_of(document, result_findings(document))
+    return Answer(task.number, outcome, files, _inputs(project, source))
 
 
 def _inputs(project: Project, source: Source) -> dict[str, str | None]:

@@ -1,7 +1,7 @@
-"""The pool: some workers on this machine, one project each at a time, and what is done when one of them fails.
+"""Workers on this machine, one project each at a time, and what is done when one of them fails.
 
 A worker that dies takes only its own project along. That project is tried once more, because the worker may have been
-killed by somebody else; if it kills the second worker, too, it is told as the cause.
+killed by somebody else; if it kills the second worker, too, it is named as the cause.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ from collections import deque
 from multiprocessing.connection import wait
 from typing import TYPE_CHECKING, Protocol
 
-from photostrip.batch.tasks import BROKEN, TIMEOUT, Answer, Limits, failure, out_of_memory
+from photostrip.batch.outcomes import BROKEN, TIMEOUT, failure, out_of_memory
+from photostrip.batch.tasks import Answer, Limits
 from photostrip.batch.worker_process import NO_MEMORY, READY, WORK, WorkerProcess, share_of_memory
 from photostrip.errors import Fault, InputError, PhotostripError
 
@@ -22,11 +23,11 @@ if TYPE_CHECKING:
 
     from photostrip.batch.tasks import Task
 
-TICK = 0.1  # seconds between two looks at what else may have happened
-TRIES = 2
+TICK_SECONDS = 0.1  # seconds between two looks at what else may have happened
+TRIES = 2  # of a project whose worker dies
 RECYCLED_AFTER = 1000  # projects
 RECYCLED_ABOVE = 0.5  # of the memory that a worker may have
-FALSE_STARTS = 3
+FALSE_STARTS = 3  # in a row, before the batch gives up
 
 
 class Executor(Protocol):
@@ -43,7 +44,7 @@ class Executor(Protocol):
         ...
 
 
-def ignored(_: Task) -> None:
+def do_nothing(_: Task) -> None:
     """Take no notice of a task that begins."""
 
 
@@ -55,7 +56,7 @@ class LocalPool:
         jobs: int = 1,
         limits: Limits | None = None,
         work: str = WORK,
-        begun: Callable[[Task], None] = ignored,
+        begun: Callable[[Task], None] = do_nothing,
     ) -> None:
         self.jobs, self.limits, self.work, self.begun = jobs, limits or Limits(), work, begun
         self.megabytes = self.limits.megabytes or share_of_memory(jobs)
@@ -94,7 +95,7 @@ class LocalPool:
                 yield heard.popleft()
             elif not more and not queue and not self._busy():
                 return
-            heard.extend(self._heard(0.0 if looking or heard else TICK))
+            heard.extend(self._heard(0.0 if looking or heard else TICK_SECONDS))
             while self._again:
                 queue.appendleft(self._again.pop())
         yield from heard
@@ -119,17 +120,17 @@ class LocalPool:
         for connection in wait(list(by_connection), patience):
             worker = by_connection[connection]  # type: ignore[index]
             try:
-                said = worker.hear()
+                received = worker.hear()
             except (EOFError, OSError):
-                yield from self._buried(worker)
+                yield from self._of_dead_worker(worker)
                 continue
-            if said == READY:
+            if received == READY:
                 worker.ready, self._false_starts = True, 0
                 continue
-            yield from self._taken(worker, said)
+            yield from self._finished(worker, received)
         yield from self._overdue()
 
-    def _taken(self, worker: WorkerProcess, answer: Answer) -> Iterator[Answer]:
+    def _finished(self, worker: WorkerProcess, answer: Answer) -> Iterator[Answer]:
         """Take an answer; a worker that has grown is replaced."""
         worker.task = None
         worker.number_done += 1
@@ -151,7 +152,7 @@ class LocalPool:
                 fault = Fault(f"took longer than {limit:g} s", "timeout", fix="give it more time with --timeout")
                 yield self._gave_up(task, TIMEOUT, fault, limit)
 
-    def _buried(self, worker: WorkerProcess) -> Iterator[Answer]:
+    def _of_dead_worker(self, worker: WorkerProcess) -> Iterator[Answer]:
         """Say what a worker died of, or let its project be tried once more."""
         code, task = worker.fate(), worker.task
         self.workers.remove(worker)

@@ -39,14 +39,14 @@ def pack(path: Path, overrides: Sequence[str] = ()) -> Parcel:
         When one of them cannot be read.
     """
     findings, names = Findings(), list[str]()
-    with reading_from(Source()):  # an account of its own: what is read here is not what a result is made from
+    with reading_from(Source()):  # a separate account: what is read now is not what a result is made from
         root = read_tree(str(path), findings, names)
         if root is not None:
             root = override(root, overrides, findings)
             names += [path_of(node, str(path)) for node in _values(root, "file")]
         findings.stop()
         files = {name: read_bytes(name, LARGEST_TABLE) for name in dict.fromkeys(names)}
-    if root is None:  # cannot be: read_tree() had a reason, and stop() told it
+    if root is None:  # cannot be: read_tree() had a reason, and stop() raised it
         raise InputError(f"{path} cannot be read")
     grids = {name for node in _values(root, "crs") for name in grid_names(node.text)}
     found = {name: path.parent / name for name in sorted(grids) if _travels(name) and (path.parent / name).is_file()}

@@ -49,8 +49,8 @@ def program() -> dict[str, str]:
     package = Path(__file__).parents[1]
     files = sorted(file for ending in ("*.py", "*.yaml") for file in package.rglob(ending))
     account = "\n".join(f"{file.relative_to(package).as_posix()} {digest(file.read_bytes())}" for file in files)
-    own = {"photostrip": __version__, "source": digest(account.encode())}
-    return own | {name: version(name) for name in LIBRARIES}
+    package_version = {"photostrip": __version__, "source": digest(account.encode())}
+    return package_version | {name: version(name) for name in LIBRARIES}
 
 
 class ResultFolder:
@@ -142,7 +142,7 @@ class ResultFolder:
             (self.path / name).unlink(missing_ok=True)
 
     def _name(self, chosen: ChosenProject) -> str:
-        """Path of a project as seen from its result."""
+        """Path of a project relative to its result."""
         return os.path.relpath(chosen.project, self.path / chosen.output).replace(os.sep, "/")
 
     @staticmethod

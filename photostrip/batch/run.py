@@ -7,7 +7,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
-from photostrip.batch.tasks import FAULTY, UNWRITTEN, Answer, Task, failure, not_run
+from photostrip.batch.outcomes import FAULTY, UNWRITTEN, failure, not_run
+from photostrip.batch.tasks import Answer, Task
 from photostrip.errors import Fault, InputError
 
 if TYPE_CHECKING:
@@ -24,8 +25,8 @@ LAST_REFUSALS = 3  # results in a row that cannot be written before the batch gi
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
-class Watch(Protocol):
-    """Who is told what happens."""
+class Listener(Protocol):
+    """Who hears what happens."""
 
     def finished(self, outcome: Document, answer: Answer | None) -> None:
         """Take notice of a project that is done; without an answer, its result was there already."""
@@ -100,10 +101,10 @@ class Run:
         self.projects, self.overrides, self.folder, self.force = projects, tuple(overrides), folder, force
         self.batch = Batch([named(not_run(), chosen, written=folder is not None) for chosen in projects])
 
-    def go(self, executor: Executor, watch: Watch, stop: Stop) -> Batch:
+    def go(self, executor: Executor, listener: Listener, stop: Stop) -> Batch:
         """Compute what must be computed."""
-        for answer in executor.answers(self._tasks(watch, stop), stop):
-            self._take(answer, watch, stop)
+        for answer in executor.answers(self._tasks(listener, stop), stop):
+            self._write(answer, listener, stop)
         return self.batch
 
     def files_read(self) -> list[str]:
@@ -114,20 +115,20 @@ class Run:
             files.update(dict.fromkeys(read or [chosen.project]))
         return list(files)
 
-    def _tasks(self, watch: Watch, stop: Callable[[], bool]) -> Iterator[Task | None]:
+    def _tasks(self, listener: Listener, stop: Callable[[], bool]) -> Iterator[Task | None]:
         """Return what must be computed, None in between for what need not."""
         for chosen in self.projects:
             if stop():
                 return
-            settled = self._settled(chosen)
-            if settled is None:
+            outcome = self._without_computing(chosen)
+            if outcome is None:
                 yield Task(chosen.number, chosen.project, self.overrides)
             else:
-                self._note(chosen, settled, None, watch)
+                self._note(chosen, outcome, None, listener)
                 yield None
 
-    def _settled(self, chosen: ChosenProject) -> Document | None:
-        """Return the line of the summary of a project that need not, or must not, be computed."""
+    def _without_computing(self, chosen: ChosenProject) -> Document | None:
+        """Return the outcome of a project that need not, or must not, be computed; None: compute it."""
         if self.folder is None or self.force:
             return None
         outcome = self.folder.unchanged(chosen)
@@ -137,7 +138,7 @@ class Run:
         refused = self.folder.refused(chosen)
         return None if refused is None else failure(FAULTY, refused)
 
-    def _take(self, answer: Answer, watch: Watch, stop: Stop) -> None:
+    def _write(self, answer: Answer, listener: Listener, stop: Stop) -> None:
         """Write a result and its line of the summary."""
         chosen = self.projects[answer.number]
         outcome = answer.outcome
@@ -150,12 +151,12 @@ class Run:
                 stop.refusals += 1
                 place = str(self.folder.path / chosen.output)
                 outcome = failure(UNWRITTEN, unwritten(error, place) if isinstance(error, OSError) else error)
-        self._note(chosen, outcome, answer, watch)
+        self._note(chosen, outcome, answer, listener)
 
-    def _note(self, chosen: ChosenProject, outcome: Document, answer: Answer | None, watch: Watch) -> None:
+    def _note(self, chosen: ChosenProject, outcome: Document, answer: Answer | None, listener: Listener) -> None:
         line = named(outcome, chosen, written=self.folder is not None)
         self.batch.outcomes[chosen.number] = line
-        watch.finished(line, answer)
+        listener.finished(line, answer)
 
 
 def named(outcome: Document, chosen: ChosenProject, *, written: bool) -> Document:

@@ -96,7 +96,7 @@ def _projects(argument: str, faults: list[Fault]) -> list[str]:
         if not found:
             faults.append(Fault("no project fits this pattern", "no-project", argument))
         return found
-    return [str(path)]  # a file that is not there is told as the fault of that project, among the others
+    return [str(path)]  # a file that is not there is reported as the fault of that project, among the others
 
 
 def _project(path: Path) -> list[str]:

@@ -5,37 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from photostrip.errors import EXIT_GEOMETRY, EXIT_INPUT, EXIT_INTERNAL, EXIT_TOLERANCE, Fault, InputError
-from photostrip.report.page.messages import findings_of, line_of
-
 if TYPE_CHECKING:
     from photostrip.batch.parcel import Parcel
-    from photostrip.errors import GeometryError
 
 Document = dict[str, Any]
-
-# How a project can end beside the verdicts of a result (good, look, failed), and the exit code of each.
-FAULTY, WEAK, BROKEN, TIMEOUT, MEMORY, UNWRITTEN, NOT_RUN = (
-    "faulty",
-    "weak",
-    "crashed",
-    "timeout",
-    "memory",
-    "unwritten",
-    "not run",
-)
-EXIT_CODES = {
-    "good": 0,
-    "look": 0,
-    "failed": EXIT_TOLERANCE,
-    FAULTY: EXIT_INPUT,
-    UNWRITTEN: EXIT_INPUT,
-    WEAK: EXIT_GEOMETRY,
-    BROKEN: EXIT_INTERNAL,
-    TIMEOUT: EXIT_INTERNAL,
-    MEMORY: EXIT_INTERNAL,
-    NOT_RUN: 0,
-}
 
 
 @dataclass(frozen=True)
@@ -53,7 +26,7 @@ class Answer:
     """What became of a project."""
 
     number: int
-    outcome: Document  # its line in the summary, see ``outcome_of`` and ``failure``
+    outcome: Document  # its line in the summary, see ``outcomes``
     files: dict[str, str] = field(default_factory=dict)  # content of its result files by name; none after a failure
     # SHA-256 of every file read, by path; None for a file that would have been read if it were there
     inputs: dict[str, str | None] = field(default_factory=dict)
@@ -68,69 +41,3 @@ class Limits:
 
     seconds: float | None = None  # time; None: any
     megabytes: float | None = None  # memory of the worker that computes it; None: an even share of the machine's memory
-
-
-def outcome_of(document: Document, findings: list[Document]) -> Document:
-    """Return the line of the summary for a result.
-
-    Parameters
-    ----------
-    findings : list of dict
-        Its verdict and notes as ``messages.result_findings`` gives them.
-
-    Returns
-    -------
-    dict
-        ``status``, ``exit_code``, counts, ``sigma0_um``, the rms at check points (at control points where there are
-        none; ``rms_at`` says which) in metres, ``messages`` (sentences, worst first) and ``findings``.
-    """
-    summary, status = document["summary"], document["status"]
-    role = "check" if any(summary["check"][part]["count"] for part in ("plan", "height")) else "control"
-    return {
-        "status": status,
-        "exit_code": EXIT_CODES[status],
-        "adjustment": document["adjustment"],
-        "strips": len(document["strips"]),
-        "photos": len(document["photos"]),
-        "points": len(document["points"]),
-        "rejected": len(document["rejected"]),
-        "sigma0_um": summary["sigma0_um"],
-        "rms_at": role,
-        "rms_plan_m": summary[role]["plan"]["rms"],
-        "rms_height_m": summary[role]["height"]["rms"],
-        "messages": document["verdict"]["look_at"],
-        "findings": [each for each in findings if each["severity"] == "error"],
-    }
-
-
-def failure(status: str, error: InputError | GeometryError | Fault) -> Document:
-    """Return the line of the summary for a project without a result.
-
-    Returns
-    -------
-    dict
-        The same keys as those of a result, without numbers.
-    """
-    findings = findings_of(InputError(error) if isinstance(error, Fault) else error)
-    nothing = dict.fromkeys(
-        ("strips", "photos", "points", "rejected", "sigma0_um", "rms_at", "rms_plan_m", "rms_height_m")
-    )
-    return {
-        "status": status,
-        "exit_code": EXIT_CODES[status],
-        "adjustment": None,
-        **nothing,
-        "messages": [line_of(each).removeprefix("error: ") for each in findings],
-        "findings": findings,
-    }
-
-
-def not_run() -> Document:
-    """Return the line of the summary for a project that was not reached."""
-    return failure(NOT_RUN, InputError(()))
-
-
-def out_of_memory() -> Document:
-    """Return the line of the summary for a project that needs more memory than it may have."""
-    fix = "give more with --memory, with fewer processes (-j) if need be"
-    return failure(MEMORY, Fault("needs more memory than a worker may have", "memory", fix=fix))

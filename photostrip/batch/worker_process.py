@@ -61,7 +61,7 @@ class WorkerProcess:
         self.number_done = 0
         self.begin = time.monotonic()
         self.last_words = ""  # the last line that it wrote on stderr, once it is dead
-        self._said = tempfile.TemporaryFile()  # noqa: SIM115 (as long as the worker lives)
+        self._stderr = tempfile.TemporaryFile()  # noqa: SIM115 (as long as the worker lives)
         self.connection, theirs = Pipe()
         handle = theirs.fileno()
         command = [sys.executable, "-c", START, "\n".join(sys.path), str(handle), str(megabytes), work]
@@ -70,7 +70,7 @@ class WorkerProcess:
             pass_fds=(handle,),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
-            stderr=self._said,
+            stderr=self._stderr,
             env={**os.environ, **dict.fromkeys(THREAD_VARIABLES, "1")},
         )
         theirs.close()
@@ -87,7 +87,7 @@ class WorkerProcess:
             self.connection.send(task)
 
     def hear(self) -> Any:  # noqa: ANN401 (an Answer or READY)
-        """Take what it has sent.
+        """Return what it has sent.
 
         Raises
         ------
@@ -101,11 +101,11 @@ class WorkerProcess:
         self.connection.close()
         self._process.kill()
         code = self._process.wait()
-        with self._said:
-            self._said.seek(0)
-            said = self._said.read().decode(errors="replace")
-        self.last_words = next((line.strip() for line in reversed(said.split("\n")) if line.strip()), "")
-        return NO_MEMORY if code and any(words in said for words in NO_MEMORY_WORDS) else code
+        with self._stderr:
+            self._stderr.seek(0)
+            written = self._stderr.read().decode(errors="replace")
+        self.last_words = next((line.strip() for line in reversed(written.split("\n")) if line.strip()), "")
+        return NO_MEMORY if code and any(words in written for words in NO_MEMORY_WORDS) else code
 
     def fate(self) -> int:
         """Return the exit code of a worker whose connection broke: it is dead, or about to be."""

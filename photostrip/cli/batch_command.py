@@ -93,7 +93,7 @@ def run_batch(options: BatchOptions, form: BatchFormat, width: int | None, *, qu
 
 @contextmanager
 def executor_of(options: BatchOptions, number: int, table: BatchTable) -> Iterator[Executor]:
-    """Return the executor that the user asked for."""
+    """Start the pool of this machine, or connect to the cluster that the user named."""
     jobs = min(options.jobs or cores(), number)
 
     def begun(task: Task) -> None:

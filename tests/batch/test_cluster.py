@@ -259,7 +259,7 @@ def test_a_scheduler_that_is_not_there_is_told_at_once(
     port = str(free_port())
     begin = time.perf_counter()
     assert main(["batch", str(tmp_path), "--executor", f"dask:{address.format(port=port)}"]) == 2
-    assert time.perf_counter() - begin < clusters.PATIENCE + 5.0  # not the half minute of the library
+    assert time.perf_counter() - begin < clusters.CONNECT_SECONDS + 5.0  # not the half minute of the library
     assert message.format(port=port) in capsys.readouterr().err
 
 

@@ -10,7 +10,8 @@ import pytest
 
 from photostrip.batch.evaluation import evaluate
 from photostrip.batch.local_pool import LocalPool, cause_of
-from photostrip.batch.tasks import Answer, Limits, Task, failure
+from photostrip.batch.outcomes import failure
+from photostrip.batch.tasks import Answer, Limits, Task
 from photostrip.batch.worker_process import WorkerProcess, share_of_memory
 from photostrip.errors import Fault, InputError, PhotostripError
 from tests.batch.faulty import WORK

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
+from photostrip.batch.outcomes import EXIT_CODES, failure, not_run
 from photostrip.batch.run import named
 from photostrip.batch.selection import ChosenProject
-from photostrip.batch.tasks import EXIT_CODES, failure, not_run
 from photostrip.errors import Fault, InputError
 from photostrip.formats.output.batch import parsed_record, record_text, summary_csv, summary_json
 from photostrip.report.commands.batch import ORDER, ROWS, batch_junit, batch_sections, counts, outcome_line

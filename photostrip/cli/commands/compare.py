@@ -81,7 +81,7 @@ def _read(file: str) -> dict[str, Any]:
 
 
 def _read_baseline(place: Path) -> dict[str, Any]:
-    """Read the baseline; a missing one is told how it comes to be."""
+    """Read the baseline; where there is none, the fault says how it comes to be."""
     from dataclasses import replace
 
     from photostrip.errors import InputError
