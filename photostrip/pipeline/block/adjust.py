@@ -170,7 +170,7 @@ def _components(
         step = variance_components.components(done.problem, done.solution, done.precision, level)
         found = variance_components.combined(found, step)
         problem = variance_components.scaled(restarted(problem, done.solution), step, level)
-        if variance_components.settled(step):
+        if variance_components.converged(step):
             break
         chosen = selected(problem, screened.selection)
         done = snooping.screen_bundle(chosen, screened.selection, quiet)

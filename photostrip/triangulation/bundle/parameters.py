@@ -9,14 +9,14 @@ import numpy as np
 
 from photostrip.triangulation.bundle.normal_equations.structure import band_structure
 from photostrip.triangulation.bundle.observations import calibration
-from photostrip.triangulation.bundle.observations.linearise import view
+from photostrip.triangulation.bundle.observations.collinearity import view
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.triangulation.bundle.normal_equations.structure import BandStructure
     from photostrip.triangulation.bundle.observations.calibration import Calibrated
-    from photostrip.triangulation.bundle.observations.linearise import Rays
+    from photostrip.triangulation.bundle.observations.collinearity import Rays
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.observations.ray_batches import Batch
 
@@ -79,13 +79,7 @@ class ParameterStep:
 
 
 def prepare(problem: BundleProblem) -> PreparedProblem:
-    """Prepare a problem.
-
-    Returns
-    -------
-    PreparedProblem
-        The same, with its structure.
-    """
+    """Find what does not change during the adjustment: structure, calibrated parameters, a-priori sigmas."""
     calibrated = calibration.parameters(problem.cameras)
     drifts = (problem.positions.offset_sigma, problem.positions.drift_sigma)
     sigmas = [calibrated.sigma, *(np.repeat(sigma[sigma > 0.0], 3) for sigma in drifts)]

@@ -30,21 +30,10 @@ SMALLEST = 1e-5  # weight that every ray keeps, so that its point stays determin
 
 
 def adjust_robustly(problem: BundleProblem) -> tuple[BundleSolution, Floats]:
-    """Adjust with weights that fall with the residual.
+    """Adjust with weights that fall with the residual, and give the factor of the weight of each ray, 0 to 1.
 
-    Parameters
-    ----------
-    problem : BundleProblem
-        All observations that take part.
-
-    Returns
-    -------
-    weight : ndarray, shape (n,)
-        Factor of the weight of each ray, 0 to 1.
-
-    Notes
-    -----
-    Source: Krarup 1980, with the scale of the residuals taken from their median.
+    p = exp(1 - e^2) where the standardised residual exceeds three times its scale, e times. Source: [Krarup 1980], with
+    the scale of the residuals taken from their median.
     """
     weight = np.ones(len(problem.images))
     sigma = problem.images.sigma

@@ -48,11 +48,7 @@ class Selection:
 def supported(problem: BundleProblem, selection: Selection) -> Selection:
     """Take out the rays of points that too few rays are left of.
 
-    Returns
-    -------
-    Selection
-        Without the rays of points that have one ray only and are not given in all three coordinates, and without the
-        control that no ray is left of.
+    These are points with one ray that are not given in all three coordinates, and control that no ray is left of.
     """
     point = problem.images.point
     rays = np.bincount(point[selection.images], minlength=problem.points)
@@ -66,13 +62,7 @@ def supported(problem: BundleProblem, selection: Selection) -> Selection:
 
 
 def selected(problem: BundleProblem, selection: Selection) -> BundleProblem:
-    """Return the problem with the observations that take part.
-
-    Returns
-    -------
-    BundleProblem
-        Rays taken out are gone; coordinates taken out have an infinite standard deviation.
-    """
+    """Leave the observations that take part: other rays go, other coordinates get infinite standard deviations."""
     images, rows = problem.images, selection.images
     chosen = ImageObservations(images.photo[rows], images.point[rows], images.xy[rows], images.sigma[rows])
     given = (problem.control.sigma, problem.positions.sigma, problem.attitudes.sigma)
@@ -89,18 +79,7 @@ def selected(problem: BundleProblem, selection: Selection) -> BundleProblem:
 
 
 def restarted(problem: BundleProblem, solution: BundleSolution) -> BundleProblem:
-    """Return a problem that starts where another one ended.
-
-    Parameters
-    ----------
-    solution : BundleSolution
-        A solution of it, or of a selection.
-
-    Returns
-    -------
-    BundleProblem
-        The same problem; a point that took no part keeps its start.
-    """
+    """Start where a solution of the problem, or of a selection, ended; a point that took no part keeps its start."""
     known = np.asarray(np.isfinite(problem.start.points).all(axis=1), bool)
     points = np.where(known[:, None], solution.points, problem.start.points)
     return replace(problem, start=StartValues(solution.centers, solution.rotations, points))

@@ -65,14 +65,8 @@ def screen_bundle(
 ) -> ScreenedBundle:
     """Adjust a problem and take its gross errors out.
 
-    Parameters
-    ----------
-    begin : Selection
-        What takes part at first; the rest is put in at the end where it fits.
-    settings : BundleSettings
-        Which search, which test, at which level.
-    kept : ndarray of bool, shape (n,), optional
-        Rays that stay in whatever the tests say.
+    ``begin`` takes part at first, the rest is put in at the end where it fits; the rays ``kept`` (n,) stay in whatever
+    the tests say.
     """
     keep = np.zeros(len(problem.images), bool) if kept is None else kept
     if settings.screening == "none":
@@ -282,7 +276,7 @@ class _Search:
 def predicted(
     problem: BundleProblem, selection: Selection, found: tuple[BundleSolution, Cofactors]
 ) -> tuple[Floats, Floats]:
-    """Test values of rays that take no part, against what the others give.
+    """Test rays that take no part against what the others give.
 
     Returns
     -------

@@ -21,15 +21,15 @@ from photostrip.triangulation.bundle.normal_equations.reduced import (
     points_of,
     reduce,
 )
-from photostrip.triangulation.bundle.observations.linearise import PHOTO, SIGNS, backward
+from photostrip.triangulation.bundle.observations.collinearity import PHOTO, SIGNS
 from photostrip.triangulation.bundle.parameters import Parameters, ParameterStep, parameters_from, prepare
 from photostrip.triangulation.bundle.solution import BundleSolution, IterationStep
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from photostrip.triangulation.bundle.normal_equations.point_elimination import Eliminated
     from photostrip.triangulation.bundle.normal_equations.reduced import Reduced
-    from photostrip.triangulation.bundle.observations.linearise import Eliminated
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.observations.ray_batches import Batch
     from photostrip.triangulation.bundle.parameters import PreparedProblem
@@ -53,13 +53,10 @@ class IterationSettings:
 
 
 def solve(problem: BundleProblem, settings: IterationSettings | None = None) -> BundleSolution:
-    """Adjust a bundle of rays.
+    """Adjust a bundle of rays by Gauss-Newton steps, damped where the sum of squares grows.
 
-    Returns
-    -------
-    BundleSolution
-        Estimate and residuals. Without control and positions the datum comes from inner constraints on the
-        points: the adjusted points have no shift, rotation and change of scale against their start.
+    Without control and positions the datum comes from inner constraints on the points: the adjusted points have no
+    shift, rotation and change of scale against their start.
 
     Raises
     ------
@@ -88,7 +85,7 @@ def _iterate(
     defects.refuse_weak_points(prepared, best)
     for _ in range(settings.iterations):
         move = _move(prepared, state, best, damping, free=free)
-        steps.append(_told(best, move, damping))
+        steps.append(_recorded(best, move, damping))
         moved = _moved(prepared, state, move)
         if damping == 0.0 and _still_to_come(steps) < settings.converged:
             return moved, tuple(steps)
@@ -114,7 +111,11 @@ def _still_to_come(steps: list[IterationStep]) -> float:
 def _move(
     prepared: PreparedProblem, state: Parameters, reduced: Reduced, damping: float, *, free: bool
 ) -> ParameterStep:
-    """Find the step of all parameters."""
+    """Find the step of all parameters: photos and common parameters from the reduced equations, then the points.
+
+    N11 dx1 + N12 dx2 = b1 for photos and common parameters is solved by the factor of N11 and the Schur complement
+    N22 - N12' N11^-1 N12; the length of the step is the root of dx' N dx.
+    """
     own = reduced.blocks[prepared.structure.own]
     anchor = datum.anchor(prepared, state, own) if free else None
     add = anchor
@@ -143,7 +144,7 @@ def _move(
 
 
 def _shift(batch: Batch, eliminated: Eliminated, photos: Floats, common: Floats) -> Floats:
-    """Give steps of the points of a batch, (3, S), once those of the photos are known."""
+    """Find the steps (3, S) of the points of a batch from those of the photos: L^-T (L^-1 A'l - T' dx)."""
     k, n = len(batch.photo), PHOTO * len(batch.photo)
     rows = eliminated.rows
     shift = np.empty(rows.shape[1:])
@@ -155,7 +156,7 @@ def _shift(batch: Batch, eliminated: Eliminated, photos: Floats, common: Floats)
     if len(common):
         shift += np.einsum("pcs,p->cs", rows[PHOTO * k : -1], common)
     np.subtract(rows[-1], shift, out=shift)
-    backward(eliminated.root, shift)
+    eliminated.root.backward(shift)
     return shift
 
 
@@ -170,7 +171,7 @@ def _moved(prepared: PreparedProblem, state: Parameters, move: ParameterStep) ->
     )
 
 
-def _told(reduced: Reduced, move: ParameterStep, damping: float) -> IterationStep:
+def _recorded(reduced: Reduced, move: ParameterStep, damping: float) -> IterationStep:
     """Put a step on record."""
     shift = max(float(np.abs(part).max(initial=0.0)) for part in (move.photos[:, :3], *move.points))
     turn = float(np.abs(move.photos[:, 3:]).max(initial=0.0))

@@ -22,15 +22,7 @@ STEP = 48  # columns of the inverse that are found at a time
 
 
 class Band:
-    """A symmetric positive definite matrix with a band, and its Cholesky factor.
-
-    Parameters
-    ----------
-    size : int
-        Rows of the matrix.
-    width : int
-        Elements below the diagonal that may differ from zero.
-    """
+    """A symmetric positive definite matrix with ``width`` elements below the diagonal, and its Cholesky factor."""
 
     def __init__(self, size: int, width: int) -> None:
         self.size, self.width = size, min(width, size - 1)
@@ -79,18 +71,10 @@ class Band:
         return found
 
     def inverse(self) -> Band:
-        """Return the elements of the inverse within the band.
+        """Find the elements of the inverse within the band, lower half; what stands outside the band is not defined.
 
-        Returns
-        -------
-        Band
-            The inverse, lower half; what stands outside the band is not defined.
-
-        Notes
-        -----
         With columns i and the rows J below them, and L the factor: Z_Ji = -Z_JJ L_Ji L_ii^-1 and
-        Z_ii = (L_ii L_ii')^-1 - (L_Ji L_ii^-1)' Z_Ji, from the last columns to the first.
-        Source: [Takahashi 1973].
+        Z_ii = (L_ii L_ii')^-1 - (L_Ji L_ii^-1)' Z_Ji, from the last columns to the first. Source: [Takahashi 1973].
         """
         from scipy.linalg.lapack import dtrtri
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.geometry.rotation import cross_matrix
-from photostrip.triangulation.bundle.observations.linearise import PHOTO, SIGNS
+from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
+from photostrip.triangulation.bundle.observations.collinearity import PHOTO, SIGNS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -23,18 +23,11 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-DEFECT = 7
-"""Parameters of a similarity: shift, rotation, scale."""
+DEFECT = SIMILARITY_PARAMETERS
 
 
 def is_free(problem: BundleProblem) -> bool:
-    """Whether nothing that is given says where the network is.
-
-    Returns
-    -------
-    bool
-        True without any control coordinate, camera position and attitude.
-    """
+    """Whether nothing says where the network is: no control coordinate, no camera position, no attitude."""
     sigmas = (problem.control.sigma, problem.positions.sigma, problem.attitudes.sigma)
     return not any(np.isfinite(sigma).any() for sigma in sigmas)
 
@@ -42,15 +35,8 @@ def is_free(problem: BundleProblem) -> bool:
 def anchor(prepared: PreparedProblem, state: Parameters, own: Floats) -> Floats:
     """Conditions that hold seven parameters: all of a photo, and its distance from the photo farthest away.
 
-    Parameters
-    ----------
-    own : ndarray, shape (m, 6, 6)
-        Blocks of the photos in the order of the band: the conditions are made as strong as the rays.
-
-    Returns
-    -------
-    ndarray, shape (m, 6, 6)
-        What is added to these blocks.
+    Returns what is added to the photos' blocks (m, 6, 6); the conditions are made as strong as the rays, whose blocks
+    in the order of the band are ``own``.
     """
     order = prepared.structure.order
     middle = len(order) // 2
@@ -63,89 +49,39 @@ def anchor(prepared: PreparedProblem, state: Parameters, own: Floats) -> Floats:
     return add
 
 
-def generators(points: Floats, origin: Floats) -> Floats:
-    """Give moves of points by a small similarity: shift, rotation about an origin, scale.
-
-    Parameters
-    ----------
-    points : ndarray, shape (n, 3)
-        Points, metres.
-    origin : ndarray, shape (3,)
-        Origin, metres.
-
-    Returns
-    -------
-    ndarray, shape (n, 3, 7)
-        Derivatives of the points.
-    """
-    arm = points - origin
-    shift = np.broadcast_to(np.eye(3), (len(points), 3, 3))
-    return np.concatenate([shift, -cross_matrix(arm), arm[:, :, None]], axis=2)
-
-
 def photo_generators(prepared: PreparedProblem, state: Parameters, origin: Floats) -> Floats:
-    """Give moves of the photos by a small similarity, in their own axes and signs.
-
-    Parameters
-    ----------
-    origin : ndarray, shape (3,)
-        Origin, metres.
-
-    Returns
-    -------
-    ndarray, shape (m, 6, 7)
-        Derivatives of the photos' parameters, in the order of the band.
-    """
+    """Move the photos by a small similarity about an origin: (m, 6, 7) in their own axes and signs, by the band."""
     order = prepared.structure.order
     back = np.swapaxes(state.rotations[order], 1, 2)
     moves = np.zeros((len(order), PHOTO, DEFECT))
-    moves[:, :3] = back @ generators(state.centers[order], origin)
+    moves[:, :3] = back @ similarity_derivatives(state.centers[order], origin)
     moves[:, 3:, 3:6] = back
     moves *= SIGNS[:, None]
     return moves
 
 
 def centred(prepared: PreparedProblem, state: Parameters, move: ParameterStep) -> ParameterStep:
-    """Take shift, rotation and scale of the points out of a step.
-
-    Parameters
-    ----------
-    state : Parameters
-        Where the step starts.
-
-    Returns
-    -------
-    ParameterStep
-        The same step under inner constraints.
-    """
+    """Take shift, rotation and scale of the points out of a step: dx - G (G'G)^-1 G' dx, G the moves of the points."""
     origin, inverse = inner(prepared, state)
     right = np.zeros(DEFECT)
     for batch, xyz, shift in zip(prepared.structure.batches, state.xyz, move.points, strict=True):
-        moves = generators(xyz[:, batch.real].T, origin)
+        moves = similarity_derivatives(xyz[:, batch.real].T, origin)
         right += np.einsum("ncd,nc->d", moves, shift[:, batch.real].T)
     similarity = inverse @ right
     points = tuple(
-        shift - np.einsum("scd,d->cs", generators(xyz.T, origin), similarity)
+        shift - np.einsum("scd,d->cs", similarity_derivatives(xyz.T, origin), similarity)
         for xyz, shift in zip(state.xyz, move.points, strict=True)
     )
     return replace(move, photos=move.photos - photo_generators(prepared, state, origin) @ similarity, points=points)
 
 
 def inner(prepared: PreparedProblem, state: Parameters) -> tuple[Floats, Floats]:
-    """Origin and inverse normal matrix of the similarity of the points.
-
-    Returns
-    -------
-    origin : ndarray, shape (3,)
-        Mean of the points, metres.
-    inverse : ndarray, shape (7, 7)
-        Inverse of G'G with the generators G of all points.
-    """
+    """Mean of the points, metres, and (G'G)^-1, (7, 7), of the similarity of all points about it."""
     pairs = list(zip(prepared.structure.batches, state.xyz, strict=True))
     total = sum(xyz[:, batch.real].sum(axis=1) for batch, xyz in pairs)
     origin = total / sum(len(batch.real) for batch, _ in pairs)
     normal = np.zeros((DEFECT, DEFECT))
     for batch, xyz in pairs:
-        moves = generators(xyz[:, batch.real].T, origin)
+        moves = similarity_derivatives(xyz[:, batch.real].T, origin)
         normal += np.einsum("nca,ncb->ab", moves, moves)
     return origin, np.asarray(np.linalg.inv(normal), float)

@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, NamedTuple, NoReturn
 
 import numpy as np
 
 from photostrip.errors import Fault, GeometryError, InputError
+from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.triangulation.bundle.normal_equations import datum
 from photostrip.triangulation.bundle.normal_equations.reduced import factored, given_at
-from photostrip.triangulation.bundle.observations.linearise import PHOTO
+from photostrip.triangulation.bundle.observations.collinearity import PHOTO
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
+    from photostrip.triangulation.bundle.normal_equations.point_elimination import Eliminated
     from photostrip.triangulation.bundle.normal_equations.reduced import Reduced
-    from photostrip.triangulation.bundle.observations.linearise import Eliminated
+    from photostrip.triangulation.bundle.observations.given_orientations import LinearisedOrientations
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.observations.ray_batches import Batch
     from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem
@@ -40,13 +42,7 @@ MOVES = ("shift along its x", "shift along its y", "shift along its z", "roll ab
 
 
 def refuse_repeated(problem: BundleProblem) -> None:
-    """Refuse rays that stand twice.
-
-    Raises
-    ------
-    InputError
-        With every point that is measured twice on a photo (``bundle-repeated``).
-    """
+    """Refuse points that are measured twice on a photo (``bundle-repeated``)."""
     key = np.sort(problem.images.point * np.intp(problem.photos) + problem.images.photo)
     again = np.unique(key[1:][key[1:] == key[:-1]])
     if len(again):
@@ -64,17 +60,9 @@ def refuse_repeated(problem: BundleProblem) -> None:
 
 
 def refuse_weak_points(prepared: PreparedProblem, reduced: Reduced) -> None:
-    """Refuse points whose rays, with their control, do not meet at an angle.
+    """Refuse points whose rays, with their control, do not meet at an angle (``bundle-rays``).
 
-    Parameters
-    ----------
-    reduced : Reduced
-        Its normal equations, without damping.
-
-    Raises
-    ------
-    GeometryError
-        With all of these points (``bundle-rays``).
+    The normal equations are those without damping.
     """
     refuse_weak(prepared, prepared.structure.batches, reduced.points)
 
@@ -96,18 +84,7 @@ def refuse_weak(prepared: PreparedProblem, batches: Sequence[Batch], eliminated:
 
 
 def listed(noun: str, names: list[str]) -> str:
-    """Name some of many.
-
-    Parameters
-    ----------
-    noun : str
-        What they are, in the singular.
-
-    Returns
-    -------
-    str
-        The first few, and how many more.
-    """
+    """Name the first few of many, and how many more."""
     more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
     return f"{noun}{'s' if len(names) > 1 else ''} {', '.join(names[:NAMED])}{more}"
 
@@ -127,12 +104,10 @@ class Held:
 
 
 def refuse_loose(prepared: PreparedProblem, state: Parameters) -> None:
-    """Refuse parts of the network that what is given does not hold in place.
+    """Refuse parts of the network that what is given does not hold in place (``bundle-rank``).
 
-    Raises
-    ------
-    GeometryError
-        Naming shift, rotation or scale that is not determined (``bundle-rank``).
+    The information of what is given on the seven parameters of a similarity of each part is taken apart by its
+    eigenvalues; what has less than a tenth of the size of the part is named: shift, rotation or scale.
     """
     parts = _parts(prepared)
     for photos in parts:
@@ -143,7 +118,7 @@ def refuse_loose(prepared: PreparedProblem, state: Parameters) -> None:
             names = [prepared.problem.photo_name(number) for number in photos.tolist()]
             whole = "" if len(parts) == 1 else f" of {listed('photo', names)}"
             raise GeometryError(
-                f"what is given does not determine {_moves(prepared, state, held, loose)}{whole}: {_reason(held)}",
+                f"what is given does not determine {_moves(state, held, loose)}{whole}: {_reason(held)}",
                 photos=() if len(parts) == 1 else names,
                 code="bundle-rank",
             )
@@ -181,31 +156,23 @@ def _held(prepared: PreparedProblem, state: Parameters, photos: Numbers) -> Held
     everything = np.concatenate([around, problem.start.points[seen]])
     radius = float(np.linalg.norm(everything - everything.mean(axis=0), axis=1).max())
     units = np.array([radius, radius, radius, 1.0, 1.0, 1.0, 1.0])
-    rows = np.einsum("nij,njd->nid", control.axes[given], datum.generators(control.xyz[given], origin)) * units
+    rows = np.einsum("nij,njd->nid", control.axes[given], similarity_derivatives(control.xyz[given], origin)) * units
     rows /= control.sigma[given][:, :, None]
     normal = np.einsum("nad,nae->de", rows, rows)
     of_photos = datum.photo_generators(prepared, state, origin)[prepared.structure.rank] * units
     for linear in (positions, attitudes):
-        normal += _information(
-            linear.by_photo, linear.by_common, linear.weight, of_photos, linear.photo, inside, prepared
-        )
+        normal += _information(linear, of_photos, inside, prepared)
     return Held(photos, origin, radius, normal, places)
 
 
 def _information(
-    by_photo: Floats,
-    by_common: Floats,
-    weight: Floats,
-    moves: Floats,
-    photo: Numbers,
-    inside: NDArray[np.bool_],
-    prepared: PreparedProblem,
+    linear: LinearisedOrientations, moves: Floats, inside: NDArray[np.bool_], prepared: PreparedProblem
 ) -> Floats:
-    """Information of given orientations on the similarity, with offsets and drifts unknown."""
-    rows = inside[photo]
-    own = (by_photo[rows] @ moves[photo[rows]]) * weight[rows][:, :, None]
-    common = by_common[rows] * weight[rows][:, :, None]
-    whole = np.concatenate([own, common], axis=2).reshape(-1, datum.DEFECT + by_common.shape[2])
+    """Information (7, 7) of given orientations on the similarity, offsets and drifts eliminated from the normals."""
+    rows = inside[linear.photo]
+    of_photos = (linear.by_photo[rows] @ moves[linear.photo[rows]]) * linear.weight[rows][:, :, None]
+    common = linear.by_common[rows] * linear.weight[rows][:, :, None]
+    whole = np.concatenate([of_photos, common], axis=2).reshape(-1, datum.DEFECT + common.shape[2])
     normal = whole.T @ whole
     seven = datum.DEFECT
     corner = normal[seven:, seven:] + np.diag(prepared.prior**-2.0)
@@ -213,9 +180,9 @@ def _information(
     return left
 
 
-def _moves(prepared: PreparedProblem, state: Parameters, held: Held, loose: Floats) -> str:
+def _moves(state: Parameters, held: Held, loose: Floats) -> str:
     """Name the movements that are not determined."""
-    flight, across, up = _directions(prepared, state, held.photos)
+    flight, across, up = _flight_axes(state, held.photos)
     line = _line(held.control)
     zero = np.zeros(3)
     turns = {"roll about the flight line": flight, "pitch": across, "heading": up}
@@ -235,16 +202,22 @@ def _moves(prepared: PreparedProblem, state: Parameters, held: Held, loose: Floa
     return ", ".join(dict.fromkeys(found)) or f"{loose.shape[1]} of the seven parameters of shift, rotation and scale"
 
 
-def _directions(prepared: PreparedProblem, state: Parameters, photos: Numbers) -> tuple[Floats, Floats, Floats]:
-    """Direction of flight, across and up of a part: unit vectors."""
-    del prepared
+class FlightAxes(NamedTuple):
+    """Unit vectors of a part of the network."""
+
+    flight: Floats
+    across: Floats
+    up: Floats
+
+
+def _flight_axes(state: Parameters, photos: Numbers) -> FlightAxes:
     up = state.rotations[photos, :, 2].mean(axis=0)
     up /= np.linalg.norm(up)
     centers = state.centers[photos] - state.centers[photos].mean(axis=0)
     flight = np.linalg.svd(centers, full_matrices=False)[2][0] if len(photos) > 1 else state.rotations[photos[0], :, 0]
     flight = flight - up * (up @ flight)
     flight /= np.linalg.norm(flight)
-    return flight, np.cross(up, flight), up
+    return FlightAxes(flight, np.cross(up, flight), up)
 
 
 def _line(control: Floats) -> Floats | None:
@@ -271,17 +244,10 @@ def _reason(held: Held) -> str:
 
 
 def refuse_singular(prepared: PreparedProblem, reduced: Reduced, extra: Floats | None) -> NoReturn:
-    """Refuse normal equations that cannot be factored, naming the photos that are not determined.
+    """Refuse normal equations that cannot be factored (``bundle-rank``), naming the photos that are not determined.
 
-    Parameters
-    ----------
-    extra : ndarray, shape (m, 6, 6), or None
-        What was added to them as a datum.
-
-    Raises
-    ------
-    GeometryError
-        Always (``bundle-rank``).
+    They are those with large elements in the null vector, found by inverse iteration on the matrix made regular with a
+    trifle of its diagonal. ``extra`` (m, 6, 6) is what was added to them as a datum.
     """
     own = reduced.blocks[prepared.structure.own] + (0.0 if extra is None else extra)
     diagonal = np.maximum(np.einsum("nii->ni", own), 0.0)
@@ -310,19 +276,9 @@ def refuse_singular(prepared: PreparedProblem, reduced: Reduced, extra: Floats |
 
 
 def refuse_common(prepared: PreparedProblem, before: Floats, left: Floats) -> None:
-    """Refuse common parameters that the observations do not determine.
+    """Refuse common parameters that the observations do not determine (``bundle-rank``), by name.
 
-    Parameters
-    ----------
-    before : ndarray, shape (p, p)
-        Normal matrix of the common parameters with all others known.
-    left : ndarray, shape (p, p)
-        The same with all others unknown.
-
-    Raises
-    ------
-    GeometryError
-        Naming the parameters (``bundle-rank``).
+    ``before`` and ``left`` (p, p) are their normal matrices with all other parameters known, and unknown.
     """
     if not len(left):
         return

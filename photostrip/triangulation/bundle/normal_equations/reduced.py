@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.triangulation.bundle.normal_equations.band import Band
+from photostrip.triangulation.bundle.normal_equations.point_elimination import eliminate, squares
 from photostrip.triangulation.bundle.normal_equations.sparse import Sparse
 from photostrip.triangulation.bundle.normal_equations.structure import blocks_of
 from photostrip.triangulation.bundle.observations import given_orientations
-from photostrip.triangulation.bundle.observations.linearise import PHOTO, by_photo, eliminate, squares
+from photostrip.triangulation.bundle.observations.collinearity import PHOTO, by_photo
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.bundle.observations.linearise import Eliminated
+    from photostrip.triangulation.bundle.normal_equations.point_elimination import Eliminated
     from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem
 
     Floats = NDArray[np.float64]
@@ -41,10 +42,7 @@ class Reduced:
 def reduce(prepared: PreparedProblem, state: Parameters, damping: float = 0.0) -> Reduced:
     """Linearise everything at a state and eliminate the points.
 
-    Parameters
-    ----------
-    damping : float
-        Part of its diagonal by which the normal matrix of each point is made larger.
+    ``damping`` is the part of its diagonal by which the normal matrix of each point is made larger.
     """
     structure, p, more = prepared.structure, len(state.common), len(prepared.calibrated)
     blocks = np.zeros((len(structure.rows), PHOTO, PHOTO))
@@ -59,12 +57,12 @@ def reduce(prepared: PreparedProblem, state: Parameters, damping: float = 0.0) -
         partials = by_photo(rays, more)
         if common is not None:
             partials[PHOTO:-1] = common
-        added, taken = squares(batch, partials, eliminated.rows)
-        chi_square += float(added[0, 0, -1, -1])
-        of_pairs, of_photos, of_common = blocks_of(added, taken, len(batch.photo))
-        pairs.add(of_pairs, blocks)
-        singles.add(of_photos, narrow)
-        corner[np.ix_(inner, inner)] += of_common
+        products = squares(batch, partials, eliminated.rows)
+        chi_square += float(products.added[0, 0, -1, -1])
+        contributed = blocks_of(products, len(batch.photo))
+        pairs.add(contributed.pairs, blocks)
+        singles.add(contributed.border, narrow)
+        corner[np.ix_(inner, inner)] += contributed.corner
         points.append(eliminated)
     if narrow is not border:
         border[:, :, inner] = narrow
@@ -141,15 +139,7 @@ def control_squares(prepared: PreparedProblem, state: Parameters) -> float:
 def factored(prepared: PreparedProblem, reduced: Reduced, add: Floats | None = None) -> Factor | None:
     """Assemble the matrix of the photos and factor it: in a band, or sparse where the band is wide.
 
-    Parameters
-    ----------
-    add : ndarray, shape (m, 6, 6), or None
-        What is added to the photos' own blocks.
-
-    Returns
-    -------
-    Band, Sparse or None
-        The factor; None when the matrix is not positive definite.
+    ``add`` (m, 6, 6) goes to the photos' own blocks. None when the matrix is not positive definite.
     """
     structure = prepared.structure
     blocks = reduced.blocks

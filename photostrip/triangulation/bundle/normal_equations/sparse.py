@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.triangulation.bundle.observations.linearise import PHOTO
+from photostrip.triangulation.bundle.observations.collinearity import PHOTO
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -26,14 +26,7 @@ TOGETHER = 64  # photos whose columns of the inverse are found at a time
 class Sparse:
     """A symmetric positive definite matrix of blocks, and its factor.
 
-    Parameters
-    ----------
-    photos : int
-        Number of photos m.
-    rows, columns : ndarray of int, shape (b,)
-        Pairs of photos, row >= column, sorted by row, then column.
-    blocks : ndarray, shape (b, 6, 6)
-        Their blocks.
+    ``blocks`` (b, 6, 6) are those of the pairs of photos ``rows`` >= ``columns``, sorted by row, then column.
     """
 
     def __init__(self, photos: int, rows: Numbers, columns: Numbers, blocks: Floats) -> None:

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from photostrip.triangulation.bundle.observations.linearise import PHOTO
+from photostrip.triangulation.bundle.observations.collinearity import PHOTO
 from photostrip.triangulation.bundle.observations.ray_batches import Batch, SortedRays, arrange, sort_rays
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from photostrip.triangulation.bundle.normal_equations.point_elimination import GroupSquares
     from photostrip.triangulation.bundle.observations.problem import BundleProblem, ControlObservations
 
     Floats = NDArray[np.float64]
@@ -60,13 +61,7 @@ class BandStructure:
 
 
 def band_structure(problem: BundleProblem) -> BandStructure:
-    """Find the structure of a problem.
-
-    Returns
-    -------
-    BandStructure
-        Order, pairs and batches.
-    """
+    """Find which photos share points, an order in which they are a narrow band, and the batches of the points."""
     m = problem.photos
     rank = np.arange(m)
     rays = sort_rays(problem.images, problem.points, rank)
@@ -81,7 +76,7 @@ def band_structure(problem: BundleProblem) -> BandStructure:
     key = np.sort(rows * m + columns)
     rows, columns = np.divmod(key, m)
     control = control_normals(problem.control, problem.points)
-    batches = tuple(_with_control(batch, *control) for batch in arrange(problem.images, rays, m))
+    batches = tuple(_with_control(batch, control) for batch in arrange(problem.images, rays, m))
     return BandStructure(
         order=np.argsort(rank),
         rank=rank,
@@ -97,13 +92,7 @@ def band_structure(problem: BundleProblem) -> BandStructure:
 
 @cache
 def triangle(rays: int) -> tuple[Numbers, Numbers]:
-    """Pairs of a set of photos, the later one first: positions within the set.
-
-    Returns
-    -------
-    tuple of ndarray of int, shape (rays (rays + 1) / 2,)
-        Row and column.
-    """
+    """Pairs of a set of photos, the later one first: positions within the set."""
     row, column = np.tril_indices(rays)
     return row, column
 
@@ -165,32 +154,30 @@ def _narrower(rows: Numbers, columns: Numbers, photos: int) -> Numbers | None:
     return rank if narrower else None
 
 
-def _with_control(batch: Batch, normal: Floats, right: Floats, where: Numbers) -> Batch:
-    """Return a batch the control of its points."""
-    if not len(normal):
+class ControlNormals(NamedTuple):
+    """Normal equations of the c points with control."""
+
+    normal: Floats  # (c, 3, 3): sum of A^T W A over the rows of a point, 1/m^2
+    right: Floats  # (c, 3): these matrices times the given positions, 1/m
+    where: Numbers  # (q,): row of each point in these; -1: no control
+
+
+def _with_control(batch: Batch, control: ControlNormals) -> Batch:
+    """Give a batch the control of its points."""
+    if not len(control.normal):
         return batch
-    slots = batch.real[where[batch.point[batch.real]] >= 0]
-    at = where[batch.point[slots]]
+    slots = batch.real[control.where[batch.point[batch.real]] >= 0]
+    at = control.where[batch.point[slots]]
     return replace(
         batch,
         control=slots,
-        control_normal=np.ascontiguousarray(normal[at].transpose(1, 2, 0)),
-        control_right=np.ascontiguousarray(right[at].T),
+        control_normal=np.ascontiguousarray(control.normal[at].transpose(1, 2, 0)),
+        control_right=np.ascontiguousarray(control.right[at].T),
     )
 
 
-def control_normals(control: ControlObservations, points: int) -> tuple[Floats, Floats, Numbers]:
-    """Sum the control of each point.
-
-    Returns
-    -------
-    normal : ndarray, shape (c, 3, 3)
-        Normal matrices of the points with control, 1/m^2.
-    right : ndarray, shape (c, 3)
-        These matrices times the given positions, 1/m.
-    where : ndarray of int, shape (q,)
-        Row of each point in these; -1: no control.
-    """
+def control_normals(control: ControlObservations, points: int) -> ControlNormals:
+    """Sum the control of each point."""
     controlled, row = np.unique(control.point, return_inverse=True)
     where = np.full(points, -1)
     where[controlled] = np.arange(len(controlled))
@@ -198,37 +185,27 @@ def control_normals(control: ControlObservations, points: int) -> tuple[Floats, 
     normal, right = np.zeros((len(controlled), 3, 3)), np.zeros((len(controlled), 3))
     np.add.at(normal, row, normals)
     np.add.at(right, row, np.einsum("nij,nj->ni", normals, control.xyz))
-    return normal, right, where
+    return ControlNormals(normal, right, where)
 
 
-def blocks_of(added: Floats, taken: Floats, rays: int) -> tuple[Floats, Floats, Floats]:
-    """Cut the products of a batch into what goes to pairs, to the border of photos and to the corner.
+class BatchBlocks(NamedTuple):
+    """What a batch contributes to the normal equations."""
 
-    Parameters
-    ----------
-    added, taken : ndarray
-        Of ``linearise.squares``.
+    pairs: Floats  # (k (k + 1) / 2 * groups, 6, 6): pairs of photos
+    border: Floats  # (k * groups, 6, more + 1): photos with common parameters and right-hand side
+    corner: Floats  # (more + 1, more + 1): common parameters and right-hand side among themselves
 
-    Returns
-    -------
-    pairs : ndarray, shape (k (k + 1) / 2 * groups, 6, 6)
-        Blocks of pairs of photos.
-    border : ndarray, shape (k * groups, 6, more + 1)
-        Blocks of photos with common parameters and right-hand side.
-    corner : ndarray, shape (more + 1, more + 1)
-        Common parameters and right-hand side among themselves.
-    """
+
+def blocks_of(products: GroupSquares, rays: int) -> BatchBlocks:
+    """Cut the products of a batch into what goes to pairs, to the border of photos and to the corner: B'B - T T'."""
+    added, subtracted = products
     n = PHOTO * rays
-    groups = len(taken)
+    groups = len(subtracted)
     row, column = triangle(rays)
-    squares = taken[:, :n, :n].reshape(groups, rays, PHOTO, rays, PHOTO)
+    squares = subtracted[:, :n, :n].reshape(groups, rays, PHOTO, rays, PHOTO)
     pairs = squares.transpose(1, 3, 0, 2, 4)[row, column]
     np.negative(pairs, out=pairs)
     pairs[row == column] += added[:, :, :PHOTO, :PHOTO]
-    border = added[:, :, :PHOTO, PHOTO:] - taken[:, :n, n:].reshape(groups, rays, PHOTO, -1).transpose(1, 0, 2, 3)
-    corner = added[:, :, PHOTO:, PHOTO:].sum(axis=(0, 1)) - taken[:, n:, n:].sum(axis=0)
-    return (
-        pairs.reshape(-1, PHOTO, PHOTO),
-        border.reshape(rays * groups, PHOTO, -1),
-        corner,
-    )
+    border = added[:, :, :PHOTO, PHOTO:] - subtracted[:, :n, n:].reshape(groups, rays, PHOTO, -1).transpose(1, 0, 2, 3)
+    corner = added[:, :, PHOTO:, PHOTO:].sum(axis=(0, 1)) - subtracted[:, n:, n:].sum(axis=0)
+    return BatchBlocks(pairs.reshape(-1, PHOTO, PHOTO), border.reshape(rays * groups, PHOTO, -1), corner)

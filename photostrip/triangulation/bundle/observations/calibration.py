@@ -35,30 +35,16 @@ class Calibrated:
 
 
 def parameters(cameras: BundleCameras) -> Calibrated:
-    """List the parameters to be calibrated.
-
-    Returns
-    -------
-    Calibrated
-        The parameters, by camera.
-    """
+    """List the parameters to be calibrated, by camera."""
     sigma = np.zeros((len(cameras.focal), len(CALIBRATION))) if cameras.sigma is None else cameras.sigma
     camera, kind = np.nonzero(sigma > 0.0)
     return Calibrated(camera, kind, sigma[camera, kind])
 
 
 def corrections(xy: Floats) -> Floats:
-    """Corrections of image coordinates by each parameter at one.
+    """Corrections of ideal image coordinates (2, ...) in mm by each parameter at one, shape (10, 2, ...).
 
-    Parameters
-    ----------
-    xy : ndarray, shape (2, ...)
-        Ideal image coordinates, mm.
-
-    Returns
-    -------
-    ndarray, shape (10, 2, ...)
-        What is added to x and y, mm; zero for the principal distance.
+    See ``problem.CALIBRATION`` for the formula; zero for the principal distance.
     """
     x, y = xy
     r2 = x * x + y * y
@@ -80,22 +66,10 @@ def corrections(xy: Floats) -> Floats:
 
 
 def partials(wanted: Calibrated, xy: Floats, ratio: Floats, camera: Numbers) -> Floats:
-    """Give partials of the computed image coordinates by the parameters.
+    """Differentiate the computed image coordinates by the parameters: (c, 2, ...), mm by the unit.
 
-    Parameters
-    ----------
-    xy : ndarray, shape (2, ...)
-        Measured ideal image coordinates, mm.
-    ratio : ndarray, shape (2, ...)
-        Computed image coordinates divided by the principal distance.
-    camera : ndarray of int, shape (...)
-        Camera of each ray.
-
-    Returns
-    -------
-    ndarray, shape (c, 2, ...)
-        Partials, mm by the unit of the parameter; a correction of the measurement counts as a change of the
-        computed coordinate with the opposite sign.
+    ``ratio`` is the computed image point divided by the principal distance. A correction of the measurement counts as
+    a change of the computed coordinate with the opposite sign.
     """
     table = -corrections(xy)
     table[PRINCIPAL_DISTANCE] = ratio

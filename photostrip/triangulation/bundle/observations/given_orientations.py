@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geometry.rotation import cross_matrix, to_vector
-from photostrip.triangulation.bundle.observations.linearise import PHOTO, SIGNS
+from photostrip.triangulation.bundle.observations.collinearity import PHOTO, SIGNS
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,29 +27,21 @@ class LinearisedOrientations:
 
     photo: Numbers  # (g,): photo of each row
     residual: Floats  # (g, 3): computed minus given, metres or radians
-    by_photo: Floats  # (g, 3, 6): partials by the photo's parameters, as ``linearise`` counts them
+    by_photo: Floats  # (g, 3, 6): partials by the photo's parameters, as ``collinearity`` counts them
     by_common: Floats  # (g, 3, p): partials by the common parameters
     weight: Floats  # (g, 3): reciprocal sigmas
 
     def scaled(self) -> tuple[Floats, Floats]:
-        """Give partials by photo and common parameters with the misfit as last column, (g, 3, 6 + p + 1); in sigmas."""
+        """Divide by sigma: partials by photo (g, 3, 6); by common parameters, the misfit last (g, 3, p + 1)."""
         whole = np.concatenate([self.by_photo, self.by_common, -self.residual[:, :, None]], axis=2)
         whole *= self.weight[:, :, None]
         return whole[:, :, :PHOTO], whole[:, :, PHOTO:]
 
 
 def drift_columns(positions: PositionObservations, first: int) -> tuple[Numbers, Numbers]:
-    """Where offset and drift of each group stand among the common parameters.
+    """First of three columns of offset and of drift of each group among the common parameters, each (groups + 1,).
 
-    Parameters
-    ----------
-    first : int
-        Number of common parameters before them.
-
-    Returns
-    -------
-    offset, drift : ndarray of int, shape (groups + 1,)
-        First of three columns; -1: not a parameter, as for the group -1 at the end.
+    ``first`` common parameters stand before them; -1: not a parameter, as for the group -1 at the end.
     """
     columns = []
     for sigma in (positions.offset_sigma, positions.drift_sigma):
@@ -62,18 +54,9 @@ def drift_columns(positions: PositionObservations, first: int) -> tuple[Numbers,
 def positions_at(
     positions: PositionObservations, centers: Floats, rotations: Floats, common: Floats, calibrated: int
 ) -> LinearisedOrientations:
-    """Linearise camera positions.
+    """Linearise camera positions: A (S + R l - X) - offset - drift t.
 
-    Parameters
-    ----------
-    centers : ndarray, shape (m, 3)
-        Perspective centres, metres.
-    rotations : ndarray, shape (m, 3, 3)
-        Rotations, photo to Cartesian frame.
-    common : ndarray, shape (p,)
-        Common parameters.
-    calibrated : int
-        How many of them are calibration parameters, which stand first.
+    The first ``calibrated`` of the common parameters are those of cameras.
     """
     turn = positions.axes @ rotations[positions.photo]
     arm = np.einsum("gij,gj->gi", turn, positions.lever)
@@ -91,15 +74,7 @@ def positions_at(
 
 
 def attitudes_at(attitudes: AttitudeObservations, rotations: Floats, common: int) -> LinearisedOrientations:
-    """Linearise given attitudes.
-
-    Parameters
-    ----------
-    rotations : ndarray, shape (m, 3, 3)
-        Rotations, photo to Cartesian frame.
-    common : int
-        Number of common parameters, on which attitudes do not depend.
-    """
+    """Linearise given attitudes: the rotation vector of R_given^T R. They do not depend on common parameters."""
     turn = to_vector(np.swapaxes(attitudes.rotations, 1, 2) @ rotations[attitudes.photo])
     by_photo = np.zeros((len(attitudes), 3, PHOTO))
     by_photo[:, :, 3:] = _vector_by_turn(turn)
@@ -113,7 +88,10 @@ def attitudes_at(attitudes: AttitudeObservations, rotations: Floats, common: int
 
 
 def _vector_by_turn(vector: Floats) -> Floats:
-    """Return the derivative of a rotation vector by a further small rotation about the turned axes, shape (n, 3, 3)."""
+    """Differentiate a rotation vector v by a further small rotation about the turned axes, shape (n, 3, 3).
+
+    I + [v]/2 + (1/a^2 - (1 + cos a) / (2 a sin a)) [v]^2 with the angle a = |v|.
+    """
     angle = np.linalg.norm(vector, axis=1)
     safe = np.where(angle < SMALL, 1.0, angle)
     factor = np.where(angle < SMALL, 1.0 / 12.0, 1.0 / safe**2 - (1.0 + np.cos(safe)) / (2.0 * safe * np.sin(safe)))

@@ -177,13 +177,10 @@ class BundleProblem:
         return self.point_ids[number] if self.point_ids else f"number {number}"
 
     def common_names(self) -> tuple[str, ...]:
-        """Names of the parameters that many photos share, in the order of ``Solution.common``.
+        """Names of the parameters that many photos share, in the order of ``BundleSolution.common``.
 
-        Returns
-        -------
-        tuple of str
-            First the calibration parameters (``camera RC30: k1``), then offsets and drifts of positions
-            (``positions A: offset 1``; the component counts along the rows of the axes).
+        First calibration parameters (``camera RC30: k1``), then offsets and drifts of positions (``positions A: offset
+        1``; the component counts along the rows of the axes).
         """
         names = []
         if self.cameras.sigma is not None:

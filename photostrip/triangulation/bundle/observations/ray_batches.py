@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -60,33 +60,14 @@ class SortedRays:
 
 
 def sort_rays(images: ImageObservations, points: int, rank: Numbers) -> SortedRays:
-    """Sort rays by point, then photo.
-
-    Parameters
-    ----------
-    rank : ndarray of int, shape (m,)
-        Place of each photo in the band.
-
-    Returns
-    -------
-    SortedRays
-        The rays in this order.
-    """
+    """Sort rays by point, then photo, whose places in the band are ``rank`` (m,)."""
     photo = rank[images.photo]
     row = np.argsort(images.point * np.intp(len(rank)) + photo)
     return SortedRays(row, photo[row], images.point[row], np.bincount(images.point, minlength=points))
 
 
 def arrange(images: ImageObservations, rays: SortedRays, photos: int) -> tuple[Batch, ...]:
-    """Arrange sorted rays in batches, without control.
-
-    Parameters
-    ----------
-    rays : SortedRays
-        The same, sorted.
-    photos : int
-        Number of photos m.
-    """
+    """Arrange sorted rays of so many photos in batches, without control."""
     first = np.cumsum(rays.counts) - rays.counts
     batches: list[Batch] = []
     for count in np.flatnonzero(np.bincount(rays.counts)).tolist():
@@ -99,27 +80,45 @@ def arrange(images: ImageObservations, rays: SortedRays, photos: int) -> tuple[B
 
 def _batches(images: ImageObservations, members: Numbers, photo: Numbers, row: Numbers, photos: int) -> list[Batch]:
     """Arrange points with the same number of rays; `photo` and `row` have shape (k, points)."""
-    order, first, count = _groups(photo, photos)
+    sets = _groups(photo, photos)
+    count = sets.size
     pieces = -(-count // LARGEST_GROUP)
     size = -(-count // pieces)
     slots = _SIZES[np.searchsorted(_SIZES, size)]
     # A row for each piece of a group, pieces of one size together.
     group = np.repeat(np.arange(len(count)), pieces)
     piece = np.arange(len(group)) - np.repeat(np.cumsum(pieces) - pieces, pieces)
-    begin = first[group] + piece * size[group]
-    length = np.minimum(size[group], first[group] + count[group] - begin)
+    begin = sets.first[group] + piece * size[group]
+    length = np.minimum(size[group], sets.first[group] + count[group] - begin)
     by_size = np.argsort(slots[group], kind="stable")
     begin, length, slots = begin[by_size], length[by_size], slots[group][by_size]
     ends = np.cumsum(slots)
     batch = (ends - 1) * len(photo) // RAYS_OF_BATCH
     cuts = [0, *(np.flatnonzero(np.diff(batch)) + 1).tolist(), len(slots)]
     return [
-        _batch(images, members, photo, row, order, (begin[a:b], length[a:b], slots[a:b])) for a, b in pairwise(cuts)
+        _batch(images, members, photo, row, sets.order, _Pieces(begin[a:b], length[a:b], slots[a:b]))
+        for a, b in pairwise(cuts)
     ]
 
 
-def _groups(photo: Numbers, photos: int) -> tuple[Numbers, Numbers, Numbers]:
-    """Sort points by their sets of photos: the order, and first place and number of points of each set."""
+class _Groups(NamedTuple):
+    """Points by their sets of photos."""
+
+    order: Numbers  # points in the order of their sets
+    first: Numbers  # first place of each set in this order
+    size: Numbers  # points of each set
+
+
+class _Pieces(NamedTuple):
+    """Groups of a batch."""
+
+    begin: Numbers  # first place in the order of the points
+    length: Numbers  # number of points
+    slots: Numbers  # number of slots
+
+
+def _groups(photo: Numbers, photos: int) -> _Groups:
+    """Sort points by their sets of photos: a set is a number to the base of the number of photos."""
     key = photo[0].astype(np.int64)
     largest = photos
     for column in photo[1:]:
@@ -130,7 +129,7 @@ def _groups(photo: Numbers, photos: int) -> tuple[Numbers, Numbers, Numbers]:
     order = np.argsort(key, kind="stable")
     ordered = key[order]
     first = np.flatnonzero(np.concatenate([[True], ordered[1:] != ordered[:-1]]))
-    return order, first, np.diff(first, append=len(order))
+    return _Groups(order, first, np.diff(first, append=len(order)))
 
 
 def _batch(
@@ -139,9 +138,9 @@ def _batch(
     photo: Numbers,
     row: Numbers,
     order: Numbers,
-    groups: tuple[Numbers, Numbers, Numbers],
+    groups: _Pieces,
 ) -> Batch:
-    """Fill the slots of one batch: first place in `order`, number of points and number of slots of each group."""
+    """Fill the slots of one batch with the points of its groups."""
     begin, length, slots = groups
     start = np.cumsum(slots) - slots
     place = np.arange(slots.sum()) - np.repeat(start, slots)

@@ -1,1 +1,6 @@
-"""How good a bundle is: precision, correlations, reliability, variance components, self-calibration."""
+"""How good an adjusted bundle is.
+
+``cofactors`` of all parameters and residuals; from these and the residuals ``reliability`` (redundancy numbers, test
+values, detectable errors), ``variance_components``, ``self_calibration`` (significance of parameters) and
+``correlations``. Source: [Baarda 1968], [Pope 1976], [Förstner 1979].
+"""

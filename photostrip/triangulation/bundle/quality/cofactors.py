@@ -1,7 +1,7 @@
 """Cofactors of everything that was adjusted, from the elements of the inverse within the band.
 
 The photos of a point lie within the band, so that the joint cofactors of its photos are at hand, and with them those of
-the point and of its residuals: with T, L as in ``linearise`` and Z of the photos and common parameters,
+the point and of its residuals: with T, L as in ``point_elimination`` and Z of the photos and common parameters,
 Y = Z T and M = I + T'Y give the cofactors L^-T M L^-1 of the point and -Y L^-1 between photos and point.
 """
 
@@ -13,18 +13,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import GeometryError
+from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.triangulation.bundle.normal_equations import datum
 from photostrip.triangulation.bundle.normal_equations.reduced import factored, given_at, reduce
-from photostrip.triangulation.bundle.observations.linearise import PHOTO, SIGNS, backward, by_photo, by_point, forward
+from photostrip.triangulation.bundle.observations.collinearity import PHOTO, SIGNS, by_photo, by_point
 from photostrip.triangulation.bundle.parameters import parameters_from
 from photostrip.triangulation.bundle.solution import Cofactors
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from photostrip.triangulation.bundle.normal_equations.point_elimination import Eliminated
     from photostrip.triangulation.bundle.normal_equations.reduced import Factor, Reduced
     from photostrip.triangulation.bundle.observations.given_orientations import LinearisedOrientations
-    from photostrip.triangulation.bundle.observations.linearise import Eliminated
     from photostrip.triangulation.bundle.observations.ray_batches import Batch
     from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem
     from photostrip.triangulation.bundle.solution import BundleSolution
@@ -43,17 +44,10 @@ class Inverse:
     factor: Factor  # factor of the photos' part: for photos farther apart than the band is wide
 
     def joint(self, sets: Numbers, more: int) -> Floats:
-        """Joint cofactors of sets of photos and the first common parameters.
+        """Joint cofactors (g, 6 k + more, 6 k + more) of sets of photos and the first common parameters.
 
-        Parameters
-        ----------
-        sets : ndarray of int, shape (g, k)
-            Photos of each set, places in the band.
-
-        Returns
-        -------
-        ndarray, shape (g, 6 k + more, 6 k + more)
-            Cofactors, photos in their own axes and signs.
+        ``sets`` (g, k) holds places in the band; photos count in their own axes and signs. With Z of the photos alone,
+        W = Z times the border and C of the common parameters: [Z + W C W', -W C; -C W', C].
         """
         groups, n = len(sets), PHOTO * sets.shape[1]
         number = (PHOTO * sets[:, :, None] + np.arange(PHOTO)).reshape(groups, n)
@@ -79,13 +73,7 @@ class Inverse:
 
 
 def cofactors_of(solution: BundleSolution) -> Cofactors:
-    """Return the cofactors of all parameters and residuals.
-
-    Raises
-    ------
-    GeometryError
-        When the normal matrix is singular at the solution (``bundle-rank``).
-    """
+    """Cofactors of all parameters and residuals; ``bundle-rank`` when the normal matrix is singular at the solution."""
     prepared = solution.prepared
     state, reduced, band = _at(solution)
     inverse = _inverse(reduced, band)
@@ -93,13 +81,13 @@ def cofactors_of(solution: BundleSolution) -> Cofactors:
     residuals = np.zeros((len(prepared.problem.images), 2, 2))
     table = prepared.table(state)
     for batch, xyz, eliminated in zip(prepared.structure.batches, state.xyz, reduced.points, strict=True):
-        of_points, of_rays = _batch(prepared, batch, eliminated, inverse, (xyz, table))
+        of_points, of_rays = _batch(prepared, batch, eliminated, inverse, xyz, table)
         points[batch.point[batch.real]] = of_points[batch.real]
         residuals[batch.row[:, batch.real].ravel()] = of_rays[:, batch.real].reshape(-1, 2, 2)
     joint = inverse.joint(np.arange(len(table[0]))[:, None], len(state.common))
     positions, attitudes = (_given(prepared, linear, joint) for linear in given_at(prepared, state))
     if solution.free:
-        points, joint = _inner(prepared, state, (band, reduced), points, joint)
+        points, joint = _inner(prepared, state, band, reduced, points, joint)
     photos, cross = _turned(prepared, state, joint)
     weights = prepared.prior**-2.0
     residuals *= prepared.problem.images.sigma[:, :, None] * prepared.problem.images.sigma[:, None, :]
@@ -139,14 +127,13 @@ def _inverse(reduced: Reduced, band: Factor) -> Inverse:
 
 
 def _batch(
-    prepared: PreparedProblem, batch: Batch, eliminated: Eliminated, inverse: Inverse, place: tuple[Floats, Floats]
+    prepared: PreparedProblem, batch: Batch, eliminated: Eliminated, inverse: Inverse, xyz: Floats, table: Floats
 ) -> tuple[Floats, Floats]:
     """Cofactors of the points (S, 3, 3), m^2, and of the residuals (k, S, 2, 2), in units of sigma."""
-    xyz, table = place
     more, k, slots = len(prepared.calibrated), *batch.photo.shape
     rays, common = prepared.rays(batch, xyz, table, np.zeros(0) if not more else np.zeros(more))
     white = by_point(rays)
-    forward(eliminated.root, white)
+    eliminated.root.forward(white)
     joint = inverse.joint(batch.sets, more)
     spread = _carried(batch, joint, eliminated.rows[:-1])
     of_point = np.einsum("pcs,pds->cds", eliminated.rows[:-1], spread)
@@ -166,9 +153,9 @@ def _batch(
     fitted += product + product.transpose(1, 0, 2, 3)
     found = -fitted.transpose(2, 3, 0, 1)
     found[..., range(2), range(2)] += 1.0
-    backward(eliminated.root, of_point)
+    eliminated.root.backward(of_point)
     of_point = of_point.transpose(1, 0, 2)
-    backward(eliminated.root, of_point)
+    eliminated.root.backward(of_point)
     return of_point.transpose(2, 0, 1), found
 
 
@@ -231,24 +218,23 @@ def _turned(prepared: PreparedProblem, state: Parameters, joint: Floats) -> tupl
 
 
 def _inner(
-    prepared: PreparedProblem, state: Parameters, system: tuple[Factor, Reduced], points: Floats, joint: Floats
+    prepared: PreparedProblem, state: Parameters, band: Factor, reduced: Reduced, points: Floats, joint: Floats
 ) -> tuple[Floats, Floats]:
     """Carry cofactors of points and photos over to inner constraints on the points.
 
     With G the generators of the similarity, E the choice of the points, H = (G'EG)^-1 and P = Q E G H: the cofactors
     are Q - G P' - P G' + G (H G'E P) G'.
     """
-    band, reduced = system
     origin, inverse = datum.inner(prepared, state)
     p = len(state.common)
-    moves = [datum.generators(xyz.T, origin).transpose(1, 2, 0) for xyz in state.xyz]  # (3, 7, S)
+    moves = [similarity_derivatives(xyz.T, origin).transpose(1, 2, 0) for xyz in state.xyz]  # (3, 7, S)
     right = np.zeros((len(prepared.structure.order), PHOTO, datum.DEFECT))
     corner = np.zeros((p, datum.DEFECT))
     white = []
     for batch, eliminated, move in zip(prepared.structure.batches, reduced.points, moves, strict=True):
         pushed = move.copy()
         pushed[..., batch.dummy] = 0.0
-        forward(eliminated.root, pushed)
+        eliminated.root.forward(pushed)
         white.append(pushed)
         _push(batch, eliminated, pushed, right, corner)
     photos, common = _solved(reduced, band, right, corner)
@@ -261,7 +247,7 @@ def _inner(
         shift = pushed - np.einsum("kpcs,kspd->cds", rows, of_sets)
         if len(prepared.calibrated):
             shift -= np.einsum("pcs,pd->cds", eliminated.rows[PHOTO * k : -1], common[: len(prepared.calibrated)])
-        backward(eliminated.root, shift)
+        eliminated.root.backward(shift)
         total += np.einsum("cas,cbs->ab", move[..., batch.real], shift[..., batch.real])
         shifts.append(shift)
     middle = inverse @ total @ inverse

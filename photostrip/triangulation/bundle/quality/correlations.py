@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.triangulation.bundle.observations.linearise import PHOTO
+from photostrip.triangulation.bundle.observations.collinearity import PHOTO
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -43,10 +43,7 @@ class Correlation:
 def correlations(solution: BundleSolution, precision: Cofactors, limit: float = LIMIT) -> tuple[Correlation, ...]:
     """List correlations above a limit: between common parameters, between these and photos, and within photos.
 
-    Returns
-    -------
-    tuple of Correlation
-        Common parameters first, then with photos, then within photos; each the largest first.
+    In this order; each the largest first.
     """
     problem = solution.prepared.problem
     names = problem.common_names()

@@ -51,37 +51,18 @@ class Group:
             return np.where(self.redundancy >= UNCONTROLLED, self.error / self.redundancy, np.nan)
 
     def detectable(self, shift: float) -> Floats:
-        """Smallest errors that are found with the wanted power.
+        """Smallest errors that are found with the wanted power, (n, k), in the unit of the observation.
 
-        Parameters
-        ----------
-        shift : float
-            Shift of the test value, ``noncentrality``.
-
-        Returns
-        -------
-        ndarray, shape (n, k)
-            In the unit of the observation; infinite where it is not controlled at all.
+        sigma shift / sqrt(r) with ``noncentrality`` as shift; infinite where it is not controlled at all.
         """
         with np.errstate(invalid="ignore", divide="ignore"):
             return np.asarray(self.sigma * shift / np.sqrt(np.maximum(self.redundancy, 0.0)), float)
 
     def external(self, shift: float) -> Floats:
-        """How far an error that is just not found can move any coordinate, in standard deviations of that coordinate.
+        """How far an error that is just not found can move any coordinate, in its standard deviations.
 
-        Parameters
-        ----------
-        shift : float
-            Shift of the test value, ``noncentrality``.
-
-        Returns
-        -------
-        ndarray, shape (n, k)
-            ``shift sqrt((1 - r) / r)``: no coordinate, and no function of coordinates, moves by more.
-
-        Notes
-        -----
-        Source: Baarda 1968.
+        ``shift sqrt((1 - r) / r)``, (n, k): no coordinate, and no function of coordinates, moves by more.
+        Source: [Baarda 1968].
         """
         r = np.clip(self.redundancy, 0.0, 1.0)
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -89,13 +70,7 @@ class Group:
 
 
 def groups_of(problem: BundleProblem, solution: BundleSolution, precision: Cofactors) -> tuple[Group, ...]:
-    """Return all observations with their redundancy numbers.
-
-    Returns
-    -------
-    tuple of Group
-        Image coordinates first; kinds without observations are left out.
-    """
+    """All observations with their redundancy numbers, image coordinates first; kinds without observations are left out."""
     found = [
         (IMAGE, solution.image_residuals, problem.images.sigma, precision.image_residuals),
         (CONTROL, -solution.control_residuals, problem.control.sigma, precision.control_residuals),
@@ -113,45 +88,17 @@ def _group(kind: str, error: Floats, sigma: Floats, cofactors: Floats) -> Group:
 
 
 def noncentrality(alpha: float, power: float) -> float:
-    """Shift of a test value by the smallest error that is found with a wanted probability.
+    """Shift of a test value by the smallest error that is found with a wanted probability, in standard deviations.
 
-    Parameters
-    ----------
-    alpha : float
-        Probability of rejecting a good observation.
-
-    Returns
-    -------
-    float
-        In standard deviations; 4.13 for 0.001 and 0.80.
-
-    Notes
-    -----
-    Source: Baarda 1968.
+    4.13 for a level of 0.001 and a power of 0.80. Source: [Baarda 1968].
     """
     return normal_quantile(1 - alpha / 2) + normal_quantile(power)
 
 
 def limit(test: str, alpha: float, redundancy: int) -> float:
-    """Largest standardised residual of a good observation.
+    """Largest standardised residual of a good observation; infinite when the redundancy does not allow the tau test.
 
-    Parameters
-    ----------
-    test : str
-        ``"baarda"`` or ``"tau"``.
-    alpha : float
-        Probability that a good one is beyond it.
-    redundancy : int
-        Redundancy of the whole adjustment, for ``tau``.
-
-    Returns
-    -------
-    float
-        The limit; infinite when the redundancy does not allow the tau test.
-
-    Notes
-    -----
-    Source: Baarda 1968; Pope 1976 for tau.
+    ``tau`` = t sqrt(r / (r - 1 + t^2)) with t of r - 1 degrees of freedom. Source: [Baarda 1968]; [Pope 1976] for tau.
     """
     if test == "baarda":
         return normal_quantile(1 - alpha / 2)
@@ -179,13 +126,7 @@ class Sigma0Test:
 
 
 def sigma0_test(solution: BundleSolution) -> Sigma0Test:
-    """Test sigma0 against 1.
-
-    Returns
-    -------
-    Sigma0Test
-        Chi-square test, both sides.
-    """
+    """Test sigma0 against 1: chi-square, both sides."""
     f = solution.redundancy
     if f < 1:
         return Sigma0Test(solution.sigma0, f, float("nan"), float("nan"))

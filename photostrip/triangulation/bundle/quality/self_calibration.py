@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.statistics import t_p_value
+from photostrip.triangulation.bundle.observations.calibration import corrections
 from photostrip.triangulation.bundle.observations.problem import CALIBRATION
 
 if TYPE_CHECKING:
@@ -68,17 +69,9 @@ class Parameter:
 
 
 def sigmas(asked: Sequence[Sequence[str]], prior: dict[str, float]) -> Floats | None:
-    """A-priori standard deviations as a problem takes them.
+    """A-priori standard deviations (cameras, 10) as a problem takes them; None when nothing is asked for.
 
-    Parameters
-    ----------
-    prior : dict of str to float
-        Their a-priori standard deviations; free without one.
-
-    Returns
-    -------
-    ndarray, shape (cameras, 10), or None
-        Infinite for free parameters, 0 for those that are none; None when nothing is asked for.
+    ``prior`` holds those by name; a parameter without one is free (infinite). 0: not a parameter.
     """
     found = np.zeros((len(asked), len(CALIBRATION)))
     for row, names in enumerate(asked):
@@ -89,57 +82,19 @@ def sigmas(asked: Sequence[Sequence[str]], prior: dict[str, float]) -> Floats | 
 
 
 def millimetre(xy: Floats) -> Floats:
-    """Return the values of the parameters that move a point at the edge of the measured part of a photo by 1 mm.
-
-    Parameters
-    ----------
-    xy : ndarray, shape (n, 2)
-        Image coordinates, mm.
-
-    Returns
-    -------
-    ndarray, shape (10,)
-        In the order of ``CALIBRATION``.
-    """
+    """Values of the parameters that move a point at the edge of the measured part of a photo by 1 mm, shape (10,)."""
     edge = max(float(np.hypot(xy[:, 0], xy[:, 1]).max(initial=1.0)), 1e-3)
     powers = np.array([0, 0, 0, 3, 5, 7, 2, 2, 1, 1])
     return np.asarray(edge ** -powers.astype(float), float)
 
 
 def columns(xy: Floats) -> Floats:
-    """Shift of image points by each parameter of one unit, the principal distance apart.
-
-    Parameters
-    ----------
-    xy : ndarray, shape (n, 2)
-        Ideal image coordinates, mm.
-
-    Returns
-    -------
-    ndarray, shape (n, 2, 10)
-        In the order of ``CALIBRATION``; 0 for the principal distance.
-    """
-    x, y = xy[:, 0], xy[:, 1]
-    square, zero, one = x**2 + y**2, np.zeros(len(xy)), np.ones(len(xy))
-    powers = [square, square**2, square**3]
-    by_x = [zero, -one, zero, *(x * power for power in powers), square + 2 * x**2, 2 * x * y, x, y]
-    by_y = [zero, zero, -one, *(y * power for power in powers), 2 * x * y, square + 2 * y**2, zero, zero]
-    return np.stack([np.stack(by_x, axis=1), np.stack(by_y, axis=1)], axis=1)
+    """Shift of image points (n, 2) by each parameter of one unit, shape (n, 2, 10); 0 for the principal distance."""
+    return corrections(xy.T).transpose(2, 1, 0)
 
 
 def values_of(problem: BundleProblem, common: Floats) -> Floats:
-    """Return the calibration parameters camera by camera.
-
-    Parameters
-    ----------
-    common : ndarray, shape (p,)
-        Common parameters of its solution.
-
-    Returns
-    -------
-    ndarray, shape (cameras, 10)
-        0 for what was not estimated.
-    """
+    """Calibration parameters camera by camera, (cameras, 10); 0 for what was not estimated."""
     sigma = problem.cameras.sigma
     found = np.zeros((len(problem.cameras.focal), len(CALIBRATION)))
     if sigma is not None:
@@ -148,21 +103,9 @@ def values_of(problem: BundleProblem, common: Floats) -> Floats:
 
 
 def image_shift(problem: BundleProblem, common: Floats, xy: Floats, photo: Numbers) -> Floats:
-    """Return the correction that makes ideal image coordinates of the given principal distance.
+    """Correction (n, 2) that makes ideal image coordinates of the given principal distance, to be added to them, mm.
 
-    Parameters
-    ----------
-    common : ndarray, shape (p,)
-        Common parameters of its solution.
-    xy : ndarray, shape (n, 2)
-        Image coordinates, mm.
-    photo : ndarray of int, shape (n,)
-        Photo of each row.
-
-    Returns
-    -------
-    ndarray, shape (n, 2)
-        To be added to `xy`, mm. A change of the principal distance is turned into a change of scale of the photo.
+    A change of the principal distance is turned into a change of scale of the photo.
     """
     values = values_of(problem, common)
     if not values.any():
@@ -174,13 +117,7 @@ def image_shift(problem: BundleProblem, common: Floats, xy: Floats, photo: Numbe
 
 
 def parameters_of(problem: BundleProblem, solution: BundleSolution, precision: Cofactors) -> tuple[Parameter, ...]:
-    """Return every calibration parameter with its precision and significance.
-
-    Returns
-    -------
-    tuple of Parameter
-        By camera, in the order of ``CALIBRATION``.
-    """
+    """Every calibration parameter with its precision and significance, by camera."""
     sigma = problem.cameras.sigma
     if sigma is None:
         return ()

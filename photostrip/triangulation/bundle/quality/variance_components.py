@@ -44,19 +44,9 @@ class Component:
 
 
 def labels(kind: str, rows: int, level: Sequence[bool]) -> list[tuple[str, slice | NDArray[np.bool_]]]:
-    """Split a kind of observations into groups of their own variance.
+    """Split a kind of observations into groups of their own variance: name, and coordinates (rows, 3).
 
-    Parameters
-    ----------
-    kind : str
-        A kind of ``reliability``.
-    level : sequence of bool
-        Whether the axes of a row are plan and height; others, as of geocentric coordinates, stay one group.
-
-    Returns
-    -------
-    list of tuple
-        Name of each group and which coordinates belong to it, shape (rows, 3).
+    ``level``: whether the axes of a row are plan and height; others, as of geocentric coordinates, stay one group.
     """
     if kind not in {reliability.CONTROL, reliability.POSITION}:
         return [(kind if kind == reliability.IMAGE else "attitudes", slice(None))]
@@ -69,21 +59,10 @@ def labels(kind: str, rows: int, level: Sequence[bool]) -> list[tuple[str, slice
 def components(
     problem: BundleProblem, solution: BundleSolution, precision: Cofactors, level: Mapping[str, Sequence[bool]]
 ) -> tuple[Component, ...]:
-    """Compare each group's residuals with its standard deviations, once.
+    """Compare each group's residuals with its standard deviations, once: factor^2 = v^T P v / r of the group.
 
-    Parameters
-    ----------
-    level : mapping of str to sequence of bool
-        For ``control`` and ``position``: whether the axes of each row are plan and height.
-
-    Returns
-    -------
-    tuple of Component
-        Factors of one step; groups without observations are left out.
-
-    Notes
-    -----
-    Source: Förstner 1979, the simplified form of Helmert's estimation.
+    ``level`` says for ``control`` and ``position`` whether the axes of each row are plan and height. Groups without
+    observations are left out. Source: [Förstner 1979], the simplified form of Helmert's estimation.
     """
     found = []
     for group in reliability.groups_of(problem, solution, precision):
@@ -106,13 +85,7 @@ def _component(name: str, group: reliability.Group, given: NDArray[np.bool_]) ->
 
 
 def scaled(problem: BundleProblem, found: Sequence[Component], level: Mapping[str, Sequence[bool]]) -> BundleProblem:
-    """Multiply the standard deviations of a problem with the factors of their groups.
-
-    Returns
-    -------
-    BundleProblem
-        The same problem with other standard deviations.
-    """
+    """Multiply the standard deviations of a problem with the factors of their groups."""
     factor = {each.name: each.factor for each in found}
 
     def with_factors(kind: str, sigma: Floats) -> Floats:
@@ -132,22 +105,11 @@ def scaled(problem: BundleProblem, found: Sequence[Component], level: Mapping[st
 
 
 def combined(before: Sequence[Component], step: Sequence[Component]) -> tuple[Component, ...]:
-    """Multiply the factors of a step onto those found before.
-
-    Parameters
-    ----------
-    before : sequence of Component
-        Factors so far; empty at the first step.
-
-    Returns
-    -------
-    tuple of Component
-        The last step's redundancies with all factors together.
-    """
+    """Multiply the factors of a step onto those found before; redundancies are those of the last step."""
     known = {each.name: each.factor for each in before}
     return tuple(replace(each, factor=each.factor * known.get(each.name, 1.0)) for each in step)
 
 
-def settled(step: Sequence[Component]) -> bool:
+def converged(step: Sequence[Component]) -> bool:
     """Whether a step changes nothing worth another adjustment."""
     return all(abs(each.factor - 1.0) < CONVERGED for each in step)
