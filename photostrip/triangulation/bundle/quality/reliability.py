@@ -70,7 +70,7 @@ class Group:
 
 
 def groups_of(problem: BundleProblem, solution: BundleSolution, precision: Cofactors) -> tuple[Group, ...]:
-    """All observations with their redundancy numbers, image coordinates first; kinds without observations are left out."""
+    """All observations with their redundancy numbers, image coordinates first; empty kinds are left out."""
     found = [
         (IMAGE, solution.image_residuals, problem.images.sigma, precision.image_residuals),
         (CONTROL, -solution.control_residuals, problem.control.sigma, precision.control_residuals),
