@@ -35,24 +35,10 @@ def _continued_fraction(terms: Iterator[tuple[float, float]]) -> float:
 
 
 def beta_cdf(x: float, a: float, b: float, rest: float | None = None) -> float:
-    """Regularised incomplete beta function I_x(a, b).
+    """Regularised incomplete beta function I_x(a, b): the probability below x of the beta distribution.
 
-    Parameters
-    ----------
-    x : float
-        Argument, 0 to 1.
-    a, b : float
-        Parameters, positive.
-    rest : float, optional
-        1 - x, where the caller knows it to more digits than the difference has.
+    `rest` is 1 - x, where the caller knows it to more digits than the difference has.
 
-    Returns
-    -------
-    float
-        Probability below x of the beta distribution.
-
-    Notes
-    -----
     Source: derived; the continued fraction stands in every handbook of functions.
     """
     rest = 1 - x if rest is None else rest
@@ -73,22 +59,8 @@ def beta_cdf(x: float, a: float, b: float, rest: float | None = None) -> float:
 
 
 def gamma_cdf(x: float, a: float) -> float:
-    """Regularised lower incomplete gamma function P(a, x).
+    """Regularised lower incomplete gamma function P(a, x): the probability below x of the gamma distribution.
 
-    Parameters
-    ----------
-    x : float
-        Argument, not negative.
-    a : float
-        Shape, positive.
-
-    Returns
-    -------
-    float
-        Probability below x of the gamma distribution of unit scale.
-
-    Notes
-    -----
     Source: derived; series below a + 1, continued fraction above.
     """
     if x <= 0:
@@ -131,25 +103,13 @@ def _solve(excess: Callable[[float], float], start: float, low: float, high: flo
 
 
 def t_sf(t: float, dof: float) -> float:
-    """Upper tail of Student's t for a positive t.
-
-    Parameters
-    ----------
-    t : float
-        Argument, not negative.
-    """
+    """Upper tail of Student's t for a t that is not negative."""
     total = dof + t * t
     return 0.5 * beta_cdf(dof / total, dof / 2, 0.5, t * t / total)
 
 
 def t_isf(tail: float, dof: float) -> float:
-    """Quantile of Student's t with a given upper tail.
-
-    Parameters
-    ----------
-    tail : float
-        Probability above the quantile, 0 to 1.
-    """
+    """Quantile of Student's t with a given upper tail."""
     if tail > 0.5:  # noqa: PLR2004  the median
         return -t_isf(1 - tail, dof)
     # In the logarithm the tail is nearly straight, so that secants converge for far tails and few degrees alike.
@@ -159,13 +119,7 @@ def t_isf(tail: float, dof: float) -> float:
 
 
 def f_sf(f: float, numerator: float, denominator: float) -> float:
-    """Upper tail of the F distribution.
-
-    Parameters
-    ----------
-    numerator, denominator : float
-        Their degrees of freedom.
-    """
+    """Upper tail of the F distribution."""
     if f <= 0:
         return 1.0
     total = denominator + numerator * f
@@ -173,17 +127,7 @@ def f_sf(f: float, numerator: float, denominator: float) -> float:
 
 
 def chi2_ppf(probability: float, dof: float) -> float:
-    """Quantile of chi-square.
-
-    Parameters
-    ----------
-    probability : float
-        Probability below the quantile, between 0 and 1.
-
-    Notes
-    -----
-    Starts from the cube-root approximation of Wilson and Hilferty.
-    """
+    """Quantile of chi-square, from the cube-root approximation of Wilson and Hilferty."""
     z = NormalDist().inv_cdf(probability)
     start = dof * max(1 - 2 / (9 * dof) + z * sqrt(2 / (9 * dof)), 1e-3) ** 3
     return 2 * _solve(lambda x: gamma_cdf(x, dof / 2) - probability, start / 2, 0.0, inf)

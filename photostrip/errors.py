@@ -67,13 +67,7 @@ class PhotostripError(Exception):
 
 
 class InputError(PhotostripError):
-    """Wrong usage, project file or data.
-
-    Parameters
-    ----------
-    faults : Fault or iterable of Fault or str
-        Every fault found; a plain text becomes a fault without a place.
-    """
+    """Wrong usage, project file or data, with every fault found; a plain text becomes a fault without a place."""
 
     exit_code = EXIT_INPUT
 
@@ -85,17 +79,7 @@ class InputError(PhotostripError):
 
 
 class GeometryError(PhotostripError):
-    """The geometry is too weak, singular, or the solution did not converge.
-
-    Parameters
-    ----------
-    message : str
-        What cannot be determined and why.
-    photos, points : tuple of str
-        Ids of the photos and points concerned.
-    code : str
-        Stable short name of the kind of failure.
-    """
+    """The geometry is too weak, singular, or the solution did not converge; it names photos and points."""
 
     exit_code = EXIT_GEOMETRY
 

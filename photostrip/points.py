@@ -32,20 +32,7 @@ class Frame(StrEnum):
 
 
 def frozen(values: ArrayLike, dtype: type = float, shape: tuple[int, ...] | None = None) -> NDArray[Any]:
-    """Return a read-only array, copied only when needed.
-
-    Parameters
-    ----------
-    values : array_like
-        Values of any shape.
-    shape : tuple of int, optional
-        Shape to bring an empty or flat input into.
-
-    Returns
-    -------
-    numpy.ndarray
-        The values; writing to it raises.
-    """
+    """Return a read-only array, copied only when needed; an empty or flat input can be brought into a shape."""
     array: NDArray[Any] = np.ascontiguousarray(values, dtype=dtype)
     if shape is not None:
         array = array.reshape(shape)
@@ -93,23 +80,7 @@ class PointTable:
         return len(self.ids)
 
     def shared(self, other: PointTable) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        """Rows of the points that both tables hold, in this table's order.
-
-        Parameters
-        ----------
-        other : PointTable
-            Table in the same frame.
-
-        Returns
-        -------
-        rows_self, rows_other : ndarray of int, shape (m,)
-            Rows of the common points in either table.
-
-        Raises
-        ------
-        ValueError
-            When the frames differ.
-        """
+        """Rows, in either table, of the points that both hold, in this table's order."""
         if self.frame is not other.frame:
             msg = f"points in the {self.frame} frame cannot be joined with points in the {other.frame} frame"
             raise ValueError(msg)

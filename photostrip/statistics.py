@@ -25,34 +25,12 @@ def normal_quantile(probability: float) -> float:
 
 
 def t_p_value(t: float, dof: float) -> float:
-    """Two-sided p value of a t ratio.
-
-    Parameters
-    ----------
-    t : float
-        Estimate divided by its standard deviation.
-
-    Returns
-    -------
-    float
-        Probability of a ratio at least as large by chance.
-    """
+    """Two-sided p value of a t ratio: the probability of one at least as large by chance."""
     return 2 * t_sf(abs(t), dof)
 
 
 def f_p_value(f: float, dof_numerator: float, dof_denominator: float) -> float:
-    """Upper tail of the F distribution.
-
-    Parameters
-    ----------
-    dof_numerator, dof_denominator : float
-        Their degrees of freedom.
-
-    Returns
-    -------
-    float
-        Probability of a ratio at least as large by chance.
-    """
+    """Upper tail of the F distribution: the probability of a ratio at least as large by chance."""
     return f_sf(f, dof_numerator, dof_denominator)
 
 
@@ -64,25 +42,12 @@ def chi2_quantile(probability: float, dof: float) -> float:
 
 @lru_cache(maxsize=4096)
 def grubbs_limit(n: int, alpha: float, *, two_sided: bool = True) -> float:
-    """Critical value of Grubbs' test for one outlier.
+    """Critical value of Grubbs' test for one outlier among n values, n at least 3: limit of max |value - mean| / s.
 
-    Parameters
-    ----------
-    n : int
-        Number of values, at least 3.
-    alpha : float
-        Probability of rejecting a value of a clean sample.
-    two_sided : bool
-        Whether the sign of the outlier is unknown.
+    `alpha` is the probability of rejecting a value of a clean sample; two-sided when the sign of the outlier is
+    unknown.
 
-    Returns
-    -------
-    float
-        Limit of max |value - mean| / s.
-
-    Notes
-    -----
-    Source: [004a]; Grubbs 1969 as a function of Student's t.
+    Source: [004a]; [Grubbs 1969] as a function of Student's t.
     """
     tail = alpha / (2 * n if two_sided else n)
     t2 = t_quantile(1 - tail, n - 2) ** 2
@@ -91,23 +56,12 @@ def grubbs_limit(n: int, alpha: float, *, two_sided: bool = True) -> float:
 
 @lru_cache(maxsize=4096)
 def tau_limit(n: int, unknowns: int, alpha: float) -> float:
-    """Critical value of the largest studentised residual (Pope's tau, Bonferroni).
+    """Critical value of the largest studentised residual |v| / (sigma0 sqrt(r)) (Pope's tau, Bonferroni).
 
-    Parameters
-    ----------
-    unknowns : int
-        Number of parameters of the adjustment; n - unknowns must be at least 2.
-    alpha : float
-        Probability of rejecting an observation of a clean adjustment.
+    `alpha` is the probability of rejecting an observation of a clean adjustment; n - unknowns must be at least 2. For
+    one unknown it is Grubbs' two-sided limit for the largest |v| / (s sqrt((n-1)/n)).
 
-    Returns
-    -------
-    float
-        Limit of |v| / (sigma0 sqrt(r)).
-
-    Notes
-    -----
-    Source: Pope 1976; for one unknown it is Grubbs' two-sided limit for the largest |v| / (s sqrt((n-1)/n)).
+    Source: [Pope 1976].
     """
     nu = n - unknowns
     t = t_quantile(1 - alpha / (2 * n), nu - 1)

@@ -5,9 +5,11 @@ denominator that is linear too. Conformal and affine transformations have the de
 ones the product, projective ones the denominator. So transformations of different kinds stand in one array, one for
 each photo, say: everything works on leading axes of any shape, points (..., n, 2).
 
-A point of weight zero takes no part in a fit, whatever finite coordinates stand in its place; photos with a missing
-mark fit into one array with the others. Coordinates are shifted and scaled before a fit and the coefficients brought
-back afterwards, because pixel numbers of ten thousand and their products would cost half of the digits.
+A fit takes corresponding points, (..., n, 2), with one weight each, (..., n), for both coordinates, and makes the
+weighted sum of squared residuals smallest (derived). A point of weight zero takes no part in a fit, whatever finite
+coordinates stand in its place; photos with a missing mark fit into one array with the others. Coordinates are shifted
+and scaled before a fit and the coefficients brought back afterwards, because pixel numbers of ten thousand and their
+products would cost half of the digits.
 """
 
 from __future__ import annotations
@@ -45,18 +47,7 @@ class PlaneTransform:
         object.__setattr__(self, "coefficients", frozen(self.coefficients))
 
     def __call__(self, points: ArrayLike) -> Floats:
-        """Transform points.
-
-        Parameters
-        ----------
-        points : array_like, shape (..., n, 2)
-            Source coordinates.
-
-        Returns
-        -------
-        ndarray, shape (..., n, 2)
-            Target coordinates.
-        """
+        """Transform points (..., n, 2)."""
         values = _terms(np.asarray(points, float)) @ self.coefficients.swapaxes(-1, -2)
         target: Floats = values[..., :2] / values[..., 2:]
         return target
@@ -69,34 +60,12 @@ class PlaneTransform:
         return PlaneTransform(_from_matrix(_inverse(self.coefficients[..., LINEAR])))
 
     def residuals(self, source: ArrayLike, target: ArrayLike) -> Floats:
-        """Give transformed source minus target.
-
-        Parameters
-        ----------
-        source, target : array_like, shape (..., n, 2)
-            Corresponding points.
-
-        Returns
-        -------
-        ndarray, shape (..., n, 2)
-            Differences in the unit of the target.
-        """
+        """Subtract the target from the transformed source."""
         differences: Floats = self(source) - np.asarray(target, float)
         return differences
 
     def jacobian(self, points: ArrayLike) -> Floats:
-        """Return the derivatives of the target by the source coordinates.
-
-        Parameters
-        ----------
-        points : array_like, shape (..., n, 2)
-            Source coordinates.
-
-        Returns
-        -------
-        ndarray, shape (..., n, 2, 2)
-            Rows: target x, y; columns: source x, y.
-        """
+        """Differentiate the target by the source at points: (..., n, 2, 2), rows target x, y."""
         p = np.asarray(points, float)
         c = self.coefficients
         values = _terms(p) @ c.swapaxes(-1, -2)
@@ -117,17 +86,7 @@ class PlaneInverse:
     inverse: PlaneTransform  # the transformation that it is the inverse of
 
     def __call__(self, points: ArrayLike) -> Floats:
-        """Transform points back.
-
-        Parameters
-        ----------
-        points : array_like, shape (..., n, 2)
-            Target coordinates of the transformation.
-
-        Returns
-        -------
-        ndarray, shape (..., n, 2)
-            Its source coordinates, on the side of the origin.
+        """Transform points (..., n, 2) back to those on the side of the origin.
 
         Raises
         ------
@@ -150,28 +109,10 @@ class PlaneInverse:
 
 
 def conformal_from_points(source: ArrayLike, target: ArrayLike, weights: ArrayLike | None = None) -> PlaneTransform:
-    """Conformal transformation (one scale, rotation, shift; never mirrored) of corresponding points, in closed form.
+    """Conformal transformation (one scale, rotation, shift; never mirrored), in closed form.
 
-    Parameters
-    ----------
-    source, target : array_like, shape (..., n, 2)
-        Corresponding points, at least two different ones.
-    weights : array_like, shape (..., n), optional
-        One weight for each point, the same for its two coordinates.
-
-    Returns
-    -------
-    PlaneTransform
-        The transformation that makes the weighted sum of squared residuals smallest.
-
-    Raises
-    ------
-    GeometryError
-        When all source points are in one place.
-
-    Notes
-    -----
-    Source: derived; the complex slope sum(conj(a) b) / sum(|a|^2) of centred coordinates.
+    The complex slope is sum(conj(a) b) / sum(|a|^2) of centred coordinates. Two different points are enough; a
+    ``GeometryError`` when all source points are in one place.
     """
     a, b, w = _arrays(source, target, weights)
     local, substitution = _local(a, w)
@@ -185,28 +126,9 @@ def conformal_from_points(source: ArrayLike, target: ArrayLike, weights: ArrayLi
 
 
 def affine_from_points(source: ArrayLike, target: ArrayLike, weights: ArrayLike | None = None) -> PlaneTransform:
-    """Affine transformation (two scales, rotation, shear, shift) of corresponding points.
+    """Affine transformation (two scales, rotation, shear, shift).
 
-    Parameters
-    ----------
-    source, target : array_like, shape (..., n, 2)
-        Corresponding points, at least three that are not on one line.
-    weights : array_like, shape (..., n), optional
-        One weight for each point, the same for its two coordinates.
-
-    Returns
-    -------
-    PlaneTransform
-        The transformation that makes the weighted sum of squared residuals smallest.
-
-    Raises
-    ------
-    GeometryError
-        When the points are too few or on one line.
-
-    Notes
-    -----
-    Source: derived.
+    Needs three points that are not on one line; a ``GeometryError`` otherwise.
     """
     a, b, w = _arrays(source, target, weights)
     local, substitution = _local(a, w)
@@ -216,31 +138,11 @@ def affine_from_points(source: ArrayLike, target: ArrayLike, weights: ArrayLike 
 
 
 def bilinear_from_points(source: ArrayLike, target: ArrayLike, weights: ArrayLike | None = None) -> PlaneTransform:
-    """Bilinear transformation (affine and a term x y) of corresponding points.
+    """Bilinear transformation (affine and a term x y).
 
-    It keeps lines parallel to the axes of the source straight, so it depends on how these axes lie.
-
-    Parameters
-    ----------
-    source, target : array_like, shape (..., n, 2)
-        Corresponding points, at least four; four in the middle of the sides of a square, on its axes, do not
-        determine the term x y.
-    weights : array_like, shape (..., n), optional
-        One weight for each point, the same for its two coordinates.
-
-    Returns
-    -------
-    PlaneTransform
-        The transformation that makes the weighted sum of squared residuals smallest.
-
-    Raises
-    ------
-    GeometryError
-        When the points are too few or do not determine all coefficients.
-
-    Notes
-    -----
-    Source: derived.
+    It keeps lines parallel to the axes of the source straight, so it depends on how these axes lie. Needs four points,
+    a ``GeometryError`` otherwise; four in the middle of the sides of a square, on its axes, do not determine the term x
+    y.
     """
     a, b, w = _arrays(source, target, weights)
     local, substitution = _local(a, w)
@@ -250,30 +152,16 @@ def bilinear_from_points(source: ArrayLike, target: ArrayLike, weights: ArrayLik
 
 
 def projective_from_points(source: ArrayLike, target: ArrayLike, weights: ArrayLike | None = None) -> PlaneTransform:
-    """Projective transformation of corresponding points.
+    """Projective transformation.
 
-    Parameters
-    ----------
-    source, target : array_like, shape (..., n, 2)
-        Corresponding points, at least four of which no three are on one line.
-    weights : array_like, shape (..., n), optional
-        One weight for each point, the same for its two coordinates.
-
-    Returns
-    -------
-    PlaneTransform
-        The transformation that makes the weighted sum of squared residuals in the target smallest.
+    The equations multiplied by the denominator give the start, Gauss-Newton steps then reduce the residuals themselves.
+    Needs four points of which no three are on one line.
 
     Raises
     ------
     GeometryError
-        When the points are too few, do not determine all coefficients, lie on both sides of the line that goes to
-        infinity, or when the iteration does not converge.
-
-    Notes
-    -----
-    Source: derived; the equations multiplied by the denominator give the start, Gauss-Newton steps then reduce the
-    residuals themselves.
+        When the points do not determine all coefficients, lie on both sides of the line that goes to infinity, or when
+        the iteration does not converge.
     """
     a, b, w = _arrays(source, target, weights)
     local_a, substitution = _local(a, w)
@@ -313,23 +201,11 @@ KINDS = {
 
 
 def strength(kind: str, points: ArrayLike, weights: ArrayLike | None = None) -> Floats:
-    """How well points determine a transformation.
+    """How well points determine a transformation of a kind, one of ``KINDS``, shape (...).
 
-    Parameters
-    ----------
-    kind : str
-        One of ``KINDS``.
-    points : array_like, shape (..., n, 2)
-        Source coordinates.
-    weights : array_like, shape (..., n), optional
-        Weights.
-
-    Returns
-    -------
-    ndarray, shape (...)
-        Smallest over largest singular value of the equations in centred coordinates of unit spread. For an affine
-        transformation 1 for the corners of a square, 0 for points on a line and for too few points; for a conformal
-        one 1 whenever two points differ.
+    Smallest over largest singular value of the equations in centred coordinates of unit spread. For an affine
+    transformation 1 for the corners of a square, 0 for points on a line and for too few points; for a conformal one 1
+    whenever two points differ.
     """
     a, _, w = _arrays(points, points, weights)
     center, size = _center_and_size(a, w)

@@ -20,18 +20,7 @@ GIMBAL_LIMIT = 1e-12  # 1 - |sine of the middle angle| below which the other two
 
 
 def rotation_x(angle: ArrayLike) -> NDArray[np.float64]:
-    """Rotation about the x axis, right-hand rule.
-
-    Parameters
-    ----------
-    angle : array_like, shape (...)
-        Angle in radians.
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 3)
-        Rotation matrices.
-    """
+    """Rotation about the x axis by angles (...), right-hand rule."""
     return _elementary(angle, 1, 2)
 
 
@@ -56,21 +45,11 @@ def _elementary(angle: ArrayLike, first: int, second: int) -> NDArray[np.float64
 
 
 def from_alpha_omega_kappa(alpha: ArrayLike, omega: ArrayLike, kappa: ArrayLike) -> NDArray[np.float64]:
-    """Rotation ``A = Ry(-alpha) Rx(omega) Rz(kappa)``.
+    """Rotations ``A = Ry(-alpha) Rx(omega) Rz(kappa)``, photo to object, (..., 3, 3), of angles in radians.
 
-    Parameters
-    ----------
-    alpha, omega, kappa : array_like, shape (...)
-        Angles in radians: alpha positive looks forward (+X), omega positive looks left (+Y), kappa
-        positive turns the x axis counter-clockwise seen from above.
+    Alpha positive looks forward (+X), omega positive looks left (+Y), kappa positive turns the x axis counter-clockwise
+    seen from above.
 
-    Returns
-    -------
-    ndarray, shape (..., 3, 3)
-        Rotation matrices, photo to object.
-
-    Notes
-    -----
     Source: [001] eq. 127, 132, 133.
     """
     al, om, ka = np.broadcast_arrays(*(np.asarray(a, float) for a in (alpha, omega, kappa)))
@@ -89,17 +68,7 @@ def from_alpha_omega_kappa(alpha: ArrayLike, omega: ArrayLike, kappa: ArrayLike)
 
 
 def alpha_omega_kappa(matrix: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Angles alpha, omega, kappa of a rotation.
-
-    Parameters
-    ----------
-    matrix : array_like, shape (..., 3, 3)
-        Rotation matrices, photo to object.
-
-    Returns
-    -------
-    alpha, omega, kappa : ndarray, shape (...)
-        Angles in radians.
+    """Angles alpha, omega, kappa, shape (...), of rotations (..., 3, 3), photo to object.
 
     Raises
     ------
@@ -126,19 +95,7 @@ def _refuse_gimbal(sine: NDArray[np.float64], middle: str, first: str) -> None:
 
 
 def angles(matrix: ArrayLike, system: str) -> NDArray[np.float64]:
-    """Angles of a rotation in the named system.
-
-    Parameters
-    ----------
-    matrix : array_like, shape (..., 3, 3)
-        Rotation matrices, photo to object.
-    system : str
-        One of ``SYSTEMS``; the angles come in the order of the name.
-
-    Returns
-    -------
-    ndarray, shape (..., 3)
-        Angles in radians.
+    """Angles (..., 3) of rotations, photo to object, in a system of ``SYSTEMS`` and in the order of its name.
 
     Raises
     ------
@@ -161,20 +118,7 @@ def angles(matrix: ArrayLike, system: str) -> NDArray[np.float64]:
 
 
 def from_angles(values: ArrayLike, system: str) -> NDArray[np.float64]:
-    """Rotation from angles in the named system; the inverse of ``angles``.
-
-    Parameters
-    ----------
-    values : array_like, shape (..., 3)
-        Angles in radians, in the order of the system's name.
-    system : str
-        One of ``SYSTEMS``.
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 3)
-        Rotation matrices, photo to object.
-    """
+    """Rotations from angles (..., 3) in a system of ``SYSTEMS``; the inverse of ``angles``."""
     first, second, kappa = np.moveaxis(np.asarray(values, float), -1, 0)
     if system == "omega-phi-kappa":
         return rotation_x(first) @ rotation_y(second) @ rotation_z(kappa)
@@ -185,20 +129,10 @@ def from_angles(values: ArrayLike, system: str) -> NDArray[np.float64]:
 
 
 def angle_rates(values: ArrayLike, system: str) -> NDArray[np.float64]:
-    """Small rotations that small changes of the angles make.
+    """Small rotations that small changes of the angles make: D (..., 3, 3) with ``theta = D d(angles)``.
 
-    Parameters
-    ----------
-    values : array_like, shape (..., 3)
-        Angles in radians, in the order of the system's name.
-    system : str
-        One of ``SYSTEMS``.
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 3)
-        D with ``theta = D d(angles)``, where ``exp([theta]) R`` is the rotation of the changed angles; theta refers to
-        the axes of the object. Singular where the middle angle is 90 degrees.
+    ``exp([theta]) R`` is the rotation of the changed angles; theta refers to the axes of the object. D is singular
+    where the middle angle is 90 degrees.
     """
     first, second, _ = np.moveaxis(np.asarray(values, float), -1, 0)
     if system == "omega-phi-kappa":
@@ -218,18 +152,7 @@ def angle_rates(values: ArrayLike, system: str) -> NDArray[np.float64]:
 
 
 def from_vector(vector: ArrayLike) -> NDArray[np.float64]:
-    """Rotation about a vector by its length (Rodrigues' formula).
-
-    Parameters
-    ----------
-    vector : array_like, shape (..., 3)
-        Rotation vectors in radians.
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 3)
-        Rotation matrices; the identity for a zero vector.
-    """
+    """Rotation about a vector (..., 3) by its length in radians (Rodrigues' formula)."""
     v = np.asarray(vector, float)
     angle = np.linalg.norm(v, axis=-1)[..., None, None]
     k = cross_matrix(v)
@@ -241,18 +164,7 @@ def from_vector(vector: ArrayLike) -> NDArray[np.float64]:
 
 
 def cross_matrix(vector: ArrayLike) -> NDArray[np.float64]:
-    """Matrix [v] with ``[v] w = v x w``.
-
-    Parameters
-    ----------
-    vector : array_like, shape (..., 3)
-        Vectors.
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 3)
-        Skew-symmetric matrices.
-    """
+    """Matrix [v] with ``[v] w = v x w``."""
     v = np.asarray(vector, float)
     matrix = np.zeros((*v.shape[:-1], 3, 3))
     matrix[..., 2, 1] = v[..., 0]
@@ -265,18 +177,7 @@ def cross_matrix(vector: ArrayLike) -> NDArray[np.float64]:
 
 
 def angle_between(first: ArrayLike, second: ArrayLike) -> NDArray[np.float64]:
-    """Angle of the rotation from one attitude to another.
-
-    Parameters
-    ----------
-    first, second : array_like, shape (..., 3, 3)
-        Rotation matrices.
-
-    Returns
-    -------
-    ndarray, shape (...)
-        Angle in radians, 0 to pi, exact also when it is tiny.
-    """
+    """Angle, 0 to pi, of the rotation from one attitude to another, exact also when it is tiny."""
     a, b = np.asarray(first, float), np.asarray(second, float)
     chord = np.linalg.norm(a - b, axis=(-2, -1)) / np.sqrt(8.0)
     angle: NDArray[np.float64] = 2 * np.arcsin(np.clip(chord, 0, 1))
@@ -284,18 +185,7 @@ def angle_between(first: ArrayLike, second: ArrayLike) -> NDArray[np.float64]:
 
 
 def to_vector(matrix: ArrayLike) -> NDArray[np.float64]:
-    """Vector of a rotation; the inverse of ``from_vector``.
-
-    Parameters
-    ----------
-    matrix : array_like, shape (..., 3, 3)
-        Rotation matrices by less than 180 degrees.
-
-    Returns
-    -------
-    ndarray, shape (..., 3)
-        Rotation vectors in radians.
-    """
+    """Vector (..., 3) of a rotation by less than 180 degrees; the inverse of ``from_vector``."""
     a = np.asarray(matrix, float)
     sine = 0.5 * np.stack(
         [a[..., 2, 1] - a[..., 1, 2], a[..., 0, 2] - a[..., 2, 0], a[..., 1, 0] - a[..., 0, 1]], axis=-1

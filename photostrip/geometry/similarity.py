@@ -32,18 +32,7 @@ class Similarity:
         object.__setattr__(self, "shift", frozen(self.shift, shape=(3,)))
 
     def __call__(self, points: ArrayLike) -> Floats:
-        """Transform points.
-
-        Parameters
-        ----------
-        points : array_like, shape (n, 3)
-            Source coordinates.
-
-        Returns
-        -------
-        ndarray, shape (n, 3)
-            Target coordinates.
-        """
+        """Transform points (n, 3)."""
         moved: Floats = self.scale * np.asarray(points, float) @ self.rotation.T + self.shift
         return moved
 
@@ -54,41 +43,19 @@ class Similarity:
         return Similarity(1 / self.scale, back, -back @ self.shift / self.scale)
 
     def residuals(self, source: ArrayLike, target: ArrayLike) -> Floats:
-        """Subtract the target from the transformed source.
-
-        Parameters
-        ----------
-        source, target : array_like, shape (n, 3)
-            Corresponding points.
-
-        Returns
-        -------
-        ndarray, shape (n, 3)
-            Differences in the unit of the target.
-        """
+        """Subtract the target from the transformed source."""
         difference: Floats = self(source) - np.asarray(target, float)
         return difference
 
     @classmethod
     def from_points(cls, source: ArrayLike, target: ArrayLike, weights: ArrayLike | None = None) -> Self:
-        """Least-squares similarity of corresponding points, in closed form.
+        """Least-squares similarity of corresponding points (n, 3), in closed form.
 
-        Parameters
-        ----------
-        source, target : array_like, shape (n, 3)
-            Corresponding points, at least three that are not on one line.
-        weights : array_like, shape (n,), optional
-            One weight for each point, the same for its three coordinates.
+        Reduced to centroids, R = U D V^T of the singular values of sum(w b a^T), the scale trace(S D) / sum(w |a|^2);
+        the determinant factor D keeps a reflection out. At least three points that are not on one line; on a line the
+        rotation about it is arbitrary, and ``collinearity`` tells.
 
-        Returns
-        -------
-        Similarity
-            The similarity that makes the weighted sum of squared residuals smallest. With points on a line
-            the rotation about that line is arbitrary; ``collinearity`` tells.
-
-        Notes
-        -----
-        Source: [001] eq. 145-149; closed form by singular values. The determinant factor keeps a reflection out.
+        Source: [001] eq. 145-149; closed form by singular values.
         """
         a, b = np.asarray(source, float), np.asarray(target, float)
         w = np.ones(len(a)) if weights is None else np.asarray(weights, float)
@@ -102,19 +69,9 @@ class Similarity:
 
 
 def collinearity(points: ArrayLike, weights: ArrayLike | None = None) -> float:
-    """How far points are from a line: second over first singular value of their scatter.
+    """How far points (n, 3) are from a line: second over first singular value of their scatter.
 
-    Parameters
-    ----------
-    points : array_like, shape (n, 3)
-        Points.
-    weights : array_like, shape (n,), optional
-        Weights.
-
-    Returns
-    -------
-    float
-        0 for points on a line, 1 for points spread alike in two directions; 0 for fewer than three points.
+    0 for points on a line and for fewer than three, 1 for points spread alike in two directions.
     """
     p = np.asarray(points, float)
     if len(p) < 3:

@@ -60,18 +60,7 @@ class Targets:
     intermediate: IntermediateFrame  # the frame in which the strip is oriented
 
     def of(self, xyz: Floats) -> Floats:
-        """Targets of the control points.
-
-        Parameters
-        ----------
-        xyz : ndarray, shape (n, 3)
-            Present positions of the points in the intermediate frame, metres.
-
-        Returns
-        -------
-        ndarray, shape (n, 3)
-            The same positions with all given coordinates put in, intermediate frame, metres.
-        """
+        """Targets of the control points: their present positions, with all given coordinates put in."""
         cartesian = self.intermediate.cartesian_from_intermediate(xyz)
         result = np.empty_like(cartesian)
         for number, frame in enumerate(self.frames):
@@ -83,35 +72,16 @@ class Targets:
         return self.intermediate.intermediate_from_cartesian(result)
 
     def axes(self, xyz: Floats) -> Floats:
-        """Directions along which the control points are compared with the strip.
+        """Directions (n, 3, 3) along which the control points at positions (n, 3) are compared with the strip.
 
-        Parameters
-        ----------
-        xyz : ndarray, shape (n, 3)
-            Positions in the intermediate frame, metres.
-
-        Returns
-        -------
-        ndarray, shape (n, 3, 3)
-            Rows are unit vectors in the intermediate frame: the point's ground axes; east, north and up
-            for geocentric points, whose coordinates come three together.
+        Rows are unit vectors in the intermediate frame: the point's ground axes; east, north and up for geocentric
+        points, whose coordinates come three together.
         """
         cartesian = self.intermediate.cartesian_from_intermediate(xyz)
         return self._by_frame(cartesian, lambda frame, points: frame.level_axes_at(points)) @ self.intermediate.axes
 
     def turned(self, xyz: Floats) -> ControlPoints:
-        """Return the control with its standard deviations along ``axes``.
-
-        Parameters
-        ----------
-        xyz : ndarray, shape (n, 3)
-            Positions in the intermediate frame, metres.
-
-        Returns
-        -------
-        ControlPoints
-            The same points; the standard deviations differ where the coordinates are geocentric.
-        """
+        """Return the control with its standard deviations along ``axes``; they differ for geocentric coordinates."""
         if not any(frame.kind == "geocentric" for frame in self.frames):
             return self.control
         cartesian = self.intermediate.cartesian_from_intermediate(xyz)
@@ -131,18 +101,7 @@ class Targets:
         return result
 
     def misclosures(self, xyz: Floats) -> Floats:
-        """Present minus given coordinates, along the ground axes.
-
-        Parameters
-        ----------
-        xyz : ndarray, shape (n, 3)
-            Positions in the intermediate frame, metres.
-
-        Returns
-        -------
-        ndarray, shape (n, 3)
-            Differences in metres; 0 where a coordinate does not count.
-        """
+        """Present minus given coordinates, along the ground axes; 0 where a coordinate does not count."""
         difference = np.einsum("nij,nj->ni", self.axes(xyz), xyz - self.of(xyz))
         return np.where(self.control.use, difference, 0.0)
 
@@ -164,19 +123,10 @@ class AbsoluteOrientation:
 
 
 def weights(control: ControlPoints, precision: tuple[float, float]) -> Floats:
-    """Weights of the control coordinates against the strip.
+    """Weights 1/(sigma_control^2 + sigma_point^2) of the control coordinates against the strip, (n, 3), metres^-2.
 
-    Parameters
-    ----------
-    control : ControlPoints
-        Control points with the standard deviations along the axes compared (``Targets.turned``).
-    precision : tuple of float
-        A-priori standard deviation of a strip point in plan and in height, metres.
-
-    Returns
-    -------
-    ndarray, shape (n, 3)
-        1/(sigma_control^2 + sigma_point^2) in metres^-2 along the axes compared; 0 where a coordinate does not count.
+    They are 0 where a coordinate does not count. The standard deviations of the control are those along the axes
+    compared (``Targets.turned``); `precision` has those of a strip point in plan and in height, a priori.
     """
     point = np.array([precision[0], precision[0], precision[1]])
     return np.where(control.use, 1 / (control.sigma**2 + point**2), 0.0)
@@ -201,8 +151,8 @@ def orient(
         All points of the strip, strip coordinates. What the control must determine is their position: control far along
         a narrow strip is enough when it spans the strip's width. Without them a square of the control's length counts.
     watch : callable, optional
-        Told of every step: the similarity before it, and shifts, rotations and scale of the step, metres at the end of
-        the strip.
+        Called at every step with the similarity before it, and shifts, rotations and scale of the step, metres at the
+        end of the strip.
 
     Raises
     ------
@@ -362,19 +312,14 @@ def _refuse_deficient(design: Floats, root: Floats, xyz: Floats, targets: Target
 def free_motion(direction: Floats, xyz: Floats, control: ControlPoints, half: float) -> str:
     """Name a motion of the strip that the control leaves free.
 
+    For example ``"the rotation about the line of control points A1, A4"``.
+
     Parameters
     ----------
     direction : ndarray, shape (7,)
         Shifts, rotations and scale of the motion, as in the design of the orientation.
-    xyz : ndarray, shape (n, 3)
-        Control points in the intermediate frame, metres.
     half : float
         Half length of the strip in metres.
-
-    Returns
-    -------
-    str
-        For example ``"the rotation about the line of control points A1, A4"``.
     """
     shift, turn, growth = direction[:3], direction[3:6], direction[6]
     sizes = np.array([np.linalg.norm(shift), np.linalg.norm(turn), abs(growth)])

@@ -56,7 +56,7 @@ def solve(
     nominal: Mapping[str, tuple[float, float]] | None = None,
     places: Mapping[str, str] | None = None,
 ) -> Certificate:
-    """Find the coordinates of fiducial marks.
+    """Coordinates of fiducial marks, mm, from measured distances: least squares with all distances of equal weight.
 
     Parameters
     ----------
@@ -66,11 +66,6 @@ def solve(
         Nominal coordinates of the marks, mm: a start, and the place of the figure.
     places : mapping of str to str, optional
         Instead, where on the photo each mark is: a key of ``PLACES``.
-
-    Returns
-    -------
-    Certificate
-        Coordinates of all these marks, mm: by least squares with all distances of equal weight.
 
     Raises
     ------

@@ -62,13 +62,7 @@ class ImageCorrectionSettings:
     earth_radius: float | None = None  # radius of the Earth in metres for the correction in image space; None: none
 
     def seen_by(self, camera: Camera) -> Camera:
-        """Return a camera without what is not to be corrected.
-
-        Returns
-        -------
-        Camera
-            The same one, with its principal point in the middle or without distortion where that is switched off.
-        """
+        """Return a camera with its principal point in the middle, or without distortion, where that is switched off."""
         point = camera.principal_point if self.principal_point else (0.0, 0.0)
         return replace(camera, principal_point=point, distortion=camera.distortion if self.distortion else None)
 
@@ -111,7 +105,7 @@ def refine(
     flying_height: float | None = None,
     ground_height: float | None = None,
 ) -> Refined:
-    """Refine photo coordinates of all photos.
+    """Refine photo coordinates of all photos: principal point, distortion, refraction and Earth curvature.
 
     Parameters
     ----------
@@ -158,38 +152,14 @@ def refine(
 
 
 def undistort(image_xy: ArrayLike, camera: Camera, bending: Bending = NOTHING_BENT) -> Floats:
-    """Return the ideal points of image points of one camera.
-
-    Parameters
-    ----------
-    image_xy : array_like, shape (n, 2)
-        Photo coordinates, mm.
-
-    Returns
-    -------
-    ndarray, shape (n, 2)
-        Ideal coordinates reduced to the principal point, mm.
-    """
+    """Ideal points, reduced to the principal point, of image points (n, 2) of one camera."""
     return _corrected(np.asarray(image_xy, float), camera, bending)[0]
 
 
 def distort(ideal_xy: ArrayLike, camera: Camera, bending: Bending = NOTHING_BENT) -> Floats:
-    """Return the image points of ideal points of one camera; the exact inverse of ``undistort``.
+    """Image points of ideal points of one camera; the inverse of ``undistort``, exact to 1e-9 mm.
 
-    Parameters
-    ----------
-    ideal_xy : array_like, shape (n, 2)
-        Ideal coordinates reduced to the principal point, mm.
-
-    Returns
-    -------
-    ndarray, shape (n, 2)
-        Photo coordinates, mm, exact to 1e-9 mm.
-
-    Raises
-    ------
-    InputError
-        When a point lies beyond the radii of a distortion table.
+    An ``InputError`` when a point lies beyond the radii of a distortion table.
     """
     xy = np.asarray(ideal_xy, float)
     f = camera.principal_distance
@@ -203,30 +173,15 @@ def distort(ideal_xy: ArrayLike, camera: Camera, bending: Bending = NOTHING_BENT
 
 
 def refraction_constant(flying_height: float, ground_height: float) -> float:
-    """Constant K of atmospheric refraction of vertical photos in the standard atmosphere.
+    """Constant K of atmospheric refraction of vertical photos in the standard atmosphere, without unit.
 
-    Parameters
-    ----------
-    flying_height, ground_height : float
-        Heights of the perspective center and of the ground above sea level, metres.
+    The mean refractivity of the air between ground and camera minus that at the camera; heights above sea level.
+    Positive, so that images lie too far outside. From n sin(theta) = constant in plane layers follows tan(alpha) =
+    tan(theta) (1 - K / cos(theta)^2) for the direction theta at the camera and the straight line alpha to the ground.
+    An ``InputError`` when the camera is not above the ground.
 
-    Returns
-    -------
-    float
-        K, dimensionless (radians at 45 degrees off the vertical): the mean refractivity of the air between
-        ground and camera minus that at the camera. Positive, so that images lie too far outside.
-
-    Raises
-    ------
-    InputError
-        When the camera is not above the ground.
-
-    Notes
-    -----
-    Source: Saastamoinen 1972, whose formula this is for heights to 11 km, with the factor 2335 rounded from
-    277 x 8.4345, and with the layer above of the standard atmosphere, ICAO Doc 7488. From n sin(theta) = constant
-    in plane layers follows tan(alpha) = tan(theta) (1 - K / cos(theta)^2) for the direction theta at the camera and
-    the straight line alpha to the ground.
+    Source: [Saastamoinen 1972], whose formula this is for heights to 11 km, with the factor 2335 rounded from 277 x
+    8.4345, and with the layer above of the standard atmosphere, ICAO Doc 7488.
     """
     _require_above(flying_height, ground_height, "refraction")
     camera, ground = flying_height / 1000, ground_height / 1000
@@ -235,26 +190,11 @@ def refraction_constant(flying_height: float, ground_height: float) -> float:
 
 
 def refraction_shift(radius: ArrayLike, principal_distance: float, constant: float) -> Floats:
-    """Outward shift of image points by refraction.
+    """Outward shift dr = K (r + r^3 / f^2) of image points by refraction, to be subtracted from their radius r.
 
-    Parameters
-    ----------
-    radius : array_like, shape (...)
-        Distances of image points from the principal point, mm, on a vertical photo.
-    principal_distance : float
-        Principal distance f, mm.
-    constant : float
-        Constant K of ``refraction_constant``.
+    Tilts of a few degrees change it by K f tan(tilt), the same for the whole photo, which the orientation takes up.
 
-    Returns
-    -------
-    ndarray, shape (...)
-        dr = K (r + r^3 / f^2), mm, to be subtracted from the radius of the image point.
-
-    Notes
-    -----
-    Source: Saastamoinen 1972. Tilts of a few degrees change it by K f tan(tilt), the same for the whole photo, which
-    the orientation takes up.
+    Source: [Saastamoinen 1972].
     """
     r = np.asarray(radius, float)
     return np.asarray(constant * r * (1 + (r / principal_distance) ** 2), np.float64)
@@ -263,27 +203,10 @@ def refraction_shift(radius: ArrayLike, principal_distance: float, constant: flo
 def curvature_constant(flying_height: float, ground_height: float, radius: float) -> float:
     """Constant C of Earth curvature in image space: height above ground over the diameter of the Earth.
 
-    Parameters
-    ----------
-    flying_height, ground_height : float
-        Heights of the perspective center and of the ground above sea level, metres.
-    radius : float
-        Radius of the Earth, metres.
+    A point of the plan at distance D lies D^2 / 2R below the plane, so that its image lies too far inside by dr = C r^3
+    / f^2, which is added to the radius. An ``InputError`` when the camera is not above the ground.
 
-    Returns
-    -------
-    float
-        C, dimensionless. A point of the plan at distance D lies D^2 / 2R below the plane, so that its image lies too
-        far inside by dr = C r^3 / f^2, which is added to the radius.
-
-    Raises
-    ------
-    InputError
-        When the camera is not above the ground.
-
-    Notes
-    -----
-    Source: Kraus, Photogrammetry, vol. 1, influence of Earth curvature on a near-vertical photo.
+    Source: [Kraus], influence of Earth curvature on a near-vertical photo.
     """
     _require_above(flying_height, ground_height, "earth_curvature")
     return (flying_height - ground_height) / (2 * radius)

@@ -67,20 +67,7 @@ class Pattern:
 
 
 def gather(fiducials: PhotoPoints, camera: Camera, photos: tuple[str, ...]) -> tuple[Marks, list[Fault]]:
-    """Put the marks of the photos of one camera into arrays, and tell what does not go in.
-
-    Parameters
-    ----------
-    fiducials : PhotoPoints
-        Measured marks; ``point_ids`` are their names.
-
-    Returns
-    -------
-    Marks
-        The marks of all these photos, measured or not.
-    list of Fault
-        Marks that the camera does not have, and marks measured twice.
-    """
+    """Put the marks of the photos of one camera into arrays; faults for unknown marks and marks measured twice."""
     names = tuple(camera.fiducials)
     row_of = {photo: row for row, photo in enumerate(photos)}
     column_of = {name: column for column, name in enumerate(names)}
@@ -111,20 +98,7 @@ def gather(fiducials: PhotoPoints, camera: Camera, photos: tuple[str, ...]) -> t
 
 
 def enough(marks: Marks, kind: str) -> tuple[Marks, list[Fault]]:
-    """Keep the photos with marks enough.
-
-    Parameters
-    ----------
-    kind : str
-        Transformation to be fitted, or ``"auto"``.
-
-    Returns
-    -------
-    Marks
-        The marks of the photos with enough of them in different places.
-    list of Fault
-        One for each of the other photos.
-    """
+    """Keep the photos with enough marks in different places for a kind of transformation; faults for the others."""
     needed = plane.KINDS["conformal" if kind == "auto" else kind].least_points
     name = "an interior orientation" if kind == "auto" else f"the {kind} transformation"
     faults = []
@@ -151,15 +125,10 @@ def right_pattern(marks: Marks) -> tuple[Marks, Flags, list[Fault]]:
     scanned from the other side its points need no repair, but when two of its marks are exchanged they come out
     mirrored, and the residuals are equally small in both cases.
 
-    Parameters
-    ----------
-    marks : Marks
-        Measured marks, at least two on each photo.
-
     Returns
     -------
     Marks
-        The marks of the photos in which they lie as calibrated.
+        The marks of the photos in which they lie as calibrated, at least two on each.
     ndarray of bool, shape (p,)
         Whether these photos were measured mirrored.
     list of Fault
@@ -260,16 +229,5 @@ def _stranger(marks: Marks, row: int, *, mirrored: bool) -> tuple[str, float] | 
 
 
 def fault(code: str, message: str, *, expected: str = "", fix: str = "") -> Fault:
-    """Return a fault of the measured marks.
-
-    Parameters
-    ----------
-    code, message, expected, fix : str
-        As in ``errors.Fault``.
-
-    Returns
-    -------
-    Fault
-        The fault, with the key of the measured marks in the project file.
-    """
+    """Return a fault with the key of the measured marks in the project file."""
     return Fault(message, code=code, key=KEY, expected=expected, fix=fix)

@@ -36,19 +36,9 @@ class Deformation:
 
     @classmethod
     def from_residuals(cls, calibrated: Sequence[Floats], residuals: Sequence[Floats]) -> Deformation:
-        """Take the residuals of the marks for deformation.
+        """Take the residuals of the marks of each photo, transformed minus calibrated (m, 2), for deformation.
 
-        Parameters
-        ----------
-        calibrated : sequence of ndarray, shape (m, 2)
-            Calibrated coordinates of the marks of each photo, mm.
-        residuals : sequence of ndarray, shape (m, 2)
-            Transformed minus calibrated coordinates, mm.
-
-        Returns
-        -------
-        Deformation
-            With nothing for photos of fewer than four marks or with all of them on one line.
+        There is none for photos of fewer than four marks or with all of them on one line.
         """
         seen = [_spread(each) for each in calibrated]
         none = np.zeros((0, 2))
@@ -60,41 +50,14 @@ class Deformation:
         return np.flatnonzero([len(each) == 0 for each in self.nodes])
 
     def corrected(self, photo: Numbers, xy: Floats) -> Floats:
-        """Correct transformed coordinates.
+        """Correct transformed coordinates (n, 2) of points, each on its photo.
 
-        Parameters
-        ----------
-        photo : ndarray of int, shape (n,)
-            Photo of each point.
-        xy : ndarray, shape (n, 2)
-            Coordinates from the transformation, mm.
-
-        Returns
-        -------
-        ndarray, shape (n, 2)
-            Coordinates without the deformation, mm.
-
-        Notes
-        -----
-        Source: Kraus, interpolation of the residuals of fiducial marks; the spline is that of scipy.interpolate.
+        Source: [Kraus], interpolation of the residuals of fiducial marks; the spline is that of scipy.interpolate.
         """
         return self._each(photo, xy, lambda points, shift: points + shift(points))
 
     def deformed(self, photo: Numbers, xy: Floats) -> Floats:
-        """Return the coordinates that ``corrected`` corrects to these; its inverse.
-
-        Parameters
-        ----------
-        photo : ndarray of int, shape (n,)
-            Photo of each point.
-        xy : ndarray, shape (n, 2)
-            Coordinates without the deformation, mm.
-
-        Returns
-        -------
-        ndarray, shape (n, 2)
-            Deformed coordinates, mm, exact to 1e-9 mm.
-        """
+        """Deform coordinates (n, 2); the inverse of ``corrected``, exact to 1e-9 mm."""
         return self._each(photo, xy, _undone)
 
     def _each(self, photo: Numbers, xy: Floats, way: Callable[[Floats, Callable[[Floats], Floats]], Floats]) -> Floats:

@@ -117,10 +117,6 @@ def orient(fiducials: PhotoPoints, cameras: Mapping[str, Camera], settings: Inte
         With one fault for each photo that has no marks, too few, marks that its camera does not have, one mark
         twice, marks on one line, or marks that do not form the pattern of the camera: then the mark that seems
         wrongly numbered is named. One photo mirrored against the others of its camera is such a case.
-
-    Notes
-    -----
-    Source: derived; transformations as in ``plane``.
     """
     faults: list[Fault] = []
     notes: list[Note] = []
@@ -147,24 +143,11 @@ def orient(fiducials: PhotoPoints, cameras: Mapping[str, Camera], settings: Inte
 
 
 def transform(observations: PhotoPoints, interior: InteriorOrientation) -> PhotoPoints:
-    """Photo coordinates of measured points.
+    """Photo coordinates, in the system of the fiducial marks, of points measured in the system of the measured marks.
 
-    Parameters
-    ----------
-    observations : PhotoPoints
-        Points in the system in which the marks were measured.
-
-    Returns
-    -------
-    PhotoPoints
-        The same rows in the system of the fiducial marks, mm. Standard deviations go through the derivatives of the
-        transformation; the correlation that a turn by half a quarter gives to x and y is dropped, and so is the
-        uncertainty of the interior orientation, which all points of a photo share, and that of the interpolation.
-
-    Raises
-    ------
-    InputError
-        When a photo has no interior orientation.
+    Standard deviations go through the derivatives of the transformation; the correlation that a turn by half a quarter
+    gives to x and y is dropped, and so is the uncertainty of the interior orientation, which all points of a photo
+    share, and that of the interpolation. An ``InputError`` when a photo has no interior orientation.
     """
     number = {photo: row for row, photo in enumerate(interior.photo_ids)}
     known = number.keys() | set(interior.without_marks)
@@ -187,17 +170,9 @@ def transform(observations: PhotoPoints, interior: InteriorOrientation) -> Photo
 
 
 def measured(photo_points: PhotoPoints, interior: InteriorOrientation) -> PhotoPoints:
-    """Return the measured coordinates of photo points; the inverse of ``transform``.
+    """Return photo points as they are measured; the inverse of ``transform``, exact to 1e-9 mm.
 
-    Parameters
-    ----------
-    photo_points : PhotoPoints
-        Points in the system of the fiducial marks, mm.
-
-    Returns
-    -------
-    PhotoPoints
-        The same rows as they are measured, exact to 1e-9 mm, with the standard deviations of the photo points.
+    The standard deviations stay those of the photo points.
     """
     number = {photo: row for row, photo in enumerate(interior.photo_ids)}
     rows = np.array([number.get(photo, -1) for photo in photo_points.photo_ids], np.intp)[photo_points.photo]

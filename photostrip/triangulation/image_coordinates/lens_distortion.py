@@ -40,17 +40,7 @@ class _Radial(NamedTuple):
 
 
 def ideal_from_image(xy: ArrayLike, distortion: Distortion) -> Floats:
-    """Remove the distortion of image points.
-
-    Parameters
-    ----------
-    xy : array_like, shape (n, 2)
-        Image coordinates reduced to the principal point, mm.
-
-    Returns
-    -------
-    ndarray, shape (n, 2)
-        Ideal coordinates, mm, exact to 1e-9 mm.
+    """Remove the distortion of image points (n, 2) reduced to the principal point, exact to 1e-9 mm.
 
     Raises
     ------
@@ -61,7 +51,7 @@ def ideal_from_image(xy: ArrayLike, distortion: Distortion) -> Floats:
 
     Notes
     -----
-    Source: Brown 1966 for the polynomials.
+    Source: [Brown 1966] for the polynomials.
     """
     points = np.asarray(xy, float)
     _refuse_beyond(points, reach(distortion)[0])
@@ -69,46 +59,18 @@ def ideal_from_image(xy: ArrayLike, distortion: Distortion) -> Floats:
 
 
 def image_from_ideal(xy: ArrayLike, distortion: Distortion) -> Floats:
-    """Apply the distortion to ideal points; the inverse of ``ideal_from_image``.
-
-    Parameters
-    ----------
-    xy : array_like, shape (n, 2)
-        Ideal coordinates, mm.
-
-    Returns
-    -------
-    ndarray, shape (n, 2)
-        Image coordinates reduced to the principal point, mm, exact to 1e-9 mm.
-
-    Raises
-    ------
-    InputError
-        When a point lies beyond the last radius of a table.
-    GeometryError
-        When no image point has this ideal point.
-    """
+    """Apply the distortion to ideal points (n, 2); the inverse of ``ideal_from_image``, with the same errors."""
     points = np.asarray(xy, float)
     _refuse_beyond(points, reach(distortion)[1])
     return _inverse(points, distortion) if distortion.direction == FORWARD else points + shift(points, distortion)
 
 
 def shift(xy: Floats, distortion: Distortion) -> Floats:
-    """Distortion D as the calibration gives it.
+    """Distortion D as the calibration gives it, mm, at points (n, 2) of the kind in which it is defined.
 
-    Parameters
-    ----------
-    xy : ndarray, shape (n, 2)
-        Points in which D is defined (image or ideal ones, by the direction), reduced to the principal point, mm.
+    Beyond the last radius of a table its last piece is continued, which only iterations may use.
 
-    Returns
-    -------
-    ndarray, shape (n, 2)
-        D in mm. Beyond the last radius of a table its last piece is continued, which only iterations may use.
-
-    Notes
-    -----
-    Source: Brown 1966, radial and decentering distortion; Fraser 1997, affinity and shear.
+    Source: [Brown 1966], radial and decentering distortion; [Fraser 1997], affinity and shear.
     """
     x, y = xy[..., 0], xy[..., 1]
     square = x**2 + y**2
@@ -121,18 +83,7 @@ def shift(xy: Floats, distortion: Distortion) -> Floats:
 
 
 def jacobian(xy: Floats, distortion: Distortion) -> Floats:
-    """Differentiate ``X + D(X)``.
-
-    Parameters
-    ----------
-    xy : ndarray, shape (n, 2)
-        Points as in ``shift``.
-
-    Returns
-    -------
-    ndarray, shape (n, 2, 2)
-        Derivatives of the shifted by the given coordinates.
-    """
+    """Differentiate ``X + D(X)`` by X, (n, 2, 2)."""
     x, y = xy[..., 0], xy[..., 1]
     p1, p2 = distortion.p
     b1, b2 = distortion.b
@@ -144,13 +95,7 @@ def jacobian(xy: Floats, distortion: Distortion) -> Floats:
 
 
 def reach(distortion: Distortion) -> tuple[float, float]:
-    """Return the radii up to which the distortion is known.
-
-    Returns
-    -------
-    image, ideal : float
-        Largest distances of image and of ideal points from the principal point, mm; infinite for polynomials.
-    """
+    """Return the radii up to which the distortion of image and of ideal points is known; infinite for polynomials."""
     if distortion.model != "radial-table":
         return np.inf, np.inf
     last = distortion.radius[-1]
@@ -161,16 +106,8 @@ def reach(distortion: Distortion) -> tuple[float, float]:
 def faults(camera: Camera, farthest: float = 0.0) -> list[Fault]:
     """Find what is wrong with the distortion of a camera.
 
-    Parameters
-    ----------
-    farthest : float
-        Radius of the farthest image point that will be measured, mm; the format counts in any case.
-
-    Returns
-    -------
-    list of Fault
-        Tables that are no tables, and distortion that folds the photo: two ideal points with one image, or the
-        other way round, so that it has no inverse.
+    Tables that are no tables, and distortion that folds the photo up to the radius `farthest` and the corners of the
+    format: two ideal points with one image, or the other way round, so that it has no inverse.
     """
     distortion = camera.distortion
     if distortion is None:

@@ -50,22 +50,7 @@ class Polynomial:
     asked: str
 
     def corrections(self, xyz: Floats) -> Floats:
-        """Correct positions by adding these.
-
-        Parameters
-        ----------
-        xyz : ndarray, shape (n, 3)
-            Strip after the similarity, intermediate frame, metres.
-
-        Returns
-        -------
-        ndarray, shape (n, 3)
-            Corrections in metres.
-
-        Notes
-        -----
-        Source: [001] eq. 150.
-        """
+        """Corrections of positions (n, 3) after the similarity, to be added. Source: [001] eq. 150."""
         return np.column_stack([polynomial_terms.columns(xyz, axis.terms) @ axis.coefficients for axis in self.axes])
 
     def __call__(self, xyz: Floats) -> Floats:
@@ -76,15 +61,7 @@ class Polynomial:
 def fit(problem: Problem, settings: PolynomialSettings) -> Polynomial:
     """Fit the polynomial that the settings ask for, or the one that the evidence supports.
 
-    Parameters
-    ----------
-    settings : PolynomialSettings
-        Degree, or ``"auto"``.
-
-    Returns
-    -------
-    Polynomial
-        The correction; of degree 0, without terms, when the control carries none or the evidence supports none.
+    It is of degree 0, without terms, when the control carries none or the evidence supports none.
     """
     counts = problem.by_axis > 0
     x = problem.xyz[:, 0]

@@ -132,20 +132,8 @@ class Design:
 
 
 def fit_axes(problem: Problem, terms: Terms) -> list[AxisFit]:
-    """Fit all three axes; a few passes settle points that give only some of their coordinates.
+    """Fit the terms of X, Y, Z; points that give only some of their coordinates need a few iterations.
 
-    Parameters
-    ----------
-    terms : tuple of tuple of str
-        Terms of X, Y, Z.
-
-    Returns
-    -------
-    list of AxisFit
-        Fits of X, Y, Z.
-
-    Notes
-    -----
     Source: [001] eq. 151.
     """
     designs = [Design.of(problem, problem.by_axis[:, axis], terms[axis]) for axis in range(3)]

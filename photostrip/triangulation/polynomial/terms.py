@@ -42,54 +42,20 @@ class Sizes:
 
 
 def columns(xyz: Floats, terms: Sequence[str]) -> Floats:
-    """Design columns of the terms, unscaled.
-
-    Parameters
-    ----------
-    xyz : ndarray, shape (n, 3)
-        Positions in the intermediate frame, metres.
-    terms : sequence of str
-        Keys of ``POWERS``.
-
-    Returns
-    -------
-    ndarray, shape (n, k)
-        Powers of X and Y.
-    """
+    """Design columns (n, k) of the terms, powers of X and Y of positions (n, 3), unscaled."""
     x, y = xyz[:, 0], xyz[:, 1]
     return np.column_stack([x**i * y**j for i, j in (POWERS[t] for t in terms)] or [np.zeros((len(xyz), 0))])
 
 
 def count_stations(x: Floats, spacing: float) -> int:
-    """Count stations along the strip that are at least a spacing apart.
-
-    Parameters
-    ----------
-    x : ndarray, shape (n,)
-        Positions along the strip.
-
-    Returns
-    -------
-    int
-        The largest number of points of which no two are nearer than the spacing.
-    """
+    """Largest number of points along the strip of which no two are nearer than a spacing."""
     return len(np.unique(bands(x, spacing))) if len(x) else 0
 
 
 def bands(x: Floats, spacing: float) -> Numbers:
-    """Group points into bands across the strip, from its beginning.
+    """Count the bands across the strip from its beginning; the number of the band of each point.
 
-    Parameters
-    ----------
-    x : ndarray, shape (n,)
-        Positions along the strip.
-    spacing : float
-        A point farther than this from the first of its band opens the next.
-
-    Returns
-    -------
-    ndarray of int, shape (n,)
-        Number of the band of each point.
+    A point farther than the spacing from the first of its band opens the next.
     """
     number = np.zeros(len(x), np.intp)
     current, first = -1, -np.inf
@@ -101,27 +67,16 @@ def bands(x: Floats, spacing: float) -> Numbers:
 
 
 def choose_terms(xyz: Floats, degree: int, sizes: Sizes, *, forced: bool = False) -> tuple[str, ...]:
-    """Terms that given control points can carry, up to a degree.
+    """Terms that given control points (n, 3) can carry, up to a degree; none when the control carries none.
+
+    Six points are necessary for six terms, not sufficient: [001] after eq. 151 says six, a cubic needs four stations.
 
     Parameters
     ----------
-    xyz : ndarray, shape (n, 3)
-        Control points that count in the axis.
-    degree : int
-        Highest power of X asked for.
     sizes : Sizes
         Sizes that make the columns comparable.
     forced : bool
         Whether a fit without redundancy is allowed.
-
-    Returns
-    -------
-    tuple of str
-        Names of the terms; empty when the control carries none.
-
-    Notes
-    -----
-    Six points are necessary for six terms, not sufficient: [001] after eq. 151 says six, a cubic needs four stations.
     """
     stations = count_stations(xyz[:, 0], sizes.spacing)
     terms = ladder(stations, len(xyz) if forced else len(xyz) - 1, degree)
@@ -133,20 +88,7 @@ def choose_terms(xyz: Floats, degree: int, sizes: Sizes, *, forced: bool = False
 
 
 def ladder(stations: int, points: int, degree: int) -> tuple[str, ...]:
-    """Most terms that so many stations and points carry, up to a degree.
-
-    Parameters
-    ----------
-    stations, points : int
-        Stations along the strip, and control points.
-    degree : int
-        Highest power of X asked for.
-
-    Returns
-    -------
-    tuple of str
-        Terms; none where nothing is carried.
-    """
+    """Most terms that so many stations and points carry, up to a degree; none where nothing is carried."""
     for candidate, power, needed, exact in LADDER:
         if power <= degree and stations >= needed and points >= exact:
             return candidate

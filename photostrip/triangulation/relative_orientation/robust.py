@@ -42,20 +42,7 @@ SETTLED = 1e-6  # rad; what follows is least squares
 
 
 def median_by_pair(values: Floats, pairs: Pairs, use: NDArray[np.bool_]) -> Floats:
-    """Median of the values of every pair.
-
-    Parameters
-    ----------
-    values : ndarray, shape (m,)
-        Values by row.
-    use : ndarray of bool, shape (m,)
-        Rows that count.
-
-    Returns
-    -------
-    ndarray, shape (p,)
-        Lower medians; NaN for a pair without a value.
-    """
+    """Lower median of the values of every pair over the rows that count; NaN for a pair without any."""
     count = pairs.sums(use.astype(float)).astype(np.intp)
     place = np.arange(len(values)) - pairs.starts[pairs.pair]
     table = np.full((pairs.size, int(place.max(initial=0)) + 1), np.inf)
@@ -65,13 +52,7 @@ def median_by_pair(values: Floats, pairs: Pairs, use: NDArray[np.bool_]) -> Floa
 
 
 def start_values(pairs: Pairs) -> Floats:
-    """Elements to start from that single wrong points do not turn: the median parallax runs along x.
-
-    Returns
-    -------
-    ndarray, shape (p, 5)
-        (0, kappa0, 0, 0, kappa0) in radians.
-    """
+    """Elements to start from that single wrong points do not turn: the median parallax runs along x."""
     used = pairs.weight > 0
     shift = pairs.left - pairs.right
     start = np.zeros((pairs.size, 5))
@@ -87,8 +68,6 @@ def solve(start: Floats, pairs: Pairs, sigma: Floats, *, near: bool = False) -> 
     ----------
     start : ndarray, shape (p, 5)
         Elements to start from, radians.
-    pairs : Pairs
-        Measurements; weight 0 leaves a point out.
     sigma : ndarray, shape (p,)
         A-priori standard deviation of a y parallax of weight one, mm.
     near : bool
@@ -126,24 +105,11 @@ def solve(start: Floats, pairs: Pairs, sigma: Floats, *, near: bool = False) -> 
 
 
 def consensus(elements: Floats, pairs: Pairs, sigma: Floats) -> Floats:
-    """Look for elements that more points agree on, in pairs where many do not agree.
+    """Look for elements that more points agree on, in pairs where many do not agree; other pairs keep theirs.
 
-    Reweighting can settle between the good points and a group of wrong ones. Minimal sets of five points, spread over
-    all points of the pair, are solved to the first order; the set with which most points agree is refined.
-
-    Parameters
-    ----------
-    elements : ndarray, shape (p, 5)
-        Elements in radians.
-    pairs : Pairs
-        Measurements; weight 0 leaves a point out.
-    sigma : ndarray, shape (p,)
-        Standard deviation of a y parallax of weight one, mm.
-
-    Returns
-    -------
-    ndarray, shape (p, 5)
-        Elements in radians; those of pairs in which nothing better was found are unchanged.
+    Reweighting can end between the good points and a group of wrong ones. Minimal sets of five points, spread over all
+    points of the pair, are solved to the first order; the set with which most points agree is refined. `sigma` is the
+    standard deviation of a y parallax of weight one in each pair.
     """
     before = _agreeing(elements, pairs, sigma)
     todo = np.flatnonzero(pairs.sums((pairs.weight > 0).astype(float)) - before > FEW)

@@ -34,19 +34,9 @@ class SixPoints:
 
 
 def orient_six_points(parallax: ArrayLike, focal: float, width: float, base: float) -> SixPoints:
-    """Elements from the y parallaxes of the six standard points, least squares linearised at zero.
+    """Elements from the y parallaxes q of the six standard points, least squares linearised at zero.
 
-    Parameters
-    ----------
-    parallax : array_like, shape (6,)
-        q = y1 - y2 of points 1 to 6, mm.
-    focal, width, base : float
-        Principal distance f, distance a of the side points from the middle ones, photo base b, mm.
-
-    Returns
-    -------
-    SixPoints
-        Elements, closing error and residuals.
+    `focal` is the principal distance f, `width` the distance a of the side points from the middle ones, `base` b.
     """
     q1, q2, q3, q4, q5, q6 = q = np.asarray(parallax, float)
     omega2 = focal * (q3 + q4 + q5 + q6 - 2 * q1 - 2 * q2) / (4 * width**2)
@@ -59,18 +49,7 @@ def orient_six_points(parallax: ArrayLike, focal: float, width: float, base: flo
 
 
 def cofactors(focal: float, width: float, base: float) -> Floats:
-    """Cofactors of the elements from six standard points.
-
-    Parameters
-    ----------
-    focal, width, base : float
-        f, a and b in mm.
-
-    Returns
-    -------
-    ndarray, shape (5, 5)
-        Cofactors in rad^2 per mm^2; times the variance of a y parallax they are covariances.
-    """
+    """Cofactors (5, 5) of the elements from six standard points, rad^2/mm^2 for a y parallax of unit variance."""
     f, a, b = focal, width, base
     alpha, omega = f**2 / (2 * a**2 * b**2), 3 * f**2 / (4 * a**4)
     kappa = (8 * a**4 + 12 * a**2 * f**2 + 9 * f**4) / (12 * a**4 * b**2)
@@ -81,18 +60,10 @@ def cofactors(focal: float, width: float, base: float) -> Floats:
 
 
 def dependent_from_base(base: float) -> Floats:
-    """First-order relation of the dependent pair (left photo fixed) to the base-frame elements.
+    """First-order relation T (5, 5) of the dependent pair (left photo fixed) to the base-frame elements.
 
-    Parameters
-    ----------
-    base : float
-        Photo base b, mm.
-
-    Returns
-    -------
-    ndarray, shape (5, 5)
-        T with (by, bz, dkappa, dalpha, domega) = T (alpha1', kappa1', alpha2', omega2', kappa2'), lengths in mm. The
-        cofactors follow as T Q T^T for any points. dalpha = alpha2' + bz/b is the decorrelation that [000] uses.
+    (by, bz, dkappa, dalpha, domega) = T (alpha1', kappa1', alpha2', omega2', kappa2'), lengths in mm. The cofactors
+    follow as T Q T^T for any points. dalpha = alpha2' + bz/b is the decorrelation that [000] uses.
     """
     matrix = np.zeros((5, 5))
     matrix[0, 1] = matrix[1, 0] = -base
@@ -102,19 +73,9 @@ def dependent_from_base(base: float) -> Floats:
 
 
 def dependent_pair(elements: ArrayLike) -> tuple[Floats, Floats]:
-    """Right photo relative to the left one, from base-frame elements; exact.
+    """Direction of the base and rotation of the right photo in the left photo's frame, from base-frame elements; exact.
 
-    Parameters
-    ----------
-    elements : array_like, shape (..., 5)
-        Elements in radians.
-
-    Returns
-    -------
-    direction : ndarray, shape (..., 3)
-        Unit vector of the base in the left photo's frame; by/bx and bz/bx are ratios of its components.
-    rotation : ndarray, shape (..., 3, 3)
-        Right photo to left photo; its angles are dalpha, domega, dkappa.
+    by/bx and bz/bx are ratios of the components of the direction; dalpha, domega, dkappa are angles of the rotation.
     """
     al1, ka1, al2, om2, ka2 = np.moveaxis(np.asarray(elements, float), -1, 0)
     left = from_alpha_omega_kappa(al1, 0.0, ka1)

@@ -60,23 +60,9 @@ class Intersected:
 
 
 def space_resection(xy: Floats, sigma: Floats, points: Floats, focal: float) -> OrientedPhoto:
-    """Orient one photo on known points, at any attitude and without approximate values.
+    """Orient one photo on known points (n, 3), at any attitude and without approximate values.
 
-    Parameters
-    ----------
-    xy : ndarray, shape (n, 2)
-        Ideal image coordinates, mm, relative to the principal point.
-    sigma : ndarray, shape (n, 2)
-        Their standard deviations, mm. The solution weighs all alike; the covariance takes them into account.
-    points : ndarray, shape (n, 3)
-        Known points, metres.
-    focal : float
-        Principal distance, mm.
-
-    Returns
-    -------
-    OrientedPhoto
-        Orientation, precision and fit.
+    The solution weighs all image points (n, 2) alike; the covariance takes their standard deviations into account.
 
     Raises
     ------
@@ -109,23 +95,7 @@ def _inverse(design: Floats) -> Floats:
 
 
 def approximate(xy: Floats, points: Floats, focal: float) -> tuple[Floats, Floats]:
-    """Orientation of a photo in closed form: the solution of three points that suits the others best.
-
-    Parameters
-    ----------
-    xy : ndarray, shape (n, 2)
-        Ideal image coordinates, mm.
-    points : ndarray, shape (n, 3)
-        Known points, metres.
-    focal : float
-        Principal distance, mm.
-
-    Returns
-    -------
-    center : ndarray, shape (3,)
-        Perspective centre.
-    rotation : ndarray, shape (3, 3)
-        Photo to the frame of the points.
+    """Perspective centre and rotation in closed form: the solution of three points that suits the others best.
 
     Raises
     ------
@@ -134,7 +104,7 @@ def approximate(xy: Floats, points: Floats, focal: float) -> tuple[Floats, Float
 
     Notes
     -----
-    Source: Grunert 1841 in the form of Haralick 1994.
+    Source: [Grunert 1841] in the form of [Haralick 1994].
     """
     if len(xy) < LEAST_POINTS:
         raise GeometryError(f"{len(xy)} known points do not orient a photo; it needs four", code="resection")
@@ -201,18 +171,7 @@ def _three_points(rays: Floats, points: Floats) -> Iterator[tuple[Floats, Floats
 def derivatives(
     points: Floats, centers: Floats, rotations: Floats, photo: Numbers, focal: Floats
 ) -> tuple[Floats, Floats]:
-    """Differentiate image coordinates.
-
-    Parameters
-    ----------
-    points : ndarray, shape (n, 3)
-        The point of each row, metres.
-    centers, rotations : ndarray, shapes (m, 3), (m, 3, 3)
-        Orientations of the photos.
-    photo : ndarray of int, shape (n,)
-        Photo of each row.
-    focal : ndarray, shape (m,)
-        Principal distances, mm.
+    """Differentiate the image coordinates of rows, each of a point on a photo.
 
     Returns
     -------

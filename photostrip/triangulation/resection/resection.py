@@ -35,25 +35,16 @@ class Resection:
 
 
 def project(points: Floats, centers: Floats, rotations: Floats, photo: Numbers, focal: Floats) -> Floats:
-    """Image coordinates of points, one for each row.
+    """Ideal image coordinates (m, 2), relative to the principal point, of a point and a photo in each row.
 
     Parameters
     ----------
-    points : ndarray, shape (m, 3)
-        Points.
-    centers : ndarray, shape (n, 3)
-        Perspective centres in the same frame.
     rotations : ndarray, shape (n, 3, 3)
-        Photo to that frame.
+        Photo to the frame of the points and of the centres (n, 3).
     photo : ndarray of int, shape (m,)
         Photo of each row.
     focal : ndarray, shape (n,)
         Principal distances in mm.
-
-    Returns
-    -------
-    ndarray, shape (m, 2)
-        Ideal image coordinates in mm, relative to the principal point.
     """
     ray = np.einsum("mi,mij->mj", points - centers[photo], rotations[photo])
     xy: Floats = -focal[photo, None] * ray[:, :2] / ray[:, 2:]
@@ -69,18 +60,11 @@ def resect(xy: Floats, points: Floats, photo: Numbers, focal: Floats, start: tup
         Image coordinates in mm, reduced to the principal point; rows ordered by photo.
     points : ndarray, shape (m, 3)
         Known points of the rows.
-    photo : ndarray of int, shape (m,)
-        Photo of each row, ascending.
     focal : ndarray, shape (n,)
         Principal distances in mm.
     start : tuple of ndarray
-        Centres (n, 3) and rotations (n, 3, 3) to start from.
-
-    Returns
-    -------
-    Resection
-        Orientations and image residuals. A photo with fewer than four points, or whose solution does
-        not settle, keeps its start values.
+        Centres (n, 3) and rotations (n, 3, 3) to start from. They stay for a photo with fewer than four points, or whose
+        iteration does not converge.
     """
     centers, rotations = start[0].copy(), start[1].copy()
     counts = np.bincount(photo, minlength=len(centers))
@@ -122,13 +106,6 @@ def partials(arm: Floats, rotations: Floats, focal: Floats, distance: Floats) ->
         Principal distances in mm.
     distance : ndarray, shape (m,)
         Unit in which the centre moves.
-
-    Returns
-    -------
-    by_x, by_y : ndarray, shape (6, m)
-        Derivatives of x and y by a shift of the centre and a small rotation, both along the axes of the photo.
-    xy : ndarray, shape (2, m)
-        Image coordinates in mm.
     """
     u, v, w = np.einsum("mi,mij->jm", arm, rotations)
     x, y = -focal * u / w, -focal * v / w

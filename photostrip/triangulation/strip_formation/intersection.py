@@ -38,11 +38,6 @@ def intersect(base: Floats, left: Floats, right: Floats, focal: float) -> Inters
     focal : float
         Principal distance in mm, the scale to which the rays are brought.
 
-    Returns
-    -------
-    Intersection
-        Points with Y the mean of both rays.
-
     Notes
     -----
     Source: [001] eq. 137 (second line corrected to y2) and 138; [001] takes Y from the left ray, here it

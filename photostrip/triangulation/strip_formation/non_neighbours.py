@@ -32,17 +32,12 @@ def bridge(
 ) -> FormedStrip:
     """Return a strip that also holds the points which some rays place without a model.
 
+    Such a point lies in the middle between its first and its last ray.
+
     Parameters
     ----------
-    focal : float
-        Principal distance, mm.
     rows : ndarray of int
         Rows of the observations: good rays of points that the strip does not hold.
-
-    Returns
-    -------
-    FormedStrip
-        With the points on which two of the rays meet, in the middle between the first and the last.
     """
     place = {photo: number for number, photo in enumerate(photos)}
     position = np.array([place[observations.photo_ids[number]] for number in observations.photo[rows]], np.intp)
@@ -70,19 +65,9 @@ def bridge(
 
 
 def meeting(centers: Floats, directions: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-    """Find the middle between two rays where they are nearest.
+    """Middle of two rays where they are nearest, and whether they meet, in front of both cameras and not too flat.
 
-    Parameters
-    ----------
-    centers, directions : ndarray, shape (n, 2, 3)
-        Perspective centres and directions of both rays.
-
-    Returns
-    -------
-    xyz : ndarray, shape (n, 3)
-        The middles; NaN where the rays do not meet.
-    sound : ndarray of bool, shape (n,)
-        Whether they meet in front of both cameras, and not too flat.
+    Centres and directions are (n, 2, 3); the middle is NaN where the rays do not meet.
     """
     unit = directions / np.linalg.norm(directions, axis=2, keepdims=True)
     base = centers[:, 1] - centers[:, 0]

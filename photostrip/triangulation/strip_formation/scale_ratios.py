@@ -91,18 +91,7 @@ def spreads(
 
 
 def depths(vectors: Floats, base: Floats) -> Floats:
-    """Distances of points from the base line.
-
-    Parameters
-    ----------
-    vectors, base : ndarray, shape (t, 3)
-        Vectors to the points from a point of the line, and its unit vectors.
-
-    Returns
-    -------
-    ndarray, shape (t,)
-        In the unit of the vectors.
-    """
+    """Distances of points from the base line, from vectors to them and unit vectors of the base (t, 3)."""
     (x, y, z), (u, v, w) = vectors.T, base.T
     return np.asarray(np.sqrt((y * w - z * v) ** 2 + (z * u - x * w) ** 2 + (x * v - y * u) ** 2), float)
 
@@ -169,23 +158,14 @@ def _cofactors(orientation: Orientation) -> Floats:
 def screen(
     ratio: Floats, weight: Floats, spread: tuple[Floats, Floats], junction: Numbers, junctions: int
 ) -> tuple[Flags, Floats]:
-    """Find the ratios that belong together.
+    """Find the ratios that belong together, and the largest relative deviation of each that still belongs.
 
     Parameters
     ----------
-    ratio, weight : ndarray, shape (t,)
-        Scale ratios and their weights in the mean.
     spread : tuple of ndarray, shape (t,)
         Relative standard deviations as ``spreads`` gives them.
     junction : ndarray of int, shape (t,)
         Junction of each ratio, ascending.
-
-    Returns
-    -------
-    used : ndarray of bool, shape (t,)
-        Ratios that belong.
-    limit : ndarray, shape (t,)
-        Largest relative deviation of each that still belongs.
     """
     size = np.hypot(*spread)
     count = np.bincount(junction, minlength=junctions)

@@ -137,21 +137,10 @@ def _renewed_models(orientation: Orientation, formed: FormedStrip, changed: Numb
 
 
 def hand_on_rotations(rotations: Floats) -> Floats:
-    """Rotations of all photos to the strip, each from its left neighbour: A2 = A1 R with R = A1'^T A2'.
+    """Rotations (p + 1, 3, 3) of all photos to the strip, each from its left neighbour: A2 = A1 R with R = A1'^T A2'.
 
-    Parameters
-    ----------
-    rotations : ndarray, shape (p, 3, 3)
-        Right photo to left photo, of every pair.
-
-    Returns
-    -------
-    ndarray, shape (p + 1, 3, 3)
-        Photo to strip; the first photo is the frame.
-
-    Notes
-    -----
-    Source: [001] eq. 131-134.
+    The first photo is the frame; R, (p, 3, 3), takes the right photo of every pair to the left one. Source: [001] eq.
+    131-134.
     """
     chain = np.empty((len(rotations) + 1, 3, 3))
     chain[0] = np.eye(3)
