@@ -11,6 +11,8 @@ from statistics import NormalDist
 
 from photostrip.distributions import chi2_ppf, f_sf, t_isf, t_sf
 
+SIGMA_FROM_MEDIAN = 1.4826  # standard deviation over the median of |x|, of a normal distribution
+
 
 @lru_cache(maxsize=4096)
 def t_quantile(probability: float, dof: float) -> float:

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     from photostrip.triangulation.gross_errors.control import control_screening, control_significance
     from photostrip.triangulation.gross_errors.pairs import screening
     from photostrip.triangulation.gross_errors.rays import strip_screening
-    from photostrip.triangulation.image_coordinates import corrections, interior
+    from photostrip.triangulation.image_coordinates import corrections
+    from photostrip.triangulation.image_coordinates.mark_fit import InteriorOrientation
     from photostrip.triangulation.independent_models.formation import FormedModels
     from photostrip.triangulation.polynomial import correction as polynomial
     from photostrip.triangulation.relative_orientation.orientation import Orientation
@@ -272,7 +273,7 @@ class Result:
     settings: Settings
     frames: tuple[GroundFrame, ...]  # ground frames of the control lists
     output: GroundFrame  # ground frame of the result
-    interior: interior.InteriorOrientation | None
+    interior: InteriorOrientation | None
     refined: corrections.Refined  # ideal image coordinates and the size of each correction
     strips: tuple[StripResult, ...]  # of photos or of independent models, never both
     points: Adjusted

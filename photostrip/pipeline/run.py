@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from photostrip.pipeline.inputs import Inputs, Settings
     from photostrip.pipeline.results import StripResult
     from photostrip.points import ControlPoints, PhotoPoints
+    from photostrip.triangulation.image_coordinates.mark_fit import InteriorOrientation
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -237,7 +238,7 @@ def _refuse_curvature_twice(inputs: Inputs, settings: Settings) -> None:
         raise InputError(fault)
 
 
-def _photo_coordinates(inputs: Inputs, settings: Settings) -> tuple[PhotoPoints, interior.InteriorOrientation | None]:
+def _photo_coordinates(inputs: Inputs, settings: Settings) -> tuple[PhotoPoints, InteriorOrientation | None]:
     """Interior orientation, when fiducial marks were measured."""
     if inputs.fiducials is None:
         return inputs.observations, None
@@ -364,7 +365,7 @@ def _reason(places: list[tuple[int, int]], *, contradicted: bool) -> str:
 
 
 def _notes(
-    inputs: Inputs, settings: Settings, found: Sequence[Note], fiducial: interior.InteriorOrientation | None
+    inputs: Inputs, settings: Settings, found: Sequence[Note], fiducial: InteriorOrientation | None
 ) -> tuple[Note, ...]:
     notes: list[Note] = [*(fiducial.notes if fiducial is not None else ()), *found]
     if settings.absolute.earth_curvature == "none" and inputs.frames and inputs.frames[0].crs != "local":

@@ -14,37 +14,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import InputError
-from photostrip.geometry import plane
 from photostrip.notes import Note
-from photostrip.points import PhotoPoints, frozen
-from photostrip.triangulation.image_coordinates.fiducial_marks import (
-    QUARTER,
-    Marks,
-    enough,
-    fault,
-    gather,
-    right_pattern,
-)
+from photostrip.points import PhotoPoints
+from photostrip.triangulation.image_coordinates.fiducial_marks import enough, fault, gather, right_pattern
 from photostrip.triangulation.image_coordinates.film_deformation import Deformation
+from photostrip.triangulation.image_coordinates.mark_fit import InteriorOrientation, fit_marks, joined_cameras
+from photostrip.triangulation.image_coordinates.mark_notes import (
+    listed_photos,
+    marks_of_no_strip,
+    marks_without_camera,
+    notes_on_marks,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
-
-    from numpy.typing import NDArray
+    from collections.abc import Mapping
 
     from photostrip.camera import Camera
     from photostrip.errors import Fault
-
-    Floats = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
-
-MICROMETRE = 1e-3  # mm
-WEAK = 0.01  # strength of a transformation below which marks count as lying on one line
-POOR_FIT = 0.05  # mm; film that was stored well fits to a third of this
-ODD_SCALE = 0.02  # departure of the scale from 1: pixel size or unit is not what was stated
-STRONG_AFFINITY = 0.01  # departure of the ratio of the two scales from 1; film shrinks by a tenth of this
-STRONG_SHEAR = np.radians(0.5)
-SHOWN = 5  # ids in a sentence
 
 
 @dataclass(frozen=True)
@@ -58,41 +44,6 @@ class InteriorSettings:
     # ``"interpolate"`` the residuals of the marks to the points, for film that is deformed in other ways than the
     # transformation has, or ``"ignore"`` them
     residuals: str = "ignore"
-
-
-@dataclass(frozen=True, eq=False)
-class InteriorOrientation:
-    """Transformations of photos and how well the marks fit."""
-
-    photo_ids: tuple[str, ...]
-    transforms: tuple[str, ...]
-    # the transformations, coefficients of shape (p, 3, 4): measured coordinates to photo coordinates, mm
-    photo_from_measured: plane.PlaneTransform
-    marks: tuple[tuple[str, ...], ...]
-    # (m, 2): transformed minus calibrated coordinates of these marks in the photo system, mm
-    residuals: tuple[Floats, ...]
-    sigma0: Floats  # (p,): standard deviation of a mark's coordinate of mean weight, mm; NaN without redundancy
-    redundancy: NDArray[np.intp]  # (p,): coordinates measured minus unknowns
-    # scale_x, scale_y: (p,): scales along the measured axes at the mean of the marks, photo over measured, positive
-    scale_x: Floats
-    scale_y: Floats
-    # rotation, shear: (p,): direction of the measured x axis in the photo system, and departure of the measured y axis
-    # from the right angle to it, both counter-clockwise (shear of mirrored photos: clockwise), radians
-    rotation: Floats
-    shear: Floats
-    mirrored: Flags  # (p,): whether the measured system is left-handed against that of the camera
-    # photos of cameras without fiducial marks: their coordinates are taken as they are
-    without_marks: tuple[str, ...] = ()
-    notes: tuple[Note, ...] = ()  # what the marks show beside the numbers
-    film: Deformation | None = None  # deformation beyond the transformations, when it is interpolated
-
-    def __post_init__(self) -> None:
-        """Freeze the arrays."""
-        for name in ("sigma0", "scale_x", "scale_y", "rotation", "shear"):
-            object.__setattr__(self, name, frozen(getattr(self, name)))
-        object.__setattr__(self, "redundancy", frozen(self.redundancy, dtype=np.intp))
-        object.__setattr__(self, "mirrored", frozen(self.mirrored, dtype=np.bool_))
-        object.__setattr__(self, "residuals", tuple(frozen(each) for each in self.residuals))
 
 
 def orient(fiducials: PhotoPoints, cameras: Mapping[str, Camera], settings: InteriorSettings) -> InteriorOrientation:
@@ -129,16 +80,16 @@ def orient(fiducials: PhotoPoints, cameras: Mapping[str, Camera], settings: Inte
         faults += wrong
         marks, mirrored, wrong = right_pattern(marks)
         faults += wrong
-        part, wrong = _fit(marks, mirrored, settings.transform)
+        part, wrong = fit_marks(marks, mirrored, settings.transform)
         faults += wrong
         parts.append(part)
-        notes += _remarks(part, camera)
+        notes += notes_on_marks(part, camera)
     digital = tuple(photo for photo, camera in cameras.items() if not camera.fiducials)
-    faults += _marks_without_camera(fiducials, cameras, digital)
+    faults += marks_without_camera(fiducials, cameras, digital)
     if faults:
         raise InputError(faults)
-    notes += _marks_of_no_strip(fiducials, cameras)
-    joined = _joined(parts, tuple(cameras), digital, tuple(notes))
+    notes += marks_of_no_strip(fiducials, cameras)
+    joined = joined_cameras(parts, tuple(cameras), digital, tuple(notes))
     return joined if settings.residuals == "ignore" else _with_film(joined, cameras)
 
 
@@ -195,259 +146,6 @@ def _with_film(joined: InteriorOrientation, cameras: Mapping[str, Camera]) -> In
     if not len(unseen):
         return replace(joined, film=film)
     photos = tuple(joined.photo_ids[row] for row in unseen)
-    message = f"residuals of fiducial marks cannot be interpolated on {_listed(photos)}: fewer than four marks, or all "
-    message += "on one line; film deformation stays in the coordinates"
+    message = f"residuals of fiducial marks cannot be interpolated on {listed_photos(photos)}: fewer than four "
+    message += "marks, or all on one line; film deformation stays in the coordinates"
     return replace(joined, film=film, notes=(*joined.notes, Note("film-unseen", message, photos=photos)))
-
-
-def _fit(marks: Marks, mirrored: Flags, kind: str) -> tuple[InteriorOrientation, list[Fault]]:
-    """Fit the transformations of the photos of one camera."""
-    kinds, faults = _kinds(marks, kind)
-    coefficients = np.zeros((len(marks.photos), 3, 4))
-    for each in plane.KINDS:
-        rows = np.flatnonzero(kinds == each)
-        if len(rows) == 0:
-            continue
-        # only a conformal transformation has to be told that it shall mirror; the others find it themselves
-        flip = np.ones((len(rows), 1, 2))
-        if each == "conformal":
-            flip[:, 0, 1] = np.where(mirrored[rows], -1.0, 1.0)
-        target = np.broadcast_to(marks.calibrated, (len(rows), *marks.calibrated.shape))
-        fit = plane.KINDS[each].fit(marks.measured[rows] * flip, target, marks.weights[rows])
-        coefficients[rows] = fit.coefficients
-        coefficients[rows, :, 1] *= flip[:, 0, 1:]
-    good = kinds != ""
-    photo_from_measured = plane.PlaneTransform(coefficients[good])
-    return _described(marks.take(good), tuple(kinds[good].tolist()), photo_from_measured, mirrored[good]), faults
-
-
-def _kinds(marks: Marks, kind: str) -> tuple[NDArray[np.str_], list[Fault]]:
-    """Choose the kind of transformation of each photo; an empty one and a fault where it cannot be determined."""
-    if kind == "auto":
-        affine = (marks.count >= 4) & ~_weak("affine", marks)
-        return np.where(affine, "affine", "conformal"), []
-    weak = _weak(kind, marks)
-    why = "on one line" if kind == "affine" else "so that not all of its coefficients can be told"
-    faults = [
-        fault(
-            "marks-in-line",
-            f"photo {marks.photos[row]}: marks {', '.join(marks.on_photo(row))} lie {why}: no {kind} transformation",
-            fix=f"use processing.interior.transform: {'conformal' if kind == 'affine' else 'affine'}",
-        )
-        for row in np.flatnonzero(weak).tolist()
-    ]
-    return np.where(weak, "", kind), faults
-
-
-def _weak(kind: str, marks: Marks) -> Flags:
-    weak: Flags = plane.strength(kind, marks.measured, marks.weights) < WEAK
-    return weak
-
-
-def _described(
-    marks: Marks, kinds: tuple[str, ...], photo_from_measured: plane.PlaneTransform, mirrored: Flags
-) -> InteriorOrientation:
-    """Residuals, precision and shape of fitted transformations."""
-    used = marks.weights > 0
-    residuals = photo_from_measured.residuals(marks.measured, marks.calibrated)
-    redundancy = 2 * marks.count - np.array([plane.KINDS[kind].unknowns for kind in kinds], np.intp)
-    squares = (marks.weights[..., None] * residuals**2).sum((1, 2))
-    sigma0 = np.sqrt(np.where(redundancy > 0, squares / np.maximum(redundancy, 1), np.nan))
-    centers = (used[..., None] * marks.measured).sum(1) / np.maximum(used.sum(1), 1)[:, None]
-    scale_x, scale_y, rotation, shear = shape(photo_from_measured.jacobian(centers[:, None])[:, 0])
-    return InteriorOrientation(
-        marks.photos,
-        kinds,
-        photo_from_measured,
-        tuple(marks.on_photo(row) for row in range(len(marks.photos))),
-        tuple(residuals[row, used[row]] for row in range(len(marks.photos))),
-        sigma0,
-        redundancy,
-        scale_x,
-        scale_y,
-        rotation,
-        shear,
-        mirrored,
-    )
-
-
-def shape(jacobian: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Scales, rotation and shear of the linear part of a transformation.
-
-    Parameters
-    ----------
-    jacobian : ndarray, shape (..., 2, 2)
-        Derivatives of photo coordinates by measured ones.
-
-    Returns
-    -------
-    scale_x, scale_y, rotation, shear : ndarray, shape (...)
-        ``jacobian = R(rotation) M [[scale_x, -scale_y sin(shear)], [0, scale_y cos(shear)]]``, where M turns the
-        sign of y when the determinant is negative; angles in radians.
-
-    Notes
-    -----
-    Source: derived.
-    """
-    first, second = jacobian[..., 0], jacobian[..., 1]
-    hand = np.where(np.linalg.det(jacobian) < 0, -1.0, 1.0)
-    rotation = np.arctan2(first[..., 1], first[..., 0])
-    cos, sin = np.cos(rotation), np.sin(rotation)
-    along = cos * second[..., 0] + sin * second[..., 1]
-    across = hand * (cos * second[..., 1] - sin * second[..., 0])
-    return np.hypot(*np.moveaxis(first, -1, 0)), np.hypot(along, across), rotation, np.arctan2(-along, across)
-
-
-def _remarks(part: InteriorOrientation, camera: Camera) -> list[Note]:
-    """Say what the marks of one camera's photos show beside the numbers."""
-    notes = [*_turned(part, camera), *_mirrored(part, camera), *_fewer(part, camera)]
-    poor = np.nan_to_num(part.sigma0) > POOR_FIT
-    if poor.any():
-        notes.append(_poor_fit(part, poor))
-    scale = np.sqrt(part.scale_x * part.scale_y)
-    odd = np.abs(np.log(scale)) > ODD_SCALE
-    if odd.any():
-        text = (
-            f"a measured millimetre is {np.median(scale[odd]):.5g} mm on {_photos(part, odd)}: unit or pixel size of "
-        )
-        text += "the measurements is not as stated; the transformation puts it right"
-        notes.append(_note("measured-scale", text, part, odd, severity="note"))
-    affinity = np.abs(np.log(part.scale_x / part.scale_y))
-    strong = (affinity > STRONG_AFFINITY) | (np.abs(part.shear) > STRONG_SHEAR)
-    if strong.any():
-        worst = int(np.argmax(np.where(strong, affinity + np.abs(part.shear), 0)))
-        text = f"{_photos(part, strong)}: the marks of camera {camera.name} need scales that differ by "
-        text += f"{100 * affinity[worst]:.1f} % and a shear of {abs(np.degrees(part.shear[worst])):.2f} degrees (photo "
-        text += f"{part.photo_ids[worst]}): check the calibrated coordinates and the shape of the pixels"
-        notes.append(_note("strong-affinity", text, part, strong))
-    return notes
-
-
-def _turned(part: InteriorOrientation, camera: Camera) -> list[Note]:
-    """Tell photos that were scanned turned by quarters; a warning where those of one camera differ."""
-    quarters = np.round(part.rotation / QUARTER).astype(int) % 4
-    severity = "note" if len(set(quarters.tolist())) == 1 else "warning"
-    # the rotation brings the scan back, so the photo lay turned the other way round
-    names = {1: "90 degrees clockwise", 2: "180 degrees", 3: "90 degrees counter-clockwise"}
-    return [
-        _note(
-            "photos-turned",
-            f"{_photos(part, quarters == quarter)}: measured turned by {name} against the marks of camera "
-            f"{camera.name}; the transformation turns the coordinates back",
-            part,
-            quarters == quarter,
-            severity=severity,
-        )
-        for quarter, name in names.items()
-        if (quarters == quarter).any()
-    ]
-
-
-def _mirrored(part: InteriorOrientation, camera: Camera) -> list[Note]:
-    if not part.mirrored.any():
-        return []
-    text = f"{_photos(part, part.mirrored)}: measured mirrored against the marks of camera {camera.name}; the "
-    text += "transformation mirrors the coordinates back. Check y_axis, the side from which the film was scanned, and "
-    text += "the signs of the calibrated coordinates: if these are wrong, the ground comes out mirrored"
-    return [_note("photos-mirrored", text, part, part.mirrored)]
-
-
-def _fewer(part: InteriorOrientation, camera: Camera) -> list[Note]:
-    """Tell photos where too few marks were measured to check them, or to fit what the others have."""
-    count = np.array([len(marks) for marks in part.marks], np.intp)
-    notes = []
-    unchecked = count == 2
-    if unchecked.any():
-        text = f"{_photos(part, unchecked)}: with two marks neither wrong numbers nor a mirrored photo can be seen"
-        notes.append(_note("marks-unchecked", text, part, unchecked))
-    conformal = np.array([kind == "conformal" for kind in part.transforms], bool) & ~unchecked
-    if conformal.any() and not conformal.all():
-        text = (
-            f"{_photos(part, conformal)}: conformal instead of affine, because not all of the {len(camera.fiducials)} "
-        )
-        text += f"marks of camera {camera.name} were measured: film deformation stays in the coordinates"
-        notes.append(_note("fewer-marks", text, part, conformal))
-    return notes
-
-
-def _poor_fit(part: InteriorOrientation, poor: Flags) -> Note:
-    worst = int(np.nanargmax(part.sigma0))
-    lengths = np.linalg.norm(part.residuals[worst], axis=1)
-    mark = part.marks[worst][int(np.argmax(lengths))]
-    text = f"{_photos(part, poor)}: the marks fit worse than {POOR_FIT / MICROMETRE:.0f} um; worst photo "
-    text += f"{part.photo_ids[worst]}, sigma0 {part.sigma0[worst] / MICROMETRE:.0f} um, "
-    if part.redundancy[worst] > 2:
-        text += f"largest residual {lengths.max() / MICROMETRE:.0f} um at mark {mark}"
-    else:
-        text += "which mark is wrong cannot be told with so few"
-    return _note("marks-fit-poorly", text, part, poor)
-
-
-def _note(code: str, message: str, part: InteriorOrientation, rows: Flags, *, severity: str = "warning") -> Note:
-    photos = tuple(photo for photo, named in zip(part.photo_ids, rows, strict=True) if named)
-    return Note(code, message, severity=severity, photos=photos)
-
-
-def _photos(part: InteriorOrientation, rows: Flags) -> str:
-    return _listed([photo for photo, named in zip(part.photo_ids, rows, strict=True) if named])
-
-
-def _listed(photos: Sequence[str]) -> str:
-    more = f" and {len(photos) - SHOWN} more" if len(photos) > SHOWN else ""
-    return f"photo{'s' * (len(photos) > 1)} {', '.join(photos[:SHOWN])}{more}"
-
-
-def _marks_without_camera(
-    fiducials: PhotoPoints, cameras: Mapping[str, Camera], digital: tuple[str, ...]
-) -> list[Fault]:
-    measured = set(fiducials.photo_ids)
-    return [
-        fault(
-            "camera-without-marks",
-            f"photo {photo}: fiducial marks are measured, but camera {cameras[photo].name} has none",
-            fix=f"give cameras.{cameras[photo].name}.fiducials",
-        )
-        for photo in digital
-        if photo in measured
-    ]
-
-
-def _marks_of_no_strip(fiducials: PhotoPoints, cameras: Mapping[str, Camera]) -> list[Note]:
-    unused = tuple(photo for photo in fiducials.photo_ids if photo not in cameras)
-    if not unused:
-        return []
-    message = f"fiducial marks of {_listed(unused)} are not used: in no strip"
-    return [Note("marks-unused", message, severity="note", photos=unused)]
-
-
-def _joined(
-    parts: Sequence[InteriorOrientation], order: tuple[str, ...], digital: tuple[str, ...], notes: tuple[Note, ...]
-) -> InteriorOrientation:
-    """Put the photos of all cameras into the order of the project."""
-    photos = [photo for part in parts for photo in part.photo_ids]
-    place = {photo: number for number, photo in enumerate(order)}
-    rows = sorted(range(len(photos)), key=lambda row: place[photos[row]])
-    transforms = [kind for part in parts for kind in part.transforms]
-    marks = [names for part in parts for names in part.marks]
-    residuals = [each for part in parts for each in part.residuals]
-
-    def column(arrays: Iterable[NDArray[np.generic]]) -> NDArray[np.float64]:
-        return np.concatenate([np.zeros(0), *arrays])[rows]
-
-    coefficients = [part.photo_from_measured.coefficients for part in parts]
-    return InteriorOrientation(
-        photo_ids=tuple(photos[row] for row in rows),
-        transforms=tuple(transforms[row] for row in rows),
-        photo_from_measured=plane.PlaneTransform(np.concatenate([np.zeros((0, 3, 4)), *coefficients])[rows]),
-        marks=tuple(marks[row] for row in rows),
-        residuals=tuple(residuals[row] for row in rows),
-        sigma0=column(part.sigma0 for part in parts),
-        redundancy=column(part.redundancy for part in parts).astype(np.intp),
-        scale_x=column(part.scale_x for part in parts),
-        scale_y=column(part.scale_y for part in parts),
-        rotation=column(part.rotation for part in parts),
-        shear=column(part.shear for part in parts),
-        mirrored=column(part.mirrored for part in parts).astype(bool),
-        without_marks=digital,
-        notes=notes,
-    )

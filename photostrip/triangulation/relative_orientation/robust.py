@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.statistics import SIGMA_FROM_MEDIAN
 from photostrip.triangulation.relative_orientation.solution import (
     Linearised,
     gauss_newton_steps,
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-NORMAL = 1.4826  # median of |x| to standard deviation, of a normal distribution
 ABSOLUTE_STEPS = 30
 WELSCH_STEPS = 15
 WELSCH = 2.985  # standard deviations; 95 % efficient without gross errors
@@ -93,7 +93,7 @@ def solve(start: Floats, pairs: Pairs, sigma: Floats, *, near: bool = False) -> 
         if absolute:
             weight = given / np.maximum(size / sigma[pairs.pair], 1.0)
         else:
-            scale = np.maximum(sigma, NORMAL * median_by_pair(size, pairs, given > 0))
+            scale = np.maximum(sigma, SIGMA_FROM_MEDIAN * median_by_pair(size, pairs, given > 0))
             weight = given * np.exp(-((size / (WELSCH * scale[pairs.pair])) ** 2))
         change, _ = gauss_newton_steps(Linearised(q, jacobian), replace(pairs, weight=weight), RIDGE, LONGEST_STEP)
         elements = elements + change

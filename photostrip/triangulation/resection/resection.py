@@ -63,8 +63,8 @@ def resect(xy: Floats, points: Floats, photo: Numbers, focal: Floats, start: tup
     focal : ndarray, shape (n,)
         Principal distances in mm.
     start : tuple of ndarray
-        Centres (n, 3) and rotations (n, 3, 3) to start from. They stay for a photo with fewer than four points, or whose
-        iteration does not converge.
+        Centres (n, 3) and rotations (n, 3, 3) to start from. They stay for a photo with fewer than four points, or
+        whose iteration does not converge.
     """
     centers, rotations = start[0].copy(), start[1].copy()
     counts = np.bincount(photo, minlength=len(centers))

@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.geometry.rotation import from_alpha_omega_kappa
-from photostrip.statistics import normal_quantile
-from photostrip.triangulation.relative_orientation.robust import NORMAL
+from photostrip.statistics import SIGMA_FROM_MEDIAN, normal_quantile
 from photostrip.triangulation.relative_orientation.solution import (
     base_rays,
     linearised_parallaxes,
@@ -174,7 +173,9 @@ def screen(
     ]
     value = np.log(ratio)
     center = _weighted_medians(value, weight, junction, junctions)
-    own = NORMAL * _weighted_medians(np.abs(value - center[junction]) / size, np.ones(len(value)), junction, junctions)
+    own = SIGMA_FROM_MEDIAN * _weighted_medians(
+        np.abs(value - center[junction]) / size, np.ones(len(value)), junction, junctions
+    )
     scale = np.maximum(1.0, own / (1 + PROOF * MEDIAN_SCATTER / np.sqrt(np.maximum(count, 1))))
     limit = (level * scale)[junction] * size
     few = (count < FEWEST)[junction]

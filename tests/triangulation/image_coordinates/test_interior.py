@@ -17,7 +17,8 @@ from photostrip.errors import InputError
 from photostrip.points import PhotoPoints
 from photostrip.triangulation.image_coordinates import interior
 from photostrip.triangulation.image_coordinates.fiducial_marks import WRONG_PATTERN
-from photostrip.triangulation.image_coordinates.interior import InteriorOrientation, InteriorSettings
+from photostrip.triangulation.image_coordinates.interior import InteriorSettings
+from photostrip.triangulation.image_coordinates.mark_fit import InteriorOrientation, linear_shape
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -173,7 +174,7 @@ def test_scales_rotation_and_shear_are_those_that_were_put_in(
     # seen along the x axis, the y axis stands at a right angle plus the shear; mirrored, on the other side
     direction = rotation + (np.pi / 2 + shear) * (-1 if mirrored else 1)
     y_axis = np.array([np.cos(direction), np.sin(direction)]) * scale_y
-    found = interior.shape(np.stack([x_axis, y_axis], 1))
+    found = linear_shape(np.stack([x_axis, y_axis], 1))
     assert np.allclose(found, (scale_x, scale_y, rotation, shear), rtol=0, atol=1e-12)
 
 

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import GeometryError, PhotostripError
-from photostrip.statistics import t_quantile
+from photostrip.statistics import SIGMA_FROM_MEDIAN, t_quantile
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.absolute_orientation import Targets
 from photostrip.triangulation.gross_errors.control import control_significance, control_subsets
@@ -49,7 +49,6 @@ CONSPICUOUS = 6.0  # largest over median misclosure that asks for a robust start
 GROSS = 12.0  # standard deviations from the median, in the robust start
 ROBUST_STEPS = 20
 SETTLED = 0.1  # of the median misclosure: the robust start is to find large errors, not digits
-NORMAL = 1.4826
 ROUGH = 5.0  # standard deviations left by a polynomial beyond which there is more than a bend
 ALIKE = 0.1  # spread of misclosures of a band over their mean, below which they are one bend
 EXCHANGED = 0.2  # misclosures left by an exchange, over those before
@@ -163,7 +162,9 @@ def _gross(control: ControlPoints, setting: StripAtControl) -> Flags:
         before, size = size, np.abs(result.misclosures)
         if np.abs(size - before).max() < SETTLED * floor:
             break
-    scatter = NORMAL * np.array([np.median(size[:, axes][control.use[:, axes]]) for axes in ([0, 1], [0, 1], [2])])
+    scatter = SIGMA_FROM_MEDIAN * np.array(
+        [np.median(size[:, axes][control.use[:, axes]]) for axes in ([0, 1], [0, 1], [2])]
+    )
     far = np.array(control.use & (size > GROSS * scatter), bool)
     far[:, PLAN] = far[:, PLAN].any(axis=1, keepdims=True) & control.use[:, PLAN]
     far &= _witnessed(result.similarity(setting.strip)[:, 0], setting.spacing, control.use & ~far)

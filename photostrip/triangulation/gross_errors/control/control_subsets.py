@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geometry.similarity import similarity_derivatives
+from photostrip.statistics import SIGMA_FROM_MEDIAN
 from photostrip.triangulation import absolute_orientation
 
 if TYPE_CHECKING:
@@ -32,7 +33,6 @@ PLAN_COLUMNS, HEIGHT_COLUMNS = [0, 1, 5, 6], [2, 3, 4]  # shifts X, Y, turn abou
 PLAN_POINTS, HEIGHT_POINTS = 2, 3  # of a set
 SETS = 2000  # all sets of up to 63 points in plan and 23 heights
 DETERMINED = 1e-4  # smallest determinant of a set, columns of unit length over all points
-NORMAL = 1.4826
 AGREE = 3.0  # standard deviations from the better half
 FAR = 12.0  # standard deviations; what is nearer is left to the tests of single coordinates
 ROUNDS = 8
@@ -71,7 +71,7 @@ def far(strip: Floats, targets: Targets, weight: Floats, start: Similarity) -> t
             break
         result = absolute_orientation.orient(strip, targets, weight * good)
         similarity, size = result.similarity, _sizes(result.misclosures)
-    scatter = [max(NORMAL * float(np.median(size[good[:, k], k])), float(expected[k])) for k in (0, 1, 2)]
+    scatter = [max(SIGMA_FROM_MEDIAN * float(np.median(size[good[:, k], k])), float(expected[k])) for k in (0, 1, 2)]
     scatter[0] = scatter[1] = max(scatter[:2])
     return np.asarray(use & (size > FAR * np.array(scatter)), bool), result.misclosures
 
@@ -106,7 +106,7 @@ def _near(left: Floats, fewest: int, expected: float) -> Flags:
     """Tell what agrees with the similarity that left these misclosures."""
     if len(left) <= fewest:
         return np.ones(len(left), bool)
-    scatter = NORMAL * float(np.sort(left)[_half(len(left), fewest)])
+    scatter = SIGMA_FROM_MEDIAN * float(np.sort(left)[_half(len(left), fewest)])
     return np.asarray(left <= AGREE * max(scatter, expected), bool)
 
 

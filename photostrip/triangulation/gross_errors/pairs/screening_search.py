@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.statistics import SIGMA_FROM_MEDIAN
 from photostrip.triangulation.gross_errors.pairs import deletion, pair_global_test
 from photostrip.triangulation.gross_errors.pairs.pair_global_test import (
     failing,
@@ -249,13 +250,13 @@ def _revised(scatter: ParallaxScatter, pairs: Pairs, left: _Sizes) -> ParallaxSc
     freedom = pairs.sums(np.where(tested, left.redundancy, 0.0))
     if freedom.sum() < ENOUGH:
         return scatter
-    pooled = robust.NORMAL * float(np.median(sizes[tested]))
+    pooled = SIGMA_FROM_MEDIAN * float(np.median(sizes[tested]))
     proof = 1 + PROOF * MEDIAN_SCATTER / np.sqrt(max(float(freedom.sum()), 1.0))
     first = np.isnan(scatter.found)
     level, factor = (scatter.stated, max(CONTRADICTION, proof)) if first else (scatter.found, UNCHANGED)
     found_now = pooled if pooled > factor * level else scatter.found
     level = max(level, np.nan_to_num(found_now))
-    own = robust.NORMAL * np.nan_to_num(robust.median_by_pair(sizes, pairs, tested))
+    own = SIGMA_FROM_MEDIAN * np.nan_to_num(robust.median_by_pair(sizes, pairs, tested))
     proven = np.where(freedom < ENOUGH, 0.0, own / (1 + PROOF * MEDIAN_SCATTER / np.sqrt(np.maximum(freedom, 1.0))))
     return ParallaxScatter(scatter.stated, found_now, np.maximum(level, np.maximum(proven, scatter.by_pair)))
 
@@ -409,7 +410,7 @@ def _delete_beyond(orientation: Orientation, sigma: Floats, todo: Numbers, log: 
     pairs = orientation.pairs
     size = np.abs(orientation.parallax) * np.sqrt(pairs.weight)
     size = np.where(np.isfinite(size), size, np.inf)
-    scale = robust.NORMAL * robust.median_by_pair(size, pairs, orientation.used)
+    scale = SIGMA_FROM_MEDIAN * robust.median_by_pair(size, pairs, orientation.used)
     limit = np.full(pairs.size, np.inf)
     limit[todo] = GROSS * np.maximum(scale, sigma)[todo]
     rows = np.flatnonzero(orientation.used & (size > limit[pairs.pair]))

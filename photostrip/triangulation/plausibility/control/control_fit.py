@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photostrip.statistics import t_quantile
+from photostrip.statistics import SIGMA_FROM_MEDIAN, t_quantile
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -30,7 +30,6 @@ MEDIAN_POINTS = 400  # at most, from which a median misclosure is taken
 LEAST_PAIR_DISTANCE = 0.25  # of the largest distance: two points that give a similarity
 DRAWS = 250  # of as many points as unknowns, for a start that wrong points do not disturb
 WORST_CONDITION = 1e6  # condition number of such a draw
-SIGMA_OF_MEDIAN = 1.4826  # standard deviation over median of the sizes of normal errors
 PLAN_REFITS = 3
 REWEIGHTINGS, SOFT_REWEIGHTINGS = 12, 8  # of a robust fit: in all, and with weights that fall slowly
 KEPT_SIGMAS = 5.0  # robust standard deviations within which a point goes with the others
@@ -138,7 +137,7 @@ def _refined(z: Complex, plan: Complex, turn: complex, shift: complex, *, mirror
     """Fit the better half of the points by least squares."""
     for _ in range(PLAN_REFITS):
         size = np.abs(turn * z + shift - plan)
-        good = size <= max(2.5 * SIGMA_OF_MEDIAN * float(_median(size, PLAN_UNKNOWNS)), TINY)
+        good = size <= max(2.5 * SIGMA_FROM_MEDIAN * float(_median(size, PLAN_UNKNOWNS)), TINY)
         d, t = z[good] - z[good].mean(), plan[good] - plan[good].mean()
         squares = float((np.abs(d) ** 2).sum())
         if squares < TINY:
@@ -172,7 +171,7 @@ def _robust(size: Floats, unknowns: int) -> float:
     """Robust standard deviation of residuals of a fit; some of them are zero only because it is one."""
     if not len(size):
         return 0.0
-    return SIGMA_OF_MEDIAN * float(_median(size, unknowns)) * (1.0 + 2.0 / max(len(size) - unknowns, 1))
+    return SIGMA_FROM_MEDIAN * float(_median(size, unknowns)) * (1.0 + 2.0 / max(len(size) - unknowns, 1))
 
 
 @dataclass(frozen=True, eq=False)

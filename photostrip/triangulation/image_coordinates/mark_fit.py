@@ -1,0 +1,191 @@
+"""Plane transformations of photos fitted to their fiducial marks, and how well the marks fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from photostrip.geometry import plane
+from photostrip.points import frozen
+from photostrip.triangulation.image_coordinates.fiducial_marks import Marks, fault
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.errors import Fault
+    from photostrip.notes import Note
+    from photostrip.triangulation.image_coordinates.film_deformation import Deformation
+
+    Floats = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
+
+WEAK = 0.01  # strength of a transformation below which marks count as lying on one line
+
+
+@dataclass(frozen=True, eq=False)
+class InteriorOrientation:
+    """Transformations of photos and how well the marks fit."""
+
+    photo_ids: tuple[str, ...]
+    transforms: tuple[str, ...]
+    # the transformations, coefficients of shape (p, 3, 4): measured coordinates to photo coordinates, mm
+    photo_from_measured: plane.PlaneTransform
+    marks: tuple[tuple[str, ...], ...]
+    # (m, 2): transformed minus calibrated coordinates of these marks in the photo system, mm
+    residuals: tuple[Floats, ...]
+    sigma0: Floats  # (p,): standard deviation of a mark's coordinate of mean weight, mm; NaN without redundancy
+    redundancy: NDArray[np.intp]  # (p,): coordinates measured minus unknowns
+    # scale_x, scale_y: (p,): scales along the measured axes at the mean of the marks, photo over measured, positive
+    scale_x: Floats
+    scale_y: Floats
+    # rotation, shear: (p,): direction of the measured x axis in the photo system, and departure of the measured y axis
+    # from the right angle to it, both counter-clockwise (shear of mirrored photos: clockwise), radians
+    rotation: Floats
+    shear: Floats
+    mirrored: Flags  # (p,): whether the measured system is left-handed against that of the camera
+    # photos of cameras without fiducial marks: their coordinates are taken as they are
+    without_marks: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()  # what the marks show beside the numbers
+    film: Deformation | None = None  # deformation beyond the transformations, when it is interpolated
+
+    def __post_init__(self) -> None:
+        """Freeze the arrays."""
+        for name in ("sigma0", "scale_x", "scale_y", "rotation", "shear"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+        object.__setattr__(self, "redundancy", frozen(self.redundancy, dtype=np.intp))
+        object.__setattr__(self, "mirrored", frozen(self.mirrored, dtype=np.bool_))
+        object.__setattr__(self, "residuals", tuple(frozen(each) for each in self.residuals))
+
+
+def fit_marks(marks: Marks, mirrored: Flags, kind: str) -> tuple[InteriorOrientation, list[Fault]]:
+    """Fit the transformations of the photos of one camera."""
+    kinds, faults = _kinds(marks, kind)
+    coefficients = np.zeros((len(marks.photos), 3, 4))
+    for each in plane.KINDS:
+        rows = np.flatnonzero(kinds == each)
+        if len(rows) == 0:
+            continue
+        # only a conformal transformation has to be told that it shall mirror; the others find it themselves
+        flip = np.ones((len(rows), 1, 2))
+        if each == "conformal":
+            flip[:, 0, 1] = np.where(mirrored[rows], -1.0, 1.0)
+        target = np.broadcast_to(marks.calibrated, (len(rows), *marks.calibrated.shape))
+        fit = plane.KINDS[each].fit(marks.measured[rows] * flip, target, marks.weights[rows])
+        coefficients[rows] = fit.coefficients
+        coefficients[rows, :, 1] *= flip[:, 0, 1:]
+    good = kinds != ""
+    photo_from_measured = plane.PlaneTransform(coefficients[good])
+    return _described(marks.take(good), tuple(kinds[good].tolist()), photo_from_measured, mirrored[good]), faults
+
+
+def _kinds(marks: Marks, kind: str) -> tuple[NDArray[np.str_], list[Fault]]:
+    """Choose the kind of transformation of each photo; an empty one and a fault where it cannot be determined."""
+    if kind == "auto":
+        affine = (marks.count >= 4) & ~_weak("affine", marks)
+        return np.where(affine, "affine", "conformal"), []
+    weak = _weak(kind, marks)
+    why = "on one line" if kind == "affine" else "so that not all of its coefficients can be told"
+    faults = [
+        fault(
+            "marks-in-line",
+            f"photo {marks.photos[row]}: marks {', '.join(marks.on_photo(row))} lie {why}: no {kind} transformation",
+            fix=f"use processing.interior.transform: {'conformal' if kind == 'affine' else 'affine'}",
+        )
+        for row in np.flatnonzero(weak).tolist()
+    ]
+    return np.where(weak, "", kind), faults
+
+
+def _weak(kind: str, marks: Marks) -> Flags:
+    weak: Flags = plane.strength(kind, marks.measured, marks.weights) < WEAK
+    return weak
+
+
+def _described(
+    marks: Marks, kinds: tuple[str, ...], photo_from_measured: plane.PlaneTransform, mirrored: Flags
+) -> InteriorOrientation:
+    """Residuals, precision and shape of fitted transformations."""
+    used = marks.weights > 0
+    residuals = photo_from_measured.residuals(marks.measured, marks.calibrated)
+    redundancy = 2 * marks.count - np.array([plane.KINDS[kind].unknowns for kind in kinds], np.intp)
+    squares = (marks.weights[..., None] * residuals**2).sum((1, 2))
+    sigma0 = np.sqrt(np.where(redundancy > 0, squares / np.maximum(redundancy, 1), np.nan))
+    centers = (used[..., None] * marks.measured).sum(1) / np.maximum(used.sum(1), 1)[:, None]
+    linear = linear_shape(photo_from_measured.jacobian(centers[:, None])[:, 0])
+    return InteriorOrientation(
+        photo_ids=marks.photos,
+        transforms=kinds,
+        photo_from_measured=photo_from_measured,
+        marks=tuple(marks.on_photo(row) for row in range(len(marks.photos))),
+        residuals=tuple(residuals[row, used[row]] for row in range(len(marks.photos))),
+        sigma0=sigma0,
+        redundancy=redundancy,
+        scale_x=linear.scale_x,
+        scale_y=linear.scale_y,
+        rotation=linear.rotation,
+        shear=linear.shear,
+        mirrored=mirrored,
+    )
+
+
+class LinearShape(NamedTuple):
+    """Scales, rotation and shear of linear transformations, each of shape (...), angles in radians."""
+
+    scale_x: Floats
+    scale_y: Floats
+    rotation: Floats
+    shear: Floats
+
+
+def linear_shape(jacobian: Floats) -> LinearShape:
+    """Scales, rotation and shear of the linear part (..., 2, 2) of transformations.
+
+    ``jacobian = R(rotation) M [[scale_x, -scale_y sin(shear)], [0, scale_y cos(shear)]]``, where M turns the sign of y
+    when the determinant is negative. Source: derived.
+    """
+    first, second = jacobian[..., 0], jacobian[..., 1]
+    hand = np.where(np.linalg.det(jacobian) < 0, -1.0, 1.0)
+    rotation = np.arctan2(first[..., 1], first[..., 0])
+    cos, sin = np.cos(rotation), np.sin(rotation)
+    along = cos * second[..., 0] + sin * second[..., 1]
+    across = hand * (cos * second[..., 1] - sin * second[..., 0])
+    return LinearShape(
+        np.hypot(*np.moveaxis(first, -1, 0)), np.hypot(along, across), rotation, np.arctan2(-along, across)
+    )
+
+
+def joined_cameras(
+    parts: Sequence[InteriorOrientation], order: tuple[str, ...], digital: tuple[str, ...], notes: tuple[Note, ...]
+) -> InteriorOrientation:
+    """Put the photos of all cameras into the order of the project."""
+    photos = [photo for part in parts for photo in part.photo_ids]
+    place = {photo: number for number, photo in enumerate(order)}
+    rows = sorted(range(len(photos)), key=lambda row: place[photos[row]])
+    transforms = [kind for part in parts for kind in part.transforms]
+    marks = [names for part in parts for names in part.marks]
+    residuals = [each for part in parts for each in part.residuals]
+
+    def column(arrays: Iterable[NDArray[np.generic]]) -> NDArray[np.float64]:
+        return np.concatenate([np.zeros(0), *arrays])[rows]
+
+    coefficients = [part.photo_from_measured.coefficients for part in parts]
+    return InteriorOrientation(
+        photo_ids=tuple(photos[row] for row in rows),
+        transforms=tuple(transforms[row] for row in rows),
+        photo_from_measured=plane.PlaneTransform(np.concatenate([np.zeros((0, 3, 4)), *coefficients])[rows]),
+        marks=tuple(marks[row] for row in rows),
+        residuals=tuple(residuals[row] for row in rows),
+        sigma0=column(part.sigma0 for part in parts),
+        redundancy=column(part.redundancy for part in parts).astype(np.intp),
+        scale_x=column(part.scale_x for part in parts),
+        scale_y=column(part.scale_y for part in parts),
+        rotation=column(part.rotation for part in parts),
+        shear=column(part.shear for part in parts),
+        mirrored=column(part.mirrored for part in parts).astype(bool),
+        without_marks=digital,
+        notes=notes,
+    )
