@@ -33,7 +33,7 @@ from photostrip.geodesy.frame_spec import FrameSpec  # noqa: E402
 from photostrip.geodesy.tying import tie_frames  # noqa: E402
 from photostrip.pipeline import Inputs, Settings, Strip, triangulate  # noqa: E402
 from photostrip.pipeline.strip import adjust_formed, form_strip  # noqa: E402
-from photostrip.planning.control_layout import Layout, Spot, numbers_of, spots_of  # noqa: E402
+from photostrip.planning.control_layout import ControlLayout, Spot, numbers_of, spots_of  # noqa: E402
 from photostrip.planning.ideal_strip import StripGeometry, ideal_strip  # noqa: E402
 from photostrip.planning.model_plan import (  # noqa: E402
     LAYOUTS as MODEL_LAYOUTS,
@@ -45,7 +45,7 @@ from photostrip.planning.model_plan import (  # noqa: E402
     plan_model,
     standard_zones,
 )
-from photostrip.planning.single_model import Control, orientation_operator  # noqa: E402
+from photostrip.planning.single_model import ModelControl, orientation_operator  # noqa: E402
 from photostrip.planning.strip_methods import (  # noqa: E402
     BUNDLE,
     COVARIANCE,
@@ -87,23 +87,23 @@ OFFSET = (0.3, -0.2, 0.5)  # m, of measured perspective centres, which the bundl
 LIMIT = 3.29  # of a test at 0.1 %
 
 
-def layouts(photos: int) -> dict[str, Layout]:
+def layouts(photos: int) -> dict[str, ControlLayout]:
     """Layouts of control by name, for a strip of so many photos."""
     middle, third, last = (photos + 1) // 2, 1 + (photos - 1) // 3, photos - (photos - 1) // 3
     heights = tuple(Spot(photo, row, "z") for photo in (third, last) for row in (1, 5))
     return {
-        "bands every 4": Layout("bands every 4", every=4, sigma=SIGMA),
-        "3 bands": Layout("3 bands", bands=3, sigma=SIGMA),
-        "corners": Layout("corners", kind="corners", sigma=SIGMA),
-        "corners+centre": Layout("corners+centre", kind="corners+centre", sigma=SIGMA),
-        "corners, heights": Layout("corners, heights", kind="corners+centre", spots=heights, sigma=SIGMA),
-        "mixed": Layout(
+        "bands every 4": ControlLayout("bands every 4", every=4, sigma=SIGMA),
+        "3 bands": ControlLayout("3 bands", bands=3, sigma=SIGMA),
+        "corners": ControlLayout("corners", kind="corners", sigma=SIGMA),
+        "corners+centre": ControlLayout("corners+centre", kind="corners+centre", sigma=SIGMA),
+        "corners, heights": ControlLayout("corners, heights", kind="corners+centre", spots=heights, sigma=SIGMA),
+        "mixed": ControlLayout(
             "mixed",
             kind="corners",
             spots=(Spot(third, 3, "z"), Spot(middle, 1, "xy"), Spot(middle, 5, "z"), Spot(last, 3)),
             sigma=(0.03, 0.03, 0.05),
         ),
-        "corners, GNSS": Layout("corners, GNSS", kind="corners", sigma=SIGMA, gnss=GNSS),
+        "corners, GNSS": ControlLayout("corners, GNSS", kind="corners", sigma=SIGMA, gnss=GNSS),
     }
 
 
@@ -115,13 +115,13 @@ class Task:
     """Some repetitions of some layouts."""
 
     geometry: StripGeometry
-    layouts: tuple[Layout, ...]
+    layouts: tuple[ControlLayout, ...]
     methods: tuple[str, ...]
     first: int
     count: int
 
 
-def methods_for(layout: Layout, methods: Sequence[str]) -> tuple[str, ...]:
+def methods_for(layout: ControlLayout, methods: Sequence[str]) -> tuple[str, ...]:
     """Methods that use what a layout gives: perspective centres are for the bundle alone."""
     return tuple(each for each in methods if layout.gnss is None or each == BUNDLE)
 
@@ -156,7 +156,7 @@ def repetitions(task: Task) -> dict[tuple[str, str], tuple[Floats, Floats]]:
 
 
 def measured(
-    strip: IdealStrip, spots: tuple[ControlSpot, ...], layout: Layout, noise: Floats, rng: np.random.Generator
+    strip: IdealStrip, spots: tuple[ControlSpot, ...], layout: ControlLayout, noise: Floats, rng: np.random.Generator
 ) -> Inputs:
     """Give a strip as it would be measured: errors in the image coordinates and in the control."""
     observed = strip.observations
@@ -181,7 +181,7 @@ def run_settings(method: str) -> Settings:
     )
 
 
-def bundled(strip: IdealStrip, layout: Layout, inputs: Inputs, rng: np.random.Generator) -> Floats:
+def bundled(strip: IdealStrip, layout: ControlLayout, inputs: Inputs, rng: np.random.Generator) -> Floats:
     """Coordinates of the points of the strip by a bundle adjustment that starts at the truth."""
     control = inputs.control
     names = [inputs.observations.point_ids[number] for number in strip.formed.point]
@@ -201,7 +201,7 @@ def bundled(strip: IdealStrip, layout: Layout, inputs: Inputs, rng: np.random.Ge
     return xyz
 
 
-def compare(geometry: StripGeometry, chosen: tuple[Layout, ...], options: argparse.Namespace) -> None:
+def compare(geometry: StripGeometry, chosen: tuple[ControlLayout, ...], options: argparse.Namespace) -> None:
     """Print one line for each layout and method."""
     strip = ideal_strip(geometry)
     share = -(-options.repeat // (4 * options.workers))
@@ -255,7 +255,7 @@ def flown(options: argparse.Namespace) -> None:
     print(f"{options.models} models flown {count} times: tilts 1 deg, relief 60 m, scattered points; metres")
     print(f"{'control':<16} {'method':<11} {HEAD.removesuffix('   single')}")
     for bands in (3, 4):
-        layout = Layout(f"{bands} bands", bands=bands, sigma=SIGMA)
+        layout = ControlLayout(f"{bands} bands", bands=bands, sigma=SIGMA)
         spots = spots_of(layout, geometry.photos, geometry.points.rows)
         for method in [each for each in options.methods if each != BUNDLE]:
             errors = np.vstack([flown_errors(geometry, layout, method, seed) for seed in range(1, count + 1)])
@@ -267,7 +267,7 @@ def flown(options: argparse.Namespace) -> None:
             print(" ".join(parts))
 
 
-def flown_errors(geometry: StripGeometry, layout: Layout, method: str, seed: int) -> Floats:
+def flown_errors(geometry: StripGeometry, layout: ControlLayout, method: str, seed: int) -> Floats:
     """Errors along, across and up of the new points of one simulated strip."""
     spec = Spec(
         seed=seed,
@@ -338,7 +338,7 @@ def measured_models(spec: ModelSpec, places: Floats, count: int) -> Floats:
     direction, _ = six_points.dependent_pair(oriented.elements)
     model = vectors.reshape(count, n, 3) * (spec.base / direction[:, :1])[:, :, None]
     error = (model - np.column_stack([every, np.full(n, -spec.focal)]))[:, len(six) :]
-    control = Control(
+    control = ModelControl(
         np.column_stack([at, np.full(len(at), spec.focal)]),
         np.array(["xy" in point.use for point in spec.control]),
         np.array(["z" in point.use for point in spec.control]),
@@ -378,7 +378,7 @@ def reliability(options: argparse.Namespace) -> None:
 
 def found_share(
     strip: IdealStrip,
-    layout: Layout,
+    layout: ControlLayout,
     spots: tuple[ControlSpot, ...],
     wrong: tuple[int, int, float],
     repeat: int,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.simulate import Control, Flight, Points, Spec, simulate
-from photostrip.simulate.bundle import problem_of
+from tests.simulated_bundle import problem_of
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:

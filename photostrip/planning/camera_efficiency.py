@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 
-class Camera(NamedTuple):
+class ComparedCamera(NamedTuple):
     """A camera to compare."""
 
     name: str
@@ -25,10 +25,7 @@ class Camera(NamedTuple):
 
     @property
     def coefficient(self) -> float:
-        """K in mm², the smaller the better.
-
-        Source: [004b] eq. 4, 7, 8.
-        """
+        """K in mm², the smaller the better (eq. 4, 7, 8)."""
         return self.focal * self.sigma
 
     @property
@@ -48,14 +45,11 @@ class Comparison(NamedTuple):
     photos: float  # how many times as many photos are needed for an area: the inverse of `area`
 
 
-def compare(first: Camera, second: Camera) -> Comparison:
-    """Compare two cameras.
+def compare(first: ComparedCamera, second: ComparedCamera) -> Comparison:
+    """Compare two cameras: ratios, first to second.
 
-    Returns
-    -------
-    Comparison
-        Ratios, first to second. Formats and bases may differ; with equal ones the printed and the true ratio of areas
-        are the scale ratio and its square.
+    Formats and bases may differ; with equal ones the printed and the true ratio of areas are the scale ratio and its
+    square.
     """
     base, width = first.base / second.base, first.width / second.width
     coefficient = first.coefficient / second.coefficient
@@ -87,25 +81,13 @@ PRINTED_TABLE = (
 )
 
 
-def source_cameras() -> tuple[Camera, ...]:
-    """Return the four cameras of the source's table.
-
-    Returns
-    -------
-    tuple of Camera
-        All with the base of 60 mm and one format.
-    """
+def source_cameras() -> tuple[ComparedCamera, ...]:
+    """Return the four cameras of the source's table, all with the base of 60 mm and one format."""
     return tuple(
-        Camera(f"f {row.focal:g} mm", row.focal, row.sigma, PRINTED_BASE, PRINTED_BASE) for row in PRINTED_TABLE
+        ComparedCamera(f"f {row.focal:g} mm", row.focal, row.sigma, PRINTED_BASE, PRINTED_BASE) for row in PRINTED_TABLE
     )
 
 
-def by_efficiency(cameras: Sequence[Camera]) -> list[Camera]:
-    """Cameras from the best to the worst.
-
-    Returns
-    -------
-    list of Camera
-        By the area that a model covers at equal m_h; with equal bases and formats that is by K.
-    """
+def by_efficiency(cameras: Sequence[ComparedCamera]) -> list[ComparedCamera]:
+    """Cameras from the best to the worst by the area of a model at equal m_h; with equal bases and formats, by K."""
     return sorted(cameras, key=lambda camera: -camera.width * camera.base**3 / camera.coefficient**2)

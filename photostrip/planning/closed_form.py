@@ -1,7 +1,6 @@
 """The same deformation of an oriented model in closed form, for level ground: sums over the control, no operators.
 
-Its only purpose is to check, and to be checked by, the operators of ``single_model``; the
-source prints this form.
+It checks the operators of ``single_model``, and is checked by them; the source prints this form.
 
 Source: [000] eq. 9-11 with nine corrections, each listed in docs/sources.md and shown to be necessary by a test.
 """
@@ -21,18 +20,7 @@ ORDER = ("dbz", "dkappa", "dalpha", "domega")
 
 
 def control_sums(control: ArrayLike) -> Array:
-    """Sum up c1 to c15 over the control.
-
-    Parameters
-    ----------
-    control : array_like, shape (n, 2)
-        x and y of the control points.
-
-    Returns
-    -------
-    ndarray, shape (15,)
-        m(u, v) = sum of u v less the product of the sums over n.
-    """
+    """Add up c1 to c15 over the control points (n, 2): m(u, v) = sum of u v less the product of the sums over n."""
     x, y = np.asarray(control, float).T
     pairs = (
         (x, x), (y, y), (x, y), (x * x, x), (y * y, y), (x * x, y), (y * y, x), (x * y, y), (x * y, x),
@@ -46,10 +34,8 @@ def coefficients(points: ArrayLike, control: ArrayLike, base: float, depth: floa
 
     Parameters
     ----------
-    points : array_like, shape (q, 2)
-        x and y from the left nadir.
-    control : array_like, shape (n, 2)
-        The same of the control points, all of them given in plan and height.
+    points, control : array_like, shape (q, 2), (n, 2)
+        x and y from the left nadir; all control is given in plan and height.
     base, depth : float
         b and the depth Z of all points.
 

@@ -28,7 +28,7 @@ class Spot:
 
 
 @dataclass(frozen=True)
-class Layout:
+class ControlLayout:
     """A layout of control to be compared with others."""
 
     name: str
@@ -44,18 +44,8 @@ class Layout:
     gnss_offset: bool = True  # whether they have a constant offset, which is to be determined
 
 
-def spots_of(layout: Layout, photos: int, rows: int) -> tuple[Spot, ...]:
-    """Return the control points of a layout.
-
-    Parameters
-    ----------
-    photos, rows : int
-        Photos of the strip, and rows of its pass points.
-
-    Returns
-    -------
-    tuple of Spot
-        Points by photo and row, none twice; a spot named one by one wins over one of a band.
+def spots_of(layout: ControlLayout, photos: int, rows: int) -> tuple[Spot, ...]:
+    """Control points of a layout by photo and row, none twice; a spot named one by one wins over one of a band.
 
     Raises
     ------
@@ -81,7 +71,7 @@ def spots_of(layout: Layout, photos: int, rows: int) -> tuple[Spot, ...]:
     return tuple(chosen[place] for place in sorted(chosen))
 
 
-def _stations(layout: Layout, last: int) -> list[int]:
+def _stations(layout: ControlLayout, last: int) -> list[int]:
     """Photos of the bands, from 0."""
     if layout.every is not None:
         return sorted({*range(0, last + 1, layout.every), last})
@@ -93,18 +83,7 @@ def _stations(layout: Layout, last: int) -> list[int]:
 
 
 def across(count: int, rows: int) -> list[int]:
-    """Rows of the points of a band, spread evenly: the middle one, both edges, and so on.
-
-    Parameters
-    ----------
-    rows : int
-        Rows of pass points.
-
-    Raises
-    ------
-    InputError
-        When there are fewer rows.
-    """
+    """Rows of the points of a band, spread evenly: the middle one, both edges, and so on."""
     if not 1 <= count <= rows:
         message = f"a band of {count} points does not fit {rows} rows of pass points"
         raise InputError(Fault(message, "plan-place", key="layouts", expected=f"1 to {rows} points"))

@@ -28,79 +28,24 @@ LEAST_REDUNDANCY = 3  # below it a standard deviation from the residuals is most
 RANK_TOLERANCE = 5e-3  # of the singular values of the scaled columns: below it x² is as good as a multiple of x
 
 
-# ------------------------------------------------------------------------------------------------- differentials
-
-
-def relative_differentials(
-    base: float, parallax: float, image: ArrayLike, errors: ArrayLike, focal: float
-) -> tuple[float, float, float]:
-    """dX/X, dY/Y and dZ/Z of a point in the normal case.
-
-    Parameters
-    ----------
-    image : array_like, shape (2,)
-        x and y.
-    errors : array_like, shape (3,)
-        dx, dy and df.
-    """
-    (x, y), (dx, dy, df) = np.asarray(image, float), np.asarray(errors, float)
-    common = base - parallax
-    return common + dx / x, common + dy / y, common + df / focal
-
-
 def parallax_error(xy: ArrayLike, elements: ArrayLike, focal: float, base: float, measured: ArrayLike = 0.0) -> Array:
-    """Return the quantity c that all errors of a point go through.
+    """Return the quantity c, mm, that all errors of a point go through (eq. 10.8).
 
     Parameters
     ----------
     xy : array_like, shape (n, 2)
         x and y.
     elements : array_like, shape (..., 5)
-        Errors of the elements, radians.
-    focal, base : float
-        f and b, mm.
+        Errors of the elements, radians. A constant f (dalpha2' - dalpha1') is left out of c, which is scale and height
+        datum only.
     measured : array_like
         Error dp of the x parallax, mm.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        c in mm. A constant f (dalpha2' - dalpha1') is left out, which is scale and height datum only.
     """
     x, y = np.moveaxis(np.asarray(xy, float), -1, 0)
     al1, ka1, al2, om2, ka2 = np.moveaxis(np.asarray(elements, float), -1, 0)
     right = x - base
     turned = (right**2 * al2 - x**2 * al1 + right * y * om2) / focal
     found: Array = turned - y * (ka2 - ka1) - np.asarray(measured, float)
-    return found
-
-
-def ground_errors(
-    xy: ArrayLike, parallax: ArrayLike, scale: float, focal: float, base: float, image: ArrayLike = (0.0, 0.0)
-) -> Array:
-    """Errors of points from c.
-
-    Parameters
-    ----------
-    xy : array_like, shape (n, 2)
-        x and y, mm.
-    parallax : array_like, shape (n,)
-        c, mm.
-    scale : float
-        m, denominator of the photo scale.
-    focal, base : float
-        f and b, mm.
-    image : array_like, shape (2,) or (n, 2)
-        Errors dx, dy of the left image point, mm.
-
-    Returns
-    -------
-    ndarray, shape (n, 3)
-        Errors along, across and up, ground mm.
-    """
-    place, c = np.asarray(xy, float), np.asarray(parallax, float)
-    plan = place / base * c[..., None] + np.asarray(image, float)
-    found: Array = scale * np.concatenate([plan, (-focal / base * c)[..., None]], axis=-1)
     return found
 
 
@@ -120,44 +65,10 @@ SIDE, CENTRAL = "side", "central"
 PRINTED = {SIDE: Constants(3.5, 2.3), CENTRAL: Constants(2.1, 1.6)}
 
 
-def source_constants() -> dict[str, Constants]:
-    """Return the printed constants before rounding, under the assumptions of the source.
-
-    Returns
-    -------
-    dict of str to Constants
-        For side points (y = b) and central points (y = 0).
-
-    Notes
-    -----
-    With a = b: alpha counts 1/2, omega 3/4 and the measured parallax 2. The side points take m_kappa = m_q / b for
-    each of the two kappas, which is not what six points give, omega at the left edge and plan at the right edge.
-
-    Source: [003] eq. 10.10, 10.11; the assumptions are found by trying.
-    """
-    found = {}
-    for name, parts, sides in ((SIDE, (0.5, 0.75, 2.0, 2.0), 2), (CENTRAL, (0.5, 2.0), 1)):
-        variance = sum(parts)
-        # plan: x = b; a side point has an error in y as in x, a central point has none from c
-        plan = np.sqrt(2 * (variance + 1)) if sides == 2 else np.sqrt(variance + 2)
-        found[name] = Constants(float(plan), float(np.sqrt(variance)))
-    return found
-
-
 def rigorous_factors(xy: ArrayLike, focal: float, width: float, base: float) -> Array:
-    """Variance of c in units of the variance of a y parallax, with the cofactors of six standard points.
+    """Variance of c in units of the variance of a y parallax, with the cofactors of six standard points, shape (n,).
 
-    Parameters
-    ----------
-    xy : array_like, shape (n, 2)
-        x and y, mm.
-    focal, width, base : float
-        f, the distance a of the side points from the middle ones, and b, mm.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        var(c) / m_q², the measured parallax counting 2.
+    `width` is the distance a of the side points from the middle ones, mm; the measured parallax counts 2.
     """
     place = np.asarray(xy, float)
     rows = np.stack([parallax_error(place, unit, focal, base) for unit in np.eye(5)], axis=-1)
@@ -166,13 +77,7 @@ def rigorous_factors(xy: ArrayLike, focal: float, width: float, base: float) -> 
 
 
 def rigorous_constants(xy: ArrayLike, focal: float, width: float, base: float) -> list[Constants]:
-    """Constants for any place in the model.
-
-    Returns
-    -------
-    list of Constants
-        One for each place. dx and dy of the left point count 1 each, as in the source.
-    """
+    """Constants for any place in the model; dx and dy of the left point count 1 each, as in the source."""
     place = np.asarray(xy, float)
     variance = rigorous_factors(place, focal, width, base)
     plan = np.sqrt((place**2).sum(axis=-1) / base**2 * variance + 2)
@@ -184,13 +89,6 @@ def rigorous_constants(xy: ArrayLike, focal: float, width: float, base: float) -
 
 def paraboloid(elements: ArrayLike, scale: float, focal: float, base: float) -> Array:
     """Return the surface into which errors of the elements bend the heights of a model.
-
-    Parameters
-    ----------
-    elements : array_like, shape (5,)
-        Errors of alpha1', kappa1', alpha2', omega2', kappa2', radians.
-    scale, focal, base : float
-        m, f and b (mm).
 
     Returns
     -------
@@ -228,18 +126,7 @@ class Paraboloid:
         return t_quantile(1 - alpha / 2, self.redundancy)
 
     def elements(self, scale: float, base: float) -> tuple[float, float]:
-        """domega2' and dalpha2' - dalpha1', radians, that bend a model so.
-
-        Parameters
-        ----------
-        scale, base : float
-            m and b; residuals in the unit of b.
-
-        Returns
-        -------
-        tuple of float
-            -C b / m and -D b / m.
-        """
+        """domega2' and dalpha2' - dalpha1', radians, that bend a model so (residuals in the unit of b)."""
         twist, bend = self.coefficients[3:]
         return -float(twist) * base / scale, -float(bend) * base / scale
 
@@ -251,17 +138,9 @@ def paraboloid_rows(xy: ArrayLike) -> Array:
 
 
 def determines_paraboloid(xy: ArrayLike) -> bool:
-    """Whether points determine the five coefficients: five of them, at three or more distances along the base.
+    """Whether points (n, 2) determine the five coefficients: five of them, at three or more distances along the base.
 
-    Parameters
-    ----------
-    xy : array_like, shape (n, 2)
-        x and y.
-
-    Returns
-    -------
-    bool
-        False also for the six standard points, where x² = b x.
+    The six standard points do not: there x² = b x.
     """
     place = np.asarray(xy, float)
     if len(place) < LEAST_POINTS:

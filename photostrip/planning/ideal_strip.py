@@ -106,20 +106,7 @@ class IdealStrip:
         return found[np.lexsort((self.row[found], self.station[found]))]
 
     def at(self, station: int, row: int) -> int:
-        """Return the point of a column.
-
-        Parameters
-        ----------
-        station : int
-            Photo, counted from 0.
-        row : int
-            Row from left to right, counted from 0.
-
-        Raises
-        ------
-        InputError
-            When there is none.
-        """
+        """Return the point of a row, from left to right, at the nadir of a photo, both counted from 0."""
         found = np.flatnonzero((self.station == station) & (self.row == row))
         if not len(found):
             message = f"photo {station + 1} has no pass point in row {row + 1}"
@@ -129,13 +116,7 @@ class IdealStrip:
 
 
 def ideal_strip(geometry: StripGeometry) -> IdealStrip:
-    """Simulate a strip without errors and form it.
-
-    Raises
-    ------
-    InputError
-        When photos do not overlap enough.
-    """
+    """Simulate a strip without errors and form it; photos that do not overlap enough are refused."""
     if geometry.photos < LEAST_PHOTOS:
         message = f"{geometry.photos} photos are no strip; a single model is planned by `plan model`"
         raise InputError(Fault(message, "plan-photos", key="photos", expected=f"{LEAST_PHOTOS} or more"))
@@ -157,18 +138,18 @@ def ideal_strip(geometry: StripGeometry) -> IdealStrip:
     middle = simulation.truth.centers.mean(axis=0)
     middle[2] = 0.0
     truth = simulation.truth.points.xyz - middle
-    return _strip(geometry, simulation, observations, (orientation, formed), truth)
+    return _strip(geometry, simulation, observations, orientation, formed, truth)
 
 
 def _strip(
     geometry: StripGeometry,
     simulation: Simulation,
     observations: PhotoPoints,
-    found: tuple[Orientation, FormedStrip],
+    orientation: Orientation,
+    formed: FormedStrip,
     truth: Floats,
 ) -> IdealStrip:
     """Carry the formed strip to the ground and find the columns of points."""
-    orientation, formed = found
     xyz = truth[formed.point]
     similarity = Similarity.from_points(formed.xyz, xyz)
     centers = similarity(formed.centers)
@@ -178,7 +159,18 @@ def _strip(
     position = np.array([photos.index(photo) for photo in observations.photo_ids], np.intp)
     errors = differentiate_strip(orientation, formed, similarity, position[observations.photo], observations.sigma)
     return IdealStrip(
-        geometry, photos, observations, orientation, formed, similarity, xyz, centers, rotations, station, row, errors
+        geometry=geometry,
+        photos=photos,
+        observations=observations,
+        orientation=orientation,
+        formed=formed,
+        similarity=similarity,
+        xyz=xyz,
+        centers=centers,
+        rotations=rotations,
+        station=station,
+        row=row,
+        errors=errors,
     )
 
 
@@ -189,6 +181,6 @@ def _columns(geometry: StripGeometry, centers: Floats, xyz: Floats) -> tuple[Num
     station[near.min(axis=1) > SAME * geometry.base] = -1
     row = np.full(len(xyz), -1)
     for each in range(len(centers)):
-        here = np.flatnonzero(station == each)
-        row[here[np.argsort(-xyz[here, 1])]] = np.arange(len(here))
+        column = np.flatnonzero(station == each)
+        row[column[np.argsort(-xyz[column, 1])]] = np.arange(len(column))
     return station, row

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.planning.single_model import PARAMETERS, Control, free_influence, parameter_rows
+from photostrip.planning.element_errors import free_influence
+from photostrip.planning.single_model import PARAMETERS, ModelControl, parameter_rows
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 class AdjustedModel:
     """An oriented model."""
 
-    control: Control
+    control: ModelControl
     base: float
     parameters: Array  # (7,): absolute orientation, in the order of `PARAMETERS`
     elements: Array  # (4,): estimated errors of the relative orientation: dkappa, dbz, dalpha2, domega
@@ -36,47 +37,21 @@ class AdjustedModel:
     weights: Array
 
     def correction(self, points: ArrayLike) -> Array:
-        """Return what is to be subtracted from model points.
-
-        Parameters
-        ----------
-        points : array_like, shape (q, 3)
-            x, y, depth.
-
-        Returns
-        -------
-        ndarray, shape (q, 3)
-            Absolute orientation and deformation together.
-        """
+        """Return what is to be subtracted from model points (q, 3): absolute orientation and deformation together."""
         found: Array = self._rows(points) @ np.concatenate([self.parameters, self.elements])
         return found
 
     def covariance(self, points: ArrayLike, measured: ArrayLike, row: Rows | None = None) -> Array:
-        """Covariance of corrected points.
-
-        Parameters
-        ----------
-        points : array_like, shape (q, 3)
-            x, y, depth.
-        measured : array_like, shape (q, 3, 3)
-            Covariance of their measured model coordinates.
-        row : ndarray of int, shape (q,), optional
-            The control point that a point is, -1 for none.
-
-        Returns
-        -------
-        ndarray, shape (q, 3, 3)
-            Covariance of x, y and height.
-        """
-        rows, own = self._rows(points), np.array(measured, float)
+        """Covariance (q, 3, 3) of corrected points; the arguments are those of ``single_model.expected_errors``."""
+        rows, measuring = self._rows(points), np.array(measured, float)
         if row is not None:
             known = np.flatnonzero(row >= 0)
-            own[known] = self.control.measured[row[known]]
-        found: Array = own + rows @ self.cofactors @ np.swapaxes(rows, 1, 2)
+            measuring[known] = self.control.measured[row[known]]
+        found: Array = measuring + rows @ self.cofactors @ np.swapaxes(rows, 1, 2)
         if row is not None:
             # the measurement of a control point is part of the estimate
-            own_part = rows[known] @ self.cofactors @ np.swapaxes(rows[known], 1, 2)
-            shared = own_part @ self.weights[row[known]] @ own[known]
+            estimated = rows[known] @ self.cofactors @ np.swapaxes(rows[known], 1, 2)
+            shared = estimated @ self.weights[row[known]] @ measuring[known]
             found[known] -= shared + np.swapaxes(shared, 1, 2)
         return found
 
@@ -84,22 +59,15 @@ class AdjustedModel:
         return np.concatenate([parameter_rows(points, self.control), free_influence(points, self.base)], axis=2)
 
 
-def adjust_model(control: Control, misclosures: ArrayLike, base: float, elements: ArrayLike) -> AdjustedModel:
+def adjust_model(control: ModelControl, misclosures: ArrayLike, base: float, elements: ArrayLike) -> AdjustedModel:
     """Orient a model with the errors of its relative orientation as further unknowns.
 
     Parameters
     ----------
-    control : Control
-        Control; coordinates that are not given do not count.
     misclosures : array_like, shape (n, 3)
-        W: model minus given.
+        W: model minus given; coordinates that are not given do not count.
     elements : array_like, shape (4, 4)
         A-priori covariance of dkappa, dbz, dalpha2, domega.
-
-    Returns
-    -------
-    AdjustedModel
-        Orientation, elements and their covariance.
     """
     rows = np.concatenate([parameter_rows(control.points, control), free_influence(control.points, base)], axis=2)
     counts = np.stack([control.plan, control.plan, control.height], axis=1)

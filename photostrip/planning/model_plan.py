@@ -8,16 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.planning import deformation
+from photostrip.planning.element_errors import FREE, element_covariance, free_covariance, measured_covariance
 from photostrip.planning.model_adjustment import adjust_model
-from photostrip.planning.single_model import (
-    FREE,
-    Control,
-    Expected,
-    element_covariance,
-    expected_errors,
-    free_covariance,
-    measured_covariance,
-)
+from photostrip.planning.single_model import ExpectedErrors, ModelControl, expected_errors
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -67,13 +60,7 @@ class ModelSpec:
 
 
 def standard_zones(base: float, width: float) -> tuple[Place, ...]:
-    """Return the six standard points.
-
-    Returns
-    -------
-    tuple of tuple of float
-        Points 1 to 6 as everywhere: middle, upper and lower ones, each left and right.
-    """
+    """Return the six standard points in their usual order: middle, upper and lower ones, each left and right."""
     return tuple((x, y) for y in (0.0, width, -width) for x in (0.0, base))
 
 
@@ -90,7 +77,7 @@ class Forecast:
 
     spec: ModelSpec
     places: Array  # (q, 2): points of the grid, mm at photo scale, rows across the flight after each other
-    expected: Expected  # their errors after the plain absolute orientation, mm at photo scale
+    expected: ExpectedErrors  # their errors after the plain absolute orientation, mm at photo scale
     adjusted: Array  # (q, 3, 3): their covariance when the elements are unknowns of the orientation
     at_control: Array  # (n, 3): standard deviations of the adjusted control points, metres
     elements: Array  # (4,): standard deviations of `FREE`: radians, dbz in mm at photo scale
@@ -106,13 +93,10 @@ class Forecast:
         return _sigmas(self.adjusted) * self.spec.ground_unit
 
     def shares(self) -> dict[str, Array]:
-        """Return the standard deviations that each source alone would cause.
+        """Return the standard deviations (q, 3), metres, that each source alone would cause.
 
-        Returns
-        -------
-        dict of str to ndarray, shape (q, 3)
-            Metres: the measurement of the point, each element, the relative orientation as a whole, control as
-            measured and as given, all together, and all together with the elements as unknowns.
+        The measurement of the point, each element, the relative orientation as a whole, control as measured and as
+        given, all together, and all together with the elements as unknowns.
         """
         unit, sources = self.spec.ground_unit, self.expected.sources
         found = {"measuring of the point": _sigmas(sources["measuring"]) * unit}
@@ -137,12 +121,7 @@ class SimpleAccuracy:
 
 
 def plan_model(spec: ModelSpec) -> Forecast:
-    """Compute the expected errors of a model.
-
-    Returns
-    -------
-    Forecast
-        Errors over the model and at its control.
+    """Compute the expected errors of a model over its area and at its control.
 
     Raises
     ------
@@ -155,34 +134,23 @@ def plan_model(spec: ModelSpec) -> Forecast:
     control = _control(spec)
     elements = _elements(spec)
     points = _level(places, spec.focal)
-    own = _measured(points, spec)
-    expected = expected_errors(points, own, control, spec.base, elements)
+    measured = _measured(points, spec)
+    expected = expected_errors(points, measured, control, spec.base, elements)
     adjusted = adjust_model(control, np.zeros((len(spec.control), 3)), spec.base, elements)
     number = np.arange(len(spec.control))
     at_control = expected_errors(control.points, control.measured, control, spec.base, elements, number)
     return Forecast(
         spec,
-        places,
-        expected,
-        adjusted.covariance(points, own),
-        at_control.sigmas * spec.ground_unit,
-        np.sqrt(np.diag(elements)),
+        places=places,
+        expected=expected,
+        adjusted=adjusted.covariance(points, measured),
+        at_control=at_control.sigmas * spec.ground_unit,
+        elements=np.sqrt(np.diag(elements)),
     )
 
 
 def simple_accuracy(spec: ModelSpec) -> list[SimpleAccuracy]:
-    """Apply the simple formulas to the corners and the middle of a model.
-
-    Parameters
-    ----------
-    spec : ModelSpec
-        The model; its control does not matter to them.
-
-    Returns
-    -------
-    list of SimpleAccuracy
-        Side points left and right, middle points left and right.
-    """
+    """Apply the simple formulas to side and middle points of a model, left and right; control does not matter there."""
     b, a, f = spec.base, spec.width, spec.focal
     places = {
         "side, left": (0.0, a),
@@ -214,15 +182,15 @@ def _measured(points: Array, spec: ModelSpec) -> Array:
     return measured_covariance(points, spec.base, spec.focal, spec.image_sigma)
 
 
-def _control(spec: ModelSpec) -> Control:
+def _control(spec: ModelSpec) -> ModelControl:
     points = _level([point.at for point in spec.control] or np.zeros((0, 2)), spec.focal)
     given = np.diag(np.square(np.array(spec.control_sigma) / spec.ground_unit))
-    return Control(
+    return ModelControl(
         points,
-        np.array(["xy" in point.use for point in spec.control], bool),
-        np.array(["z" in point.use for point in spec.control], bool),
-        _measured(points, spec),
-        np.broadcast_to(given, (len(points), 3, 3)),
+        plan=np.array(["xy" in point.use for point in spec.control], bool),
+        height=np.array(["z" in point.use for point in spec.control], bool),
+        measured=_measured(points, spec),
+        given=np.broadcast_to(given, (len(points), 3, 3)),
     )
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import GeometryError
-from photostrip.planning.control_layout import Layout, Spot, across, spots_of
+from photostrip.planning.control_layout import ControlLayout, Spot, across, spots_of
 from photostrip.planning.strip_methods import Accuracy, accuracy
 
 if TYPE_CHECKING:
@@ -53,30 +53,20 @@ class Placement:
 
 
 @dataclass(frozen=True)
-class Placed:
-    """The best places found.
-
-    Parameters
-    ----------
-    spots : tuple of Spot
-        Where the further points go.
-    before, equal, found : tuple of float
-        Worst standard deviations in plan and height, metres: of the layout alone, with the points equally spaced, and
-        at the places found.
-    equal_spots : tuple of Spot
-        The best of the equally spaced ways.
-    gain : float
-        Part by which the search lowers what equal spacing gives: with a required accuracy the worse of plan and height,
-        each relative to what is required, else the root mean square of both worst standard deviations, each relative
-        to that of equal spacing. 0 where it does not beat equal spacing.
-    """
+class BestPlaces:
+    """The best places found."""
 
     placement: Placement
-    spots: tuple[Spot, ...]
+    spots: tuple[Spot, ...]  # where the further points go
+    # before, equal, found: worst standard deviations in plan and height, metres: of the layout alone, with the points
+    # equally spaced, and at the places found
     before: tuple[float, float]
     equal: tuple[float, float]
-    equal_spots: tuple[Spot, ...]
+    equal_spots: tuple[Spot, ...]  # the best of the equally spaced ways
     found: tuple[float, float]
+    # part by which the search lowers what equal spacing gives: with a required accuracy the worse of plan and height,
+    # each relative to what is required, else the root mean square of both worst standard deviations, each relative to
+    # that of equal spacing. 0 where it does not beat equal spacing
     gain: float
     tried: int
 
@@ -97,12 +87,12 @@ class _Search:
     required: bool  # whether the scale is what is required: then the larger of plan and height counts
     # whether plan and height count otherwise: a point in height only can do nothing for the plan
     counts: tuple[bool, bool]
-    seen: dict[frozenset[Spot], tuple[float, float]]
+    tried: dict[frozenset[Spot], tuple[float, float]]
 
     def worst(self, spots: frozenset[Spot]) -> tuple[float, float]:
-        if spots not in self.seen:
-            self.seen[spots] = self.look(spots)
-        return self.seen[spots]
+        if spots not in self.tried:
+            self.tried[spots] = self.look(spots)
+        return self.tried[spots]
 
     def score(self, spots: frozenset[Spot]) -> float:
         """Worst standard deviations relative to the scale: the larger of plan and height, or their mean square."""
@@ -112,56 +102,46 @@ class _Search:
         counts = [part for part, counted in zip(parts, self.counts, strict=True) if counted]
         return round(float(np.sqrt(np.mean(np.square(counts)))), DECIMALS)
 
-    def spent(self) -> bool:
+    def is_spent(self) -> bool:
         """Whether it has looked at enough."""
-        return len(self.seen) >= MOST_TRIED
+        return len(self.tried) >= MOST_TRIED
 
 
-def best_places(strip: IdealStrip, layout: Layout, placement: Placement, required: Required) -> Placed:
+def best_places(strip: IdealStrip, layout: ControlLayout, placement: Placement, required: Required) -> BestPlaces:
     """Search the best places for further control points.
 
-    Parameters
-    ----------
-    layout : Layout
-        The control that is there in any case.
-    placement : Placement
-        How many points, for which method.
-    required : Required
-        Weighs plan against height; without it both count alike, relative to what equal spacing gives.
-
-    Returns
-    -------
-    Placed
-        The places; those of equal spacing when the search finds nothing better.
-
-    Notes
-    -----
     Places are the pass points at the nadirs, in long strips those at the edges and in the middle. The search starts
     from equal spacing and from points added one by one where each helps most, then moves one point at a time to a place
     not far away where it helps most, until no move helps. It may miss the very best layout; it never ends behind equal
     spacing.
+
+    Parameters
+    ----------
+    layout : ControlLayout
+        The control that is there in any case.
+    required : Required
+        Weighs plan against height; without it both count alike, relative to what equal spacing gives.
     """
     photos, rows = strip.geometry.photos, strip.geometry.points.rows
     fixed = spots_of(layout, photos, rows)
 
     def look(spots: frozenset[Spot]) -> tuple[float, float]:
-        given = tuple(sorted((*fixed, *spots), key=lambda spot: (spot.photo, spot.row)))
         try:
-            found = accuracy(strip, layout, given, placement.method)
+            found = accuracy(strip, layout, _in_order((*fixed, *spots)), placement.method)
         except GeometryError:
             return float("inf"), float("inf")
         return worst(found)
 
-    taken = {(spot.photo, spot.row) for spot in fixed}
+    fixed_places = {(spot.photo, spot.row) for spot in fixed}
     free = [
         Spot(photo, row, placement.use)
         for photo in range(1, photos + 1)
         for row in (1 + each for each in across(rows if photos <= SHORT else min(EDGES_AND_MIDDLE, rows), rows))
-        if (photo, row) not in taken
+        if (photo, row) not in fixed_places
     ]
     asked = required.plan is not None or required.height is not None
     search = _Search(look, (1.0, 1.0), asked, ("xy" in placement.use, "z" in placement.use), {})
-    ways = [way for way in equal_ways(placement, photos, rows) if not {(s.photo, s.row) for s in way} & taken]
+    ways = [way for way in equal_ways(placement, photos, rows) if not {(s.photo, s.row) for s in way} & fixed_places]
     ways = ways or [frozenset(free[: placement.points])]
     reference = search.worst(min(ways, key=lambda way: max(search.worst(way))))
     search.scale = (required.plan or reference[0], required.height or reference[1])
@@ -171,27 +151,24 @@ def best_places(strip: IdealStrip, layout: Layout, placement: Placement, require
     gain = 1 - search.score(best) / search.score(spaced)
     if gain < WORTH:
         best, gain = spaced, 0.0
-    order = sorted(best, key=lambda spot: (spot.photo, spot.row))
-    return Placed(
+    return BestPlaces(
         placement,
-        tuple(order),
-        search.worst(frozenset()),
-        search.worst(spaced),
-        tuple(sorted(spaced, key=lambda spot: (spot.photo, spot.row))),
-        search.worst(best),
-        gain,
-        len(search.seen),
+        spots=_in_order(best),
+        before=search.worst(frozenset()),
+        equal=search.worst(spaced),
+        equal_spots=_in_order(spaced),
+        found=search.worst(best),
+        gain=gain,
+        tried=len(search.tried),
     )
 
 
-def equal_ways(placement: Placement, photos: int, rows: int) -> Iterator[frozenset[Spot]]:
-    """Return the ways of spacing points equally: on alternating edges, in the middle, by pairs, by bands of three.
+def _in_order(spots: Iterable[Spot]) -> tuple[Spot, ...]:
+    return tuple(sorted(spots, key=lambda spot: (spot.photo, spot.row)))
 
-    Yields
-    ------
-    frozenset of Spot
-        One way; only those that have exactly so many points.
-    """
+
+def equal_ways(placement: Placement, photos: int, rows: int) -> Iterator[frozenset[Spot]]:
+    """Ways of spacing exactly so many points equally: on alternating edges, in the middle, by twos or threes."""
     count = placement.points
     edges = across(2, rows)
     for sides in (edges, edges[::-1], across(1, rows)):
@@ -225,14 +202,14 @@ def _greedy(search: _Search, free: list[Spot], count: int) -> frozenset[Spot]:
 def _exchanged(search: _Search, chosen: frozenset[Spot], free: list[Spot]) -> frozenset[Spot]:
     """Move one point at a time to where it helps most, until no move helps."""
     helped = True
-    while helped and not search.spent():
+    while helped and not search.is_spent():
         helped = False
-        for spot in sorted(chosen, key=lambda each: (each.photo, each.row)):
+        for spot in _in_order(chosen):
             rest = chosen - {spot}
             near = [each for each in free if each not in rest and abs(each.photo - spot.photo) <= FARTHEST]
             best = min((rest | {other} for other in near), key=search.score)
             if search.score(best) < search.score(chosen) * (1 - 1e-9):
                 chosen, helped = best, True
-            if search.spent():
+            if search.is_spent():
                 break
     return chosen

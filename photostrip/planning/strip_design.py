@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import GeometryError, InputError
-from photostrip.planning.control_layout import Layout, Spot, spots_of
+from photostrip.planning.control_layout import ControlLayout, Spot, spots_of
 from photostrip.planning.ideal_strip import IdealStrip, StripGeometry, ideal_strip
-from photostrip.planning.placement import Placed, Placement, Required, best_places, worst
+from photostrip.planning.placement import BestPlaces, Placement, Required, best_places, worst
 from photostrip.planning.strip_methods import BUNDLE, METHODS, Accuracy, accuracy
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ class Design:
     """What is to be designed."""
 
     geometry: StripGeometry
-    layouts: tuple[Layout, ...]
+    layouts: tuple[ControlLayout, ...]
     methods: tuple[str, ...] = METHODS
     required: Required = ANYTHING  # accuracy that is needed
     placement: Placement | None = None
@@ -40,7 +40,7 @@ class Design:
 class Outcome:
     """One layout adjusted by one method."""
 
-    layout: Layout
+    layout: ControlLayout
     spots: tuple[Spot, ...]
     method: str
     accuracy: Accuracy | None  # expected precision; None where the control does not determine the strip
@@ -60,28 +60,18 @@ class Needed:
 
 
 @dataclass(frozen=True, eq=False)
-class Report:
+class DesignReport:
     """Everything about a design."""
 
     design: Design
     strip: IdealStrip
     outcomes: tuple[Outcome, ...]
     needed: tuple[Needed, ...]  # bands that the required accuracy needs, by method; empty when none is required
-    placed: Placed | None
+    placed: BestPlaces | None
 
 
-def plan_strip(design: Design) -> Report:
-    """Work out a design.
-
-    Parameters
-    ----------
-    design : Design
-        What is to be designed.
-
-    Returns
-    -------
-    Report
-        Expected precision of every layout and method, bands needed and best places.
+def plan_strip(design: Design) -> DesignReport:
+    """Work out a design: expected precision of every layout and method, bands needed and best places.
 
     Raises
     ------
@@ -100,7 +90,7 @@ def plan_strip(design: Design) -> Report:
     if design.placement is not None:
         into = next(layout for layout in design.layouts if layout.name == design.placement.into)
         placed = best_places(strip, into, design.placement, design.required)
-    return Report(design, strip, outcomes, needed, placed)
+    return DesignReport(design, strip, outcomes, needed, placed)
 
 
 def _require_places(design: Design) -> None:
@@ -116,30 +106,13 @@ def _require_places(design: Design) -> None:
         raise InputError(reversed(faults))
 
 
-def methods_of(design: Design, layout: Layout) -> tuple[str, ...]:
-    """Return the methods that a layout is adjusted by: with perspective centres the bundle, which alone uses them.
-
-    Parameters
-    ----------
-    design : Design
-        Methods that are compared.
-
-    Returns
-    -------
-    tuple of str
-        All of them, or the bundle alone.
-    """
+def methods_of(design: Design, layout: ControlLayout) -> tuple[str, ...]:
+    """Return the methods that a layout is adjusted by: with perspective centres the bundle, which alone uses them."""
     return (BUNDLE,) if layout.gnss is not None and BUNDLE in design.methods else design.methods
 
 
-def outcome(strip: IdealStrip, layout: Layout, method: str) -> Outcome:
-    """Adjust one layout by one method.
-
-    Returns
-    -------
-    Outcome
-        Its precision, or why there is none.
-    """
+def outcome(strip: IdealStrip, layout: ControlLayout, method: str) -> Outcome:
+    """Adjust one layout by one method; where the control does not determine the strip, say why."""
     spots = spots_of(layout, strip.geometry.photos, strip.geometry.points.rows)
     try:
         return Outcome(layout, spots, method, accuracy(strip, layout, spots, method))
@@ -148,31 +121,21 @@ def outcome(strip: IdealStrip, layout: Layout, method: str) -> Outcome:
 
 
 def along_the_strip(strip: IdealStrip, expected: Accuracy) -> Floats:
-    """Return the worst standard deviations near each photo.
+    """Worst standard deviations near each photo in plan and height, shape (m, 2), metres.
 
-    Returns
-    -------
-    ndarray, shape (m, 2)
-        In plan and height, metres, of the points whose nearest nadir is that of the photo, control included.
+    Of the points whose nearest nadir is that of the photo, control included.
     """
     nearest = np.abs(strip.xyz[:, None, 0] - strip.centers[None, :, 0]).argmin(axis=1)
     sigmas = expected.plan_and_height
     return np.array([sigmas[nearest == photo].max(axis=0) for photo in range(len(strip.centers))])
 
 
-def bands_needed(strip: IdealStrip, layout: Layout, method: str, required: Required) -> Needed:
+def bands_needed(strip: IdealStrip, layout: ControlLayout, method: str, required: Required) -> Needed:
     """Find the least number of evenly spread bands that reaches an accuracy.
 
-    Parameters
-    ----------
-    layout : Layout
-        Points of a band, and their precision.
-
-    Returns
-    -------
-    Needed
-        The number. Up to 20 bands are tried one more at a time, more in steps of a tenth, to a band at every photo;
-        when a step meets the requirement the numbers that it went over are tried too.
+    Up to 20 bands are tried one more at a time, more in steps of a tenth, to a band at every photo; when a step meets
+    the requirement the numbers that it went over are tried too. The layout gives the points of a band and their
+    precision.
     """
     last = (float("inf"), float("inf"))
     failed = 1
@@ -196,7 +159,7 @@ def _steps(photos: int) -> Iterator[int]:
     yield photos
 
 
-def _with_bands(strip: IdealStrip, layout: Layout, method: str, bands: int) -> tuple[float, float]:
+def _with_bands(strip: IdealStrip, layout: ControlLayout, method: str, bands: int) -> tuple[float, float]:
     """Worst standard deviations with evenly spread bands; infinite where they do not determine the strip."""
     found = outcome(strip, replace(layout, kind="bands", bands=bands, every=None, spots=()), method).accuracy
     return worst(found) if found is not None and len(found.new) else (float("inf"), float("inf"))

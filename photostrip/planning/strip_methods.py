@@ -1,6 +1,6 @@
 """How precise a planned strip becomes with a layout of control, by each method of adjustment.
 
-The covariances are those that a run reports for a measured strip: nothing is propagated here a second time.
+The covariances are those that a run reports for a measured strip: nothing is propagated anew.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from photostrip.errors import GeometryError
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.local_frame import IntermediateFrame
 from photostrip.geodesy.tying import tie_frames
-from photostrip.planning.control_layout import USES, Layout, Spot, numbers_of
+from photostrip.planning.control_layout import USES, ControlLayout, Spot, numbers_of
 from photostrip.points import ControlPoints
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.bundle.observations import problem as bundle
@@ -70,20 +70,7 @@ class Accuracy:
 
 
 def control_of(strip: IdealStrip, spots: tuple[Spot, ...], sigma: tuple[float, float, float]) -> ControlPoints:
-    """Return the control points of a layout.
-
-    Parameters
-    ----------
-    spots : tuple of Spot
-        Where they are.
-    sigma : tuple of float
-        Standard deviations along, across and in height, metres.
-
-    Returns
-    -------
-    ControlPoints
-        In the order of the spots, along X, Y, Z of the strip.
-    """
+    """Return the control points of a layout along X, Y, Z of the strip, in the order of the spots."""
     numbers = numbers_of(strip, spots)
     ids = tuple(f"{spot.photo}/{spot.row}" for spot in spots)
     use = np.array([USES[spot.use] for spot in spots], bool).reshape(-1, 3)
@@ -91,18 +78,10 @@ def control_of(strip: IdealStrip, spots: tuple[Spot, ...], sigma: tuple[float, f
     return ControlPoints(ids, np.where(use, strip.xyz[numbers], np.nan), use, np.zeros(len(ids), bool), given)
 
 
-def accuracy(strip: IdealStrip, layout: Layout, spots: tuple[Spot, ...], method: str) -> Accuracy:
+def accuracy(strip: IdealStrip, layout: ControlLayout, spots: tuple[Spot, ...], method: str) -> Accuracy:
     """Compute the expected precision of a strip with one layout of control, by one method.
 
-    Parameters
-    ----------
-    layout : Layout
-        Precision of the control and of measured perspective centres, which only the bundle uses.
-
-    Returns
-    -------
-    Accuracy
-        Covariances and detectable errors of the control.
+    The layout gives the precision of the control and of measured perspective centres, which only the bundle uses.
 
     Raises
     ------
@@ -150,19 +129,13 @@ def _oriented(strip: IdealStrip, numbers: Numbers, control: ControlPoints) -> _F
 
 def _fitted(strip: IdealStrip, ground: _Fit, method: str) -> Accuracy:
     """Similarity, and polynomials of a fixed degree as far as the control carries them."""
-    numbers, control, targets, weight, xyz = (
-        ground.numbers,
-        ground.control,
-        ground.targets,
-        ground.weight,
-        ground.xyz,
-    )
+    numbers, targets, weight, xyz = ground.numbers, ground.targets, ground.weight, ground.xyz
     terms: list[tuple[str, ...]] = [(), (), ()]
     if method in DEGREES:
         problem = correction.Problem(xyz[numbers], targets, weight, strip.geometry.base, _breadth(xyz))
         terms = [axis.terms for axis in correction.fit(problem, correction.PolynomialSettings(DEGREES[method])).axes]
     axes = targets.axes(xyz[numbers])
-    found = control_errors.misclosures(strip.errors.points, control, numbers, axes)
+    found = control_errors.misclosures(strip.errors.points, ground.control, numbers, axes)
     shift = targets.intermediate.intermediate_from_cartesian(strip.errors.origin[None])[0]
     fit = control_errors.fit_operator(found, weight, xyz[numbers], terms, shift)
     parameters = covariances.of_parameters(strip.errors, found, fit.operator)
@@ -202,7 +175,7 @@ def _precision(strip: IdealStrip) -> tuple[float, float]:
 
 
 def _predicted(strip: IdealStrip, ground: _Fit) -> Accuracy:
-    """Misclosures distributed by the strip's own covariance, with the distances of the pass points at the joints."""
+    """Misclosures distributed by the strip's own covariance, with the distances of the pass points at the junctions."""
     numbers, errors = ground.numbers, strip.errors
     axes = np.broadcast_to(np.eye(3), (len(numbers), 3, 3))
     found = control_errors.misclosures(errors.points, ground.control, numbers, axes)
@@ -222,7 +195,7 @@ def _predicted(strip: IdealStrip, ground: _Fit) -> Accuracy:
 # -------------------------------------------------------------------------------------------------------- bundle
 
 
-def _bundle(strip: IdealStrip, layout: Layout, spots: tuple[Spot, ...], control: ControlPoints) -> Accuracy:
+def _bundle(strip: IdealStrip, layout: ControlLayout, spots: tuple[Spot, ...], control: ControlPoints) -> Accuracy:
     """All rays with control and perspective centres in one solution."""
     numbers = np.array(numbers_of(strip, spots), np.intp)
     problem = bundle_problem(strip, layout, numbers, control)
@@ -234,19 +207,10 @@ def _bundle(strip: IdealStrip, layout: Layout, spots: tuple[Spot, ...], control:
     return Accuracy(BUNDLE, BUNDLE, found.points, numbers, np.where(control.use, detectable, np.nan))
 
 
-def bundle_problem(strip: IdealStrip, layout: Layout, numbers: Numbers, control: ControlPoints) -> bundle.BundleProblem:
-    """Return the strip and its control to the bundle adjustment.
-
-    Parameters
-    ----------
-    numbers : ndarray of int, shape (c,)
-        Points that are control.
-
-    Returns
-    -------
-    bundle.BundleProblem
-        Its points are those of the strip, in their order; it starts at the truth.
-    """
+def bundle_problem(
+    strip: IdealStrip, layout: ControlLayout, numbers: Numbers, control: ControlPoints
+) -> bundle.BundleProblem:
+    """Return the strip and its control (point `numbers`) as a bundle adjustment that starts at the truth."""
     observed = strip.observations
     point = np.full(len(observed.point_ids), -1)
     point[strip.formed.point] = np.arange(len(strip.formed.point))

@@ -17,15 +17,13 @@ from photostrip.planning.deformation import (
     SIDE,
     determines_paraboloid,
     fit_paraboloid,
-    ground_errors,
     paraboloid,
     paraboloid_rows,
     parallax_error,
-    relative_differentials,
     rigorous_constants,
     rigorous_factors,
-    source_constants,
 )
+from tests.planning.formulas import ground_errors, relative_differentials, source_constants
 from tests.vectors import cases
 
 if TYPE_CHECKING:

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from photostrip.planning.closed_form import ORDER, control_sums
-from photostrip.planning.single_model import ELEMENTS, Control, influence, orientation_operator
+from photostrip.planning.element_errors import ELEMENTS, influence
+from photostrip.planning.single_model import ModelControl, orientation_operator
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -25,9 +26,9 @@ X_PRINTED = ("b2 in x alpha", "sign in x omega", "symbols")
 Y_PRINTED = ("c8 in y kappa", "b2 in y alpha", "squares in y omega", "symbols")
 
 
-def control() -> Control:
+def control() -> ModelControl:
     every, none = np.ones(len(XY), bool), np.zeros((len(XY), 3, 3))
-    return Control(np.column_stack([XY, np.full(len(XY), DEPTH)]), every, every, none, none)
+    return ModelControl(np.column_stack([XY, np.full(len(XY), DEPTH)]), every, every, none, none)
 
 
 def direct() -> Floats:

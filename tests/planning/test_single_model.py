@@ -12,24 +12,25 @@ from hypothesis import strategies as st
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.planning.closed_form import ORDER, coefficients, control_sums
-from photostrip.planning.model_adjustment import adjust_model
-from photostrip.planning.single_model import (
+from photostrip.planning.element_errors import (
     ELEMENTS,
     FREE,
-    Control,
-    deformation,
     element_covariance,
-    expected_errors,
     free_covariance,
     free_influence,
     influence,
     measured_covariance,
+)
+from photostrip.planning.model_adjustment import adjust_model
+from photostrip.planning.single_model import (
+    ModelControl,
+    deformation,
+    expected_errors,
     orientation_operator,
-    orientation_parameters,
     parameter_rows,
-    six_point_variances,
 )
 from photostrip.triangulation.relative_orientation import six_points
+from tests.planning.formulas import orientation_parameters, six_point_variances
 from tests.vectors import cases
 
 if TYPE_CHECKING:
@@ -44,13 +45,13 @@ TURN = 1e-5  # step of differences, rad or photo scale mm
 PRINTED_ORDER = [ELEMENTS.index(name) for name in ORDER]
 
 
-def control_at(xy: ArrayLike, depth: float = 100.0, sd: tuple[float, float] = (0.0, 0.0)) -> Control:
+def control_at(xy: ArrayLike, depth: float = 100.0, sd: tuple[float, float] = (0.0, 0.0)) -> ModelControl:
     """Full control points at one depth; standard deviations of all measured and of all given coordinates."""
     place = np.asarray(xy, float)
     count = len(place)
     one = np.broadcast_to(np.eye(3), (count, 3, 3))
     yes = np.ones(count, bool)
-    return Control(np.column_stack([place, np.full(count, depth)]), yes, yes, sd[0] ** 2 * one, sd[1] ** 2 * one)
+    return ModelControl(np.column_stack([place, np.full(count, depth)]), yes, yes, sd[0] ** 2 * one, sd[1] ** 2 * one)
 
 
 def diagonal(sd: ArrayLike, count: int) -> Floats:
@@ -113,7 +114,7 @@ def test_expected_errors_computed_apart(vector: Vector) -> None:
     )
     count = len(given_["control_xy"])
     level = control_at(given_["control_xy"], z)
-    control = Control(
+    control = ModelControl(
         level.points,
         level.plan,
         level.height,
@@ -222,7 +223,7 @@ def test_operators_are_the_direct_least_squares_fit(layout: list[Any], seed: int
     height[:4], plan[:2] = True, True
     if not spread(xy[height]):
         return
-    control = Control(full.points, plan, height, full.measured, full.given)
+    control = ModelControl(full.points, plan, height, full.measured, full.given)
     misclosure = rng.normal(size=(len(xy), 3))
     rows = parameter_rows(full.points, control)
     counts = np.stack([plan, plan, height], axis=1)
@@ -316,7 +317,7 @@ def _parallaxes(six: Floats, elements: Floats) -> Floats:
 def test_expected_errors_against_the_exact_chain() -> None:
     at_control, elsewhere = oriented_errors(1500)
     level = control_at(CORNERS, F)
-    control = Control(
+    control = ModelControl(
         level.points, level.plan, level.height, diagonal((0.003, 0.003, 0.006), 5), diagonal((0.002, 0.002, 0.004), 5)
     )
     elements = np.diag(six_point_variances(0.005, F, A, B))

@@ -11,7 +11,7 @@ import pytest
 
 from benchmarks.planning import Task, repetitions
 from photostrip.errors import GeometryError, InputError
-from photostrip.planning.control_layout import Layout, Spot, across, spots_of
+from photostrip.planning.control_layout import ControlLayout, Spot, across, spots_of
 from photostrip.planning.ideal_strip import StripGeometry, ideal_strip
 from photostrip.planning.placement import Placement, Required, best_places, equal_ways, worst
 from photostrip.planning.strip_design import Design, along_the_strip, bands_needed, outcome, plan_strip
@@ -62,34 +62,34 @@ USUAL = StripGeometry.points
 @pytest.mark.parametrize(
     ("layout", "places"),
     [
-        (Layout("", bands=2), [(1, 1), (1, 3), (1, 5), (9, 1), (9, 3), (9, 5)]),
-        (Layout("", every=5, per_band=1), [(1, 3), (6, 3), (9, 3)]),
-        (Layout("", every=4, per_band=2), [(1, 1), (1, 5), (5, 1), (5, 5), (9, 1), (9, 5)]),
-        (Layout("", bands=1, per_band=1), [(5, 3)]),
-        (Layout("", kind="corners"), [(1, 1), (1, 5), (9, 1), (9, 5)]),
-        (Layout("", kind="corners+centre"), [(1, 1), (1, 5), (5, 3), (9, 1), (9, 5)]),
-        (Layout("", kind="points", spots=(Spot(3, 2), Spot(2, 2))), [(2, 2), (3, 2)]),
+        (ControlLayout("", bands=2), [(1, 1), (1, 3), (1, 5), (9, 1), (9, 3), (9, 5)]),
+        (ControlLayout("", every=5, per_band=1), [(1, 3), (6, 3), (9, 3)]),
+        (ControlLayout("", every=4, per_band=2), [(1, 1), (1, 5), (5, 1), (5, 5), (9, 1), (9, 5)]),
+        (ControlLayout("", bands=1, per_band=1), [(5, 3)]),
+        (ControlLayout("", kind="corners"), [(1, 1), (1, 5), (9, 1), (9, 5)]),
+        (ControlLayout("", kind="corners+centre"), [(1, 1), (1, 5), (5, 3), (9, 1), (9, 5)]),
+        (ControlLayout("", kind="points", spots=(Spot(3, 2), Spot(2, 2))), [(2, 2), (3, 2)]),
     ],
 )
-def test_layouts(layout: Layout, places: list[tuple[int, int]]) -> None:
+def test_layouts(layout: ControlLayout, places: list[tuple[int, int]]) -> None:
     assert [(spot.photo, spot.row) for spot in spots_of(layout, 9, 5)] == places
 
 
 def test_a_single_point_wins_over_that_of_a_band() -> None:
-    spots = spots_of(Layout("", bands=2, per_band=1, spots=(Spot(1, 2, "z"),)), 5, 3)
+    spots = spots_of(ControlLayout("", bands=2, per_band=1, spots=(Spot(1, 2, "z"),)), 5, 3)
     assert spots == (Spot(1, 2, "z"), Spot(5, 2))
 
 
 @pytest.mark.parametrize(
     "layout",
     [
-        Layout("a", bands=12),
-        Layout("a", per_band=4),
-        Layout("a", spots=(Spot(6, 1),)),
-        Layout("a", spots=(Spot(1, 4),)),
+        ControlLayout("a", bands=12),
+        ControlLayout("a", per_band=4),
+        ControlLayout("a", spots=(Spot(6, 1),)),
+        ControlLayout("a", spots=(Spot(1, 4),)),
     ],
 )
-def test_layouts_that_do_not_fit_are_refused(layout: Layout) -> None:
+def test_layouts_that_do_not_fit_are_refused(layout: ControlLayout) -> None:
     with pytest.raises(InputError) as caught:
         spots_of(layout, 5, 3)
     assert caught.value.faults[0].code == "plan-place"
@@ -105,7 +105,7 @@ def test_points_of_a_band_stand_evenly() -> None:
 @pytest.mark.slow
 def test_expected_precision_is_the_scatter_of_whole_runs() -> None:
     single = (Spot(3, 2, "z"), Spot(5, 1, "xy"), Spot(6, 3))
-    layout = Layout("mixed", kind="corners", spots=single, sigma=(0.03, 0.03, 0.05))
+    layout = ControlLayout("mixed", kind="corners", spots=single, sigma=(0.03, 0.03, 0.05))
     geometry = StripGeometry(FILM, 8)
     strip = ideal_strip(geometry)
     methods = (SIMILARITY, COVARIANCE)
@@ -124,7 +124,7 @@ def test_expected_precision_is_the_scatter_of_whole_runs() -> None:
 
 def test_better_methods_are_better_and_symmetric() -> None:
     strip = strip_of(9, USUAL)
-    layout = Layout("4 bands", bands=4)
+    layout = ControlLayout("4 bands", bands=4)
     spots = spots_of(layout, 9, 5)
     rms = {}
     for method in METHODS:
@@ -143,11 +143,11 @@ def test_better_methods_are_better_and_symmetric() -> None:
 def test_what_the_control_carries_is_said() -> None:
     strip = strip_of(9)
     for layout, method, used in (
-        (Layout("", bands=3), "degree 3", "degree 2"),
-        (Layout("", bands=4), "degree 3", "degree 3"),
-        (Layout("", kind="corners"), "degree 2", "degree 1"),
+        (ControlLayout("", bands=3), "degree 3", "degree 2"),
+        (ControlLayout("", bands=4), "degree 3", "degree 3"),
+        (ControlLayout("", kind="corners"), "degree 2", "degree 1"),
         (
-            Layout("", kind="corners", spots=(Spot(5, 1, "z"), Spot(5, 3, "z"))),
+            ControlLayout("", kind="corners", spots=(Spot(5, 1, "z"), Spot(5, 3, "z"))),
             "degree 2",
             "degree 1 in plan, degree 2 in height",
         ),
@@ -157,7 +157,7 @@ def test_what_the_control_carries_is_said() -> None:
 
 def test_measured_perspective_centres_help_the_bundle_only() -> None:
     strip = strip_of(12)
-    plain, with_gnss = Layout("", kind="corners"), Layout("", kind="corners", gnss=(0.05, 0.05, 0.08))
+    plain, with_gnss = ControlLayout("", kind="corners"), ControlLayout("", kind="corners", gnss=(0.05, 0.05, 0.08))
     spots = spots_of(plain, 12, 3)
     without, offset, absolute = (
         worst(accuracy(strip, layout, spots, BUNDLE))
@@ -167,27 +167,27 @@ def test_measured_perspective_centres_help_the_bundle_only() -> None:
     for method in (SIMILARITY, "degree 1"):
         assert worst(accuracy(strip, plain, spots, method)) == worst(accuracy(strip, with_gnss, spots, method))
     # without any offset the centres alone are control enough, with one they are too, but not in the plan's place
-    none = Layout("", kind="points", gnss=(0.05, 0.05, 0.08), gnss_offset=False)
+    none = ControlLayout("", kind="points", gnss=(0.05, 0.05, 0.08), gnss_offset=False)
     assert outcome(strip, none, SIMILARITY).accuracy is None
 
 
 def test_too_little_control_is_told_and_not_raised() -> None:
-    found = outcome(strip_of(5), Layout("", kind="points", spots=(Spot(1, 1), Spot(5, 1))), SIMILARITY)
+    found = outcome(strip_of(5), ControlLayout("", kind="points", spots=(Spot(1, 1), Spot(5, 1))), SIMILARITY)
     assert found.accuracy is None
     assert "2 in height" in found.reason
     with pytest.raises(GeometryError):
-        accuracy(strip_of(5), Layout(""), (Spot(1, 1),), SIMILARITY)
+        accuracy(strip_of(5), ControlLayout(""), (Spot(1, 1),), SIMILARITY)
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_control_on_the_line_of_flight_levels_no_strip(method: str) -> None:
-    found = outcome(strip_of(6), Layout("", bands=6, per_band=1), method)
+    found = outcome(strip_of(6), ControlLayout("", bands=6, per_band=1), method)
     assert found.accuracy is None
     assert found.reason
 
 
 def test_errors_go_with_the_image_coordinates_when_control_is_good() -> None:
-    layout = Layout("", bands=3, sigma=(1e-4, 1e-4, 1e-4))
+    layout = ControlLayout("", bands=3, sigma=(1e-4, 1e-4, 1e-4))
     one, two = (
         worst(accuracy(strip_of(8, sigma=s), layout, spots_of(layout, 8, 3), "degree 2")) for s in (0.004, 0.008)
     )
@@ -200,7 +200,7 @@ def test_errors_go_with_the_image_coordinates_when_control_is_good() -> None:
 @pytest.mark.parametrize("method", [COVARIANCE, BUNDLE])
 def test_detectable_errors_of_best_estimates_follow_from_their_sigmas(method: str) -> None:
     strip = strip_of(9)
-    layout = Layout("", bands=3, sigma=(0.2, 0.2, 0.3))
+    layout = ControlLayout("", bands=3, sigma=(0.2, 0.2, 0.3))
     found = accuracy(strip, layout, spots_of(layout, 9, 3), method)
     adjusted = np.diagonal(found.covariance[found.control], axis1=1, axis2=2)
     given = np.array(layout.sigma) ** 2
@@ -211,7 +211,7 @@ def test_detectable_errors_of_best_estimates_follow_from_their_sigmas(method: st
 @pytest.mark.parametrize("method", [SIMILARITY, "degree 2"])
 def test_detectable_errors_of_a_fit_are_those_of_prediction_without_the_point(method: str) -> None:
     strip = strip_of(9, USUAL)
-    layout = Layout("", bands=4)
+    layout = ControlLayout("", bands=4)
     spots = spots_of(layout, 9, 5)
     whole = accuracy(strip, layout, spots, method)
     for number in (0, 4):
@@ -224,7 +224,7 @@ def test_detectable_errors_of_a_fit_are_those_of_prediction_without_the_point(me
 
 
 def test_what_nothing_checks_is_never_found() -> None:
-    layout = Layout("", kind="points", spots=(Spot(1, 1), Spot(8, 2), Spot(4, 3, "z")))
+    layout = ControlLayout("", kind="points", spots=(Spot(1, 1), Spot(8, 2), Spot(4, 3, "z")))
     found = accuracy(strip_of(8), layout, layout.spots, SIMILARITY)
     assert np.isinf(found.detectable[:, 2]).all()  # three heights for three parameters
     assert np.isnan(found.detectable[2, :2]).all()
@@ -237,30 +237,30 @@ def test_what_nothing_checks_is_never_found() -> None:
 def test_the_number_of_bands_is_the_least(method: str) -> None:
     strip = strip_of(12)
     required = Required(0.3, 0.4)
-    needed = bands_needed(strip, Layout("", per_band=2), method, required)
+    needed = bands_needed(strip, ControlLayout("", per_band=2), method, required)
     if needed.bands is None:
         assert not required.met(needed.worst)
         return
     assert required.met(needed.worst)
     assert needed.points == 2 * needed.bands
     for bands in range(2, needed.bands):
-        found = outcome(strip, Layout("", bands=bands, per_band=2), method).accuracy
+        found = outcome(strip, ControlLayout("", bands=bands, per_band=2), method).accuracy
         assert found is None or not required.met(worst(found))
 
 
 def test_steps_over_many_bands_leave_none_out() -> None:
     strip = strip_of(40)
     required = Required(0.0945)
-    needed = bands_needed(strip, Layout("", per_band=2), COVARIANCE, required)
+    needed = bands_needed(strip, ControlLayout("", per_band=2), COVARIANCE, required)
     assert needed.bands is not None
     assert needed.bands > 21
-    before = outcome(strip, Layout("", bands=needed.bands - 1, per_band=2), COVARIANCE).accuracy
+    before = outcome(strip, ControlLayout("", bands=needed.bands - 1, per_band=2), COVARIANCE).accuracy
     assert before is not None
     assert not required.met(worst(before))
 
 
 def test_an_accuracy_that_no_control_gives() -> None:
-    needed = bands_needed(strip_of(6), Layout(""), BUNDLE, Required(height=0.001))
+    needed = bands_needed(strip_of(6), ControlLayout(""), BUNDLE, Required(height=0.001))
     assert needed.bands is None
     assert needed.worst[1] > 0.001
     assert Required().met((1e9, 1e9))
@@ -269,7 +269,7 @@ def test_an_accuracy_that_no_control_gives() -> None:
 @pytest.mark.parametrize(("method", "count"), [(SIMILARITY, 2), ("degree 2", 2), (BUNDLE, 1)])
 def test_the_search_finds_the_very_best_places_of_a_small_strip(method: str, count: int) -> None:
     strip = strip_of(7)
-    base = Layout("corners", kind="corners")
+    base = ControlLayout("corners", kind="corners")
     placed = best_places(strip, base, Placement(count, "corners", method), Required(1.0, 1.0))
     fixed = spots_of(base, 7, 3)
     free = [Spot(p, r) for p in range(1, 8) for r in range(1, 4) if Spot(p, r) not in fixed]
@@ -287,9 +287,9 @@ def test_the_search_beats_equal_spacing_or_says_that_it_cannot() -> None:
     strip = strip_of(9)
     gains = []
     for count, method in ((1, "degree 2"), (3, "degree 2"), (4, SIMILARITY)):
-        placed = best_places(strip, Layout("c", kind="corners"), Placement(count, "c", method), Required())
+        placed = best_places(strip, ControlLayout("c", kind="corners"), Placement(count, "c", method), Required())
         assert len(placed.spots) == len(placed.equal_spots) == count
-        assert not set(placed.spots) & set(spots_of(Layout("c", kind="corners"), 9, 3))
+        assert not set(placed.spots) & set(spots_of(ControlLayout("c", kind="corners"), 9, 3))
         assert (placed.gain > 0) == (placed.spots != placed.equal_spots)
         gains.append(placed.gain)
     assert max(gains) > 0.03
@@ -306,7 +306,7 @@ def test_ways_of_equal_spacing() -> None:
 
 
 def test_a_whole_design() -> None:
-    layouts = (Layout("corners", kind="corners"), Layout("bands", bands=3))
+    layouts = (ControlLayout("corners", kind="corners"), ControlLayout("bands", bands=3))
     design = Design(
         StripGeometry(FILM, 7, points=SIMPLE), layouts, (SIMILARITY, BUNDLE), Required(0.2), Placement(1, "corners")
     )

@@ -14,17 +14,17 @@ from photostrip.result.numbers import GROUND, Document, micrometres, rms, rounde
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.planning.control_layout import Layout, Spot
+    from photostrip.planning.control_layout import ControlLayout, Spot
     from photostrip.planning.ideal_strip import IdealStrip
-    from photostrip.planning.placement import Placed
-    from photostrip.planning.strip_design import Needed, Outcome, Report
+    from photostrip.planning.placement import BestPlaces
+    from photostrip.planning.strip_design import DesignReport, Needed, Outcome
 
     Floats = NDArray[np.float64]
 
 PLACED = 6  # decimals of metres that decide which point is the worst: strips are symmetric
 
 
-def strip_document(name: str, report: Report) -> Document:
+def strip_document(name: str, report: DesignReport) -> Document:
     """Return the plan of a strip as a document.
 
     Returns
@@ -57,7 +57,7 @@ def strip_document(name: str, report: Report) -> Document:
     }
 
 
-def _layout(layout: Layout, spots: tuple[Spot, ...], strip: IdealStrip) -> Document:
+def _layout(layout: ControlLayout, spots: tuple[Spot, ...], strip: IdealStrip) -> Document:
     numbers = numbers_of(strip, spots)
     return {
         "name": layout.name,
@@ -75,7 +75,7 @@ def _spot(spot: Spot) -> Document:
     return {"photo": spot.photo, "row": spot.row, "use": spot.use}
 
 
-def _outcome(outcome: Outcome, report: Report) -> Document:
+def _outcome(outcome: Outcome, report: DesignReport) -> Document:
     head = {"layout": outcome.layout.name, "method": outcome.method}
     found = outcome.accuracy
     if found is None or not len(found.new):
@@ -126,7 +126,7 @@ def _needed(needed: Needed) -> Document:
     }
 
 
-def _placed(placed: Placed) -> Document:
+def _placed(placed: BestPlaces) -> Document:
     def pair(values: tuple[float, float]) -> Document:
         return {"plan_m": rounded(values[0], GROUND), "z_m": rounded(values[1], GROUND)}
 

@@ -9,8 +9,8 @@ import numpy as np
 from photostrip.formats.output.csv_text import to_csv
 from photostrip.formats.output.plan_strip import along_rows
 from photostrip.planning.camera_efficiency import PRINTED_TABLE, by_efficiency, compare, source_cameras
+from photostrip.planning.element_errors import FREE
 from photostrip.planning.model_plan import simple_accuracy
-from photostrip.planning.single_model import FREE
 from photostrip.result.numbers import GROUND, Document, micrometres, rms, rounded, significant
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.planning.camera_efficiency import Camera
+    from photostrip.planning.camera_efficiency import ComparedCamera
     from photostrip.planning.model_plan import Forecast
 
     Floats = NDArray[np.float64]
@@ -141,7 +141,7 @@ def _share(source: str, sigmas: Floats) -> Document:
 # ------------------------------------------------------------------------------------------------------- cameras
 
 
-def camera_document(name: str, cameras: Sequence[Camera], reference: Camera) -> Document:
+def camera_document(name: str, cameras: Sequence[ComparedCamera], reference: ComparedCamera) -> Document:
     """Return a comparison of cameras as a document.
 
     Returns
@@ -160,7 +160,7 @@ def camera_document(name: str, cameras: Sequence[Camera], reference: Camera) -> 
     }
 
 
-def _camera(camera: Camera, reference: Camera) -> Document:
+def _camera(camera: ComparedCamera, reference: ComparedCamera) -> Document:
     beside = compare(camera, reference)
     return {
         "camera": camera.name,

@@ -60,8 +60,8 @@ class CameraPlan(NamedTuple):
     """Cameras to compare."""
 
     name: str
-    cameras: tuple[camera_efficiency.Camera, ...]
-    reference: camera_efficiency.Camera
+    cameras: tuple[camera_efficiency.ComparedCamera, ...]
+    reference: camera_efficiency.ComparedCamera
     files: Sequence[str]
 
 
@@ -73,10 +73,12 @@ def load_camera_plan(path: Path, assignments: Sequence[str]) -> CameraPlan:
     return CameraPlan(str(given.name), cameras, named.get(str(given.reference), cameras[-1]), reading.files)
 
 
-def _plan_camera(name: str, given: PlanCamera, end_lap: float) -> camera_efficiency.Camera:
+def _plan_camera(name: str, given: PlanCamera, end_lap: float) -> camera_efficiency.ComparedCamera:
     base = given.base
     if base is None and given.format is not None:
         base = given.format[0] * (1.0 - end_lap / 100.0)
     # without a format all cameras count as equally wide
     width = given.format[1] if given.format is not None else camera_efficiency.PRINTED_BASE
-    return camera_efficiency.Camera(name, given.principal_distance, given.sigma_um / 1000.0, base or np.nan, width)
+    return camera_efficiency.ComparedCamera(
+        name, given.principal_distance, given.sigma_um / 1000.0, base or np.nan, width
+    )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Self
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from photostrip.formats.text.findings import suggestion
-from photostrip.planning.control_layout import LAYOUTS, USES, Layout, Spot
+from photostrip.planning.control_layout import LAYOUTS, USES, ControlLayout, Spot
 from photostrip.planning.ideal_strip import LEAST_PHOTOS, StripGeometry
 from photostrip.planning.placement import Placement, Required
 from photostrip.planning.strip_design import Design, plan_strip
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from photostrip.planning.strip_design import Report
+    from photostrip.planning.strip_design import DesignReport
     from photostrip.project.yaml.reading import Reading
 
 MODELS = Range(LEAST_PHOTOS - 1, 400, "models")
@@ -42,7 +42,7 @@ ROWS = Range(2, 20, "rows")
 EXTRA = Range(0, 200, "points")
 PLACED = Range(1, 40, "points")
 REACH = Range(5.0, 95.0, "%")
-USUAL, USUAL_LAYOUT = StripGeometry.points, Layout("")
+USUAL, USUAL_LAYOUT = StripGeometry.points, ControlLayout("")
 # Keys of a simulation by which the strip is refused, and those of the plan.
 SIMULATED = {"flight.end_lap_percent": "end_lap_percent", "flight.photos": "models", "flight": "end_lap_percent"}
 DEFAULT_LAYOUTS = {"3 bands": "bands=3", "4 bands": "bands=4", "corners": "corners"}
@@ -176,7 +176,7 @@ class StripPlan:
     design: Design
     reading: Reading
 
-    def computed(self) -> Report:
+    def computed(self) -> DesignReport:
         """Compute what the plan asks for.
 
         Raises
@@ -215,8 +215,8 @@ def load_strip_plan(path: Path | None, assignments: Sequence[str]) -> StripPlan:
     return StripPlan(str(given.name), Design(geometry, layouts, methods, required, placement), reading)
 
 
-def _of_layout(name: str, given: StripLayout, sigma: tuple[float, float, float]) -> Layout:
-    return Layout(
+def _of_layout(name: str, given: StripLayout, sigma: tuple[float, float, float]) -> ControlLayout:
+    return ControlLayout(
         name=name,
         kind=str(given.layout),
         bands=given.bands,

@@ -12,7 +12,6 @@ import pytest
 from photostrip.geometry.rotation import from_vector
 from photostrip.simulate import Control as SimulatedControl
 from photostrip.simulate import Flight, Points, Spec, simulate
-from photostrip.simulate.bundle import problem_of, truth_of
 from photostrip.triangulation.bundle.observations.problem import (
     AttitudeObservations,
     BundleProblem,
@@ -22,6 +21,7 @@ from photostrip.triangulation.bundle.observations.problem import (
 from photostrip.triangulation.bundle.quality.cofactors import cofactors_of
 from photostrip.triangulation.bundle.solve import solve
 from tests.bundles import dense
+from tests.simulated_bundle import problem_of, truth_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable

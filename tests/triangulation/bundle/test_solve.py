@@ -15,7 +15,6 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.geometry.rotation import angle_between, from_vector
 from photostrip.simulate import Control as SimulatedControl
 from photostrip.simulate import Flight, Image, Points, Spec, simulate
-from photostrip.simulate.bundle import problem_of, truth_of
 from photostrip.triangulation.bundle.observations.problem import (
     BundleCameras,
     BundleProblem,
@@ -25,6 +24,7 @@ from photostrip.triangulation.bundle.observations.problem import (
     StartValues,
 )
 from photostrip.triangulation.bundle.solve import IterationSettings, solve
+from tests.simulated_bundle import problem_of, truth_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from photostrip.simulate import Flight, Points, Spec, simulate
-from photostrip.simulate.bundle import problem_of
 from photostrip.triangulation.bundle.normal_equations import reduced
 from photostrip.triangulation.bundle.normal_equations.band import Band
 from photostrip.triangulation.bundle.normal_equations.sparse import Sparse
 from photostrip.triangulation.bundle.quality.cofactors import cofactors_of
 from photostrip.triangulation.bundle.solve import solve
+from tests.simulated_bundle import problem_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

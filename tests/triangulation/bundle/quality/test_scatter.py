@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from photostrip.simulate import Control, Flight, Image, Points, Spec, simulate
-from photostrip.simulate.bundle import problem_of, truth_of
 from photostrip.triangulation.bundle.quality.cofactors import cofactors_of
 from photostrip.triangulation.bundle.solve import solve
+from tests.simulated_bundle import problem_of, truth_of
 
 SEEDS = 500
 WITHIN = 0.03
