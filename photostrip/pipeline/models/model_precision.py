@@ -74,7 +74,7 @@ def of_linked(
         known, and neither are their covariances.
     """
     formed, axes = strip.of_models.formed, strip.intermediate.axes
-    found = model_errors.differentiate(formed, strip.absolute.similarity)
+    found = model_errors.differentiate_models(formed, strip.absolute.similarity)
     seen, fit = _fit_to_control(strip, found, frames)
     factor, basis = variance_factor(formed)
     influence = _influence(strip, fit)
@@ -125,7 +125,7 @@ def joint(
     control, rows = given
     if control.use.sum() > control_significance.LARGEST or len(formed.photos) > control_significance.LONGEST:
         return None
-    found = model_errors.differentiate(formed, orientation.similarity)
+    found = model_errors.differentiate_models(formed, orientation.similarity)
     xyz = orientation.similarity(formed.xyz[rows])
     targets = absolute_orientation.Targets(control, frames, intermediate)
     seen = _misclosures(targets.turned(xyz), targets.axes(xyz), xyz, found.origin)

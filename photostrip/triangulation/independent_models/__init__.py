@@ -1,1 +1,7 @@
-"""Independent models: measured model coordinates joined to a strip by a similarity in space from model to model."""
+"""A strip of independent models: neighbouring models linked by similarities, one behind the other.
+
+In come the model coordinates of a strip (``StripModels``), out comes the formed strip with its links and their tests
+(``FormedModels``), which takes the place of a strip formed from photos. ``linking`` solves all links,
+``link_screening`` takes gross errors out, ``formation`` chains them, ``model_errors`` carries errors to the points,
+``perspective_centers`` moves centres with a polynomial. Source: [001] eq. 145-149; docs/independent-models.md.
+"""

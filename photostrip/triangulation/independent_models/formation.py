@@ -104,24 +104,13 @@ class FormedModels:
         middles = [self.model_xyz[self.models.model == number].mean(axis=0) for number in (0, self.models.count - 1)]
         if self.models.count > 1:
             return np.array(middles)
-        here = self.model_xyz[self.models.model == 0]
-        _, _, vt = np.linalg.svd(here - here.mean(axis=0))
+        alone = self.model_xyz[self.models.model == 0]
+        _, _, vt = np.linalg.svd(alone - alone.mean(axis=0))
         return np.array([middles[0], middles[0] + vt[0]])
 
 
 def require_links(shared: CommonPoints, models: StripModels, used: Flags, names: Sequence[str]) -> None:
-    """Refuse links that do not determine a similarity.
-
-    Parameters
-    ----------
-    used : ndarray of bool, shape (t,)
-        Rows that count.
-
-    Raises
-    ------
-    GeometryError
-        With fewer than three common points, or with all of them on one line.
-    """
+    """Refuse links with fewer than three common points, or with all of them on one line (``used``: rows that count)."""
     count = np.bincount(shared.link[used], minlength=shared.count)
     for link in np.flatnonzero(count < linking.LEAST_COMMON).tolist():
         msg = (
@@ -155,18 +144,7 @@ def _neighbours(models: StripModels, link: int, names: Sequence[str]) -> str:
 
 
 def form_from_models(models: StripModels, links: ScreenedLinks, photos: Numbers) -> FormedModels:
-    """Form the strip.
-
-    Parameters
-    ----------
-    photos : ndarray of int, shape (f,)
-        Node of the centre of each photo, in flight order.
-
-    Returns
-    -------
-    FormedModels
-        Places of the models, points and centres.
-    """
+    """Form the strip; ``photos`` (f,) are the nodes of the centres of the photos, in flight order."""
     places = _chain(links.solved.similarities)
     xyz = places.of(models.model, models.xyz)
     used = _counting(models, links, places, xyz)
@@ -176,11 +154,21 @@ def form_from_models(models: StripModels, links: ScreenedLinks, photos: Numbers)
     node, inverse = np.unique(models.node[used], return_inverse=True)
     count = np.bincount(inverse, minlength=len(node))
     sums = np.column_stack([np.bincount(inverse, xyz[used, axis], len(node)) for axis in range(3)])
-    return FormedModels(models, links, places, xyz, used, node, sums / np.maximum(count, 1)[:, None], count, photos)
+    return FormedModels(
+        models=models,
+        links=links,
+        places=places,
+        model_xyz=xyz,
+        used=used,
+        node=node,
+        node_xyz=sums / np.maximum(count, 1)[:, None],
+        node_models=count,
+        photos=photos,
+    )
 
 
 def _chain(links: Similarities) -> Similarities:
-    """Put the similarities one behind the other: from each model into the first."""
+    """Chain the similarities, from each model into the first: k' = k0 k, R' = R0 R, t' = k0 R0 t + t0."""
     count = len(links.scale) + 1
     scale, rotation, shift = np.ones(count), np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3))
     for number in range(count - 1):

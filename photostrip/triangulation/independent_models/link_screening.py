@@ -20,7 +20,7 @@ from photostrip.triangulation.independent_models import linking
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.independent_models.linking import CommonPoints, SolvedLinks, StripModels
+    from photostrip.triangulation.independent_models.linking import CommonPoints, PointTests, SolvedLinks, StripModels
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -80,18 +80,10 @@ class ScreenedLinks:
 
 
 def reflected(shared: CommonPoints, models: StripModels, used: Flags) -> Flags:
-    """Links whose models fit each other only as mirror images.
+    """Links whose models fit each other only as mirror images, shape (j,).
 
-    Parameters
-    ----------
-    used : ndarray of bool, shape (t,)
-        Rows that count.
-
-    Returns
-    -------
-    ndarray of bool, shape (j,)
-        True where the similarity of the other hand leaves a tenth of the squares and the best proper one far too much.
-        Three points, or points in one plane, fit both ways and are False.
+    The similarity of the other hand leaves a tenth of the squares, and the best proper one far too much. Three points,
+    or points in one plane, fit both ways and are False.
     """
     share = used.astype(float)
     found, squares = linking.closed_form(shared, models, share)
@@ -102,48 +94,50 @@ def reflected(shared: CommonPoints, models: StripModels, used: Flags) -> Flags:
 
 
 def screen_links(shared: CommonPoints, models: StripModels, settings: LinkSettings, kept: Flags) -> ScreenedLinks:
-    """Solve the links of a strip and take out what contradicts the rest.
+    """Solve the links of a strip and take out what contradicts the rest, but for the rows ``kept`` (t,).
 
-    Parameters
-    ----------
-    shared : CommonPoints
-        Common rows; every link has three that are not on one line.
-    kept : ndarray of bool, shape (t,)
-        Rows that the user keeps.
-
-    Returns
-    -------
-    ScreenedLinks
-        Links and what was taken out.
+    Every link has three common rows that are not on one line.
     """
     used, log = np.ones(len(shared.link), bool), list[LinkRejection]()
     mirrored = reflected(shared, models, used)
     solved = linking.solve(shared, models, used)
-    value, error, freedom = linking.studentised(shared, solved, used)
-    factor = _scatter(value, freedom, solved)
+    tests = linking.studentised(shared, solved, used)
+    factor = _scatter(tests, solved)
     limit = _limits(shared, used, settings.alpha)
     open_links = np.ones(shared.count, bool)
     while settings.screening != "none":
-        worst = _worst(shared, models, (used, kept), value / factor, limit, open_links)
+        worst = _worst(shared, models, used, used & ~kept, tests.value / factor, limit, open_links)
         if not len(worst):
             break
         for row in worst.tolist():
             link = int(shared.link[row])
-            size = (float(error[row, 0]), float(error[row, 1]), float(error[row, 2]))
-            log.append(LinkRejection(link, row, float(value[row] / factor), float(limit[link]), size))
+            x, y, z = tests.error[row].tolist()
+            size = float(tests.value[row] / factor)
+            log.append(LinkRejection(link=link, row=row, value=size, limit=float(limit[link]), error=(x, y, z)))
         used = used.copy()
         used[worst] = False
         solved = linking.solve(shared, models, used)
-        value, error, freedom = linking.studentised(shared, solved, used)
-        factor = _scatter(value, freedom, solved)
-    doubtful = _doubtful(shared, value / factor, limit) if settings.screening != "none" else ()
+        tests = linking.studentised(shared, solved, used)
+        factor = _scatter(tests, solved)
+    value = tests.value / factor
+    doubtful = _doubtful(shared, value, limit) if settings.screening != "none" else ()
     log.sort(key=lambda each: -each.value)
-    return ScreenedLinks(shared, used, solved, value / factor, limit, tuple(log), doubtful, factor, mirrored)
+    return ScreenedLinks(
+        shared=shared,
+        used=used,
+        solved=solved,
+        value=value,
+        limit=limit,
+        rejections=tuple(log),
+        doubtful=doubtful,
+        factor=factor,
+        reflected=mirrored,
+    )
 
 
-def _scatter(value: Floats, freedom: Numbers, solved: SolvedLinks) -> float:
+def _scatter(tests: PointTests, solved: SolvedLinks) -> float:
     """Variance factor by the median test value; 1 unless the stated precision is contradicted."""
-    known = value[freedom == 3]  # every direction of the point is checked
+    known = tests.value[tests.freedom == 3]  # every direction of the point is checked
     independent = solved.redundancy.sum() / 3
     if len(known) < LEFT or independent < LEFT:
         return 1.0
@@ -161,21 +155,21 @@ def _limits(shared: CommonPoints, used: Flags, alpha: float) -> Floats:
 def _worst(
     shared: CommonPoints,
     models: StripModels,
-    flags: tuple[Flags, Flags],
+    used: Flags,
+    free: Flags,
     value: Floats,
     limit: Floats,
     open_links: Flags,
 ) -> Numbers:
-    """One row for each link that must go; a link in which it cannot be told, or that would break, is closed."""
-    used, kept = flags
-    size = np.where(used & ~kept & open_links[shared.link] & (value > limit[shared.link]), value, -np.inf)
+    """One of the ``free`` rows of each link that must go; links that cannot tell it, or would break, are closed."""
+    size = np.where(free & open_links[shared.link] & (value > limit[shared.link]), value, -np.inf)
     rows = []
     for link in np.unique(shared.link[np.isfinite(size)]).tolist():
-        here = np.flatnonzero(shared.link == link)
-        row = int(here[np.argmax(size[here])])
+        rows_of_link = np.flatnonzero(shared.link == link)
+        row = int(rows_of_link[np.argmax(size[rows_of_link])])
         alone = used.copy()
         alone[row] = False
-        rivals = here[used[here] & (here != row)]
+        rivals = rows_of_link[used[rows_of_link] & (rows_of_link != row)]
         equal = (value[row] - value[rivals] < EQUALLY_GOOD).any()
         if equal or len(rivals) < LEFT - 1 or linking.extents(shared, models, alone)[link] < linking.THIN:
             open_links[link] = False
@@ -189,20 +183,17 @@ def _doubtful(shared: CommonPoints, value: Floats, limit: Floats) -> tuple[tuple
     beyond = np.flatnonzero(value > limit[shared.link])
     found = []
     for link in np.unique(shared.link[beyond]).tolist():
-        here = np.flatnonzero(shared.link == link)
-        here = here[np.argsort(-np.nan_to_num(value[here], nan=-np.inf), kind="stable")]
-        near = here[value[here[0]] - value[here] < EQUALLY_GOOD]
+        rows_of_link = np.flatnonzero(shared.link == link)
+        rows_of_link = rows_of_link[np.argsort(-np.nan_to_num(value[rows_of_link], nan=-np.inf), kind="stable")]
+        near = rows_of_link[value[rows_of_link[0]] - value[rows_of_link] < EQUALLY_GOOD]
         found.append(tuple(near.tolist()))
     return tuple(found)
 
 
 def detectable(shared: CommonPoints, screened: ScreenedLinks) -> Floats:
-    """Smallest error of each common point that its link finds in 80 % of cases, mm.
+    """Smallest error of each common point that its link finds in 80 % of cases, mm, shape (t,).
 
-    Returns
-    -------
-    ndarray, shape (t,)
-        In the direction in which the link checks the point least; infinite where it does not, NaN for rows not used.
+    In the direction in which the link checks the point least; infinite where it does not, NaN for rows not used.
     """
     solved = screened.solved
     reduced = (

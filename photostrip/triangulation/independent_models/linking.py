@@ -11,7 +11,7 @@ Source: [001] eq. 145-149 for the similarity; weights and iteration derived, see
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -98,13 +98,7 @@ class SolvedLinks:
 
 
 def common(models: StripModels) -> CommonPoints:
-    """Find what neighbouring models have in common.
-
-    Returns
-    -------
-    CommonPoints
-        Rows by link, then by number of the point; a point of models i and i + 2 alone links nothing.
-    """
+    """Find what neighbouring models have in common; a point of models i and i + 2 alone links nothing."""
     order = np.lexsort((models.model, models.node))
     model, node = models.model[order], models.node[order]
     both = np.flatnonzero((node[1:] == node[:-1]) & (model[1:] == model[:-1] + 1))
@@ -115,22 +109,9 @@ def common(models: StripModels) -> CommonPoints:
 
 
 def closed_form(shared: CommonPoints, models: StripModels, share: Floats) -> tuple[Similarities, Floats]:
-    """Similarities by singular values, and what a reflected one would leave.
+    """Similarities by singular values, from the model after into the model before, with weights ``share`` of the rows.
 
-    Parameters
-    ----------
-    share : ndarray, shape (t,)
-        Weight of each row, 0 for rows not used.
-
-    Returns
-    -------
-    similarities : Similarities
-        From the model after into the model before.
-    squares : ndarray, shape (j, 2)
-        Sum of squares that the best similarity leaves, and the best one of the other hand, mm^2.
-
-    Notes
-    -----
+    Also the sums of squares (j, 2) that the best similarity leaves, and the best one of the other hand, mm^2.
     Source: [001] eq. 145-149; the determinant factor keeps reflections out, its opposite asks for one.
     """
     a, b = models.xyz[shared.before], models.xyz[shared.after]
@@ -151,18 +132,7 @@ def closed_form(shared: CommonPoints, models: StripModels, share: Floats) -> tup
 
 
 def either_hand(source: Floats, target: Floats) -> tuple[float, float]:
-    """Sum of squares that the best similarity of two sets of points leaves, and the best reflected one.
-
-    Parameters
-    ----------
-    source, target : ndarray, shape (n, 3)
-        Corresponding points.
-
-    Returns
-    -------
-    tuple of float
-        In the unit of the target, squared.
-    """
+    """What the best similarity of two sets of points leaves, and the best reflected one: sums of squares."""
     a, b = target - target.mean(axis=0), source - source.mean(axis=0)
     u, values, vt = np.linalg.svd(a.T @ b)
     sign = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
@@ -172,18 +142,7 @@ def either_hand(source: Floats, target: Floats) -> tuple[float, float]:
 
 
 def extents(shared: CommonPoints, models: StripModels, used: Flags) -> Floats:
-    """How far the common points of each link are from a line.
-
-    Parameters
-    ----------
-    used : ndarray of bool, shape (t,)
-        Rows that count.
-
-    Returns
-    -------
-    ndarray, shape (j,)
-        Second over first root mean square extent in the model before; 0 on a line.
-    """
+    """How far the common points of each link are from a line: second over first extent in the model before, (j,)."""
     a, share = models.xyz[shared.before], used.astype(float)
     mean = shared.sums(share[:, None] * a) / np.maximum(shared.sums(share), 1.0)[:, None]
     da = (a - mean[shared.link]) * share[:, None]
@@ -192,22 +151,8 @@ def extents(shared: CommonPoints, models: StripModels, used: Flags) -> Floats:
 
 
 def solve(shared: CommonPoints, models: StripModels, used: Flags) -> SolvedLinks:
-    """Least squares of all links together.
+    """Least squares of all links together; every link has at least three rows in use that are not on one line.
 
-    Parameters
-    ----------
-    shared : CommonPoints
-        Common rows; every link has at least three in use that are not on one line.
-    used : ndarray of bool, shape (t,)
-        Rows that count.
-
-    Returns
-    -------
-    SolvedLinks
-        Similarities, residuals, cofactors.
-
-    Notes
-    -----
     Minimises v^T (C_a + s^2 R C_b R^T)^-1 v with v = a - (s R b + t): the coordinates of both models carry errors.
     """
     share = used.astype(float)
@@ -239,7 +184,16 @@ def solve(shared: CommonPoints, models: StripModels, used: Flags) -> SolvedLinks
     squares = shared.sums(share * np.einsum("ti,tij,tj->t", residual, weight, residual))
     redundancy = 3 * shared.sums(share).astype(np.intp) - SIMILARITY_PARAMETERS
     cofactors = inverse * unit[:, :, None] * unit[:, None, :]
-    return SolvedLinks(found, residual, weight, design, cofactors, centroid, squares, redundancy)
+    return SolvedLinks(
+        similarities=found,
+        residual=residual,
+        weight=weight,
+        design=design,
+        cofactors=cofactors,
+        centroid=centroid,
+        squares=squares,
+        redundancy=redundancy,
+    )
 
 
 def _corrected(found: Similarities, step: Floats, centroid: Floats) -> Similarities:
@@ -252,26 +206,18 @@ def _corrected(found: Similarities, step: Floats, centroid: Floats) -> Similarit
     return Similarities(found.scale * growth, u @ vt, shift)
 
 
-def studentised(shared: CommonPoints, solved: SolvedLinks, used: Flags) -> tuple[Floats, Floats, Numbers]:
+class PointTests(NamedTuple):
+    """Tests of common points; P the weights, Q_v the cofactors of the residuals v."""
+
+    value: Floats  # (t,): v^T P (P Q_v P)^-1 P v, chi-square with ``freedom`` degrees; NaN for rows not used
+    # (t, 3): estimated gross error (P Q_v P)^-1 P v, mm in the model before; of rows not used their residual
+    error: Floats
+    freedom: Numbers  # (t,): directions in which the others check the point: 3, fewer where they hardly fix the link
+
+
+def studentised(shared: CommonPoints, solved: SolvedLinks, used: Flags) -> PointTests:
     """Test every common point as a whole: how much of the squares goes when it is left out.
 
-    Parameters
-    ----------
-    used : ndarray of bool, shape (t,)
-        Rows that took part.
-
-    Returns
-    -------
-    value : ndarray, shape (t,)
-        v^T P (P Q_v P)^-1 P v, distributed as chi-square with `freedom` degrees without a gross error; NaN for rows not
-        used.
-    error : ndarray, shape (t, 3)
-        Estimated gross error (P Q_v P)^-1 P v, mm in the model before; of rows not used their residual.
-    freedom : ndarray of int, shape (t,)
-        Directions in which the other points check it: 3, fewer where they hardly determine the link.
-
-    Notes
-    -----
     Source: [Baarda 1968], the three coordinates of a point together.
     """
     values, axes = np.linalg.eigh(solved.weight)
@@ -279,15 +225,15 @@ def studentised(shared: CommonPoints, solved: SolvedLinks, used: Flags) -> tuple
     scaled = root @ solved.design
     reduced = np.eye(3) - scaled @ solved.cofactors[shared.link] @ scaled.transpose(0, 2, 1)
     left, directions = np.linalg.eigh(reduced)
-    seen = left > HELD
-    inverse = np.where(seen, 1 / np.where(seen, left, 1.0), 0.0)
+    checked = left > HELD
+    inverse = np.where(checked, 1 / np.where(checked, left, 1.0), 0.0)
     white = np.einsum("tij,tj->ti", root, solved.residual)
     parts = np.einsum("tji,tj->ti", directions, white) * inverse
     estimate = np.einsum("tij,tj->ti", directions, parts)
     value = (white * estimate).sum(axis=1)
     error = np.linalg.solve(root, estimate[:, :, None])[:, :, 0]
-    return (
-        np.where(used, value, np.nan),
-        np.where(used[:, None], error, solved.residual),
-        np.where(used, seen.sum(axis=1), 0).astype(np.intp),
+    return PointTests(
+        value=np.where(used, value, np.nan),
+        error=np.where(used[:, None], error, solved.residual),
+        freedom=np.where(used, checked.sum(axis=1), 0).astype(np.intp),
     )

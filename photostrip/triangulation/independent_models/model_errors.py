@@ -40,27 +40,18 @@ class ModelErrors:
     after: Numbers
     gain: Floats  # (t, 7, 3): step of each link by the difference of a common point, the row before minus the row after
     link: Numbers  # (t,): link of each entry
-    rows: tuple[Numbers, Numbers]  # (t,): rows before and after of each entry
+    # first, second: (t,): row of each entry in the model before and in the model after
+    first: Numbers
+    second: Numbers
     model: Numbers  # (n,): model of every row
     item: Numbers  # (n,): node of every row, counted in `FormedModels.node`; -1 for rows that make no mean
     share: Floats  # (n,): share of the row in the mean of its node
-    frame: Floats  # (k, 3, 7): displacement of every node by a similarity
+    by_similarity: Floats  # (k, 3, 7): displacement of every node by a similarity
     models: int
 
 
-def differentiate(formed: FormedModels, similarity: Similarity) -> ModelErrors:
-    """Rows of derivatives of a formed strip.
-
-    Parameters
-    ----------
-    similarity : Similarity
-        From the strip to the frame of the ground.
-
-    Returns
-    -------
-    ModelErrors
-        Gains of the links, covariances of the coordinates, rows of the nodes.
-    """
+def differentiate_models(formed: FormedModels, similarity: Similarity) -> ModelErrors:
+    """Differentiate the linking of models; ``similarity`` leads from the strip to the frame of the ground."""
     models, links = formed.models, formed.links
     scale = similarity.scale * formed.places.scale
     turn = scale[:, None, None] * (similarity.rotation @ formed.places.rotation)
@@ -76,9 +67,20 @@ def differentiate(formed: FormedModels, similarity: Similarity) -> ModelErrors:
     before[first], after[second] = np.arange(len(used)), np.arange(len(used))
     item = np.where(formed.used, np.searchsorted(formed.node, models.node), -1)
     share = np.where(formed.used, 1 / formed.node_models[np.maximum(item, 0)], 0.0)
-    frame = similarity_derivatives(nodes, origin)
     return ModelErrors(
-        origin, covariance, before, after, gain, link, (first, second), models.model, item, share, frame, models.count
+        origin=origin,
+        covariance=covariance,
+        before=before,
+        after=after,
+        gain=gain,
+        link=link,
+        first=first,
+        second=second,
+        model=models.model,
+        item=item,
+        share=share,
+        by_similarity=similarity_derivatives(nodes, origin),
+        models=models.count,
     )
 
 
@@ -106,7 +108,7 @@ def _gains(link: Numbers, xyz: Floats, covariance: Floats, origin: Floats, count
 
 
 def sums(errors: ModelErrors, nodes: Numbers, weights: Floats) -> Floats:
-    """Coefficients of the model coordinates in weighted sums of displacements of nodes.
+    """Coefficients (t, n, 3) of the model coordinates of all rows in weighted sums of displacements of nodes.
 
     Parameters
     ----------
@@ -114,25 +116,19 @@ def sums(errors: ModelErrors, nodes: Numbers, weights: Floats) -> Floats:
         Nodes, counted as ``FormedModels.node``, each at most once.
     weights : ndarray, shape (t, c, 3)
         Weight of each coordinate of each node in each sum.
-
-    Returns
-    -------
-    ndarray, shape (t, n, 3)
-        By the coordinates of every row, along the axes of the ground.
     """
-    place = np.full(len(errors.frame), -1)
+    place = np.full(len(errors.by_similarity), -1)
     place[nodes] = np.arange(len(nodes))
     rows = np.flatnonzero((errors.item >= 0) & (place[errors.item] >= 0))
     own = errors.share[rows, None] * weights[:, place[errors.item[rows]]]
     found = np.zeros((len(weights), len(errors.model), 3))
     found[:, rows] = own
     by_model = np.zeros((errors.models, len(weights), SIMILARITY_PARAMETERS))
-    np.add.at(by_model, errors.model[rows], np.einsum("tri,rij->rtj", own, errors.frame[errors.item[rows]]))
+    np.add.at(by_model, errors.model[rows], np.einsum("tri,rij->rtj", own, errors.by_similarity[errors.item[rows]]))
     beyond = np.cumsum(by_model[::-1], axis=0)[::-1][1:]  # of all models after each link
     by_row = np.einsum("etj,eji->tei", beyond[errors.link], errors.gain)
-    first, second = errors.rows
-    found[:, first] += by_row
-    found[:, second] -= by_row
+    found[:, errors.first] += by_row
+    found[:, errors.second] -= by_row
     return found
 
 
@@ -144,27 +140,15 @@ def covariance_of_sums(errors: ModelErrors, one: Floats) -> Floats:
 
 
 def with_sums(errors: ModelErrors, coefficients: Floats) -> Floats:
-    """Covariances of the displacements of all nodes with sums of model coordinates.
-
-    Parameters
-    ----------
-    coefficients : ndarray, shape (t, n, 3)
-        Of the sums, as ``sums`` gives them.
-
-    Returns
-    -------
-    ndarray, shape (k, 3, t)
-        Covariances, metres^2 for sums of metres.
-    """
+    """Covariances (k, 3, t) of the displacements of all nodes with sums of model coordinates of ``sums``."""
     by_row = np.einsum("rij,trj->rit", errors.covariance, coefficients)
-    first, second = errors.rows
     steps = np.zeros((errors.models, SIMILARITY_PARAMETERS, len(coefficients)))
-    np.add.at(steps, errors.link + 1, errors.gain @ (by_row[first] - by_row[second]))
+    np.add.at(steps, errors.link + 1, errors.gain @ (by_row[errors.first] - by_row[errors.second]))
     frames = np.cumsum(steps, axis=0)
     rows = np.flatnonzero(errors.item >= 0)
     item, share = errors.item[rows], errors.share[rows]
-    result = np.zeros((len(errors.frame), 3, len(coefficients)))
-    parts = errors.frame[item] @ frames[errors.model[rows]] + by_row[rows]
+    result = np.zeros((len(errors.by_similarity), 3, len(coefficients)))
+    parts = errors.by_similarity[item] @ frames[errors.model[rows]] + by_row[rows]
     np.add.at(result, item, share[:, None, None] * parts)
     return result
 
@@ -173,15 +157,8 @@ def with_sums(errors: ModelErrors, coefficients: Floats) -> Floats:
 
 
 def covariances(errors: ModelErrors) -> Floats:
-    """Covariances of the nodes of the formed strip relative to its first model, shape (k, 3, 3), metres^2.
+    """Covariances (k, 3, 3) of the nodes of the formed strip relative to its first model, metres^2.
 
-    Returns
-    -------
-    ndarray, shape (k, 3, 3)
-        Covariances.
-
-    Notes
-    -----
     A node is displaced by ``B (xi + sum of b_j step_j) + sum of its own coordinates`` with xi the similarity of its
     first model and b_j the share of its models after link j. xi and the steps correlate with their neighbours only.
     """
@@ -193,27 +170,23 @@ def covariances(errors: ModelErrors) -> Floats:
     chain[1:] = np.cumsum(added, axis=0)
     rows = np.flatnonzero(errors.item >= 0)
     item, model, share = errors.item[rows], errors.model[rows], errors.share[rows]
-    first = np.full(len(errors.frame), errors.models)
+    first = np.full(len(errors.by_similarity), errors.models)
     np.minimum.at(first, item, model)
-    held = np.zeros((len(errors.frame), int((model - first[item]).max(initial=0)) + 2))
+    held = np.zeros((len(errors.by_similarity), int((model - first[item]).max(initial=0)) + 2))
     np.add.at(held, (item, model - first[item]), share)
     beyond = np.cumsum(held[:, ::-1], axis=1)[:, ::-1][:, 1:]  # share of the models after each slot's link
     place = chain[first].copy()
     for slot in range(beyond.shape[1] - 1):
-        here = np.flatnonzero(beyond[:, slot] > 0)
-        link, part = first[here] + slot, beyond[here, slot, None, None]
-        own = part**2 * steps[link]
-        one = part * behind[link] if slot == 0 else np.zeros_like(own)
-        if slot:
-            one = beyond[here, slot - 1, None, None] * part * mixed[link - 1]
-        place[here] += own + one + one.transpose(0, 2, 1)
-    return _with_own(errors, place, (rows, first, beyond))
+        held_on = np.flatnonzero(beyond[:, slot] > 0)
+        link, part = first[held_on] + slot, beyond[held_on, slot, None, None]
+        cross = beyond[held_on, slot - 1, None, None] * part * mixed[link - 1] if slot else part * behind[link]
+        place[held_on] += part**2 * steps[link] + cross + cross.transpose(0, 2, 1)
+    return _with_coordinates(errors, place, rows, first, beyond)
 
 
 def _steps(errors: ModelErrors) -> tuple[Floats, Floats]:
     """Covariances of the steps, shape (j, 7, 7), and of each with the next, shape (j - 1, 7, 7)."""
-    first, second = errors.rows
-    both = errors.covariance[first] + errors.covariance[second]
+    both = errors.covariance[errors.first] + errors.covariance[errors.second]
     count = errors.models - 1
     steps = np.zeros((count, SIMILARITY_PARAMETERS, SIMILARITY_PARAMETERS))
     np.add.at(steps, errors.link, errors.gain @ both @ errors.gain.transpose(0, 2, 1))
@@ -224,9 +197,8 @@ def _steps(errors: ModelErrors) -> tuple[Floats, Floats]:
     return steps, mixed
 
 
-def _with_own(errors: ModelErrors, place: Floats, parts: tuple[Numbers, Numbers, Floats]) -> Floats:
-    """Add what the nodes' own coordinates do to what their similarities do."""
-    rows, first, beyond = parts
+def _with_coordinates(errors: ModelErrors, place: Floats, rows: Numbers, first: Numbers, beyond: Floats) -> Floats:
+    """Add what the coordinates of the nodes do to what their similarities do."""
     item, model, share = errors.item[rows], errors.model[rows], errors.share[rows]
     slot = model - first[item]
     mixed = np.zeros((len(place), SIMILARITY_PARAMETERS, 3))
@@ -238,7 +210,7 @@ def _with_own(errors: ModelErrors, place: Floats, parts: tuple[Numbers, Numbers,
     inside = np.flatnonzero(ahead >= 0)
     part = beyond[item[inside], slot[inside]]
     np.add.at(mixed, item[inside], part[:, None, None] * (errors.gain[ahead[inside]] @ own[inside]))
-    cross = errors.frame @ mixed
-    result = errors.frame @ place @ errors.frame.transpose(0, 2, 1) + cross + cross.transpose(0, 2, 1)
+    cross = errors.by_similarity @ mixed
+    result = errors.by_similarity @ place @ errors.by_similarity.transpose(0, 2, 1) + cross + cross.transpose(0, 2, 1)
     np.add.at(result, item, share[:, None, None] * own)
     return result

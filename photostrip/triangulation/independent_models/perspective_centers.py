@@ -26,25 +26,10 @@ NEAREST = 3  # points at least that say where the ground below a centre is
 
 
 def displacement_rows(xyz: Floats, above: Floats, terms: Sequence[tuple[str, ...]]) -> list[Floats]:
-    """Displacements of centres by the coefficients of the polynomials of X, Y and Z.
+    """Displacements of centres by the coefficients of the polynomials of X, Y and Z, a list of three (n, 3, k).
 
-    Parameters
-    ----------
-    xyz : ndarray, shape (n, 3)
-        Centres after the similarity, intermediate frame; any unit.
-    above : ndarray, shape (n,)
-        Their heights above the ground below them, in the same unit.
-    terms : sequence of tuple of str
-        Terms of the three polynomials, names of ``terms.POWERS``.
-
-    Returns
-    -------
-    list of ndarray, shape (n, 3, k)
-        For each of the three polynomials, by its coefficients for X and Y in that unit.
-
-    Notes
-    -----
-    dX = fx - h dfz/dX, dY = fy - h dfz/dY, dZ = fz + h (dfx/dX + dfy/dY) / 2.
+    dX = fx - h dfz/dX, dY = fy - h dfz/dY, dZ = fz + h (dfx/dX + dfy/dY) / 2 with h = ``above``, the heights (n,) of
+    the centres above the ground below them, and ``terms`` of the three polynomials by name.
     """
     x, y = xyz[:, 0], xyz[:, 1]
     found = []
@@ -64,20 +49,7 @@ def displacement_rows(xyz: Floats, above: Floats, terms: Sequence[tuple[str, ...
 
 
 def heights_above(centers: Floats, points: Floats) -> Floats:
-    """Heights of centres above the ground below them: the mean height of the points that are nearest along the strip.
-
-    Parameters
-    ----------
-    centers : ndarray, shape (n, 3)
-        Perspective centres after the similarity, intermediate frame.
-    points : ndarray, shape (q, 3)
-        Points of the strip.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Heights, in the unit of the coordinates.
-    """
+    """Heights of centres above the ground below them: the mean of the points that are nearest along the strip."""
     near = min(max(len(points) // max(len(centers), 1), NEAREST), len(points))
     order = np.argsort(points[:, 0], kind="stable")
     x, z = points[order, 0], np.concatenate([[0.0], np.cumsum(points[order, 2])])

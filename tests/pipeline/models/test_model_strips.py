@@ -164,7 +164,7 @@ def test_covariances_are_those_of_a_numerical_jacobian() -> None:
     measured = given.measured(rng.normal(size=(len(given.model), 3)))
     formed = nodes_of(measured)
     similarity = Similarity.from_points(formed.xyz, given.points[formed.point])
-    found = model_errors.differentiate(formed, similarity)
+    found = model_errors.differentiate_models(formed, similarity)
     count = len(formed.node)
 
     def place(xyz: Floats) -> Floats:
