@@ -132,7 +132,7 @@ def closed_form(shared: CommonPoints, models: StripModels, share: Floats) -> tup
 
 
 def either_hand(source: Floats, target: Floats) -> tuple[float, float]:
-    """Find the sums of squares that the best similarity of two sets of points leaves, and the best reflected one.
+    """Find the sums of squares that the best similarity of two sets of points leaves, and the best reflected one."""
     a, b = target - target.mean(axis=0), source - source.mean(axis=0)
     u, values, vt = np.linalg.svd(a.T @ b)
     sign = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
