@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from photostrip import __version__
 from photostrip.result import conventions, summary
-from photostrip.result.adjustment import bundle, covariance, deformation, models, pairs, strips
+from photostrip.result.adjustment import bundle, covariance, deformation, junctions, links, pairs, rejected, strips
 from photostrip.result.numbers import Document, natural_rank
 from photostrip.result.points import ground, photos, precision
 from photostrip.result.verdict import verdict_of
@@ -35,8 +35,7 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         Numbers are rounded to decimals that lie well below what they are good for.
     """
     rank = natural_rank(result.refined.observations.point_ids)
-    images = [photos.ImageResiduals.of(result, strip, rank) for strip in result.photo_strips]
-    singles = photos.singles_of(result, rank)
+    images = photos.image_residuals(result, rank)
     found = ground.differences(result)
     numbers = summary.summary_of(result, found)
     body: Document = {
@@ -44,12 +43,12 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         "frame": ground.frame_of(result),
         "summary": numbers,
         "tolerances": summary.tolerances_of(result, numbers),
-        "counts": summary.counts_of(result, sum(len(image.rows) for image in (*images, *singles))),
+        "counts": summary.counts_of(result, sum(len(image.rows) for image in images)),
         "conventions": conventions.conventions_of(result),
         "settings": conventions.settings_of(result),
         "corrections": conventions.corrections_of(result),
         "cameras": conventions.cameras_of(result),
-        "strips": models.strips_of(result) if result.model_strips else strips.strips_of(result),
+        "strips": strips.strips_of(result),
         "absolute": strips.absolute_of(result),
         **strips.polynomials_of(result),
         **covariance.covariances_of(result),
@@ -58,23 +57,19 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         "control": ground.control_of(result, found),
         "misclosures": ground.misclosures_of(result),
         "ties": ground.ties_of(result, rank),
-        "rejected": bundle.with_bundle(result, [*models.rejected_of(result), *pairs.rejected_of(result)]),
+        "rejected": rejected.rejected_of(result),
         "not_determined": ground.not_determined_of(result),
         "findings": [_finding(each) for each in result.findings],
         "notes": [_note(note) for note in (*notes, *result.notes)],
-        "models": models.models_of(result) if result.model_strips else pairs.models_of(result),
-        **({"links": models.links_of(result)} if result.model_strips else {}),
+        "models": links.models_of(result) if result.model_strips else pairs.models_of(result),
+        **({"links": links.links_of(result)} if result.model_strips else {}),
         **deformation.deformations_of(result),
-        "junctions": pairs.junctions_of(result),
-        "photos": models.photos_of(result)
-        if result.model_strips
-        else [*photos.photos_of(result, images), *photos.single_photos_of(result, singles)],
-        "points": ground.points_of(result, photos.point_rms(result, [*images, *singles]), rank),
-        "residuals": bundle.with_reliability(
-            result, [*photos.residuals_of(result, images), *photos.single_residuals_of(result, singles)]
-        ),
+        "junctions": junctions.junctions_of(result),
+        "photos": photos.photos_of(result, images),
+        "points": ground.points_of(result, photos.point_rms(result, images), rank),
+        "residuals": bundle.with_reliability(result, photos.residuals_of(result, images)),
         "parallaxes": pairs.parallaxes_of(result, rank),
-        **({"link_residuals": models.residuals_of(result, rank)} if result.model_strips else {}),
+        **({"link_residuals": links.residuals_of(result, rank)} if result.model_strips else {}),
     }
     verdict = verdict_of(body)
     head = {
@@ -88,7 +83,7 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
 
 
 def _finding(finding: Finding) -> Document:
-    """Return a finding; the numbers of its evidence have six digits."""
+    """Return a finding with the keys that a note has too; the numbers of its evidence have six digits."""
     return {
         "code": finding.code,
         "title": finding.title,
@@ -100,10 +95,7 @@ def _finding(finding: Finding) -> Document:
         "strips": list(finding.strips),
         "photos": list(finding.photos),
         "points": list(finding.points),
-        "file": finding.file,
-        "line": finding.line,
-        "column": finding.column,
-        "key": finding.key,
+        **_cause(finding),
     }
 
 
@@ -119,8 +111,9 @@ def _note(note: Note) -> Document:
         "strip": note.strip,
         "photos": list(note.photos),
         "points": list(note.points),
-        "file": note.file,
-        "line": note.line,
-        "column": note.column,
-        "key": note.key,
+        **_cause(note),
     }
+
+
+def _cause(noted: Finding | Note) -> Document:
+    return {"file": noted.file, "line": noted.line, "column": noted.column, "key": noted.key}

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from itertools import product
+from itertools import pairwise, product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -157,3 +157,13 @@ def _cells(entry: Quantity | Table, column: Any, size: int) -> Sequence[Plain]: 
         cells: Sequence[Plain] = entry.rounded(column)
         return cells
     return [None if each is None else _record(entry, each) for each in column]
+
+
+def grouped(block: str, heads: Mapping[str, Any], columns: Mapping[str, Any], ends: Sequence[int]) -> list[Document]:
+    """Make records with a list in each column: one value of each head, and the rows between two `ends` of a column."""
+    table = table_at(block)
+    cells = {key: _cells(table[key], column, len(ends) - 1) for key, column in heads.items()}
+    for key, column in columns.items():
+        values = _cells(table[key], column, 0)
+        cells[key] = [values[start:end] for start, end in pairwise(ends)]
+    return _rows(cells)

@@ -6,18 +6,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.result.adjustment import models
+from photostrip.result.adjustment import links
 from photostrip.result.adjustment.bundle import image_fit
-from photostrip.result.adjustment.pairs import Parallaxes, rejected_by_strip, sigma0
-from photostrip.result.adjustment.strips import AXES
-from photostrip.result.numbers import GROUND, Document, Plain, micrometres, rms, rounded
+from photostrip.result.adjustment.pairs import Parallaxes, sigma0
+from photostrip.result.adjustment.rejected import rejected_by_strip
+from photostrip.result.numbers import rms
 from photostrip.result.points.ground import of_used
 from photostrip.result.quantities import record
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from photostrip.pipeline import Result
+    from photostrip.result.numbers import Document, Plain
     from photostrip.result.points.ground import Differences
 
     Floats = NDArray[np.float64]
@@ -37,17 +40,20 @@ TOLERANCES: dict[str, tuple[tuple[str, ...], str]] = {
 
 
 def counts_of(result: Result, measurements: int) -> Document:
-    """Return the block ``counts``."""
+    """Return the block ``counts``; `measurements` is the number of image points."""
     roles, control = result.roles, result.inputs.control
     measured = result.control_rows >= 0
     part = measured & ~control.check & control.use.any(axis=1)
-    strips = result.photo_strips
-    bundle = None if result.bundle is None else result.bundle.screened.selection
-    out = 0 if result.bundle is None else sum(not each.readmitted for each in result.bundle.screened.rejections)
-    found = {
+    photos = [strip.of_photos for strip in result.photo_strips]
+    transfers = [each.formed.junctions.used for each in photos]
+    transfers += [strip.of_models.formed.links.used for strip in result.model_strips]
+    bundle = result.bundle
+    used = sum(len(each.rows) for each in photos) if bundle is None else int(bundle.screened.selection.images.sum())
+    out = [] if bundle is None else [each for each in bundle.screened.rejections if not each.readmitted]
+    return {
         "strips": len(result.inputs.flights),
         "photos": sum(len(strip.photos) for strip in result.inputs.flights),
-        "models": sum(len(s.of_photos.formed.scale) for s in strips),
+        "models": sum(len(strip.strip.photos) - 1 for strip in result.strips),
         "points": len(roles),
         "new_points": roles.count("new"),
         "control_points": int(part.sum()),
@@ -56,107 +62,130 @@ def counts_of(result: Result, measurements: int) -> Document:
         "check_points": int((measured & control.check).sum()),
         "given_not_measured": int((~measured).sum()),
         "image_points": measurements,
-        "image_points_used": sum(len(s.of_photos.rows) for s in strips) if bundle is None else int(bundle.images.sum()),
-        "pass_point_transfers": sum(int(s.of_photos.formed.junctions.used.sum()) for s in strips),
-        "rejected_in_pairs": sum(not rejection.readmitted for s in strips for rejection in s.of_photos.rejections),
-        "rejected_in_scale_transfer": sum(int((~s.of_photos.formed.junctions.used).sum()) for s in strips),
+        "image_points_used": used,
+        "pass_point_transfers": sum(int(used.sum()) for used in transfers),
+        "rejected_in_pairs": sum(not rejection.readmitted for each in photos for rejection in each.rejections),
+        "rejected_in_scale_transfer": sum(int((~each.formed.junctions.used).sum()) for each in photos),
         "rejected_for_rays": sum(
-            len(np.unique(s.of_photos.contradictions.point[rejected_by_strip(s)])) for s in strips
+            len(np.unique(strip.of_photos.contradictions.point[rejected_by_strip(strip)]))
+            for strip in result.photo_strips
         ),
-        **({} if bundle is None else {"rejected_in_bundle": out}),
+        **({} if bundle is None else {"rejected_in_bundle": len(out)}),
         "not_determined": len(result.not_determined),
         "ties": len(result.ties.number),
+        **(_counts_of_models(result) if result.model_strips else {}),
     }
-    return found | models.counts_of(result) if result.model_strips else found
+
+
+def _counts_of_models(result: Result) -> Document:
+    formed = [strip.of_models.formed for strip in result.model_strips]
+    points = [each.models.node < each.models.points for each in formed]
+    return {
+        "model_points": sum(int(each.sum()) for each in points),
+        "model_points_used": sum(int((each & one.used).sum()) for each, one in zip(points, formed, strict=True)),
+        "model_centers": sum(int((~each).sum()) for each in points),
+        "rejected_in_links": sum(len(each.links.rejections) for each in formed),
+    }
 
 
 def summary_of(result: Result, found: Differences) -> Document:
     """Return the block ``summary``: the accuracy of the whole project.
 
-    Parameters
-    ----------
-    found : Differences
-        What is left at control and check points; rejected control does not count.
+    `found` is what is left at control and check points; rejected control does not count.
     """
     found = of_used(result, found)
-    document = models.summary_of(result) if result.model_strips else _of_photos(result)
     control = result.inputs.control
     roles = {"control": ~control.check & control.use.any(axis=1), "check": control.check}
+    values = _of_models(result) if result.model_strips else _of_photos(result)
     for role, rows in roles.items():
-        document[f"{role}_rms"] = _axis_rms(found.axes[rows])
-        document[f"{role}_rms_um"] = _axis_rms(found.axes[rows] / found.scale[rows, None] * 1e6, 1)
-        document[f"{role}_mean"] = _axis_mean(found.axes[rows])
+        values[f"{role}_rms"] = _by_axis(rms, found.axes[rows])
+        values[f"{role}_rms_um"] = _by_axis(rms, found.axes[rows] / found.scale[rows, None] * 1e6)
+        values[f"{role}_mean"] = _by_axis(_mean, found.axes[rows])
     for role, rows in roles.items():
-        document[role] = _role(result, found, rows)
-    return document
+        values[role] = _role(result, found, rows)
+    return record("summary", values)
 
 
 def _of_photos(result: Result) -> Document:
     """Say how good the image coordinates are, and how large the photos."""
+    strips = [strip.of_photos for strip in result.photo_strips]
     sums = [Parallaxes.of(strip) for strip in result.photo_strips]
-    squares = np.concatenate([each.squares for each in sums])
     redundancy = np.concatenate([each.redundancy for each in sums])
-    photos = np.array([len(s.strip.photos) for s in result.photo_strips])
-    sigma = [result.refined.observations.sigma[s.of_photos.rows].ravel() for s in result.photo_strips]
-    parallax = [
-        float(np.abs(s.of_photos.orientation.parallax[s.of_photos.orientation.used]).max()) for s in result.photo_strips
-    ]
-    document: Document = {
-        "sigma0_um": micrometres(sigma0(squares, redundancy)),
-        "sigma_given_um": micrometres(rms(np.concatenate(sigma))),
+    sigma = [result.refined.observations.sigma[each.rows].ravel() for each in strips]
+    parallax = [np.abs(each.orientation.parallax[each.orientation.used]).max() for each in strips]
+    sigma0_um = 1000.0 * sigma0(np.concatenate([each.squares for each in sums]), redundancy)
+    values: Document = {
+        "sigma0_um": sigma0_um,
+        "sigma_given_um": 1000.0 * rms(np.concatenate(sigma)),
         "redundancy": int(redundancy.sum()),
-        "max_parallax_um": micrometres(max(parallax)),
-        "image_rms_um": micrometres(
-            rms(np.concatenate([s.of_photos.resection.residuals.ravel() for s in result.photo_strips]))
-        ),
-        "photo_scale": rounded(np.average([s.scale_number for s in result.photo_strips], weights=photos), 1),
-        "flying_height": rounded(np.average([s.depth for s in result.photo_strips], weights=photos), 2),
+        "max_parallax_um": 1000.0 * max(parallax),
+        "image_rms_um": 1000.0 * rms(np.concatenate([each.resection.residuals.ravel() for each in strips])),
+        "photo_scale": _mean_of_strips(result, [strip.scale_number for strip in result.strips]),
+        "flying_height": _mean_of_strips(result, [strip.depth for strip in result.strips]),
     }
-    if result.bundle is not None:
-        document |= record("summary", image_fit(result.bundle)) | {"sigma0_pairs_um": document["sigma0_um"]}
-    return document
+    return values if result.bundle is None else values | image_fit(result.bundle) | {"sigma0_pairs_um": sigma0_um}
 
 
-def _axis_rms(values: Floats, decimals: int = GROUND) -> Document:
-    return dict(zip(AXES, rounded([rms(column) for column in values.T], decimals), strict=True))
+def _of_models(result: Result) -> Document:
+    """Say how good the model coordinates are, and how large the models."""
+    strips = result.model_strips
+    redundancy = np.array([strip.of_models.formed.links.solved.redundancy.sum() for strip in strips])
+    share = redundancy / max(int(redundancy.sum()), 1)
+    ratio = np.sqrt((share * np.nan_to_num([links.sigma0(strip) ** 2 for strip in strips])).sum())
+    stated = rms(np.array([links.stated_sigma(strip) for strip in strips]))
+    return {
+        "sigma0_um": 1000.0 * (ratio * stated) if redundancy.sum() else None,
+        "sigma_given_um": 1000.0 * stated,
+        "redundancy": int(redundancy.sum()),
+        "max_parallax_um": None,
+        "image_rms_um": None,
+        "photo_scale": None,
+        "model_scale": _mean_of_strips(result, [strip.scale_number for strip in strips]),
+        "flying_height": _mean_of_strips(result, [strip.depth for strip in strips]),
+    }
 
 
-def _axis_mean(values: Floats) -> Document:
+def _mean_of_strips(result: Result, values: list[float]) -> float:
+    """Return a mean over the photos, or over the models."""
+    size = [len(strip.strip.photos) - bool(result.model_strips) for strip in result.strips]
+    return float(np.average(values, weights=size))
+
+
+def _by_axis(sum_up: Callable[[Floats], float], values: Floats) -> Document:
+    return {axis: sum_up(column) for axis, column in zip("xyz", values.T, strict=True)}
+
+
+def _mean(values: Floats) -> float:
+    """Mean of what is not NaN; NaN when there is nothing."""
     known = ~np.isnan(values)
-    with np.errstate(invalid="ignore"):
-        mean = np.where(known, values, 0.0).sum(axis=0) / known.sum(axis=0)
-    return dict(zip(AXES, rounded(mean, GROUND), strict=True))
+    return float(np.where(known, values, 0.0).sum() / known.sum()) if known.any() else float("nan")
 
 
 def _role(result: Result, found: Differences, rows: Flags) -> Document:
-    """Sum up plan and height of one role: number, rms, maximum and where it is."""
+    """Sum up plan and height of one role, and its differences over what control and one model let expect."""
     ids = result.inputs.control.ids
+    counted = np.where(found.rejected, np.nan, result.control_differences)
     return {
         "plan": _part(found.plan, found.scale, rows, ids),
         "height": _part(np.abs(found.height), found.scale, rows, ids),
-        "normalised": rounded(_normalised(result, found, rows), 2),
+        "normalised": rms((counted[rows] / found.sigma[rows]).ravel()),
     }
 
 
 def _part(values: Floats, scale: Floats, rows: Flags, ids: tuple[str, ...]) -> Document:
+    """Count differences; their rms, the largest and where it is."""
     counted = np.flatnonzero(rows & ~np.isnan(values))
     if not len(counted):
         return {"count": 0, "rms": None, "max": None, "worst": None, "rms_um": None, "max_um": None}
     worst = int(counted[np.argmax(values[counted])])
     return {
         "count": len(counted),
-        "rms": rounded(rms(values[counted]), GROUND),
-        "max": rounded(values[worst], GROUND),
+        "rms": rms(values[counted]),
+        "max": values[worst],
         "worst": ids[worst],
-        "rms_um": rounded(rms(values[counted] / scale[counted]) * 1e6, 1),
-        "max_um": rounded(values[worst] / scale[worst] * 1e6, 1),
+        "rms_um": rms(values[counted] / scale[counted]) * 1e6,
+        "max_um": values[worst] / scale[worst] * 1e6,
     }
-
-
-def _normalised(result: Result, found: Differences, rows: Flags) -> float:
-    """Root mean square of the differences in units of what control and one model let expect."""
-    counted = np.where(found.rejected, np.nan, result.control_differences)
-    return rms((counted[rows] / found.sigma[rows]).ravel())
 
 
 def tolerances_of(result: Result, summary: Document) -> list[Document]:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from photostrip.result.numbers import rms, rounded
-from photostrip.result.quantities import DECIMALS_BY_UNIT, record
+from photostrip.result.numbers import rms
+from photostrip.result.quantities import record
 from photostrip.triangulation.bundle.quality import reliability
 
 if TYPE_CHECKING:
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from photostrip.result.numbers import Document
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.settings import BundleSettings
-    from photostrip.triangulation.bundle.snooping import BundleRejection
     from photostrip.triangulation.bundle.solution import BundleSolution
 
     Floats = NDArray[np.float64]
@@ -260,7 +259,7 @@ def _foremost(found: Bundle, shift: float, values: list[Floats]) -> list[Documen
 def _observed(found: Bundle, group: reliability.Group, at: tuple[int, int], shift: float) -> Document:
     """Return everything about one observed coordinate; errors that would be found where others check it."""
     kind = KINDS[group.kind]
-    photo, point = names_of(found.screened.problem, group.kind, at[0])
+    photo, point = names_of_observation(found.screened.problem, group.kind, at[0])
     checked = group.redundancy[at] >= reliability.UNCONTROLLED
     external = group.external(shift)[at] if checked else np.nan
     return {
@@ -293,7 +292,7 @@ def _effect(found: Bundle, kind: str, row: int, external: float) -> float:
     return float(external * np.sqrt(np.linalg.eigvalsh(block)[-1]))
 
 
-def names_of(problem: BundleProblem, kind: str, row: int) -> tuple[str | None, str | None]:
+def names_of_observation(problem: BundleProblem, kind: str, row: int) -> tuple[str | None, str | None]:
     """Return photo and point of an observation, as far as it has them."""
     if kind == reliability.IMAGE:
         images = problem.images
@@ -302,73 +301,3 @@ def names_of(problem: BundleProblem, kind: str, row: int) -> tuple[str | None, s
         return None, problem.point_name(int(problem.control.point[row]))
     part = problem.positions if kind == reliability.POSITION else problem.attitudes
     return problem.photo_name(int(part.photo[row])), None
-
-
-# --------------------------------------------------------------------------------------------------- rejections
-
-
-def with_bundle(result: Result, rejected: list[Document]) -> list[Document]:
-    """Bring the list ``rejected`` of the strip method up to date with the bundle adjustment.
-
-    Parameters
-    ----------
-    rejected : list of dict
-        What was taken out while the strips were formed and brought to the ground.
-
-    Returns
-    -------
-    list of dict
-        The same, without a bundle adjustment; otherwise what it uses after all is marked as re-admitted, and what it
-        took out itself, of stage ``bundle``, comes last.
-    """
-    found = result.bundle
-    if found is None:
-        return rejected
-    problem, selection = found.block.problem, found.screened.selection
-    images = problem.images
-    inside = np.flatnonzero(selection.images).tolist()
-    used = {(problem.photo_name(int(images.photo[n])), problem.point_name(int(images.point[n]))) for n in inside}
-    control = {
-        problem.point_name(int(point))
-        for point, yes, sigma in zip(problem.control.point, selection.control, problem.control.sigma, strict=True)
-        if (yes | ~np.isfinite(sigma)).all()
-    }
-    rows = []
-    for each in rejected:
-        photos = [photo for photo in (each["photo"], each["other_photo"]) if photo is not None]
-        back = all((photo, each["point"]) in used for photo in photos) if photos else each["point"] in control
-        after_all = {"readmitted": True, "blamed": [], "reason": "used by the bundle adjustment"}
-        rows.append({**each, **after_all} if back else each)
-    return rows + [_rejection(found, each) for each in found.screened.rejections]
-
-
-def _rejection(found: Bundle, each: BundleRejection) -> Document:
-    kind = KINDS[each.kind]
-    photo, point = names_of(found.block.problem, each.kind, each.row)
-    size = rounded(each.size * kind.factor, DECIMALS_BY_UNIT[kind.unit])
-    reason = (
-        "does not fit the other observations"
-        if size is None
-        else f"{kind.axes[each.axis]} is wrong by about {size:+g} {kind.unit.replace('um', 'µm')}"
-    )
-    if each.readmitted:
-        reason = "taken back: it fits after the others went"
-    strip = next((s.strip.id for s in found.start.strips if photo in s.strip.photos), "") if photo else ""
-    return {
-        "strip": strip,
-        "photo": photo,
-        "other_photo": None,
-        "point": point,
-        "stage": "bundle",
-        "test": each.test,
-        "value": rounded(each.value, 2),
-        "limit": rounded(each.limit, 2),
-        "unit": "",
-        "parallax_um": None,
-        "zone": None,
-        "size": size,
-        "size_unit": kind.unit,
-        "readmitted": each.readmitted,
-        "blamed": [photo] if photo is not None and point is not None and not each.readmitted else [],
-        "reason": reason,
-    }

@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from photostrip.errors import GeometryError
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.geometry.rotation import alpha_omega_kappa
-from photostrip.result.adjustment.pairs import PPM, Parallaxes, discrepancies, sigma0
-from photostrip.result.numbers import (
-    DEGREES,
-    EXACT,
-    GROUND,
-    ROTATION,
-    Document,
-    Plain,
-    micrometres,
-    rms,
-    rounded,
-    significant,
-)
+from photostrip.result.adjustment import links, pairs
+from photostrip.result.adjustment.junctions import DIRECTIONS, PPM, discrepancies
+from photostrip.result.numbers import rms
+from photostrip.result.quantities import record
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,7 +21,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.pipeline import Result, StripResult
-    from photostrip.triangulation.polynomial.correction import AxisFit, Evidence, Polynomial
+    from photostrip.result.numbers import Document
+    from photostrip.triangulation.polynomial.correction import Polynomial
 
     Floats = NDArray[np.float64]
 
@@ -38,51 +31,77 @@ AXES = ("x", "y", "z")
 
 def strips_of(result: Result) -> list[Document]:
     """Return the list ``strips``: what each strip is like and how well it holds together."""
-    return [_strip(result, strip) for strip in result.photo_strips]
+    return [_strip(result, strip) for strip in result.strips]
 
 
 def _strip(result: Result, strip: StripResult) -> Document:
-    sums, formed, resection = Parallaxes.of(strip), strip.of_photos.formed, strip.of_photos.resection
-    used = strip.of_photos.orientation.used
-    gap = discrepancies(strip)[formed.junctions.used]  # rms() passes over points left out for their rays
-    gap_rms = [rms(column) for column in gap.T]
-    sigma = result.refined.observations.sigma[strip.of_photos.rows]
-    return {
+    of_photos = strip.model_stages is None
+    formed = strip.of_photos.formed.junctions if of_photos else strip.of_models.formed.links
+    gap = discrepancies(strip)[formed.used]  # rms() passes over points left out for their rays
+    base = np.linalg.norm(np.diff(strip.centers, axis=0), axis=1)
+    base = base[np.isfinite(base)]
+    values = {
         "id": strip.strip.id,
-        "camera": strip.of_photos.strip.camera.name,
+        "camera": strip.of_photos.strip.camera.name if of_photos else None,
         "photos": len(strip.strip.photos),
-        "models": len(formed.scale),
-        "points": len(formed.point),
-        "photo_scale": rounded(strip.scale_number, 1),
-        "flying_height": rounded(strip.depth, 2),
-        "base": rounded(np.linalg.norm(np.diff(resection.centers, axis=0), axis=1).mean(), 2),
-        "azimuth_deg": rounded(np.degrees(strip.intermediate.azimuth) % 360, DEGREES),
-        "sigma_given_um": micrometres(np.sqrt(np.mean(sigma**2))),
-        "sigma0_um": micrometres(sigma0(sums.squares, sums.redundancy)),
+        "models": len(strip.strip.photos) - 1,
+        "points": len(strip.formed.point),
+        "photo_scale": strip.scale_number if of_photos else None,
+        **({} if of_photos else {"model_scale": strip.scale_number}),
+        "flying_height": strip.depth,
+        "base": base.mean() if len(base) else np.nan,
+        "azimuth_deg": np.degrees(strip.intermediate.azimuth) % 360,
+        **(_fit_of_photos(result, strip) if of_photos else _fit_of_models(strip)),
+        "precision": dict(zip(("plan", "height"), strip.precision, strict=True)),
+        "discrepancy": {name: rms(column) for name, column in zip(DIRECTIONS, gap.T, strict=True)},
+        "scale_drift": {
+            "expected_ppm": (_expected_drift(strip) if of_photos else links.expected_drift(strip)) * PPM,
+            "found_ppm": _found_drift(strip) * PPM if of_photos else None,
+        },
+    }
+    return record("strips", values)
+
+
+def _fit_of_photos(result: Result, strip: StripResult) -> Document:
+    sums, stages = pairs.Parallaxes.of(strip), strip.of_photos
+    return {
+        "sigma_given_um": 1000.0 * rms(result.refined.observations.sigma[stages.rows]),
+        "sigma0_um": 1000.0 * pairs.sigma0(sums.squares, sums.redundancy),
         "redundancy": int(sums.redundancy.sum()),
-        "rms_parallax_um": micrometres(rms(strip.of_photos.orientation.parallax[used])),
-        "image_rms_um": micrometres(rms(resection.residuals)),
-        "precision": {"plan": rounded(strip.precision[0], GROUND), "height": rounded(strip.precision[1], GROUND)},
-        "discrepancy": dict(zip(("along", "across", "up"), rounded(gap_rms, GROUND), strict=True)),
-        "scale_drift": _drift(strip),
+        "rms_parallax_um": 1000.0 * rms(stages.orientation.parallax[stages.orientation.used]),
+        "image_rms_um": 1000.0 * rms(stages.resection.residuals),
     }
 
 
-def _drift(strip: StripResult) -> Document:
-    """Change of scale along the strip: what the spread of the scale ratios lets expect, and what the polynomial found.
+def _fit_of_models(strip: StripResult) -> Document:
+    stated = links.stated_sigma(strip)
+    return {
+        "sigma_given_um": 1000.0 * stated,
+        "sigma0_um": 1000.0 * (links.sigma0(strip) * stated),
+        "redundancy": int(strip.of_models.formed.links.solved.redundancy.sum()),
+        "rms_parallax_um": None,
+        "image_rms_um": None,
+    }
+
+
+def _expected_drift(strip: StripResult) -> float:
+    """Change of scale along a strip of photos that the spread of the scale ratios lets expect, as a ratio.
 
     The scale is handed from model to model, so its error grows as a sum of independent ones.
     """
-    joined, correction = strip.of_photos.formed.junctions, strip.polynomial
+    joined = strip.of_photos.formed.junctions
     count = np.bincount(joined.junction, joined.used, len(joined.factor))
     with np.errstate(invalid="ignore"):
-        expected = np.sqrt((joined.spread**2 / count).sum()) * PPM
-    found = None
-    if correction is not None and correction.axes[0].terms:
-        ends = strip.of_photos.resection.centers[[0, -1], 0]
-        start, end = (_scale_change(correction, x) for x in ends)
-        found = rounded((end - start) * PPM, 1)
-    return {"expected_ppm": rounded(expected, 1), "found_ppm": found}
+        return float(np.sqrt((joined.spread**2 / count).sum()))
+
+
+def _found_drift(strip: StripResult) -> float:
+    """Change of scale along the strip that the polynomial took out; NaN when there is none."""
+    correction = strip.polynomial
+    if correction is None or not correction.axes[0].terms:
+        return np.nan
+    start, end = (_scale_change(correction, x) for x in strip.centers[[0, -1], 0])
+    return end - start
 
 
 def _scale_change(correction: Polynomial, x: float) -> float:
@@ -99,34 +118,31 @@ def absolute_of(result: Result) -> list[Document]:
 
 def _absolute(strip: StripResult) -> Document:
     found, use = strip.absolute, strip.control.use
-    misclosures = rounded([rms(column) for column in np.where(use, found.misclosures, np.nan).T], GROUND)
-    return {
+    misclosures = [rms(column) for column in np.where(use, found.misclosures, np.nan).T]
+    values = {
         "strip": strip.strip.id,
         "control": {"points": len(strip.control), "plan": int(use[:, 0].sum()), "height": int(use[:, 2].sum())},
-        "scale": significant(found.similarity.scale, EXACT),
-        "rotation": rounded(found.similarity.rotation.ravel(), ROTATION),
+        "scale": found.similarity.scale,
+        "rotation": found.similarity.rotation.ravel(),
         "angles_deg": _angles(found.similarity.rotation),
-        "shift": rounded(found.similarity.shift, GROUND),
-        "origin": rounded(strip.intermediate.origin, GROUND),
-        "axes": rounded(strip.intermediate.axes.ravel(), ROTATION),
-        "sigma0": significant(found.sigma0),
+        "shift": found.similarity.shift,
+        "origin": strip.intermediate.origin,
+        "axes": strip.intermediate.axes.ravel(),
+        "sigma0": found.sigma0,
         "redundancy": found.redundancy,
-        "condition": significant(found.condition),
+        "condition": found.condition,
         "iterations": found.iterations,
         "misclosure_rms": dict(zip(GROUND_AXES, misclosures, strict=True)),
     }
+    return record("absolute", values)
 
 
-def _angles(rotation: Floats) -> Plain:
+def _angles(rotation: Floats) -> Document | None:
     try:
         values = alpha_omega_kappa(rotation)
     except GeometryError:
         return None
-    return dict(zip(("alpha", "omega", "kappa"), rounded(np.degrees(values), DEGREES), strict=True))
-
-
-def _by_axis(values: Sequence[Plain]) -> Document:
-    return dict(zip(AXES, values, strict=True))
+    return dict(zip(("alpha", "omega", "kappa"), np.degrees(values), strict=True))
 
 
 def polynomials_of(result: Result) -> Document:
@@ -136,38 +152,27 @@ def polynomials_of(result: Result) -> Document:
 
 
 def _polynomial(strip: str, found: Polynomial) -> Document:
-    axes: tuple[AxisFit, ...] = found.axes
+    axes = found.axes
     with np.errstate(invalid="ignore", divide="ignore"):
         ratios = [axis.coefficients / axis.sigmas for axis in axes]
-    return {
+    values = {
         "strip": strip,
         "degree": found.degree,
         "asked": found.asked,
         "terms": _by_axis([list(axis.terms) for axis in axes]),
-        "coefficients": _by_axis([significant(axis.coefficients, EXACT) for axis in axes]),
-        "sigmas": _by_axis([significant(axis.sigmas) for axis in axes]),
-        "t": _by_axis([rounded(ratio, 2) for ratio in ratios]),
-        "effects": _by_axis([rounded(axis.effects, GROUND) for axis in axes]),
-        "sigma0": _by_axis([rounded(axis.sigma0, GROUND) for axis in axes]),
+        "coefficients": _by_axis([axis.coefficients for axis in axes]),
+        "sigmas": _by_axis([axis.sigmas for axis in axes]),
+        "t": _by_axis(ratios),
+        "effects": _by_axis([axis.effects for axis in axes]),
+        "sigma0": _by_axis([axis.sigma0 for axis in axes]),
         "redundancy": _by_axis([axis.redundancy for axis in axes]),
-        "condition": _by_axis([significant(axis.condition) for axis in axes]),
-        "stations": {"plan": found.stations[0], "height": found.stations[1]},
-        "reach": rounded(found.reach, 2),
-        "evidence": [_evidence(step) for step in found.evidence],
+        "condition": _by_axis([axis.condition for axis in axes]),
+        "stations": dict(zip(("plan", "height"), found.stations, strict=True)),
+        "reach": np.array(found.reach),
+        "evidence": [asdict(step) for step in found.evidence],
     }
+    return record("polynomials", values)
 
 
-def _evidence(step: Evidence) -> Document:
-    return {
-        "group": step.group,
-        "degree": step.degree,
-        "terms": step.terms,
-        "redundancy": step.redundancy,
-        "rms": rounded(step.rms, GROUND),
-        "left_out": rounded(step.left_out, GROUND),
-        "left_out_by": step.left_out_by,
-        "f": significant(step.f),
-        "p": significant(step.p),
-        "against": step.against,
-        "accepted": step.accepted,
-    }
+def _by_axis(values: Sequence[Any]) -> Document:
+    return dict(zip(AXES, values, strict=True))

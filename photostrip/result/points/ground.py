@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geodesy.frame_spec import GROUND_AXES
-from photostrip.result.numbers import GEOGRAPHIC, GROUND, Document, Plain, natural_rank, rounded
+from photostrip.result.numbers import natural_rank, rounded
 from photostrip.result.points.precision import point_columns
+from photostrip.result.quantities import coordinate_decimals, records
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.pipeline import Result, StripResult
+    from photostrip.pipeline import Result
+    from photostrip.result.numbers import Document
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -50,24 +52,10 @@ class Differences:
         return self.parts[:, 2]
 
 
-def coordinates(frame: GroundFrame, enu: Floats) -> Plain:
-    """Ground coordinates as they are written.
-
-    Parameters
-    ----------
-    enu : ndarray, shape (n, 3)
-        Coordinates in the internal order.
-
-    Returns
-    -------
-    list of list of float
-        In the order of the frame's axes; 4 decimals, angles 10.
-    """
-    height = rounded(enu[:, 2], GROUND)
-    plan = rounded(enu[:, :2], GEOGRAPHIC if frame.kind == "geographic" else GROUND)
-    first, second, third = frame.order
-    rows = ((*pair, z) for pair, z in zip(plan, height, strict=True))
-    return [(row[first], row[second], row[third]) for row in rows]
+def coordinates(frame: GroundFrame, enu: Floats) -> Document:
+    """Return the columns x, y, z of coordinates in the internal order, with the decimals of their frame."""
+    decimals = coordinate_decimals(frame.kind, frame.axes)
+    return {axis: rounded(enu[:, k], count) for axis, k, count in zip("xyz", frame.order, decimals, strict=True)}
 
 
 def frame_of(result: Result) -> Document:
@@ -98,27 +86,19 @@ def points_of(result: Result, image_rms: Floats, rank: Numbers) -> list[Document
         Place of each of them in natural order.
     """
     points, ids = result.points, result.refined.observations.point_ids
-    names = [ids[number] for number in points.number]
     models = np.zeros(len(ids), np.intp)
     for strip in result.strips:
         models[strip.formed.point] += strip.formed.model_count
-    columns = zip(
-        names,
-        result.roles,
-        coordinates(result.output, points.ground),
-        points.rays.tolist(),
-        models[points.number].tolist(),
-        rounded(image_rms[points.number] * 1000, 2),
-        point_columns(result),
-        strict=True,
-    )
-    rows = [
-        {
-            "id": name, "role": role, "x": x, "y": y, "z": z, **sigmas,
-            "rays": rays, "models": count, "image_rms_um": image,
-        }
-        for name, role, (x, y, z), rays, count, image, sigmas in columns
-    ]  # fmt: skip
+    columns = {
+        "id": [ids[number] for number in points.number],
+        "role": list(result.roles),
+        **coordinates(result.output, points.ground),
+        **point_columns(result),
+        "rays": points.rays,
+        "models": models[points.number],
+        "image_rms_um": image_rms[points.number] * 1000.0,
+    }
+    rows = records("points", columns)
     return [rows[row] for row in np.argsort(rank[points.number])]
 
 
@@ -249,40 +229,41 @@ def _expected_of_bundle(
 def control_of(result: Result, found: Differences) -> list[Document]:
     """Return the list ``control``: every given point with what is left there, in natural order of the ids."""
     control = result.inputs.control
-    order = np.argsort(natural_rank(control.ids))
-    moved = rounded(found.axes, GROUND)
-    size = rounded(np.column_stack([found.plan, found.height]), GROUND)
-    in_photo = rounded(np.column_stack([found.plan, found.height]) / found.scale[:, None] * 1e6, 1)
-    given = _own_order(result, control.sigma)
-    expected = _own_order(result, found.sigma)
-    normalised = rounded(found.normalised, 2)
-    return [
-        {
-            "id": control.ids[row],
-            "role": "check" if control.check[row] else "control",
-            "use": _use(control.use[row].tolist()),
-            "rejected": _use(found.rejected[row].tolist()) if found.rejected[row].any() else "",
-            "measured": bool(result.control_rows[row] >= 0),
-            "dx": moved[row][0], "dy": moved[row][1], "dz": moved[row][2],
-            "plan": size[row][0], "height": size[row][1],
-            "plan_um": in_photo[row][0], "height_um": in_photo[row][1],
-            "sigma": given[row],
-            "sigma_fit": expected[row],
-            "normalised": normalised[row],
-            "list": int(control.frame[row]) + 1,
-            "strips": list(found.strips[row]),
-        }
-        for row in order.tolist()
-    ]  # fmt: skip
+    columns = {
+        "id": list(control.ids),
+        "role": ["check" if check else "control" for check in control.check.tolist()],
+        "use": [_use(counts) for counts in control.use.tolist()],
+        "rejected": [_use(out) if any(out) else "" for out in found.rejected.tolist()],
+        "measured": result.control_rows >= 0,
+        **_size_columns(found.axes, found.plan, found.height, found.scale),
+        "sigma": _in_list_order(result, control.sigma),
+        "sigma_fit": _in_list_order(result, found.sigma),
+        "normalised": found.normalised,
+        "list": control.frame + 1,
+        "strips": [list(strips) for strips in found.strips],
+    }
+    rows = records("control", columns)
+    return [rows[row] for row in np.argsort(natural_rank(control.ids))]
 
 
-def _own_order(result: Result, enu: Floats) -> Plain:
-    """Give standard deviations in the order of the axes of each point's own list."""
+def _size_columns(axes: Floats, plan: Floats, height: Floats, scale: Floats) -> Document:
+    """Return columns of differences: along the axes of the result, in plan and in height, and at photo scale."""
+    return {
+        **{f"d{axis}": axes[:, k] for k, axis in enumerate("xyz")},
+        "plan": plan,
+        "height": height,
+        "plan_um": plan / scale * 1e6,
+        "height_um": height / scale * 1e6,
+    }
+
+
+def _in_list_order(result: Result, enu: Floats) -> Floats:
+    """Return standard deviations in the order of the axes of each point's own list."""
     columns = enu.copy()
     for number, frame in enumerate(result.frames):
         rows = result.inputs.control.frame == number
         columns[rows] = frame.user_from_internal(enu[rows])
-    return rounded(columns, GROUND)
+    return columns
 
 
 def _use(counts: list[bool]) -> str:
@@ -296,23 +277,16 @@ def ties_of(result: Result, rank: Numbers) -> list[Document]:
     ties, ids = result.ties, result.refined.observations.point_ids
     if not len(ties.number):
         return []
-    scale = np.array([s.scale_number for s in result.strips])[ties.strips].mean(axis=1)
-    moved = rounded(result.output.user_from_internal(ties.difference), GROUND)
-    level = _level_ties(result)
-    size = np.column_stack([np.hypot(level[:, 0], level[:, 1]), level[:, 2]])
-    metres, in_photo = rounded(size, GROUND), rounded(size / scale[:, None] * 1e6, 1)
-    names = [s.strip.id for s in result.strips]
-    order = np.lexsort((ties.strips[:, 1], ties.strips[:, 0], rank[ties.number])).tolist()
-    return [
-        {
-            "id": ids[ties.number[row]],
-            "strips": [names[number] for number in ties.strips[row]],
-            "dx": moved[row][0], "dy": moved[row][1], "dz": moved[row][2],
-            "plan": metres[row][0], "height": metres[row][1],
-            "plan_um": in_photo[row][0], "height_um": in_photo[row][1],
-        }
-        for row in order
-    ]  # fmt: skip
+    names = [strip.strip.id for strip in result.strips]
+    scale = np.array([strip.scale_number for strip in result.strips])[ties.strips].mean(axis=1)
+    level, axes = _level_ties(result), result.output.user_from_internal(ties.difference)
+    columns = {
+        "id": [ids[number] for number in ties.number],
+        "strips": [[names[first], names[second]] for first, second in ties.strips],
+        **_size_columns(axes, np.hypot(level[:, 0], level[:, 1]), level[:, 2], scale),
+    }
+    rows = records("ties", columns)
+    return [rows[row] for row in np.lexsort((ties.strips[:, 1], ties.strips[:, 0], rank[ties.number]))]
 
 
 def _level_ties(result: Result) -> Floats:
@@ -335,39 +309,25 @@ def misclosures_of(result: Result) -> list[Document]:
 
     Beside them, how far each coordinate is checked by all others, and its share in its own polynomial.
     """
-    rows = []
+    found = []
     for strip in result.strips:
-        values = rounded(np.where(strip.control.use, strip.absolute.misclosures, np.nan), GROUND)
-        redundancy, detectable = _checked(strip)
-        leverage = _leverage(strip)
-        for row in np.argsort(natural_rank(strip.control.ids)):
-            parts = dict(zip(GROUND_AXES, values[row], strict=True))
-            rows.append(
-                {
-                    "strip": strip.strip.id,
-                    "id": strip.control.ids[row],
-                    **parts,
-                    "redundancy": dict(zip(GROUND_AXES, redundancy[row], strict=True)),
-                    "detectable": dict(zip(GROUND_AXES, detectable[row], strict=True)),
-                    "leverage": dict(zip("xyz", leverage[row], strict=True)),
-                }
-            )
-    return rows
-
-
-def _checked(strip: StripResult) -> tuple[Plain, Plain]:
-    """Redundancy numbers of the control, and the smallest errors that would be found, metres."""
-    found, nothing = strip.judged_control, np.full(strip.control.use.shape, np.nan)
-    if found is None:
-        return rounded(nothing, 3), rounded(nothing, 3)
-    known = np.isfinite(found.detectable)
-    return rounded(np.where(known, found.redundancy, np.nan), 3), rounded(found.detectable, 3)
-
-
-def _leverage(strip: StripResult) -> Plain:
-    """Share of each control point in the polynomials of X, Y, Z at its own place, 0 to 1."""
-    nothing = np.full(strip.control.use.shape, np.nan)
-    if strip.polynomial is None:
-        return rounded(nothing, 3)
-    columns = [axis.leverage if axis.terms else nothing[:, k] for k, axis in enumerate(strip.polynomial.axes)]
-    return rounded(np.column_stack(columns), 3)
+        nothing = np.full(strip.control.use.shape, np.nan)
+        tested, correction = strip.judged_control, strip.polynomial
+        detectable = nothing if tested is None else tested.detectable
+        redundancy = nothing if tested is None else np.where(np.isfinite(detectable), tested.redundancy, np.nan)
+        leverage = [
+            nothing[:, k] if correction is None or not correction.axes[k].terms else correction.axes[k].leverage
+            for k in range(3)
+        ]
+        misclosures = np.where(strip.control.use, strip.absolute.misclosures, np.nan)
+        columns = {
+            "strip": strip.strip.id,
+            "id": list(strip.control.ids),
+            **dict(zip(GROUND_AXES, misclosures.T, strict=True)),
+            "redundancy": dict(zip(GROUND_AXES, redundancy.T, strict=True)),
+            "detectable": dict(zip(GROUND_AXES, detectable.T, strict=True)),
+            "leverage": dict(zip("xyz", leverage, strict=True)),
+        }
+        rows = records("misclosures", columns)
+        found += [rows[row] for row in np.argsort(natural_rank(strip.control.ids))]
+    return found

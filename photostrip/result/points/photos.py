@@ -9,153 +9,64 @@ import numpy as np
 
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import angles
-from photostrip.result.numbers import DEGREES, RADIANS, ROTATION, Document, Plain, micrometres, rounded
+from photostrip.result.numbers import Plain, rounded
 from photostrip.result.points.ground import coordinates
-from photostrip.result.points.precision import columns_of_photos, photo_columns
+from photostrip.result.points.precision import UNITS, centre_columns, photo_columns
+from photostrip.result.quantities import angle_decimals, grouped, records
 from photostrip.triangulation.resection.resection import project
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
-    from photostrip.pipeline import Result, StripResult
+    from photostrip.pipeline import Result, Strip, StripResult
+    from photostrip.result.numbers import Document
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
     Flags = NDArray[np.bool_]
-
-PER_RADIAN = {"deg": (180 / np.pi, DEGREES), "gon": (200 / np.pi, DEGREES), "rad": (1.0, RADIANS)}
 
 
 @dataclass(frozen=True, eq=False)
 class ImageResiduals:
     """Measured minus computed image coordinates of one strip, also of measurements that took no part."""
 
+    strip: Strip
     rows: Numbers  # (m,): rows of the observations, by photo in flight order, then by natural order of the points
     photo: Numbers  # (m,): place of each row's photo in the strip
     residuals: Floats  # (m, 2): in x and y, mm; NaN where the point has no coordinates in the strip
     used: Flags  # (m,): whether the measurement took part
 
-    @classmethod
-    def of(cls, result: Result, strip: StripResult, rank: Numbers) -> ImageResiduals:
-        """Compute the residuals of a strip under its final orientations."""
-        observations, photos = result.refined.observations, strip.strip.photos
-        place = {photo: number for number, photo in enumerate(photos)}
-        position = np.array([place.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo]
-        rows = np.flatnonzero(position >= 0)
-        rows = rows[np.lexsort((rank[observations.point[rows]], position[rows]))]
-        position = position[rows]
-        known = np.full((len(observations.point_ids), 3), np.nan)
-        known[strip.formed.point] = strip.xyz
-        resection = strip.of_photos.resection
-        focal = np.full(len(photos), strip.of_photos.strip.camera.principal_distance)
-        with np.errstate(invalid="ignore"):
-            computed = project(known[observations.point[rows]], resection.centers, resection.rotations, position, focal)
-        used = np.zeros(len(observations), bool)
-        used[strip.of_photos.rows] = True
-        return cls(rows, position, observations.xy[rows] - computed, used[rows])
 
+def image_residuals(result: Result, rank: Numbers) -> list[ImageResiduals]:
+    """Return the residuals of all strips under their final orientations, then those of single photos.
 
-def photos_of(result: Result, residuals: list[ImageResiduals]) -> list[Document]:
-    """Return the list ``photos``: exterior orientations in the frame of the result, in flight order."""
-    return [
-        photo
-        for number, (strip, image) in enumerate(zip(result.photo_strips, residuals, strict=True))
-        for photo in _photos(result, number, strip, image)
-    ]
-
-
-def _photos(result: Result, number: int, strip: StripResult, image: ImageResiduals) -> list[Document]:
-    photos, resection = strip.strip.photos, strip.of_photos.resection
-    cartesian = strip.intermediate.cartesian_from_intermediate(resection.centers)
-    ground = result.output.ground_from_cartesian(cartesian, ids=[f"at the center of photo {p}" for p in photos])
-    turned = strip.intermediate.cartesian_rotations(resection.rotations)
-    rotations = result.output.axes_at(cartesian) @ turned
-    system, unit = result.settings.angle_system, result.settings.angle_unit
-    rows = zip(
-        photos,
-        coordinates(result.output, ground),
-        rounded(rotations.reshape(-1, 9), ROTATION),
-        _angles(rotations, system, unit),
-        micrometres(resection.rms),
-        np.bincount(image.photo[image.used], minlength=len(photos)).tolist(),
-        resection.solved.tolist(),
-        photo_columns(result, number, cartesian, rotations),
-        strict=True,
-    )
-    return [
-        {
-            "id": photo, "strip": strip.strip.id, "x": x, "y": y, "z": z, "rotation": rotation,
-            "angles": {"system": system, "unit": unit, "values": values}, **sigmas,
-            "image_rms_um": rms, "points": points, "resected": solved,
-        }
-        for photo, (x, y, z), rotation, values, rms, points, solved, sigmas in rows
-    ]  # fmt: skip
-
-
-def _angles(rotations: Floats, system: str, unit: str) -> Plain:
-    """Angles in the unit of the output; None for a photo whose outer two angles cannot be separated."""
-    factor, decimals = PER_RADIAN[unit]
-    try:
-        return rounded(angles(rotations, system) * factor, decimals)
-    except GeometryError:
-        return [_angles_of_one(rotation, system, unit) for rotation in rotations]
-
-
-def _angles_of_one(rotation: Floats, system: str, unit: str) -> Plain:
-    factor, decimals = PER_RADIAN[unit]
-    try:
-        return rounded(angles(rotation, system) * factor, decimals)
-    except GeometryError:
-        return None
-
-
-def residuals_of(result: Result, residuals: list[ImageResiduals]) -> list[Document]:
-    """Return the list ``residuals``: image residuals photo by photo, points in natural order."""
-    observations = result.refined.observations
-    ids = observations.point_ids
-    found = []
-    for strip, image in zip(result.photo_strips, residuals, strict=True):
-        names = [ids[number] for number in observations.point[image.rows].tolist()]
-        vx, vy = (micrometres(image.residuals[:, axis]) for axis in (0, 1))
-        used = image.used.tolist()
-        ends = np.searchsorted(image.photo, np.arange(len(strip.strip.photos) + 1)).tolist()
-        found += [
-            {
-                "strip": strip.strip.id,
-                "photo": photo,
-                "points": names[ends[n] : ends[n + 1]],
-                "vx_um": vx[ends[n] : ends[n + 1]],
-                "vy_um": vy[ends[n] : ends[n + 1]],
-                "used": used[ends[n] : ends[n + 1]],
-            }
-            for n, photo in enumerate(strip.strip.photos)
-        ]
-    return found
-
-
-def point_rms(result: Result, residuals: list[ImageResiduals]) -> Floats:
-    """Root mean square image residual of every point over all its photos, mm; NaN where it took no part.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        By number of the point in the observations.
+    Photos that are strips of their own are known to a bundle adjustment only. `rank` is the place of each point in
+    natural order.
     """
-    observations = result.refined.observations
-    squares, count = np.zeros(len(observations.point_ids)), np.zeros(len(observations.point_ids))
-    for image in residuals:
-        point = observations.point[image.rows[image.used]]
-        np.add.at(squares, point, (image.residuals[image.used] ** 2).sum(axis=1))
-        np.add.at(count, point, 2)
+    return [_of_strip(result, strip, rank) for strip in result.photo_strips] + _of_singles(result, rank)
+
+
+def _of_strip(result: Result, strip: StripResult, rank: Numbers) -> ImageResiduals:
+    observations, stages = result.refined.observations, strip.of_photos
+    place = {photo: number for number, photo in enumerate(strip.strip.photos)}
+    position = np.array([place.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo]
+    rows = np.flatnonzero(position >= 0)
+    rows = rows[np.lexsort((rank[observations.point[rows]], position[rows]))]
+    known = np.full((len(observations.point_ids), 3), np.nan)
+    known[strip.formed.point] = strip.xyz
+    used = np.zeros(len(observations), bool)
+    used[stages.rows] = True
+    places = known[observations.point[rows]]
+    centers, rotations = stages.resection.centers, stages.resection.rotations
+    focal = np.full(len(strip.strip.photos), stages.strip.camera.principal_distance)
     with np.errstate(invalid="ignore"):
-        return np.sqrt(np.where(count > 0, squares / np.maximum(count, 1), np.nan))
+        residuals = observations.xy[rows] - project(places, centers, rotations, position[rows], focal)
+    return ImageResiduals(stages.strip, rows, position[rows], residuals, used[rows])
 
 
-# ------------------------------------------------------------------------------------------------ single photos
-
-
-def singles_of(result: Result, rank: Numbers) -> list[ImageResiduals]:
-    """Return the residuals of the photos that are strips of their own, which only a bundle adjustment has."""
+def _of_singles(result: Result, rank: Numbers) -> list[ImageResiduals]:
     if result.bundle is None:
         return []
     observations = result.refined.observations
@@ -167,55 +78,151 @@ def singles_of(result: Result, rank: Numbers) -> list[ImageResiduals]:
     for single in result.bundle.singles:
         rows = np.flatnonzero(observations.photo == observations.photo_ids.index(single.strip.photos[0]))
         rows = rows[np.argsort(rank[observations.point[rows]], kind="stable")]
-        photo = np.zeros(len(rows), np.intp)
+        photo, places = np.zeros(len(rows), np.intp), known[observations.point[rows]]
         focal = np.array([single.strip.camera.principal_distance])
         with np.errstate(invalid="ignore"):
-            at = known[observations.point[rows]]
-            computed = project(at, single.center[None], single.rotation[None], photo, focal)
-        found.append(ImageResiduals(rows, photo, observations.xy[rows] - computed, used[rows]))
+            computed = project(places, single.center[None], single.rotation[None], photo, focal)
+        found.append(ImageResiduals(single.strip, rows, photo, observations.xy[rows] - computed, used[rows]))
     return found
 
 
-def single_photos_of(result: Result, residuals: list[ImageResiduals]) -> list[Document]:
-    """Return the entries of ``photos`` for photos that are strips of their own."""
-    if result.bundle is None:
-        return []
-    system, unit = result.settings.angle_system, result.settings.angle_unit
-    rows = []
-    place = {photo: number for number, photo in enumerate(result.bundle.start.photos)}
-    for single, image in zip(result.bundle.singles, residuals, strict=True):
-        photo = single.strip.photos[0]
-        center = single.center[None]
-        (ground,) = coordinates(result.output, result.output.ground_from_cartesian(center, ids=[f"of photo {photo}"]))
-        rotation = result.output.axes_at(center) @ single.rotation[None]
-        covariance = result.bundle.photo_covariances[place[photo]][None]
-        (columns,) = columns_of_photos(result, center, rotation, covariance)
-        values = _angles(rotation, system, unit)[0]
-        fit = micrometres(np.sqrt(np.mean(image.residuals[image.used] ** 2))) if image.used.any() else None
-        rows.append(
-            {
-                "id": photo, "strip": single.strip.id, "x": ground[0], "y": ground[1], "z": ground[2],
-                "rotation": rounded(rotation.reshape(9), ROTATION),
-                "angles": {"system": system, "unit": unit, "values": values}, **columns,
-                "image_rms_um": fit, "points": int(image.used.sum()), "resected": True,
-            }
-        )  # fmt: skip
-    return rows
-
-
-def single_residuals_of(result: Result, residuals: list[ImageResiduals]) -> list[Document]:
-    """Return the entries of ``residuals`` for photos that are strips of their own."""
-    if result.bundle is None:
-        return []
-    observations = result.refined.observations
-    return [
-        {
-            "strip": single.strip.id,
-            "photo": single.strip.photos[0],
+def residuals_of(result: Result, images: Sequence[ImageResiduals]) -> list[Document]:
+    """Return the list ``residuals``: image residuals photo by photo, points in natural order."""
+    observations, found = result.refined.observations, []
+    for image in images:
+        columns = {
             "points": [observations.point_ids[number] for number in observations.point[image.rows].tolist()],
-            "vx_um": micrometres(image.residuals[:, 0]),
-            "vy_um": micrometres(image.residuals[:, 1]),
-            "used": image.used.tolist(),
+            "vx_um": 1000.0 * image.residuals[:, 0],
+            "vy_um": 1000.0 * image.residuals[:, 1],
+            "used": image.used,
         }
-        for single, image in zip(result.bundle.singles, residuals, strict=True)
+        photos = image.strip.photos
+        ends = np.searchsorted(image.photo, np.arange(len(photos) + 1)).tolist()
+        found += grouped("residuals", {"strip": image.strip.id, "photo": photos}, columns, ends)
+    return found
+
+
+def point_rms(result: Result, images: Sequence[ImageResiduals]) -> Floats:
+    """Root mean square image residual of every point over all its photos, mm; NaN where it took no part.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        By number of the point in the observations.
+    """
+    observations = result.refined.observations
+    squares, count = np.zeros(len(observations.point_ids)), np.zeros(len(observations.point_ids))
+    for image in images:
+        point = observations.point[image.rows[image.used]]
+        np.add.at(squares, point, (image.residuals[image.used] ** 2).sum(axis=1))
+        np.add.at(count, point, 2)
+    with np.errstate(invalid="ignore"):
+        return np.sqrt(np.where(count > 0, squares / np.maximum(count, 1), np.nan))
+
+
+# -------------------------------------------------------------------------------------------------- orientations
+
+
+def photos_of(result: Result, images: Sequence[ImageResiduals]) -> list[Document]:
+    """Return the list ``photos``: exterior orientations in the frame of the result, in flight order.
+
+    Of photos whose strip is made of independent models the perspective centre alone is known.
+    """
+    if result.model_strips:
+        return [photo for number, strip in enumerate(result.strips) for photo in _centres(result, number, strip)]
+    of_strips = zip(result.photo_strips, images, strict=False)
+    found = [
+        photo
+        for number, (strip, image) in enumerate(of_strips)
+        for photo in _photos_of_strip(result, number, strip, image)
     ]
+    return found + _single_photos(result, images[len(result.photo_strips) :])
+
+
+def _photos_of_strip(result: Result, number: int, strip: StripResult, image: ImageResiduals) -> list[Document]:
+    photos, resection = strip.strip.photos, strip.of_photos.resection
+    centers = strip.intermediate.cartesian_from_intermediate(resection.centers)
+    rotations = result.output.axes_at(centers) @ strip.intermediate.cartesian_rotations(resection.rotations)
+    ground = result.output.ground_from_cartesian(centers, ids=[f"at the center of photo {photo}" for photo in photos])
+    known = result.precision
+    columns = {
+        "image_rms_um": 1000.0 * resection.rms,
+        "points": np.bincount(image.photo[image.used], minlength=len(photos)),
+        "resected": resection.solved,
+    }
+    sigmas = {"sigma": None} if known is None else photo_columns(result, centers, rotations, known.photos[number])
+    head = {"id": photos, "strip": strip.strip.id, **coordinates(result.output, ground)}
+    return records("photos", head | _turned(result, rotations) | sigmas | columns)
+
+
+def _single_photos(result: Result, images: Sequence[ImageResiduals]) -> list[Document]:
+    """Return the entries of photos that are strips of their own."""
+    if result.bundle is None or not images:
+        return []
+    singles = result.bundle.singles
+    photos = [single.strip.photos[0] for single in singles]
+    centers = np.array([single.center for single in singles])
+    rotations = result.output.axes_at(centers) @ np.array([single.rotation for single in singles])
+    ground = result.output.ground_from_cartesian(centers, ids=[f"of photo {photo}" for photo in photos])
+    rows = [result.bundle.start.photos.index(photo) for photo in photos]
+    columns = {
+        "image_rms_um": [
+            1000.0 * np.sqrt(np.mean(image.residuals[image.used] ** 2)) if image.used.any() else None
+            for image in images
+        ],
+        "points": [int(image.used.sum()) for image in images],
+        "resected": True,
+    }
+    head = {"id": photos, "strip": [single.strip.id for single in singles], **coordinates(result.output, ground)}
+    sigmas = photo_columns(result, centers, rotations, result.bundle.photo_covariances[rows])
+    return records("photos", head | _turned(result, rotations) | sigmas | columns)
+
+
+def _turned(result: Result, rotations: Floats) -> Document:
+    """Return the columns of rotations and angles."""
+    system, unit = result.settings.angle_system, result.settings.angle_unit
+    values = _angles(rotations, system, unit)
+    return {"rotation": rotations.reshape(-1, 9), "angles": {"system": system, "unit": unit, "values": values}}
+
+
+def _angles(rotations: Floats, system: str, unit: str) -> list[Plain]:
+    """Angles in the unit of the output; None for a photo whose outer two angles cannot be separated."""
+    try:
+        found: list[Plain] = rounded(angles(rotations, system) * UNITS[unit], angle_decimals(unit))
+    except GeometryError:
+        if len(rotations) == 1:
+            return [None]
+        return [_angles(rotation[None], system, unit)[0] for rotation in rotations]
+    return found
+
+
+def _centres(result: Result, number: int, strip: StripResult) -> list[Document]:
+    """Return the perspective centres of a strip of independent models, as far as they are known."""
+    photos, models = strip.strip.photos, strip.of_models.formed.models
+    known = np.flatnonzero(np.isfinite(strip.centers).all(axis=1))
+    centers = strip.intermediate.cartesian_from_intermediate(strip.centers[known])
+    names = [f"at the center of photo {photos[row]}" for row in known.tolist()]
+    places = coordinates(result.output, result.output.ground_from_cartesian(centers, ids=names))
+    covariances = None if result.precision is None else result.precision.photos[number][known]
+    columns = {"id": [photos[row] for row in known], **places, **centre_columns(result, centers, covariances)}
+    of_centre = {row["id"]: row for row in records("photos", columns)} if len(known) else {}
+    used = (models.node < models.points) & strip.of_models.formed.used
+    count = np.bincount(models.model[used], minlength=models.count).tolist()
+    system, unit = result.settings.angle_system, result.settings.angle_unit
+    found = []
+    for row, photo in enumerate(photos):
+        centre = of_centre.get(photo, {"x": None, "y": None, "z": None, "sigma": None})
+        found.append(
+            {
+                "id": photo,
+                "strip": strip.strip.id,
+                **{axis: centre.pop(axis) for axis in "xyz"},
+                "rotation": None,
+                "angles": {"system": system, "unit": unit, "values": None},
+                **{key: value for key, value in centre.items() if key != "id"},
+                "image_rms_um": None,
+                "points": max(count[max(row - 1, 0) : row + 1]),
+                "resected": None,
+            }
+        )
+    return found

@@ -19,12 +19,9 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
 
-COVARIANCE = 8  # decimals of metres^2: a tenth of a millimetre squared
-DIRECTION = 1  # decimals of degrees of the axes of an ellipse
 UNITS = {"deg": 180 / np.pi, "gon": 200 / np.pi, "rad": 1.0}
 UPPER = np.triu_indices(6)
 INSIDE = {"plan": float(np.sqrt(chi2_quantile(0.95, 2))), "height": normal_quantile(0.975)}
-EMPTY_POINT: Document = {"sigma_x": None, "sigma_y": None, "sigma_z": None}
 
 
 def turned(covariances: Floats, axes: Floats) -> Floats:
@@ -82,70 +79,48 @@ def ellipses(level: Floats) -> tuple[Floats, Floats]:
 # ------------------------------------------------------------------------------------------------------- columns
 
 
-def point_columns(result: Result) -> list[Document]:
-    """Return what is added to each point of ``points``: standard deviations, covariances, error ellipse in plan.
+def point_columns(result: Result) -> Document:
+    """Return columns of ``points``: standard deviations, covariances, error ellipse in plan.
 
-    Returns
-    -------
-    list of dict
-        One for each point of ``result.points``; only empty standard deviations when nothing is known.
+    Only empty standard deviations when nothing is known.
     """
     precision, frame, place = result.precision, result.output, result.points.cartesian
     if precision is None:
-        return [EMPTY_POINT] * len(place)
+        return dict.fromkeys(("sigma_x", "sigma_y", "sigma_z"))
     level = turned(precision.points, frame.level_axes_at(place))
     order = list(frame.order)
-    own = (precision.points if frame.kind == "geocentric" else level)[:, order][:, :, order]
+    covariances = (precision.points if frame.kind == "geocentric" else level)[:, order][:, :, order]
     with np.errstate(invalid="ignore"):
-        sigma = rounded(np.sqrt(np.diagonal(own, axis1=1, axis2=2)), GROUND)
-    mixed = rounded(own[:, (0, 0, 1), (1, 2, 2)], COVARIANCE)
+        sigma = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
     size, azimuth = ellipses(level)
-    columns = zip(sigma, mixed, rounded(size, GROUND), rounded(np.degrees(azimuth), DIRECTION), strict=True)
-    return [
-        {
-            "sigma_x": x, "sigma_y": y, "sigma_z": z, "cov_xy": xy, "cov_xz": xz, "cov_yz": yz,
-            "ellipse_a": a, "ellipse_b": b, "ellipse_azimuth_deg": direction,
-        }
-        for (x, y, z), (xy, xz, yz), (a, b), direction in columns
-    ]  # fmt: skip
+    return {
+        **{f"sigma_{axis}": sigma[:, k] for k, axis in enumerate("xyz")},
+        "cov_xy": covariances[:, 0, 1],
+        "cov_xz": covariances[:, 0, 2],
+        "cov_yz": covariances[:, 1, 2],
+        "ellipse_a": size[:, 0],
+        "ellipse_b": size[:, 1],
+        "ellipse_azimuth_deg": np.degrees(azimuth),
+    }
 
 
-def photo_columns(result: Result, number: int, place: Floats, rotations: Floats) -> list[Document]:
-    """Return what is added to each photo of a strip: standard deviations of centre and angles, and their covariances.
+def photo_columns(result: Result, place: Floats, rotations: Floats, given: Floats) -> Document:
+    """Return columns of ``photos``: standard deviations of centre and angles, and their covariances.
 
-    Parameters
-    ----------
-    place : ndarray, shape (m, 3)
-        Perspective centres in the Cartesian frame.
-    rotations : ndarray, shape (m, 3, 3)
-        Photo to the axes of the output at the centres.
-
-    Returns
-    -------
-    list of dict
-        ``sigma`` with x, y, z in metres and the angles in their exported unit; ``covariance``, the upper triangle, row
-        by row, of the matrix of x, y, z and the three angles. An angle's rows take the small rotation about the axes
-        of the output to the angles of the system.
-    """
-    if result.precision is None:
-        return [{"sigma": None} for _ in place]
-    return columns_of_photos(result, place, rotations, result.precision.photos[number])
-
-
-def columns_of_photos(result: Result, place: Floats, rotations: Floats, given: Floats) -> list[Document]:
-    """Return the same for photos with given covariances.
+    An angle's rows take the small rotation about the axes of the output to the angles of the system.
 
     Parameters
     ----------
     place, rotations : ndarray, shapes (m, 3), (m, 3, 3)
-        As for ``photo_columns``.
+        Perspective centres in the Cartesian frame; photo to the axes of the output at the centres.
     given : ndarray, shape (m, 6, 6)
         Covariances in the axes of the Cartesian frame, as in ``pipeline.Precision``.
 
     Returns
     -------
-    list of dict
-        As ``photo_columns``.
+    dict
+        ``sigma`` with x, y, z in metres and the angles in their exported unit; ``covariance``, the upper triangle, row
+        by row, of the matrix of x, y, z and the three angles.
     """
     axes = result.output.axes_at(place)
     turn = np.zeros((len(place), 6, 6))
@@ -154,12 +129,18 @@ def columns_of_photos(result: Result, place: Floats, rotations: Floats, given: F
     covariances = turn @ given @ turn.transpose(0, 2, 1)
     with np.errstate(invalid="ignore"):
         sigma = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
-    columns = zip(
-        rounded(sigma[:, :3], GROUND), significant(sigma[:, 3:]), significant(covariances[:, *UPPER]), strict=True
-    )
-    return [
-        {"sigma": {"x": x, "y": y, "z": z, "angles": angle}, "covariance": mixed} for (x, y, z), angle, mixed in columns
-    ]
+    of_centre = dict(zip("xyz", sigma.T[:3], strict=True))
+    return {"sigma": {**of_centre, "angles": sigma[:, 3:]}, "covariance": covariances[:, *UPPER]}
+
+
+def centre_columns(result: Result, place: Floats, given: Floats | None) -> Document:
+    """Return the same of perspective centres alone: nothing is known of the angles."""
+    if given is None:
+        return {"sigma": None}
+    covariances = np.full((len(place), 6, 6), np.nan)
+    covariances[:, :3, :3] = turned(given[:, :3, :3], result.output.axes_at(place)[:, list(result.output.order)])
+    sigma = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2)[:, :3])
+    return {"sigma": {**dict(zip("xyz", sigma.T, strict=True)), "angles": None}, "covariance": covariances[:, *UPPER]}
 
 
 def _rates(rotations: Floats, system: str) -> Floats:

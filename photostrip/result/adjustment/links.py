@@ -1,0 +1,137 @@
+"""Independent models in their strips, and the links between them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.pipeline.models.model_notes import far_ends
+from photostrip.result.adjustment.junctions import DIRECTIONS, PPM, discrepancies
+from photostrip.result.numbers import rms
+from photostrip.result.quantities import grouped, record, records
+from photostrip.triangulation.independent_models.link_screening import detectable
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.pipeline import Result, StripResult
+    from photostrip.result.numbers import Document
+
+    Numbers = NDArray[np.intp]
+
+AXES = ("x", "y", "z")
+
+
+def sigma0(strip: StripResult) -> float:
+    """Root of the variance of the model coordinates over what is stated; NaN without redundancy."""
+    solved = strip.of_models.formed.links.solved
+    redundancy = int(solved.redundancy.sum())
+    return float(np.sqrt(solved.squares.sum() / redundancy)) if redundancy else float("nan")
+
+
+def stated_sigma(strip: StripResult) -> float:
+    """Root mean square of the stated standard deviations of points, mm."""
+    models = strip.of_models.formed.models
+    return rms(models.sigma[models.node < models.points])
+
+
+def expected_drift(strip: StripResult) -> float:
+    """Change of scale along the strip that the links let expect, ratio."""
+    links = strip.of_models.formed.links
+    return float(np.sqrt(links.solved.cofactors[:, 6, 6].sum() * links.factor)) if links.shared.count else float("nan")
+
+
+def models_of(result: Result) -> list[Document]:
+    """Return the list ``models``: what each model holds and how it lies in its strip, in flight order."""
+    return [model for strip in result.model_strips for model in _models(strip)]
+
+
+def _models(strip: StripResult) -> list[Document]:
+    formed, models, photos = strip.of_models.formed, strip.of_models.formed.models, strip.strip.photos
+    point = models.node < models.points
+    used = np.bincount(models.model[point & formed.used], minlength=models.count)
+    columns = {
+        "strip": strip.strip.id,
+        "id": strip.of_models.strip.models,
+        "left": photos[:-1],
+        "right": photos[1:],
+        **dict.fromkeys(("elements", "sigma0_um", "rms_parallax_um", "max_parallax_um")),
+        "points_used": used,
+        "points_rejected": np.bincount(models.model[point], minlength=models.count) - used,
+        "centers": np.bincount(models.model[~point], minlength=models.count),
+        "redundancy": None,
+        "base": np.linalg.norm(np.diff(strip.centers, axis=0), axis=1),
+        "scale_factor": formed.places.scale,
+        "model_scale": strip.of_models.scales,
+        "rotation": (strip.absolute.similarity.rotation @ formed.places.rotation).reshape(-1, 9),
+    }
+    return records("models", columns)
+
+
+def links_of(result: Result) -> list[Document]:
+    """Return the list ``links``: how every model fits the one before it, in flight order."""
+    return [link for strip in result.model_strips for link in _links(result, strip)]
+
+
+def _links(result: Result, strip: StripResult) -> list[Document]:
+    formed, names = strip.of_models.formed, strip.of_models.strip.models
+    links, models, shared, solved = formed.links, formed.models, formed.links.shared, formed.links.solved
+    gap, far, smallest, found = discrepancies(strip), far_ends(formed), detectable(shared, links), []
+    for number in range(shared.count):
+        rows = np.flatnonzero(shared.link == number)
+        used = rows[links.used[rows]]
+        of_points = models.node[shared.before[used]] < models.points
+        worst = used[np.argmax(links.value[used])]
+        size = np.array([rms(column) for column in gap[used].T])
+        redundancy = int(solved.redundancy[number])
+        link = {
+            "strip": strip.strip.id,
+            "photo": strip.strip.photos[number + 1],
+            "before": names[number],
+            "after": names[number + 1],
+            "points_used": int(of_points.sum()),
+            "points_rejected": names_of(result, models.node[shared.before[rows[~links.used[rows]]]]),
+            "center": bool((~of_points).any()),
+            "factor": solved.similarities.scale[number],
+            "redundancy": redundancy,
+            "sigma0": np.sqrt(solved.squares[number] / redundancy) if redundancy else np.nan,
+            "largest": links.value[worst],
+            "largest_point": names_of(result, models.node[shared.before[[worst]]])[0],
+            "limit": links.limit[number],
+            "detectable_um": smallest[used].max() * 1000.0,
+            "far_end": far[number],
+            "discrepancy": dict(zip(DIRECTIONS, size, strict=True)),
+            "discrepancy_um": dict(zip(DIRECTIONS, size / strip.scale_number * PPM, strict=True)),
+        }
+        found.append(record("links", link))
+    return found
+
+
+def names_of(result: Result, nodes: Numbers) -> list[str]:
+    """Name points, and perspective centres by their photos."""
+    measured = result.inputs.models
+    return [] if measured is None else [measured.points.name(int(node)) for node in nodes]
+
+
+def residuals_of(result: Result, rank: Numbers) -> list[Document]:
+    """Return the list ``link_residuals``: differences of what neighbouring models have in common, link by link.
+
+    After minus before, in micrometres along the axes of the model before; also of points that took no part.
+    """
+    found = []
+    for strip in result.model_strips:
+        formed, names = strip.of_models.formed, strip.of_models.strip.models
+        links, node, shared = formed.links, formed.models.node, formed.links.shared
+        place = np.concatenate([rank, len(rank) + np.arange(len(strip.strip.photos) + node.max(initial=0))])
+        order = np.lexsort((place[node[shared.before]], shared.link))
+        columns = {
+            "points": names_of(result, node[shared.before[order]]),
+            **{f"v{axis}_um": -1000.0 * links.solved.residual[order, k] for k, axis in enumerate(AXES)},
+            "test": links.value[order],
+            "used": links.used[order],
+        }
+        heads = {"strip": strip.strip.id, "before": names[:-1], "after": names[1:]}
+        ends = np.searchsorted(shared.link[order], np.arange(shared.count + 1)).tolist()
+        found += grouped("link_residuals", heads, columns, ends)
+    return found

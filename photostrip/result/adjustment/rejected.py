@@ -1,0 +1,313 @@
+"""What was taken out, from pairs to the bundle adjustment, each with the test that found it and the reason in words."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.result.adjustment.bundle import KINDS, names_of_observation
+from photostrip.result.adjustment.junctions import PPM
+from photostrip.result.adjustment.links import AXES, names_of
+from photostrip.result.numbers import natural, rounded
+from photostrip.result.quantities import DECIMALS_BY_UNIT, record
+from photostrip.triangulation.gross_errors.control import control_screening
+from photostrip.triangulation.gross_errors.rays.strip_screening import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY
+from photostrip.triangulation.strip_formation.scale_ratios import depths
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.pipeline import Result, StripResult
+    from photostrip.pipeline.results import Bundle
+    from photostrip.points import PhotoPoints
+    from photostrip.result.numbers import Document
+    from photostrip.triangulation.bundle.snooping import BundleRejection
+    from photostrip.triangulation.gross_errors.control.control_screening import ControlRejection
+    from photostrip.triangulation.gross_errors.pairs.screening import PairRejection
+
+    Flags = NDArray[np.bool_]
+
+MICROMETRES = 1000.0  # in a millimetre
+ANOTHER_POINT = 0.05  # of the extent of a model: an error as large is one of identity
+REASONS = {
+    WRONG_RAY: "the other rays of the point meet without it",
+    TWO_RAYS: "the two rays of the point contradict each other: neither is used",
+    SEVERAL_RAYS: "the rays of the point contradict each other, and which is wrong cannot be told: none is used",
+}
+EMPTY: Document = {
+    "strip": "",
+    "photo": None,
+    "other_photo": None,
+    "point": None,
+    "stage": "",
+    "test": "",
+    "value": None,
+    "limit": None,
+    "unit": "",
+    "parallax_um": None,
+    "zone": None,
+    "size": None,
+    "size_unit": "um",
+    "readmitted": False,
+    "blamed": [],
+    "reason": "",
+}
+
+
+def rejected_of(result: Result) -> list[Document]:
+    """Return the list ``rejected``: what was taken out of pairs, scale transfers, points and control, in flight order.
+
+    Within a pair, a junction or a link they stand in natural order of the points: the order of the tables does not
+    show. A measurement that was taken back in the end is in it, marked. What a bundle adjustment took out comes last.
+    """
+    observations = result.refined.observations
+    found = []
+    for strip in result.strips:
+        if strip.model_stages is None:
+            found += _from_pairs(strip, observations)
+            found += _from_junctions(strip, observations)
+            found += _from_rays(strip, observations)
+        else:
+            found += _from_links(result, strip)
+        found += [_from_control(strip, wrong) for wrong in strip.wrong_control]
+    if result.bundle is None:
+        return found
+    return _after_bundle(result.bundle, found) + [
+        _from_bundle(result.bundle, each) for each in result.bundle.screened.rejections
+    ]
+
+
+def _entry(**values: object) -> Document:
+    return record("rejected", EMPTY | values)
+
+
+# -------------------------------------------------------------------------------------------------------- photos
+
+
+def _from_pairs(strip: StripResult, observations: PhotoPoints) -> list[Document]:
+    ids, oriented = observations.point_ids, strip.of_photos.orientation
+
+    def place(rejection: PairRejection) -> tuple[int, object]:
+        return int(oriented.pairs.pair[rejection.row]), natural(ids[oriented.point[rejection.row]])
+
+    return [_from_pair(strip, each, observations) for each in sorted(strip.of_photos.rejections, key=place)]
+
+
+def _from_pair(strip: StripResult, rejection: PairRejection, observations: PhotoPoints) -> Document:
+    oriented, wrong = strip.of_photos.orientation, strip.of_photos.contradictions
+    pair = int(oriented.pairs.pair[rejection.row])
+    size = rejection.size * MICROMETRES
+    factor = MICROMETRES if rejection.test == "parallax" else 1.0
+    blamed = [
+        observations.photo_ids[observations.photo[row]]
+        for row, kind in zip(wrong.wrong, wrong.kind, strict=True)
+        if kind == WRONG_RAY and row in oriented.rows[rejection.row]
+    ]
+    if rejection.readmitted:
+        blamed = []
+        reason = "taken back: the pair or the strip oriented on the other points predicts it, or the user keeps it"
+    elif rejection.test == "in front":
+        reason = "the rays do not meet in front of the cameras"
+    else:
+        reason = f"y parallax {size:.1f} µm in the pair oriented without it"
+    if blamed:
+        reason += f"; the wrong ray is that of photo {', '.join(blamed)}: the others of the point meet without it"
+    elif rejection.test != "in front" and not rejection.readmitted:
+        reason += "; which of its two rays is wrong cannot be told"
+    return _entry(
+        strip=strip.strip.id,
+        photo=strip.strip.photos[pair],
+        other_photo=strip.strip.photos[pair + 1],
+        point=observations.point_ids[oriented.point[rejection.row]],
+        stage="relative",
+        test=rejection.test,
+        value=rejection.value * factor,
+        limit=rejection.limit * factor,
+        unit="um" if rejection.test == "parallax" else "",
+        parallax_um=size,
+        zone=rejection.zone or None,
+        size=size,
+        readmitted=rejection.readmitted,
+        blamed=blamed,
+        reason=reason,
+    )
+
+
+def _from_junctions(strip: StripResult, observations: PhotoPoints) -> list[Document]:
+    """Pass points that did not belong in a scale transfer; the error as that of an x parallax in one of the models."""
+    stages, ids = strip.of_photos, observations.point_ids
+    joined, oriented = stages.formed.junctions, stages.orientation
+    out = np.flatnonzero(~joined.used).tolist()
+    rows = np.array(
+        sorted(out, key=lambda row: (int(joined.junction[row]), natural(ids[int(joined.point[row])]))), np.intp
+    )
+    base, _ = oriented.relative
+    deviation = joined.ratio[rows] / joined.factor[joined.junction[rows]] - 1
+    depth = depths(stages.formed.vectors[joined.after[rows]], base[joined.junction[rows] + 1])
+    size = deviation * oriented.pairs.focal / depth * MICROMETRES
+    return [
+        _entry(
+            strip=strip.strip.id,
+            photo=strip.strip.photos[joined.junction[row] + 1],
+            point=ids[joined.point[row]],
+            stage="scale_transfer",
+            test="ratio",
+            value=abs(off) * PPM,
+            limit=joined.limit[row] * PPM,
+            unit="ppm",
+            zone=stages.screened.zone[joined.after[row]],
+            size=shift,
+            reason=f"scale ratio {abs(off) * PPM:.0f} ppm from that of the other pass points: an x parallax wrong "
+            f"by {shift:.1f} µm would explain it",
+        )
+        for row, off, shift in zip(rows.tolist(), deviation.tolist(), size.tolist(), strict=True)
+    ]
+
+
+def _from_rays(strip: StripResult, observations: PhotoPoints) -> list[Document]:
+    """Rays that contradict the others of their point, in natural order of the points, then in flight order.
+
+    A ray that all its pairs have rejected stands with those.
+    """
+    found = strip.of_photos.contradictions
+    zone = np.zeros(len(observations), np.intp)  # in the pair with the next photo, else with the one before
+    for side in (1, 0):
+        zone[strip.of_photos.orientation.rows[:, side]] = strip.of_photos.screened.zone
+    photos = [observations.photo_ids[observations.photo[row]] for row in found.wrong]
+    names = [observations.point_ids[number] for number in found.point]
+    place = {photo: number for number, photo in enumerate(strip.strip.photos)}
+    rows = []
+    for number in sorted(np.flatnonzero(rejected_by_strip(strip)), key=lambda n: (natural(names[n]), place[photos[n]])):
+        kind, size = found.kind[number], found.size[number]
+        known = bool(np.isfinite(size).all())
+        rows.append(
+            _entry(
+                strip=strip.strip.id,
+                photo=photos[number],
+                point=names[number],
+                stage="rays",
+                test="strip",
+                value=found.value[number],
+                limit=found.limit[number],
+                zone=int(zone[found.wrong[number]]) or None,
+                size=size[np.argmax(np.abs(size))] * MICROMETRES if known else None,
+                size_unit="um" if known else "",
+                blamed=[photos[number]] if kind == WRONG_RAY else [],
+                reason=REASONS[kind],
+            )
+        )
+    return rows
+
+
+def rejected_by_strip(strip: StripResult) -> Flags:
+    """Return which of the strip's contradicting measurements had not been rejected by all their pairs already."""
+    oriented, wrong = strip.of_photos.orientation, strip.of_photos.contradictions.wrong
+    logged = np.zeros(len(oriented.point), bool)
+    logged[[each.row for each in strip.of_photos.rejections if not each.readmitted]] = True
+    return np.asarray(np.isin(wrong, oriented.rows[~logged]), bool)
+
+
+def _from_control(strip: StripResult, wrong: ControlRejection) -> Document:
+    sizes = dict(zip(control_screening.AXES, wrong.size, strict=True))
+    reason = "; ".join(f"{axis} by about {sizes[axis]:+.2f} m" for axis in wrong.axes)
+    if wrong.exchanged_with:
+        reason += f"; fits when exchanged with {wrong.exchanged_with}"
+    return _entry(
+        strip=strip.strip.id,
+        point=wrong.id,
+        stage="control",
+        test="left out",
+        value=wrong.value,
+        limit=wrong.limit,
+        size=max((sizes[axis] for axis in wrong.axes), key=abs, default=0.0),
+        size_unit="m",
+        reason=f"given coordinates contradict the strip and the other control: {reason}",
+    )
+
+
+# -------------------------------------------------------------------------------------------- independent models
+
+
+def _from_links(result: Result, strip: StripResult) -> list[Document]:
+    formed, names, found = strip.of_models.formed, strip.of_models.strip.models, []
+    for each in formed.links.rejections:
+        before, after = formed.links.shared.before[each.row], formed.links.shared.after[each.row]
+        pair = [names[each.link], names[each.link + 1]]
+        parts = ", ".join(f"{axis} {value * MICROMETRES:+.0f}" for axis, value in zip(AXES, each.error, strict=True))
+        size = float(np.linalg.norm(each.error))
+        if formed.used[before] == formed.used[after]:
+            wrong = "which one is wrong cannot be told, and the mean is made of neither"
+        else:
+            right, other = pair if formed.used[before] else pair[::-1]
+            wrong = f"other models agree with {right}: {other} is wrong"
+        entry = _entry(
+            strip=strip.strip.id,
+            photo=strip.strip.photos[each.link + 1],
+            point=names_of(result, formed.models.node[[before]])[0],
+            stage="link",
+            test="link",
+            value=each.value,
+            limit=each.limit,
+            size=size * MICROMETRES,
+            reason=f"models {pair[0]} and {pair[1]} contradict each other by {parts} µm"
+            f"{_other_point(strip, int(before), size)}; {wrong}",
+            models=pair,
+        )
+        del entry["blamed"]  # models have no rays
+        found.append(entry)
+    return found
+
+
+def _other_point(strip: StripResult, row: int, size: float) -> str:
+    """Say that a difference is of the size of the model, as where one id stands for two points."""
+    models = strip.of_models.formed.models
+    xyz = models.xyz[models.model == models.model[row]]
+    extent = float(np.linalg.norm(xyz - xyz.mean(axis=0), axis=1).max())
+    return ", as where one id stands for two points" if size > ANOTHER_POINT * extent else ""
+
+
+# ------------------------------------------------------------------------------------------------------- bundle
+
+
+def _after_bundle(found: Bundle, rejected: list[Document]) -> list[Document]:
+    """Mark as re-admitted what the strip method had taken out and the bundle adjustment uses after all."""
+    problem, selection = found.block.problem, found.screened.selection
+    images, control = problem.images, problem.control
+    inside = np.flatnonzero(selection.images).tolist()
+    used = {(problem.photo_name(int(images.photo[n])), problem.point_name(int(images.point[n]))) for n in inside}
+    whole = np.flatnonzero((selection.control | ~np.isfinite(control.sigma)).all(axis=1))
+    held = {problem.point_name(int(point)) for point in control.point[whole]}
+    after_all = {"readmitted": True, "blamed": [], "reason": "used by the bundle adjustment"}
+    rows = []
+    for each in rejected:
+        photos = [photo for photo in (each["photo"], each["other_photo"]) if photo is not None]
+        back = all((photo, each["point"]) in used for photo in photos) if photos else each["point"] in held
+        rows.append(each | after_all if back else each)
+    return rows
+
+
+def _from_bundle(found: Bundle, each: BundleRejection) -> Document:
+    kind = KINDS[each.kind]
+    photo, point = names_of_observation(found.block.problem, each.kind, each.row)
+    size = rounded(each.size * kind.factor, DECIMALS_BY_UNIT[kind.unit])
+    if each.readmitted:
+        reason = "taken back: it fits after the others went"
+    elif size is None:
+        reason = "does not fit the other observations"
+    else:
+        reason = f"{kind.axes[each.axis]} is wrong by about {size:+g} {kind.unit.replace('um', 'µm')}"
+    return _entry(
+        strip=next((strip.strip.id for strip in found.start.strips if photo in strip.strip.photos), ""),
+        photo=photo,
+        point=point,
+        stage="bundle",
+        test=each.test,
+        value=each.value,
+        limit=each.limit,
+        size=size,
+        size_unit=kind.unit,
+        readmitted=each.readmitted,
+        blamed=[photo] if photo is not None and point is not None and not each.readmitted else [],
+        reason=reason,
+    )
