@@ -156,13 +156,7 @@ class Cluster:
 
 
 def require_same(theirs: dict[str, str]) -> None:
-    """Refuse answers of another program: results would depend on the machine that computed them.
-
-    Raises
-    ------
-    InputError
-        When it is not what is installed here.
-    """
+    """Refuse answers of another program: results would depend on the machine that computed them."""
     local = program()
     different = [name for name in local if theirs.get(name) != local[name]]
     if different:
@@ -194,18 +188,7 @@ def cluster(
     work: str = WORK,
     say: Callable[[str], None] = say_nothing,
 ) -> Iterator[Cluster]:
-    """Connect to a cluster, or start one on this machine.
-
-    Parameters
-    ----------
-    address : str
-        ``tcp://HOST:PORT`` of a scheduler, or ``local``.
-
-    Raises
-    ------
-    InputError
-        When Dask is not installed, or there is no scheduler at this address.
-    """
+    """Connect to a cluster at ``tcp://HOST:PORT``, or start one on this machine, at ``local``."""
     distributed = _dask()
     with ExitStack() as stack:
         stack.enter_context(_quiet())

@@ -24,17 +24,9 @@ _lock = threading.Lock()
 
 
 def compute(task: Task, limits: Limits, work: str = WORK) -> tuple[Answer, dict[str, str]]:
-    """Compute a project in a process below this one.
+    """Compute a project in a process below this one; return with the answer which program computed it.
 
-    Parameters
-    ----------
-    limits : Limits
-        What it may use; without a limit of memory, this machine's memory shared among its cores.
-
-    Returns
-    -------
-    program : dict of str to str
-        What computed it, as ``result_folder.program`` gives it.
+    Without a limit of memory it may use this machine's memory shared among its cores.
     """
     key = limits, work
     with _lock:

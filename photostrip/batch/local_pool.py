@@ -34,13 +34,7 @@ class Executor(Protocol):
     """Who computes: a pool on this machine, or a cluster."""
 
     def answers(self, tasks: Iterator[Task | None], stopped: Callable[[], bool]) -> Iterator[Answer]:
-        """Compute tasks.
-
-        Parameters
-        ----------
-        tasks : iterator of Task or None
-            What is to be done, taken as it is needed; None: nothing yet, look again.
-        """
+        """Compute tasks, taken as they are needed; a task that is None means: nothing yet, look again."""
         ...
 
 
@@ -182,18 +176,7 @@ class LocalPool:
 
 
 def cause_of(code: int) -> str:
-    """Say how a process ended.
-
-    Parameters
-    ----------
-    code : int
-        Its exit code; negative after a signal.
-
-    Returns
-    -------
-    str
-        For example ``killed by SIGSEGV``.
-    """
+    """Say how a process with this exit code, negative after a signal, ended: ``killed by SIGSEGV``."""
     if code >= 0:
         return f"it ended with exit code {code}"
     try:

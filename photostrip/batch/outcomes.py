@@ -30,18 +30,10 @@ EXIT_CODES = {
 
 
 def outcome_of(document: Document, findings: list[Document]) -> Document:
-    """Return the line of the summary for a result.
+    """Return the line of the summary for a result with its findings.
 
-    Parameters
-    ----------
-    findings : list of dict
-        Its verdict and notes as ``messages.result_findings`` gives them.
-
-    Returns
-    -------
-    dict
-        ``status``, ``exit_code``, counts, ``sigma0_um``, the rms at check points (at control points where there are
-        none; ``rms_at`` says which) in metres, ``messages`` (sentences, worst first) and ``findings``.
+    The rms are those at check points, at control points where there are none; ``rms_at`` says which. ``messages`` are
+    sentences, worst first.
     """
     summary, status = document["summary"], document["status"]
     role = "check" if any(summary["check"][part]["count"] for part in ("plan", "height")) else "control"
@@ -63,13 +55,7 @@ def outcome_of(document: Document, findings: list[Document]) -> Document:
 
 
 def failure(status: str, error: InputError | GeometryError | Fault) -> Document:
-    """Return the line of the summary for a project without a result.
-
-    Returns
-    -------
-    dict
-        The same keys as those of a result, without numbers.
-    """
+    """Return the line of the summary for a project without a result: the keys of a result, without numbers."""
     findings = findings_of(InputError(error) if isinstance(error, Fault) else error)
     nothing = dict.fromkeys(
         ("strips", "photos", "points", "rejected", "sigma0_um", "rms_at", "rms_plan_m", "rms_height_m")

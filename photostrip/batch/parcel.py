@@ -31,13 +31,7 @@ class Parcel:
 
 
 def pack(path: Path, overrides: Sequence[str] = ()) -> Parcel:
-    """Read all files of a project without looking into its tables.
-
-    Raises
-    ------
-    InputError
-        When one of them cannot be read.
-    """
+    """Read all files of a project without looking into its tables."""
     findings, names = Findings(), list[str]()
     with reading_from(Source()):  # a separate account: what is read now is not what a result is made from
         root = read_tree(str(path), findings, names)

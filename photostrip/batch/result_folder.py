@@ -39,10 +39,7 @@ _TEMPORARY = re.compile(r"\..+\.\d+\.tmp")
 def program() -> dict[str, str]:
     """Return what computes: the version, the digest of the program's own files, the versions of the libraries below it.
 
-    Returns
-    -------
-    dict of str to str
-        Two programs for which it is the same give the same results.
+    Two programs for which it is the same give the same results.
     """
     from importlib.metadata import version
 
@@ -60,13 +57,7 @@ class ResultFolder:
         self.path, self.overrides = path, list(overrides)
 
     def unchanged(self, chosen: ChosenProject) -> Document | None:
-        """Return the line of the summary of a result that can be trusted.
-
-        Returns
-        -------
-        dict or None
-            The line; None when the project must be computed.
-        """
+        """Return the line of the summary of a result that can be trusted; None when the project must be computed."""
         place = self.path / chosen.output
         _sweep(place)
         record = self._record(place)
@@ -91,12 +82,9 @@ class ResultFolder:
         return [_back(name, folder) for name, content in record["inputs"].items() if content is not None]
 
     def refused(self, chosen: ChosenProject) -> Fault | None:
-        """Say whether a project must not be written where it would go: the result of another one stands there.
+        """Say why a project must not be written where it would go: the result of another one stands there.
 
-        Returns
-        -------
-        Fault or None
-            What stands there. A project that was moved, but not changed, is no other one.
+        A project that was moved, but not changed, is no other one.
         """
         record = self._record(self.path / chosen.output)
         if record is None or record["project"] == self._name(chosen):
@@ -109,13 +97,7 @@ class ResultFolder:
         return Fault(message, "output-taken", str(there), fix="choose another folder with -o, or use --force")
 
     def write(self, chosen: ChosenProject, answer: Answer) -> None:
-        """Write a result, the record last.
-
-        Raises
-        ------
-        InputError, OSError
-            When it cannot be written; what was there before is as it was.
-        """
+        """Write a result, the record last; when that fails, what was there before is as it was."""
         folder = os.path.split(chosen.project)[0]
         place = self.path / chosen.output
         inputs = {_short(name, folder): content for name, content in answer.inputs.items()}
@@ -155,26 +137,9 @@ class ResultFolder:
 
 @contextmanager
 def opened(path: Path, overrides: Sequence[str] = ()) -> Iterator[ResultFolder]:
-    """Take a folder for one batch.
+    """Open a folder, made when it is missing, for one batch, and remove the summary of an earlier one.
 
     The lock is the system's: it is gone with the process that holds it, however that ends.
-
-    Parameters
-    ----------
-    path : Path
-        The folder; made when it is missing.
-
-    Yields
-    ------
-    ResultFolder
-        The folder, without the summary of an earlier batch.
-
-    Raises
-    ------
-    InputError
-        When another batch is writing into it.
-    OSError
-        When nothing can be written there.
     """
     import fcntl
 

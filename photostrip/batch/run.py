@@ -80,14 +80,10 @@ class Batch:
 
 
 class Run:
-    """One batch on its way.
+    """One batch: which projects must be computed, what is written, what became of each.
 
-    Parameters
-    ----------
-    folder : ResultFolder, optional
-        Where results go; None: nowhere.
-    force : bool
-        Whether to compute what is unchanged, too, and to replace results of other projects.
+    Without a folder nothing is written; with ``force`` what is unchanged is computed, too, and results of other
+    projects are replaced.
     """
 
     def __init__(
@@ -160,18 +156,7 @@ class Run:
 
 
 def named(outcome: Document, chosen: ChosenProject, *, written: bool) -> Document:
-    """Put the names of a project before its line of the summary.
-
-    Parameters
-    ----------
-    written : bool
-        Whether the batch has a folder to write into.
-
-    Returns
-    -------
-    dict
-        The line with ``project`` and ``output`` first; ``output`` is None where there is no result.
-    """
+    """Put the names of a project before its line of the summary; ``output`` is None where no result was written."""
     there = written and outcome["status"] in {"good", "look", "failed"}
     return {"project": chosen.project, "output": chosen.output if there else None, **outcome}
 

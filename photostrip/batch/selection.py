@@ -32,23 +32,11 @@ class ChosenProject:
 
 
 def choose(arguments: Sequence[str]) -> list[ChosenProject]:
-    """Find the projects that the user names.
+    """Find the projects that the user names, each once, in the order of the arguments.
 
-    Parameters
-    ----------
-    arguments : sequence of str
-        Each a project file; a folder (its ``project.yaml``, or all of them below it); a pattern with ``*``, ``?`` or
-        ``**``; or ``@FILE``, a list of such arguments, one a line, with paths relative to FILE (``@-``: from stdin).
-
-    Returns
-    -------
-    list of ChosenProject
-        Every project once, in the order of the arguments.
-
-    Raises
-    ------
-    InputError
-        With a fault for each argument that leads to no project.
+    An argument is a project file; a folder (its ``project.yaml``, or all of them below it); a pattern with ``*``, ``?``
+    or ``**``; or ``@FILE``, a list of such arguments, one a line, with paths relative to FILE (``@-``: from stdin).
+    Those that lead to no project are faults.
     """
     faults: list[Fault] = []
     found: dict[str, str] = {}
@@ -117,13 +105,10 @@ def _below(folder: Path) -> list[str]:
 
 
 def output_names(projects: Sequence[str]) -> list[str]:
-    """Return every project the name of its result's folder.
+    """Return the name of each project's result folder.
 
-    Returns
-    -------
-    list of str
-        The folder of a ``project.yaml``, the name of any other file without its ending; where that is not enough, with
-        as many folders above it as tell one from the other (``north/s1``, ``south/s1``).
+    It is the folder of a ``project.yaml``, the name of any other file without its ending; where that is not enough,
+    with as many folders above it as tell one from the other (``north/s1``, ``south/s1``).
     """
     parts = [_parts(project) for project in projects]
     names = [list(each[-1:]) for each in parts]

@@ -47,13 +47,7 @@ START = (
 
 
 class WorkerProcess:
-    """A worker as its parent sees it.
-
-    Parameters
-    ----------
-    work : str
-        What it does with a task, as ``module:function``.
-    """
+    """A worker as its parent sees it; ``work`` is what it does with a task, as ``module:function``."""
 
     def __init__(self, megabytes: float, work: str = WORK) -> None:
         self.task: Task | None = None
@@ -87,13 +81,7 @@ class WorkerProcess:
             self.connection.send(task)
 
     def hear(self) -> Any:  # noqa: ANN401 (an Answer or READY)
-        """Return what it has sent.
-
-        Raises
-        ------
-        EOFError, OSError
-            When it is dead.
-        """
+        """Return what it has sent; ``EOFError`` or ``OSError`` when it is dead."""
         return self.connection.recv()
 
     def end(self) -> int:
@@ -115,13 +103,7 @@ class WorkerProcess:
 
 
 def share_of_memory(workers: int) -> float:
-    """Return an even share of the machine's memory, megabytes.
-
-    Returns
-    -------
-    float
-        The share; of the container's memory where it is limited.
-    """
+    """Return an even share of the memory of the machine, or of its container, megabytes."""
     total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     for file in ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes"):
         with suppress(OSError, ValueError):
@@ -133,13 +115,7 @@ def share_of_memory(workers: int) -> float:
 
 
 def serve(handle: int, megabytes: float, work: str) -> None:
-    """Compute what comes through a connection until it closes.
-
-    Parameters
-    ----------
-    work : str
-        What to do with a task, as ``module:function``.
-    """
+    """Compute what comes through a connection until it closes."""
     try:
         _serve(Connection(handle), megabytes, work)
     except MemoryError:

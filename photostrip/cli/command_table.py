@@ -19,73 +19,42 @@ class Entry(NamedTuple):
     example: str
 
 
-COMMANDS = {
-    "init": Entry(
-        "photostrip.cli.commands.init",
-        "Write a commented project file and the headers of its tables.",
-        "photostrip init strip-a",
-    ),
-    "check": Entry(
-        "photostrip.cli.commands.check",
-        "Check projects without adjusting them, and name all faults.",
-        "photostrip check project.yaml",
-    ),
-    "run": Entry(
-        "photostrip.cli.commands.run",
-        "Adjust the strips of a project and report the accuracy.",
-        "photostrip run project.yaml -o result",
-    ),
-    "batch": Entry(
-        "photostrip.cli.commands.batch",
-        "Adjust many projects, on all cores or many machines.",
-        "photostrip batch strips/* -o results -j 4",
-    ),
-    "report": Entry(
-        "photostrip.cli.commands.report",
-        "Print the accuracy report of a saved result again.",
-        "photostrip report result/result.json",
-    ),
-    "compare": Entry(
-        "photostrip.cli.commands.compare",
+_TEXTS = (
+    ("init", "Write a commented project file and the headers of its tables.", "photostrip init strip-a"),
+    ("check", "Check projects without adjusting them, and name all faults.", "photostrip check project.yaml"),
+    ("run", "Adjust the strips of a project and report the accuracy.", "photostrip run project.yaml -o result"),
+    ("batch", "Adjust many projects, on all cores or many machines.", "photostrip batch strips/* -o results -j 4"),
+    ("report", "Print the accuracy report of a saved result again.", "photostrip report result/result.json"),
+    (
+        "compare",
         "Compare a result with a baseline, within tolerances.",
         "photostrip compare result baseline.json --tol exact.yaml",
     ),
-    "simulate": Entry(
-        "photostrip.cli.commands.simulate",
+    (
+        "simulate",
         "Write a synthetic project with known truth, ready to run.",
         "photostrip simulate strip.yaml -o simulated",
     ),
-    "plan": Entry(
-        "photostrip.cli.commands.plan",
+    (
+        "plan",
         "Expected accuracy and design, before any photo is taken.",
         "photostrip plan model --overlap 60 --control corners",
     ),
-    "terrestrial": Entry(
-        "photostrip.cli.commands.terrestrial",
+    (
+        "terrestrial",
         "Directions of a phototheodolite, displacements between epochs.",
         "photostrip terrestrial displacement survey.yaml -o result",
     ),
-    "schema": Entry(
-        "photostrip.cli.commands.schema",
+    (
+        "schema",
         "Print the JSON Schema of the project file, for editors.",
         "photostrip schema -o photostrip.schema.json",
     ),
-    "completion": Entry(
-        "photostrip.cli.commands.completion",
-        "Print the script that makes a shell complete commands.",
-        "photostrip completion bash >> ~/.bashrc",
-    ),
-    "man": Entry(
-        "photostrip.cli.commands.man",
-        "Print a manual page, or write all of them.",
-        "photostrip man -o ~/.local/share/man/man1",
-    ),
-    "info": Entry(
-        "photostrip.cli.commands.info",
-        "Print versions and formats, and how to get what is missing.",
-        "photostrip info --format json",
-    ),
-}
+    ("completion", "Print the script that makes a shell complete commands.", "photostrip completion bash >> ~/.bashrc"),
+    ("man", "Print a manual page, or write all of them.", "photostrip man -o ~/.local/share/man/man1"),
+    ("info", "Print versions and formats, and how to get what is missing.", "photostrip info --format json"),
+)
+COMMANDS = {name: Entry(f"photostrip.cli.commands.{name}", text, example) for name, text, example in _TEXTS}
 
 
 def usage() -> str:

@@ -11,11 +11,8 @@ VARIABLE = "_PHOTOSTRIP_COMPLETE"  # set by the script of the shell when it asks
 def answer(instruction: str) -> int:
     """Answer a shell.
 
-    Parameters
-    ----------
-    instruction : str
-        ``source_bash`` for its script, ``complete_bash`` for what can stand at the cursor, which the shell's script
-        describes in variables of its own.
+    The instruction is ``source_bash`` for its script, ``complete_bash`` for what can stand at the cursor, which the
+    script describes in further variables.
     """
     from photostrip.cli.whole_program import whole_program
 
@@ -31,13 +28,7 @@ def answer(instruction: str) -> int:
 
 
 def keys(incomplete: str) -> list[str]:
-    """Return the keys that an assignment of ``--set`` may begin with.
-
-    Returns
-    -------
-    list of str
-        Keys of the project file, each with ``=`` behind it.
-    """
+    """Return the keys of the project file that an assignment of ``--set`` may begin with, each with ``=`` behind it."""
     from photostrip.project.schema.project_file import json_schema
 
     schema = json_schema()

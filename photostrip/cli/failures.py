@@ -66,15 +66,7 @@ def as_fault(error: OSError) -> InputError:
 def failures_as(form: Format) -> Iterator[None]:
     """Print failures in the form that was asked for: as JSON or annotations on stdout, else as lines on stderr.
 
-    Parameters
-    ----------
-    form : Format
-        What the user asked for. The exit code is the same whatever it is.
-
-    Raises
-    ------
-    typer.Exit
-        With the exit code, after the failure was printed.
+    The exit code is the same whatever the form.
     """
     try:
         yield

@@ -39,14 +39,7 @@ OWN = ("test", "dev", "peer")  # extras for those who work on photostrip itself
 
 
 def installation() -> dict[str, Any]:
-    """Return what is installed.
-
-    Returns
-    -------
-    dict
-        ``photostrip``, ``python``, ``system``, ``libraries`` (name to version), ``threads`` (variable to value),
-        ``formats``, ``extras`` (name to ``missing`` libraries and the command that gets them).
-    """
+    """Return what is installed: libraries with versions, threads, formats, extras with what is missing."""
     required, extras = _requirements()
     return {
         "photostrip": __version__,

@@ -23,18 +23,7 @@ EXIT_USAGE = 2
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line.
-
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        What the user typed after ``photostrip``; default: the arguments of the process.
-
-    Returns
-    -------
-    int
-        The exit code. Every failure becomes one; none is raised.
-    """
+    """Run what the user typed after ``photostrip`` and return the exit code; no failure is raised."""
     rest = list(sys.argv[1:] if arguments is None else arguments)
     debug = _take_flag(rest, "--debug") or os.environ.get("PHOTOSTRIP_DEBUG", "") not in {"", "0"}
     for stream in (sys.stdout, sys.stderr):

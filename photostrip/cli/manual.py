@@ -30,13 +30,7 @@ VARIABLES = (
 
 
 def manual_pages() -> dict[str, str]:
-    """Return all manual pages.
-
-    Returns
-    -------
-    dict of str to str
-        Text by file name: ``photostrip.1``, and ``photostrip-COMMAND.1`` for every command, also those below another.
-    """
+    """Return the manual pages by file name: ``photostrip.1``, and one for every command and those below it."""
     root: Any = typer.main.get_command(whole_program())
     pages = {"photostrip.1": _main_page(root)}
     for name, command in root.commands.items():

@@ -39,15 +39,7 @@ def compare_methods(
 ) -> int:
     """Adjust a project in every way there is and print what is left at its check points.
 
-    Parameters
-    ----------
-    output : Path or None
-        Folder in which each adjustment gets a folder of its own name.
-
-    Returns
-    -------
-    int
-        0, or the exit code of the first failure when no adjustment succeeded.
+    In the output folder each adjustment gets a folder of its name. When none succeeds, the first failure is raised.
     """
     found: dict[str, Document | PhotostripError] = {}
     name = ""

@@ -94,13 +94,7 @@ def report_text(
     verbose: bool = False,
     ascii_letters: bool = False,
 ) -> str:
-    """Return the report of a result as text, without colours.
-
-    Parameters
-    ----------
-    ascii_letters : bool
-        Whether the text may have ASCII letters only.
-    """
+    """Return the report of a result as text, without colours."""
     from photostrip.report.page import layout, text
 
     if form is Format.JSON:
@@ -144,13 +138,7 @@ def trace_text(result: Result, form: Format) -> str:
 
 
 def form_of(path: Path, option: str = "--output") -> Format:
-    """Return the format that the ending of a file name asks for; text for a name without one.
-
-    Raises
-    ------
-    typer.BadParameter
-        For another ending.
-    """
+    """Return the format that the ending of a file name asks for; text for a name without one."""
     if path.suffix.lower() not in {*ENDINGS, ""}:
         known = ", ".join(ENDINGS)
         message = f"no report is written as '{path.suffix}': the name may end in {known}, or give --format"

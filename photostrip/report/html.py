@@ -26,13 +26,7 @@ INSTALL = "pip install 'photostrip[report]'"
 
 
 def check_html(key: str = "--html") -> None:
-    """Make sure that HTML can be written, before anything is computed.
-
-    Raises
-    ------
-    InputError
-        When jinja2 is missing.
-    """
+    """Refuse HTML without jinja2, before anything is computed."""
     try:
         found = find_spec("jinja2") is not None
     except ValueError:  # put out of action: sys.modules["jinja2"] is None
@@ -43,18 +37,7 @@ def check_html(key: str = "--html") -> None:
 
 
 def to_html(document: Document, *, everything: bool = False) -> str:
-    """Return the report of a result as one HTML file.
-
-    Parameters
-    ----------
-    everything : bool
-        Whether all rows of all tables are wanted, not only the worst of long ones.
-
-    Returns
-    -------
-    str
-        The page, the same for the same document: style and pictures are in it, no script, no link to elsewhere.
-    """
+    """Return the report of a result as one HTML file: style and pictures are in it, no script, no link to elsewhere."""
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
@@ -73,12 +56,12 @@ def to_html(document: Document, *, everything: bool = False) -> str:
 
 def _sections(sections: Iterable[Section]) -> Iterator[Document]:
     """Return the sections as the template takes them; ids are made from their titles."""
-    taken = {"pictures"}
+    used = {"pictures"}
     for number, section in enumerate(sections):
         name = re.sub(r"[^a-z0-9]+", "-", section.title.lower()).strip("-") or f"section-{number}"
-        while name in taken:
+        while name in used:
             name = f"{name}-{number}"
-        taken.add(name)
+        used.add(name)
         yield {"id": name, "title": section.title, "parts": list(_parts(section.parts))}
 
 

@@ -31,23 +31,17 @@ COLUMNS = (
 )
 ROWS = 60  # projects that are shown; more stand in summary.csv
 MESSAGES = 3  # of one project that are shown
-# How bad each status is, and the style in which it is told.
+# How bad each status is, and the style in which it is shown.
 ORDER = ("crashed", "timeout", "memory", "weak", "faulty", "unwritten", "failed", "not run", "look", "good")
 STYLES = {"good": "good", "look": "look", "not run": "look"}
 
 
 def batch_sections(outcomes: Sequence[Document], *, quiet: bool = False, everything: bool = False) -> list[Section]:
-    """Return the summary of a batch.
-
-    Parameters
-    ----------
-    outcomes : sequence of dict
-        The line of each project, in the order in which the user named them.
-    """
+    """Return the summary of a batch from the line of each project."""
     sections = [] if quiet else [Section("Projects", (_table(outcomes, everything=everything),))]
     wrong = [each for each in _worst_first(outcomes) if each["exit_code"]]
     if wrong:
-        sections.append(Section("What is wrong", tuple(_told(wrong, everything=everything))))
+        sections.append(Section("What is wrong", tuple(_messages(wrong, everything=everything))))
     return [*sections, Section("Verdict" if sections else "", (Words(counts(outcomes), _style(outcomes)),))]
 
 
@@ -63,7 +57,7 @@ def _table(outcomes: Sequence[Document], *, everything: bool) -> Table:
     return tabulated(shown, COLUMNS, note=note)
 
 
-def _told(wrong: Sequence[Document], *, everything: bool) -> list[Words]:
+def _messages(wrong: Sequence[Document], *, everything: bool) -> list[Words]:
     """Return the messages of the projects that are not as they should be."""
     shown = wrong if everything else wrong[:ROWS]
     found = []

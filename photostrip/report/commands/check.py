@@ -19,15 +19,7 @@ IDS_SHOWN = 8
 
 
 def check_sections(document: Document, *, everything: bool = False) -> tuple[Section, ...]:
-    """Return the sections for one project that could be read.
-
-    Parameters
-    ----------
-    document : dict
-        What was decoded, see ``checking.check_project``.
-    everything : bool
-        Whether all control points and all ids are wanted.
-    """
+    """Return the sections for one project that could be read, from what was decoded."""
     return (
         _contents(document),
         _frames(document["frames"]),

@@ -12,7 +12,7 @@ from photostrip.report.page.tables import number, tabulated, words
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-SMALL = 1e-4  # shares below are told in parts per million
+LEAST_PERCENT = 1e-4  # share; smaller ones are shown in parts per million
 SHOWN = 20  # differences; --verbose prints all
 NAMES = {
     "plan": "plan",
@@ -37,15 +37,7 @@ def compare_title(document: Document) -> str:
 
 
 def compare_sections(document: Document, *, quiet: bool = False, everything: bool = False) -> tuple[Section, ...]:
-    """Return the sections of a comparison.
-
-    Parameters
-    ----------
-    document : dict
-        The comparison, see ``compare.compare_results``.
-    everything : bool
-        Whether all differences are wanted, not only the worst.
-    """
+    """Return the sections of a comparison."""
     same = document["status"] == "same"
     verdict = Words(headline(document), "good" if same else "failed")
     if quiet:
@@ -83,7 +75,7 @@ def allowed_words(kind: Document) -> str:
     parts = [f"{short(allowed['absolute'])} {name}".rstrip()] if allowed["absolute"] else []
     parts += [f"{short(allowed['absolute_um'])} µm"] if allowed.get("absolute_um") else []
     share = allowed["relative"]
-    parts += [f"{short(100 * share)} %" if share >= SMALL else f"{short(1e6 * share)} ppm"] if share else []
+    parts += [f"{short(100 * share)} %" if share >= LEAST_PERCENT else f"{short(1e6 * share)} ppm"] if share else []
     return ", ".join(parts) or "none"
 
 

@@ -17,17 +17,10 @@ MOST = 50  # annotations of one comparison; a server shows no more
 
 
 def compare_findings(document: Document, line_of: Callable[[str, str], int]) -> list[Document]:
-    """Return what differs as findings, each at the line of the baseline in which the record stands.
+    """Return what differs as findings, worst first, each at the line of the baseline in which the record stands.
 
-    Parameters
-    ----------
-    line_of : callable
-        Gives the line of a block and an id in the baseline; 0 when it is not there.
-
-    Returns
-    -------
-    list of dict
-        Findings, worst first; what is too much to show is counted in the last one.
+    ``line_of`` gives the line of a block and an id, 0 when it is not there. What is too much to show is counted in the
+    last finding.
     """
     found = list(_findings(document, line_of))
     if len(found) <= MOST:

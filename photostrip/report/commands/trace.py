@@ -29,18 +29,7 @@ def trace_title(document: Document) -> str:
 
 
 def trace_sections(document: Document) -> tuple[Section, ...]:
-    """Return the sections of a trace.
-
-    Parameters
-    ----------
-    document : dict
-        The trace, see ``trace.trace_of``.
-
-    Returns
-    -------
-    tuple of Section
-        Symbols, then for each strip its pairs, the chain, joints, absolute orientation and polynomials.
-    """
+    """Return symbols, then for each strip its pairs, the chain, junctions, absolute orientation and polynomials."""
     unit = document["angles"]
     found = [Section("Symbols", (Facts(tuple(document["symbols"].items())), Words(f"Angles in {unit}.")))]
     for strip in document["strips"]:

@@ -33,15 +33,7 @@ STYLES = {
 def print_report(
     title: str, sections: Iterable[Section], stream: TextIO, width: int | None = None, *, colour: bool | None = None
 ) -> None:
-    """Print a report.
-
-    Parameters
-    ----------
-    width : int, optional
-        Width in characters, brought between 60 and 200; default: that of the terminal, 100 where there is none.
-    colour : bool, optional
-        Whether to use colours; default: whether the stream is a terminal that has them and `NO_COLOR` is not set.
-    """
+    """Print a report as wide as the terminal, 100 where there is none; in colours where the stream has them."""
     lines = lay_out(
         title, sections, page_width() if width is None else clamp(width), ascii_only=not speaks_unicode(stream)
     )
@@ -63,13 +55,7 @@ def speaks_unicode(stream: TextIO) -> bool:
 
 
 def has_colours(stream: TextIO, environment: Mapping[str, str]) -> bool:
-    """Whether to use colours on a stream.
-
-    Parameters
-    ----------
-    environment : mapping of str to str
-        ``NO_COLOR``, when it is set and not empty, forbids colours; so does ``TERM=dumb``.
-    """
+    """Whether to use colours on a stream: ``NO_COLOR``, when it is not empty, and ``TERM=dumb`` forbid them."""
     if environment.get("NO_COLOR") or environment.get("TERM", "") in {"dumb", "unknown"}:
         return False
     return stream.isatty()

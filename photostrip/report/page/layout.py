@@ -47,20 +47,7 @@ def clamp(width: int) -> int:
 
 
 def lay_out(title: str, sections: Iterable[Section], width: int, *, ascii_only: bool = False) -> list[Line]:
-    """Lay out a report.
-
-    Parameters
-    ----------
-    title : str
-        Its title; none is printed when it is empty.
-    width : int
-        Width of the page in characters, brought between 60 and 200.
-
-    Returns
-    -------
-    list of Line
-        No line is wider than the page, none ends in a blank.
-    """
+    """Lay out a report: no line is wider than the page, none ends in a blank; an empty title is not printed."""
     page = clamp(width)
     plain: Plain = plain_ascii if ascii_only else str
     lines = [Line(line, "title") for line in wrapped(plain(title), page)] if title else []
@@ -165,18 +152,7 @@ def _row(
 
 
 def wrapped(text: str, width: int) -> list[str]:
-    """Break a text into lines.
-
-    Parameters
-    ----------
-    width : int
-        Cells of a line; longer words are broken.
-
-    Returns
-    -------
-    list of str
-        The lines; none for an empty text.
-    """
+    """Break a text into lines of so many cells; longer words are broken."""
     lines: list[str] = []
     for word in text.split():
         if lines and cells(lines[-1]) + 1 + cells(word) <= width:

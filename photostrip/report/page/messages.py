@@ -1,4 +1,4 @@
-"""Faults, findings and notes in the three forms in which they are told: lines, JSON for programs, annotations.
+"""Faults, findings and notes in the three forms in which they are reported: lines, JSON for programs, annotations.
 
 Whatever the form, the same findings come out with the same file, line, column, key and code.
 """
@@ -22,44 +22,37 @@ SCHEMA = 1
 ACCEPTED = "accepted: "
 
 
-def finding_of(told: Fault | Note | Finding) -> Document:
-    """Return a fault, a note or a finding as plain values.
-
-    Returns
-    -------
-    dict
-        ``severity`` (``error``, ``warning``, ``note``), ``code``, ``file``, ``line``, ``column``, ``key``,
-        ``message``, ``expected``, ``fix``, ``photos``, ``points``; 0 and empty texts where nothing is known.
-    """
+def finding_of(source: Fault | Note | Finding) -> Document:
+    """Return a fault, a note or a finding as plain values; 0 and empty texts where nothing is known."""
     found: Document = {
-        "severity": "error" if isinstance(told, Fault) else told.severity,
-        "code": told.code,
-        "file": told.file,
-        "line": told.line,
-        "column": told.column,
-        "key": told.key,
-        "message": told.message,
+        "severity": "error" if isinstance(source, Fault) else source.severity,
+        "code": source.code,
+        "file": source.file,
+        "line": source.line,
+        "column": source.column,
+        "key": source.key,
+        "message": source.message,
     }
-    if isinstance(told, Finding):
-        return found | _of_finding(told)
-    if isinstance(told, Fault):
-        return found | {"expected": told.expected, "fix": told.fix, "photos": [], "points": []}
-    return found | {"expected": "", "fix": "", "photos": list(told.photos), "points": list(told.points)}
+    if isinstance(source, Finding):
+        return found | _of_finding(source)
+    if isinstance(source, Fault):
+        return found | {"expected": source.expected, "fix": source.fix, "photos": [], "points": []}
+    return found | {"expected": "", "fix": "", "photos": list(source.photos), "points": list(source.points)}
 
 
-def _of_finding(told: Finding) -> Document:
+def _of_finding(finding: Finding) -> Document:
     """Return what a finding has beside message and place; an accepted one is no error and needs no cure."""
     return {
-        "severity": "note" if told.accepted else told.severity,
-        "message": f"{ACCEPTED if told.accepted else ''}{told.message}",
+        "severity": "note" if finding.accepted else finding.severity,
+        "message": f"{ACCEPTED if finding.accepted else ''}{finding.message}",
         "expected": "",
-        "fix": "" if told.accepted else told.fix,
-        "photos": list(told.photos),
-        "points": list(told.points),
-        "strips": list(told.strips),
-        "title": told.title,
-        "accepted": told.accepted,
-        "evidence": dict(told.evidence),
+        "fix": "" if finding.accepted else finding.fix,
+        "photos": list(finding.photos),
+        "points": list(finding.points),
+        "strips": list(finding.strips),
+        "title": finding.title,
+        "accepted": finding.accepted,
+        "evidence": dict(finding.evidence),
     }
 
 
@@ -73,13 +66,7 @@ def findings_of(error: InputError | GeometryError) -> list[Document]:
 
 
 def result_findings(document: Document) -> list[Document]:
-    """Return the verdict and the notes of a result as findings.
-
-    Returns
-    -------
-    list of dict
-        Tolerances that are not kept are errors; the rest are warnings and notes.
-    """
+    """Return tolerances that are not kept, as errors, then the findings and notes of a result."""
     empty = {"file": "", "line": 0, "column": 0, "key": "", "expected": "", "fix": "", "photos": [], "points": []}
     found = [
         {
@@ -94,12 +81,12 @@ def result_findings(document: Document) -> list[Document]:
     ]
     return (
         found
-        + [_told(empty, each) for each in document.get("findings", [])]
+        + [_of_result(empty, each) for each in document.get("findings", [])]
         + [empty | note for note in document["notes"]]
     )
 
 
-def _told(empty: Document, finding: Document) -> Document:
+def _of_result(empty: Document, finding: Document) -> Document:
     """Return a finding of a result's document in the form of the others."""
     if not finding["accepted"]:
         return empty | finding
@@ -107,33 +94,21 @@ def _told(empty: Document, finding: Document) -> Document:
 
 
 def as_document(findings: Sequence[Document], exit_code: int) -> Document:
-    """Return the answer of a command that came to no result.
-
-    Returns
-    -------
-    dict
-        The content of what is printed with ``--format json``.
-    """
+    """Return the answer with ``--format json`` of a command that came to no result."""
     return {"photostrip_error": SCHEMA, "exit_code": exit_code, "findings": list(findings)}
 
 
 def line_of(finding: Document) -> str:
     """Return a finding on one line: ``error: file:line:column: key: what; expected ...; what would fix it``."""
     names = ("message", "code", "file", "line", "column", "key", "expected", "fix")
-    told = {name: finding[name] for name in names}
+    values = {name: finding[name] for name in names}
     if "evidence" in finding:  # the codes of the gate are for people, too: they can be accepted
-        told["message"] = f"{finding['code']} {finding['message']}"
-    return f"{finding['severity']}: {Fault(**told)}"
+        values["message"] = f"{finding['code']} {finding['message']}"
+    return f"{finding['severity']}: {Fault(**values)}"
 
 
 def annotated(findings: Iterable[Document]) -> str:
-    """Give findings as annotations of GitHub Actions.
-
-    Returns
-    -------
-    str
-        One workflow command a line: ``::error file=...,line=...,col=...,title=...::what is wrong``.
-    """
+    """Return findings as annotations of GitHub Actions: ``::error file=...,line=...,title=...::what is wrong``."""
     return "".join(f"{_annotation(each)}\n" for each in findings)
 
 

@@ -11,6 +11,8 @@ if TYPE_CHECKING:
 
 Number = float | None
 
+LEAST_PROBABILITY = 0.001  # smaller ones are all shown as smaller than this
+
 
 def fixed(value: Number, decimals: int) -> str:
     """Return a number with fixed decimals, never -0."""

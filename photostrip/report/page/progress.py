@@ -28,13 +28,7 @@ TURNS = "|/-\\"
 
 
 class Progress:
-    """The line on one terminal.
-
-    Parameters
-    ----------
-    total : int
-        Number of things to do; 0 when it is not known.
-    """
+    """The line on one terminal; the total, of steps to do, is 0 when it is not known."""
 
     def __init__(self, stream: TextIO, total: int = 0) -> None:
         self.stream, self.total, self.done, self.text = stream, total, 0, ""
@@ -43,7 +37,7 @@ class Progress:
         self._shown = False
 
     def at(self, text: str) -> None:
-        """Say what is being done now; with a total, it is one more of the things to do."""
+        """Say what is being done now; with a total, it is one more of the steps."""
         self.done += bool(self.total)
         self.text = text
 
@@ -90,20 +84,7 @@ def _columns(stream: TextIO) -> int:
 
 @contextmanager
 def progress(stream: TextIO, total: int = 0, *, quiet: bool = False) -> Iterator[Progress]:
-    """Show progress while a block runs.
-
-    Parameters
-    ----------
-    stream : text stream
-        Where to; nothing is written when it is no terminal.
-    total : int
-        Number of things to do; 0 when it is not known.
-
-    Yields
-    ------
-    Progress
-        Tell it what is being done with ``Progress.at``.
-    """
+    """Show progress while a block runs, where the stream is a terminal; ``Progress.at`` says what is being done."""
     line = Progress(stream, total)
     if quiet or not wanted(stream, os.environ):
         yield line
@@ -214,13 +195,7 @@ def clock(seconds: float) -> str:
 
 @contextmanager
 def batch_table(stream: TextIO, total: int, *, quiet: bool = False) -> Iterator[BatchTable]:
-    """Show the table of a batch while a block runs.
-
-    Parameters
-    ----------
-    stream : text stream
-        Where to; no table is shown when it is no terminal.
-    """
+    """Show the table of a batch while a block runs, where the stream is a terminal."""
     table = BatchTable(stream, total, live=not quiet and wanted(stream, os.environ))
     table.start()
     try:

@@ -32,13 +32,7 @@ def words(name: str, value: Value, unit: str = "", *, rank: int = 0) -> Shown:
 
 
 def number(name: str, value: Value, form: int | Callable[[Any], str] = str, unit: str = "", *, rank: int = 0) -> Shown:
-    """Return a column of numbers.
-
-    Parameters
-    ----------
-    form : int or function
-        The decimals, or what writes the number; default: whole numbers.
-    """
+    """Return a column of numbers, written with decimals or by a function; default: whole numbers."""
     read = _reader(value)
     if isinstance(form, int):
         return Shown(Column(name, unit, rank=rank), lambda row: fixed(read(row), form))

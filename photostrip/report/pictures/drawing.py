@@ -26,13 +26,7 @@ INSTALL = "pip install photostrip[report]"
 
 
 def check_matplotlib(key: str, of: str = "") -> None:
-    """Make sure that a picture can be drawn, before anything is computed.
-
-    Raises
-    ------
-    InputError
-        When matplotlib is missing.
-    """
+    """Refuse pictures without matplotlib, before anything is computed."""
     try:
         missing = find_spec("matplotlib") is None
     except ValueError:  # put out of action: sys.modules["matplotlib"] is None
@@ -83,11 +77,7 @@ def isolines(
 ) -> None:
     """Draw lines of equal value with their numbers; none on a plane.
 
-    Parameters
-    ----------
-    surface : (len(y), len(x)) array
-    filled : bool
-        Whether areas are coloured, too, dark where the value is small.
+    The surface has a row for each y. Filled areas are dark where the value is small.
     """
     if np.ptp(surface) > 0:
         colours = f"{SURFACE}_r" if filled else SURFACE

@@ -33,13 +33,7 @@ class Plan(NamedTuple):
 
 
 def plan_of(document: Document) -> Plan:
-    """Return the plan of a result, turned so that its first strip runs to the right.
-
-    Returns
-    -------
-    Plan
-        Places and differences in metres.
-    """
+    """Return the plan of a result in metres, turned so that its first strip runs to the right."""
     grid = _Grid(document)
     photos = document["photos"]
     first = [photo for photo in photos if photo["strip"] == document["strips"][0]["id"]]

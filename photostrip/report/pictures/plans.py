@@ -33,15 +33,7 @@ def check_picture(path: Path) -> None:
 
 
 def plan_picture(document: Document, ending: str) -> bytes:
-    """Draw a plan.
-
-    Parameters
-    ----------
-    document : dict
-        Document of a plan; of a model with errors on a fine grid.
-    ending : str
-        ``.svg`` or ``.png``.
-    """
+    """Draw the document of a plan, of a model with errors on a fine grid; the ending is ``.svg`` or ``.png``."""
     with drawn_alike():
         figure = DRAWINGS[document["kind"]](document)
         return as_png(figure) if ending.lower() == ".png" else as_svg(figure).encode()

@@ -27,13 +27,7 @@ WORDS = {"control": "control point", "check": "check point", "new": "new point",
 
 
 def strip_pictures(document: Document) -> list[Picture]:
-    """Draw a result.
-
-    Returns
-    -------
-    list of Picture
-        The plan; heights along the strip, where there are given heights; precision, where it is known.
-    """
+    """Draw a result: its plan; heights along the strip and precision, where they are known."""
     plan = plan_of(document)
     found = [_plan_picture(document, plan)]
     if any(spot.up is not None for spot in plan.spots):

@@ -1,6 +1,6 @@
 """Colours, marks and sizes of all pictures, drawn by matplotlib (plans, terrestrial) or by ``svg`` (pages).
 
-Colours are told apart by the colour-blind: the series are those of Okabe and Ito without yellow, which is lost on
+The colour-blind can distinguish them: the series are those of Okabe and Ito without yellow, which is lost on
 white; what matters differs in mark or dash as well. The colours of roles are those of the light page, where
 ``templates/report.css`` has them for dark screens and paper, too.
 """

@@ -115,15 +115,7 @@ def mark(place: Point, shape: str, kind: str, hint: str, size: float = 5.0) -> s
 
 
 def picture(name: str, size: Point, words: tuple[str, str, str], content: Iterable[str]) -> Picture:
-    """Put a picture together.
-
-    Parameters
-    ----------
-    size : tuple of float
-        Width and height of its coordinates; on the page it is as wide as there is room.
-    words : tuple of str
-        Title, caption, and a description for readers who cannot see it.
-    """
+    """Put a picture together; the words are title, caption, and a description for readers who cannot see it."""
     title, caption, description = words
     head = element("title", escape(title), id=f"picture-{name}-title") + element(
         "desc", escape(description), id=f"picture-{name}-desc"

@@ -29,15 +29,7 @@ def check_plot(file: str) -> None:
 
 @drawn_alike()
 def accuracy_plot(document: Document, fine: Document) -> str:
-    """Draw the required accuracy of directions over the photo.
-
-    Parameters
-    ----------
-    document : dict
-        The document of required accuracies, for title and names.
-    fine : dict
-        The same on a fine grid over the whole photo.
-    """
+    """Draw the required accuracy of directions, known on a fine grid over the whole photo."""
     camera = document["camera"]
     title = (
         f"{camera['name']}, f = {camera['principal_distance_mm']:g} mm: accuracy of directions for"

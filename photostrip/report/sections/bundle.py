@@ -18,13 +18,7 @@ NAMED = 6
 
 
 def bundle_sections(document: Document) -> list[Section]:
-    """Return the sections of a bundle adjustment.
-
-    Parameters
-    ----------
-    document : dict
-        The document of a result; without the block ``bundle`` there are none.
-    """
+    """Return the sections of a bundle adjustment; none without the block ``bundle``."""
     block = document.get("bundle")
     if block is None:
         return []

@@ -14,13 +14,7 @@ if TYPE_CHECKING:
 
 
 def covariance_section(document: Document, *, everything: bool) -> Section:
-    """Show the test of the whole adjustment and of each control coordinate.
-
-    Parameters
-    ----------
-    document : dict
-        The document of a result that has the block ``covariance``.
-    """
+    """Show the test of the whole adjustment and of each control coordinate."""
     blocks = document["covariance"]
     # a result that was written before the choice existed has none
     distances = document["settings"].get("covariance", {}).get("distances", True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from photostrip.report.page.numbers import counted, micrometres, short
+from photostrip.report.page.numbers import LEAST_PROBABILITY, counted, micrometres, short
 from photostrip.report.page.parts import Document, Facts, Section, Words
 from photostrip.report.page.tables import number, tabulated, words
 
@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
 WEIGHTS_SHOWN = 24  # control points; --verbose prints all
-LEAST_SHOWN = 0.001  # probabilities below are not told apart
 
 
 def decisions_section(document: Document) -> Section:
@@ -44,11 +43,11 @@ def _decisions(document: Document) -> Iterator[tuple[str, str]]:
 
 
 def _degree(block: Document) -> str:
-    """Say which degree was taken in plan and in height, and what spoke for it."""
+    """Say which degree was chosen in plan and in height, and what spoke for it."""
     parts = []
     for group in ("plan", "height"):
-        taken = [row for row in block["evidence"] if row["group"] == group and row["accepted"] and row["degree"]]
-        parts.append(f"{_step(taken[-1])} in {group}" if taken else f"none in {group}")
+        chosen = [row for row in block["evidence"] if row["group"] == group and row["accepted"] and row["degree"]]
+        parts.append(f"{_step(chosen[-1])} in {group}" if chosen else f"none in {group}")
     if all(part.startswith("none") for part in parts):
         return "none: no degree brings more than chance, or serves control that took no part"
     return f"{' and '.join(parts)}; F is the ratio of the gain over the degree before, p its probability by chance"
@@ -58,7 +57,7 @@ def _step(row: Document) -> str:
     """Name an accepted degree with its test."""
     if row["f"] is None or row["p"] is None:
         return f"degree {row['degree']}"
-    probability = f"p = {row['p']:.3f}" if row["p"] >= LEAST_SHOWN else f"p below {LEAST_SHOWN:g}"
+    probability = f"p = {row['p']:.3f}" if row["p"] >= LEAST_PROBABILITY else f"p below {LEAST_PROBABILITY:g}"
     return f"degree {row['degree']} (F = {row['f']:.1f}, {probability})"
 
 

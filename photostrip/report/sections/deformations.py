@@ -9,13 +9,7 @@ from photostrip.report.sections.strip import photos_of
 
 
 def deformation_section(document: Document) -> Section:
-    """Twist and bending of the models that have the height control for it.
-
-    Parameters
-    ----------
-    document : dict
-        The document of a result that has ``deformations``.
-    """
+    """Twist and bending of the models that have the height control for it."""
     rows = document["deformations"]
     bent = sum(row["significant"] for row in rows)
     verdict = f"{bent} of them deformed" if bent else "none of them deformed"

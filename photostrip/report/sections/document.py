@@ -39,13 +39,7 @@ if TYPE_CHECKING:
 
 
 def sections_of(document: Document, *, everything: bool = False) -> tuple[Section, ...]:
-    """Return the sections of the accuracy report.
-
-    Parameters
-    ----------
-    everything : bool
-        Whether all rows of all tables are wanted, not only the worst of long ones.
-    """
+    """Return the sections of the accuracy report."""
     return (
         verdict_section(document, everything=everything),
         *findings_sections(document),
@@ -105,18 +99,7 @@ def chosen_sections(document: Document, *, quiet: bool = False, everything: bool
 
 
 def require_complete(document: Document, file: str) -> None:
-    """Refuse a document that was read from a file and cannot be reported.
-
-    Parameters
-    ----------
-    document : dict
-        What stands in the file; a user may have cut or edited it.
-
-    Raises
-    ------
-    InputError
-        When something that the report shows is missing or of another kind.
-    """
+    """Refuse a document whose file a user has cut or edited so that it cannot be reported."""
     try:
         title_of(document)
         sections_of(document, everything=True)

@@ -1,4 +1,4 @@
-"""What the data say against themselves, told at the top of the report: each finding, its numbers and its cure."""
+"""What the data say against themselves, at the top of the report: each finding, its numbers and its cure."""
 
 from __future__ import annotations
 
@@ -12,22 +12,16 @@ if TYPE_CHECKING:
 
 
 def findings_sections(document: Document) -> tuple[Section, ...]:
-    """Return the section of the findings; none when there are none.
-
-    Parameters
-    ----------
-    document : dict
-        The document of a result; those of older versions have no findings.
-    """
+    """Return the section of the findings; none when there are none."""
     findings = document.get("findings", [])
     if not findings:
         return ()
-    parts = tuple(part for each in findings for part in _told(each))
+    parts = tuple(part for each in findings for part in _paragraphs(each))
     return (Section("Plausibility of the data", parts),)
 
 
-def _told(finding: Document) -> Iterator[Part]:
-    """Tell one finding in up to three paragraphs."""
+def _paragraphs(finding: Document) -> Iterator[Part]:
+    """Write one finding in up to three paragraphs."""
     place = before(finding["file"], finding["line"], finding["column"])
     word = "accepted" if finding["accepted"] else finding["severity"]
     colour = "" if finding["accepted"] else "failed" if finding["severity"] == "error" else "look"

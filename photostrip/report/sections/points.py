@@ -183,7 +183,7 @@ def image_section(document: Document) -> Section:
 
 
 def rejected_section(document: Document, *, everything: bool) -> Section:
-    """Measurements that were taken out."""
+    """Measurements that were rejected."""
     rejected = [row for row in document["rejected"] if not row.get("readmitted", False)]
     if not rejected:
         return Section("Rejected", (Words("Nothing was rejected."),))
@@ -221,7 +221,7 @@ def notes_section(document: Document, *, everything: bool) -> Section:
     notes = document["notes"]
     limit = len(notes) if everything else 2 * WORST_SHOWN
     parts: list[Part] = [
-        Words(f"{note['severity']}: {_told(note)}", "look" if note["severity"] == "warning" else "", "-")
+        Words(f"{note['severity']}: {_sentence_of(note)}", "look" if note["severity"] == "warning" else "", "-")
         for note in notes[:limit]
     ]
     if len(notes) > limit:
@@ -229,6 +229,6 @@ def notes_section(document: Document, *, everything: bool) -> Section:
     return Section("Notes", tuple(parts) or (Words("None."),))
 
 
-def _told(note: Document) -> str:
+def _sentence_of(note: Document) -> str:
     """Return a note with its place; results of older versions have none."""
     return before(note.get("file", ""), note.get("line", 0), note.get("column", 0)) + str(note["message"])

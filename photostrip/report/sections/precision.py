@@ -19,13 +19,7 @@ PARTS = (("plan", "east and north together"), ("height", "up"))
 
 
 def precision_section(document: Document, *, everything: bool) -> Section:
-    """Show standard deviations carried from the image coordinates and the control to points and photos.
-
-    Parameters
-    ----------
-    document : dict
-        The document of a result that has the block ``precision``.
-    """
+    """Show standard deviations carried from the image coordinates and the control to points and photos."""
     block = document["precision"]
     measured = "model" if "links" in document else "image"
     text = (

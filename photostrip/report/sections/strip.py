@@ -1,11 +1,11 @@
-"""Sections on pairs, joints, absolute orientation and polynomials."""
+"""Sections on pairs, junctions, absolute orientation and polynomials."""
 
 from __future__ import annotations
 
 from functools import partial
 from typing import TYPE_CHECKING
 
-from photostrip.report.page.numbers import counted, fixed, metres, micrometres, percent, power, short
+from photostrip.report.page.numbers import LEAST_PROBABILITY, counted, fixed, metres, micrometres, percent, power, short
 from photostrip.report.page.parts import Document, Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
 
@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
 ALL_SHOWN = 24  # rows up to which a table is printed whole
-SMALL = 0.001  # probabilities below it are not told apart
 HIGH_LEVERAGE = 0.7  # share of a control point in the polynomial at its own place
 STRIPS_SHOWN = 3  # strips up to which every polynomial is shown with its evidence
 WORST_SHOWN = 12  # rows shown of a longer one
@@ -26,19 +25,9 @@ GROUND_AXES = ("east", "north", "up")
 def worst_first(
     rows: Sequence[Document], badness: Callable[[Document], float], where: str, *, everything: bool
 ) -> tuple[list[Document], str]:
-    """Choose the rows of a table that are shown.
+    """Choose the rows of a table that are shown: all in their order, or the worst, and what to say of the others.
 
-    Parameters
-    ----------
-    where : str
-        What the rows are and where all of them stand.
-
-    Returns
-    -------
-    rows : list of dict
-        All in their order, or the worst, worst first.
-    note : str
-        What is left out; empty when nothing is.
+    ``where`` says what the rows are and in which block of result.json all of them stand.
     """
     if everything or len(rows) <= ALL_SHOWN:
         return list(rows), ""
@@ -230,7 +219,7 @@ def _by_strip(blocks: Sequence[Document]) -> Table:
 
 
 def _choice(document: Document, block: Document) -> str:
-    """Say which degree was taken and on what control."""
+    """Say which degree was chosen and on what control."""
     how = "decided by the evidence below" if block["asked"] == "auto" else f"degree {block['asked']} was asked for"
     plan, height = (_degree(block["terms"][axis]) for axis in ("x", "z"))
     what = "no polynomial" if not block["degree"] else f"degree {plan} in plan and {height} in height"
@@ -255,7 +244,7 @@ EVIDENCE = (
     number("rms", "rms", 3, "m"),
     number("left out", "left_out", 3, "m"),
     number("F", "f", 2),
-    number("p", "p", lambda p: "<0.001" if (p or 1) < SMALL else fixed(p, 3)),
+    number("p", "p", lambda p: "<0.001" if (p or 1) < LEAST_PROBABILITY else fixed(p, 3)),
     words("taken", lambda step: "yes" if step["accepted"] else "no"),
 )
 
