@@ -23,7 +23,7 @@ limit_threads()  # before numpy is imported
 
 import numpy as np  # noqa: E402
 
-from photostrip.terrestrial.monitoring import Settings  # noqa: E402
+from photostrip.terrestrial.monitoring import MonitoringSettings  # noqa: E402
 from tests.terrestrial.simulated import repeated, turned, world  # noqa: E402
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def surveys() -> dict[str, World]:
     }
 
 
-def row(name: str, truth: World, settings: Settings, runs: int) -> str:
+def row(name: str, truth: World, settings: MonitoringSettings, runs: int) -> str:
     """Compute one kind of survey many times and give its line."""
     count = repeated(truth, runs, settings)
     errors = np.concatenate(count.errors)
@@ -79,12 +79,12 @@ def main() -> None:
     print(f"{runs} surveys of each kind\n")
     print(f"The turn of a camera is always taken out\n{HEAD}")
     for name, truth in surveys().items():
-        print(row(name, truth, Settings(), runs))
+        print(row(name, truth, MonitoringSettings(), runs))
     print(f"\nA camera that turned a little, by the way it is treated\n{HEAD}")
     for arcseconds in (0.0, 2.0, 4.0, 6.0, 8.0, 12.0):
         for treatment in ("always", "auto", "never"):
             truth = turned(FACE, arcseconds, -arcseconds / 2, 0.7 * arcseconds)
-            print(row(f"{arcseconds:4.0f}″ {treatment}", truth, Settings(moved_camera=treatment), runs))
+            print(row(f"{arcseconds:4.0f}″ {treatment}", truth, MonitoringSettings(moved_camera=treatment), runs))
 
 
 if __name__ == "__main__":

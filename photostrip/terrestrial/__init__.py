@@ -1,11 +1,8 @@
-"""Terrestrial photogrammetry: directions of a phototheodolite, displacements by pseudo-parallaxes.
+"""Terrestrial photogrammetry: directions of a phototheodolite [002], displacements by pseudo-parallaxes [004c].
 
-- ``frame``: how a camera looks at the ground, and the direction of a ray;
-- ``directions``: photo coordinates to directions and back;
-- ``accuracy``: how accurate correction directions must be, and what a theodolite is good for;
-- ``orientation``: a photo oriented by directions to distinct points;
-- ``normal_case``: two photos of any orientation brought to the normal case;
-- ``displacement``: displacements of points between two epochs;
-- ``camera_motion``: cameras that turned between epochs;
-- ``monitoring``: all epochs of all points, as a time series.
+In come image coordinates (x, z) and directions to points; out go the orientation of a photo (``orientation``), the
+accuracy that directions must have (``accuracy``), and displacements between epochs with their tests: ``normal_case``
+brings two photos of any orientation to the normal case, ``displacement`` compares two epochs, ``camera_motion`` finds
+cameras that turned, ``epochs`` walks through all of it to the time series of ``monitoring``, ``remarks`` say what is
+wrong with it. ``frame`` and ``directions`` hold the geometry: how a camera looks at the ground.
 """

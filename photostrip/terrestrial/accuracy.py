@@ -1,7 +1,8 @@
 """How accurately correction directions must be measured for a given image accuracy, and the other way round.
 
 The exact formulas hold for any orientation of the camera. Those of the source, kept for comparison, hold for a level
-camera and inherit a misprint of its eq. 3 in the vertical direction.
+camera and inherit a misprint of its eq. 3 in the vertical direction. ``xz`` (..., 2) everywhere are image coordinates
+in mm, reduced to the principal point; ``rotation`` (3, 3) takes the photo to the ground.
 """
 
 from __future__ import annotations
@@ -33,28 +34,11 @@ class Required:
 
 
 def required(xz: ArrayLike, principal_distance: float, sigma: float, rotation: ArrayLike) -> Required:
-    """Accuracy of directions that corresponds to an accuracy of image coordinates.
+    """Accuracy of directions that corresponds to a standard error `sigma` of x, of z and of the principal distance, mm.
 
-    Parameters
-    ----------
-    xz : array_like, shape (..., 2)
-        Image coordinates in mm, reduced to the principal point.
-    principal_distance : float
-        Principal distance in mm.
-    sigma : float
-        Standard error m of x, of z and of the principal distance, mm.
-    rotation : array_like, shape (3, 3)
-        Photo to ground.
+    For a level camera m_lambda' = m / sqrt(f^2 + x^2) and m_beta = m / sqrt(f^2 + x^2 + z^2).
 
-    Returns
-    -------
-    Required
-        Standard errors in radians.
-
-    Notes
-    -----
-    Source: [002] eq. 4-6 with all first-order terms and without the misprint of eq. 3. For a level camera
-    m_lambda' = m / sqrt(f^2 + x^2) and m_beta = m / sqrt(f^2 + x^2 + z^2).
+    Source: [002] eq. 4-6 with all first-order terms and without the misprint of eq. 3.
     """
     by = partials(xz, principal_distance, rotation)
     errors = sigma * np.sqrt((by.by_xz**2).sum(axis=-1) + by.by_f**2)
@@ -72,24 +56,8 @@ class Printed:
 
 
 def as_printed(xz: ArrayLike, principal_distance: float, sigma: float) -> Printed:
-    """Accuracy of directions by the formulas of the source.
+    """Accuracy of directions by the formulas of the source, for a standard error `sigma` of the image coordinates, mm.
 
-    Parameters
-    ----------
-    xz : array_like, shape (..., 2)
-        Image coordinates in mm, reduced to the principal point.
-    principal_distance : float
-        Principal distance in mm.
-    sigma : float
-        Standard error m of x, of z and of the principal distance, mm.
-
-    Returns
-    -------
-    Printed
-        Standard errors in radians.
-
-    Notes
-    -----
     Source: [002] eq. 5 and 6 as printed, see docs/sources.md.
     """
     x, z = np.moveaxis(np.asarray(xz, float), -1, 0)
@@ -103,27 +71,11 @@ def as_printed(xz: ArrayLike, principal_distance: float, sigma: float) -> Printe
 def supported(
     xz: ArrayLike, principal_distance: float, horizontal: float, vertical: float, rotation: ArrayLike
 ) -> Floats:
-    """Image accuracy that directions of a given accuracy can vouch for.
+    """Image accuracy that directions of a given accuracy can vouch for, shape (..., 2), mm.
 
-    Parameters
-    ----------
-    xz : array_like, shape (..., 2)
-        Image coordinates in mm, reduced to the principal point.
-    principal_distance : float
-        Principal distance in mm.
-    horizontal, vertical : float
-        Standard errors of the measured directions, radians.
-    rotation : array_like, shape (3, 3)
-        Photo to ground.
+    Smallest standard error of image coordinates for which the horizontal and the vertical direction, with the standard
+    errors given, are accurate enough.
 
-    Returns
-    -------
-    ndarray, shape (..., 2)
-        Smallest standard error of image coordinates, in mm, for which the horizontal and the vertical direction are
-        accurate enough.
-
-    Notes
-    -----
     Source: derived; ``required`` solved for m.
     """
     unit = required(xz, principal_distance, 1.0, rotation)
@@ -131,55 +83,24 @@ def supported(
 
 
 def of_rounds(sigma: float, rounds: int) -> float:
-    """Return the standard error of the mean of several rounds.
-
-    Parameters
-    ----------
-    sigma : float
-        Standard error of a direction measured in one round, in both faces; any unit.
-
-    Returns
-    -------
-    float
-        In the unit of `sigma`.
-    """
+    """Return the standard error of the mean of several rounds, each measured in both faces."""
     return float(sigma / np.sqrt(rounds))
 
 
 def rounds_for(sigma: float, wanted: float) -> int:
-    """Return the number of rounds that a theodolite needs.
-
-    Parameters
-    ----------
-    sigma : float
-        Standard error of a direction measured in one round, in both faces.
-    wanted : float
-        Standard error that the mean must have, in the same unit.
-
-    Returns
-    -------
-    int
-        Number of rounds, at least 1.
-    """
+    """Return the number of rounds, each in both faces with `sigma`, whose mean has the standard error wanted."""
     return max(1, ceil((sigma / wanted) ** 2 - 1e-9))  # exactly four times is not more than four times
 
 
 def grid(photo_format: tuple[float, float], step: float, *, level: bool = True) -> tuple[Floats, Floats]:
-    """Coordinates over the photo at which accuracy is tabulated.
+    """Coordinates x and z over the photo, mm, at which accuracy is tabulated: multiples of the step, and the edge.
 
     Parameters
     ----------
     photo_format : tuple of float
         Width and height of the photo in mm.
-    step : float
-        Distance of the coordinates in mm.
     level : bool
         Whether one quarter of the photo stands for the others.
-
-    Returns
-    -------
-    x, z : ndarray
-        Multiples of the step up to the edge, and the edge itself, mm.
     """
     axes = []
     for size in photo_format:
@@ -232,13 +153,7 @@ class WorkedExample:
 
 
 def worked(example: Example) -> WorkedExample:
-    """Compute an example of the source again.
-
-    Returns
-    -------
-    WorkedExample
-        The same by the printed and by the exact formulas.
-    """
+    """Compute an example of the source again, by the printed and by the exact formulas."""
     f, x, z, m = example.f, example.x, example.z, example.sigma
     exact = required([x, z], f, m, ground_from_photo(0.0))
     printed = as_printed([x, z], f, m)

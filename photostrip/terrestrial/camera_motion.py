@@ -8,7 +8,7 @@ fitted to the stable points and tested against zero. A stable point that does no
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     Flags = NDArray[np.bool_]
 
 ANGLES = 3  # a turn to the right, up, and about the optical axis
-ITERATIONS = 20
-CONVERGED = 1e-12  # rad
-WEAKEST = 1e-10  # reciprocal of the squared condition number below which a turn is not determined
-REJECTION = 0.01  # probability of rejecting any of the stable points of an epoch by chance
+MOST_ITERATIONS = 20
+CONVERGED_RAD = 1e-12
+LEAST_RECIPROCAL = 1e-10  # reciprocal of the squared condition number below which a turn is not determined
+FALSE_REJECTION = 0.01  # probability of rejecting any of the stable points of an epoch by chance
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,13 +83,7 @@ class Turn:
         return int((self.weights > 0).sum()) - ANGLES
 
     def predict(self, number: int) -> tuple[Floats, Floats] | None:
-        """Fit the turn without one point.
-
-        Returns
-        -------
-        tuple of ndarray or None
-            Turn and its normal matrix; None when the other points do not determine it.
-        """
+        """Fit the turn without one point; None when the other points do not determine it."""
         own = self.design[number] * self.weights[number][:, None]
         normal = self.normal - own.T @ self.design[number]
         if not determined(normal):
@@ -99,44 +93,15 @@ class Turn:
 
 
 def turned(before: Floats, principal_distance: float, turn: Floats) -> Floats:
-    """Where points stand in the photo after the camera turned.
-
-    Parameters
-    ----------
-    before : ndarray, shape (m, 2)
-        Coordinates before in mm, from the principal point.
-    principal_distance : float
-        f in mm.
-    turn : ndarray, shape (3,)
-        Turn to the right, up, and counter-clockwise, radians.
-
-    Returns
-    -------
-    ndarray, shape (m, 2)
-        Coordinates after it, mm.
-    """
+    """Where points (m, 2), mm from the principal point, stand in the photo after the camera turned."""
     ray = rays(before, principal_distance) @ small_turn(turn)
     after: Floats = -principal_distance * ray[:, :2] / ray[:, 2:]
     return after
 
 
 def turn_gradient(points: Floats, principal_distance: float) -> Floats:
-    """Return the derivatives of coordinates by a small turn of the camera.
+    """Return the derivatives (m, 2, 3) of coordinates x, z by a small turn to the right, up, counter-clockwise; mm/rad.
 
-    Parameters
-    ----------
-    points : ndarray, shape (m, 2)
-        Coordinates in mm, from the principal point.
-    principal_distance : float
-        f in mm.
-
-    Returns
-    -------
-    ndarray, shape (m, 2, 3)
-        Rows x, z; columns turn to the right, up, counter-clockwise; mm/rad.
-
-    Notes
-    -----
     Source: derived; tested against differences.
     """
     x, z = points.T
@@ -148,24 +113,14 @@ def turn_gradient(points: Floats, principal_distance: float) -> Floats:
 
 
 def fit(pair: ImagePair, used: Flags) -> Turn | None:
-    """Fit the turn of a camera.
+    """Fit the turn of a camera to the points used; None when they do not determine it.
 
-    Parameters
-    ----------
-    pair : ImagePair
-        The stable points on both photos.
-    used : ndarray of bool, shape (m,)
-        Points to use.
-
-    Returns
-    -------
-    Turn or None
-        None when the points do not determine a turn: two points with x and z are needed, or three with x.
+    Two points with x and z are needed, or three with x.
     """
     there = pair.measured & used[:, None]
     weights = np.where(there, 1.0 / pair.variances, 0.0)
     values = np.zeros(ANGLES)
-    for _ in range(ITERATIONS):
+    for _ in range(MOST_ITERATIONS):
         predicted = turned(pair.before, pair.principal_distance, values)
         design = np.where(there[:, :, None], turn_gradient(np.nan_to_num(predicted), pair.principal_distance), 0.0)
         normal = np.einsum("mij,mi,mik->jk", design, weights, design)
@@ -174,7 +129,7 @@ def fit(pair: ImagePair, used: Flags) -> Turn | None:
         residuals = pair.after - predicted
         step = np.linalg.solve(normal, np.einsum("mij,mi,mi->j", design, weights, np.nan_to_num(residuals)))
         values = _composed(values, step)
-        if np.abs(step).max() < CONVERGED:
+        if np.abs(step).max() < CONVERGED_RAD:
             return Turn(values, normal, design, weights, residuals)
     return None
 
@@ -190,7 +145,16 @@ def determined(normal: Floats) -> bool:
     if not length.all():
         return False
     size = np.linalg.eigvalsh(normal / np.outer(length, length))
-    return bool(size[0] > WEAKEST)
+    return bool(size[0] > LEAST_RECIPROCAL)
+
+
+class MovedPoint(NamedTuple):
+    """A point, given as stable, that does not fit to the others."""
+
+    point: int  # its number among the stable points
+    # value, limit: squared misclosure against the others, in units of its variance, and what chance allows
+    value: float
+    limit: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,26 +164,17 @@ class Motion:
     # of the left and the right camera; None where the stable points do not determine it
     turns: tuple[Turn | None, Turn | None]
     used: Flags  # (m,): stable points that fit together
-    # number, test value and limit of points that do not fit to the others, in order
-    rejected: tuple[tuple[int, float, float], ...]
+    rejected: tuple[MovedPoint, ...]  # points that do not fit to the others, in order
 
 
 def find_motion(left: ImagePair, right: ImagePair) -> Motion:
     """Fit the turns of both cameras to the points that did not move.
 
-    Parameters
-    ----------
-    left, right : ImagePair
-        The same stable points on the photos of both cameras.
-
-    Returns
-    -------
-    Motion
-        Turns, and the points that moved themselves: at each step the one that fits worst to the others.
+    At each step the point that fits worst to the others is taken out, as having moved itself.
     """
     pairs = (left, right)
     used = np.ones(len(left.before), bool)
-    rejected: list[tuple[int, float, float]] = []
+    rejected: list[MovedPoint] = []
     while True:
         turns = (fit(left, used), fit(right, used))
         worst = _worst(pairs, turns, used)
@@ -227,15 +182,15 @@ def find_motion(left: ImagePair, right: ImagePair) -> Motion:
             return Motion(turns, used, tuple(rejected))
         rejected.append(worst)
         used = used.copy()
-        used[worst[0]] = False
+        used[worst.point] = False
 
 
 def _worst(
     pairs: tuple[ImagePair, ImagePair], turns: tuple[Turn | None, Turn | None], used: Flags
-) -> tuple[int, float, float] | None:
+) -> MovedPoint | None:
     """Find the point that fits worst to the turns that the others give, if it fits too badly."""
     rows = np.flatnonzero(used)
-    worst: tuple[int, float, float] | None = None
+    worst: MovedPoint | None = None
     for row in rows:
         value, components = 0.0, 0
         for pair, turn in zip(pairs, turns, strict=True):
@@ -243,9 +198,9 @@ def _worst(
             value, components = value + drop, components + parts
         if not components:
             continue
-        limit = chi2_quantile(1 - REJECTION / len(rows), components)
-        if value > limit and (worst is None or value / limit > worst[1] / worst[2]):
-            worst = (int(row), value, limit)
+        limit = chi2_quantile(1 - FALSE_REJECTION / len(rows), components)
+        if value > limit and (worst is None or value / limit > worst.value / worst.limit):
+            worst = MovedPoint(int(row), value, limit)
     return worst
 
 

@@ -1,6 +1,7 @@
 """Photo coordinates of a phototheodolite to horizontal and vertical directions, and back.
 
-Directions are azimuths lambda, clockwise from the ground's Y axis, and elevations beta.
+Directions (..., 2) are azimuths lambda, clockwise from the ground's Y axis in (-pi, pi], and elevations beta. ``xz``
+(..., 2) are image coordinates in mm, reduced to the principal point; ``rotation`` (3, 3) takes the photo to the ground.
 """
 
 from __future__ import annotations
@@ -41,47 +42,14 @@ class Partials:
 def directions_from_photo(xz: ArrayLike, principal_distance: float, rotation: ArrayLike) -> Floats:
     """Horizontal and vertical directions of image points.
 
-    Parameters
-    ----------
-    xz : array_like, shape (..., 2)
-        Image coordinates in mm, reduced to the principal point.
-    principal_distance : float
-        Principal distance in mm.
-    rotation : array_like, shape (3, 3)
-        Photo to ground.
-
-    Returns
-    -------
-    ndarray, shape (..., 2)
-        Lambda in (-pi, pi] and beta in radians.
-
-    Notes
-    -----
     Source: [002] eq. 1 turned round; for omega = kappa = 0 eq. 3 with cos(lambda') where sec(lambda') is printed.
     """
     return directions_of(rays(xz, principal_distance) @ np.asarray(rotation, float).T)
 
 
 def photo_from_directions(directions: ArrayLike, principal_distance: float, rotation: ArrayLike) -> Floats:
-    """Image coordinates of directions.
+    """Image coordinates of directions; NaN where the direction is 90 degrees or more from the optical axis.
 
-    Parameters
-    ----------
-    directions : array_like, shape (..., 2)
-        Lambda and beta in radians.
-    principal_distance : float
-        Principal distance in mm.
-    rotation : array_like, shape (3, 3)
-        Photo to ground.
-
-    Returns
-    -------
-    ndarray, shape (..., 2)
-        Image coordinates in mm from the principal point; NaN where the direction is 90 degrees or more from the
-        optical axis.
-
-    Notes
-    -----
     Source: [002] eq. 1; eq. 2 for omega = kappa = 0.
     """
     ray = vectors_of(directions) @ np.asarray(rotation, float)
@@ -93,17 +61,6 @@ def photo_from_directions(directions: ArrayLike, principal_distance: float, rota
 def partials(xz: ArrayLike, principal_distance: float, rotation: ArrayLike) -> Partials:
     """Return the derivatives of the directions by what is measured in the photo.
 
-    Parameters
-    ----------
-    xz : array_like, shape (..., 2)
-        Image coordinates in mm, reduced to the principal point.
-    principal_distance : float
-        Principal distance in mm.
-    rotation : array_like, shape (3, 3)
-        Photo to ground.
-
-    Notes
-    -----
     Source: derived; for omega = kappa = 0 they are [002] eq. 4 with the error of eq. 3 removed.
     """
     turn = np.asarray(rotation, float)

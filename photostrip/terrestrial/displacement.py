@@ -5,7 +5,7 @@ A pseudo-parallax is the difference of a coordinate on two photos taken from the
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -21,25 +21,15 @@ SINGULAR = 1e-12  # reciprocal condition of a covariance matrix below which ther
 
 
 def displacements(first: Floats, second: Floats, principal_distance: float, base: float) -> Floats:
-    """Displacements in the axes of the normal case.
+    """Displacements dX, dY, dZ in the axes of the normal case, second minus first epoch, shape (n, 3), metres.
+
+    Exactly the difference of the intersected points, without its loss of digits.
 
     Parameters
     ----------
     first, second : ndarray, shape (n, 4)
         x, z of the left and x, z of the right photo in mm in two epochs.
-    principal_distance : float
-        f in mm.
-    base : float
-        B in metres.
 
-    Returns
-    -------
-    ndarray, shape (n, 3)
-        dX, dY, dZ in metres, second minus first epoch: exactly the difference of the intersected points, without
-        its loss of digits.
-
-    Notes
-    -----
     Source: [004c] eq. 2, completed: x' and z' are coordinates of the second epoch, dp is left minus right.
     """
     f = principal_distance
@@ -54,7 +44,7 @@ def displacements(first: Floats, second: Floats, principal_distance: float, base
 
 
 def standard_errors(second: Floats, sigma: float, principal_distance: float, base: float) -> Floats:
-    """Give standard errors for pseudo-parallaxes of equal accuracy, z of the right photo not measured.
+    """Give m_dX, m_dY, m_dZ, metres, for pseudo-parallaxes of equal accuracy, z of the right photo not measured.
 
     Parameters
     ----------
@@ -62,18 +52,7 @@ def standard_errors(second: Floats, sigma: float, principal_distance: float, bas
         Coordinates of the second epoch in mm.
     sigma : float
         Standard deviation of each pseudo-parallax in mm.
-    principal_distance : float
-        f in mm.
-    base : float
-        B in metres.
 
-    Returns
-    -------
-    ndarray, shape (n, 3)
-        m_dX, m_dY, m_dZ in metres.
-
-    Notes
-    -----
     Source: derived from the completed [004c] eq. 2.
     """
     x, z, p = second[:, 0], second[:, 1], second[:, 0] - second[:, 2]
@@ -89,19 +68,9 @@ def standard_errors(second: Floats, sigma: float, principal_distance: float, bas
 
 
 def statistic(displacement: Floats, covariance: Floats) -> Floats:
-    """Test value of displacements: chi-square with three degrees of freedom where nothing moved.
+    """Test value d^T C^-1 d of displacements: chi-square with three degrees of freedom where nothing moved.
 
-    Parameters
-    ----------
-    displacement : ndarray, shape (n, 3)
-        Displacements in metres.
-    covariance : ndarray, shape (n, 3, 3)
-        Their covariance in m^2.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        d^T C^-1 d; NaN where C is singular or has no value.
+    NaN where the covariance (n, 3, 3) is singular or has no value.
     """
     value = np.full(len(displacement), np.nan)
     sound = np.flatnonzero(np.isfinite(displacement).all(axis=1) & np.isfinite(covariance).all(axis=(1, 2)))
@@ -113,19 +82,20 @@ def statistic(displacement: Floats, covariance: Floats) -> Floats:
 
 
 def limit(significance: float, components: int = SPACE) -> float:
-    """Critical value of ``statistic``.
-
-    Parameters
-    ----------
-    significance : float
-        Probability of calling a point moved that did not move.
-    components : int
-        Degrees of freedom.
-    """
+    """Critical value of ``statistic``, for the probability of calling a point moved that did not move."""
     return chi2_quantile(1 - significance, components)
 
 
-def ellipses(covariance: ArrayLike, probability: float) -> tuple[Floats, Floats, Floats]:
+class Ellipses(NamedTuple):
+    """Confidence ellipses in plan."""
+
+    # major, minor: (...): semi-axes, metres
+    major: Floats
+    minor: Floats
+    azimuth: Floats  # (...): direction of the major axis clockwise from the second axis, in [0, pi), radians
+
+
+def ellipses(covariance: ArrayLike, probability: float) -> Ellipses:
     """Confidence ellipses in plan.
 
     Parameters
@@ -134,13 +104,6 @@ def ellipses(covariance: ArrayLike, probability: float) -> tuple[Floats, Floats,
         Covariance of the first two components (to the right and ahead, or east and north), m^2.
     probability : float
         Probability that the ellipse around the estimate covers the truth.
-
-    Returns
-    -------
-    major, minor : ndarray, shape (...)
-        Semi-axes in metres.
-    azimuth : ndarray, shape (...)
-        Direction of the major axis clockwise from the second axis, in [0, pi), radians.
     """
     c = np.asarray(covariance, float)
     half_sum = (c[..., 0, 0] + c[..., 1, 1]) / 2
@@ -149,4 +112,4 @@ def ellipses(covariance: ArrayLike, probability: float) -> tuple[Floats, Floats,
     factor = chi2_quantile(probability, 2)
     azimuth = np.mod(np.arctan2(c[..., 0, 1], half_difference) / 2, np.pi)
     major, minor = (np.sqrt(factor * np.maximum(half_sum + each, 0)) for each in (radius, -radius))
-    return major, minor, azimuth
+    return Ellipses(major, minor, azimuth)

@@ -24,9 +24,9 @@ from photostrip.terrestrial.monitoring import (
     SMALL_PARALLAX,
     CameraState,
     Monitoring,
+    MonitoringSettings,
     Rates,
     Series,
-    Settings,
     Step,
 )
 from photostrip.terrestrial.normal_case import SIDES, Normal, StereoPair, intersect, meeting_z, to_normal
@@ -79,27 +79,15 @@ class _Epoch:
     turns: _Turns
 
 
-def monitor(series: Series, pair: StereoPair, settings: Settings | None = None) -> Monitoring:
-    """Compute the displacements of all points in all epochs.
-
-    Parameters
-    ----------
-    series : Series
-        Measurements; the first epoch is the reference.
-    pair : StereoPair
-        Stations and orientation of the reference epoch.
-
-    Returns
-    -------
-    Monitoring
-        Coordinates, displacements, rates and turns of the cameras, with precision and tests.
+def monitor(series: Series, pair: StereoPair, settings: MonitoringSettings | None = None) -> Monitoring:
+    """Compute the displacements of all points in all epochs; the first epoch is the reference.
 
     Raises
     ------
     GeometryError
         When there is no base, or the cameras look along it.
     """
-    chosen = settings or Settings()
+    chosen = settings or MonitoringSettings()
     ground = pair.ground_from_normal()
     series = replace(series, coordinates=_consistent(series.coordinates))
     reference = _epoch(series, pair, 0, _no_turns(series))
@@ -115,22 +103,23 @@ def monitor(series: Series, pair: StereoPair, settings: Settings | None = None) 
         Step(each.xyz @ ground.T + pair.centers[0], _position_covariance(series, epochs, number))
         for number, each in enumerate(epochs)
     ]
-    change, sigma, change_sigma = _parallax_precision(series, epochs)
+    sigma, change_sigma = _parallax_precision(series, epochs)
+    parallax = np.array([each.normal.parallax for each in epochs])
     result = Monitoring(
-        series,
-        pair,
-        chosen,
-        tuple(positions),
-        tuple(first),
-        tuple(previous),
-        None if series.times is None else _rates(series.times, first, covariance),
-        _reasons(series, epochs),
-        np.array([each.normal.parallax for each in epochs]),
-        sigma,
-        change,
-        change_sigma,
-        tuple(cameras),
-        tuple(motions),
+        series=series,
+        pair=pair,
+        settings=chosen,
+        positions=tuple(positions),
+        since_first=tuple(first),
+        since_previous=tuple(previous),
+        rates=None if series.times is None else _rates(series.times, first, covariance),
+        reason=_reasons(series, epochs),
+        parallax=parallax,
+        parallax_sigma=sigma,
+        parallax_change=parallax - parallax[0],
+        parallax_change_sigma=change_sigma,
+        cameras=tuple(cameras),
+        motions=tuple(motions),
     )
     return replace(result, notes=tuple(remarks(result)))
 
@@ -167,7 +156,7 @@ def _motion(series: Series, pair: StereoPair, number: int) -> Motion | None:
     return find_motion(left, right)
 
 
-def _states(number: int, motion: Motion | None, settings: Settings) -> list[CameraState]:
+def _states(number: int, motion: Motion | None, settings: MonitoringSettings) -> list[CameraState]:
     critical = limit(settings.significance, ANGLES)
     states = []
     for camera, side in enumerate(SIDES):
@@ -301,10 +290,10 @@ def _steps(epochs: list[_Epoch], covariance: Floats, ground: Floats, pair: Stere
     return first, previous
 
 
-def _parallax_precision(series: Series, epochs: list[_Epoch]) -> tuple[Floats, Floats, Floats]:
-    """Return the changes of vertical parallaxes, and standard deviations of parallaxes and changes."""
+def _parallax_precision(series: Series, epochs: list[_Epoch]) -> tuple[Floats, Floats]:
+    """Return the standard deviations of vertical parallaxes and of their changes since the first epoch."""
     gradients = np.array([each.normal.parallax_by_measured for each in epochs])
-    changes = np.array([each.normal.parallax - epochs[0].normal.parallax for each in epochs])
+    unknown = np.array([np.isnan(each.normal.parallax + epochs[0].normal.parallax) for each in epochs])
     total = np.einsum("enj,enj->en", gradients**2, series.shared + series.own)
     own = np.einsum("enj,enj->en", gradients**2, series.own)
     common = np.einsum("enj,nj->en", (gradients - gradients[0]) ** 2, series.shared)
@@ -315,7 +304,7 @@ def _parallax_precision(series: Series, epochs: list[_Epoch]) -> tuple[Floats, F
         turned[number, ~each.turns.known] = np.nan
     change = own + own[0] + common + turned
     change[0] = np.nan
-    return changes, np.sqrt(np.where(np.isnan(changes), np.nan, total + turned)), np.sqrt(change)
+    return np.sqrt(np.where(unknown, np.nan, total + turned)), np.sqrt(change)
 
 
 def _rates(times: Floats, first: list[Step], covariance: Floats) -> Rates:

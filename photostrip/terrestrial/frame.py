@@ -30,21 +30,11 @@ TURN_AXES = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 def ground_from_photo(alpha: ArrayLike, omega: ArrayLike = 0.0, kappa: ArrayLike = 0.0) -> Floats:
-    """Rotation of a terrestrial photo.
+    """Rotation (..., 3, 3) of a terrestrial photo with azimuth, elevation and roll of the camera.
 
-    Parameters
-    ----------
-    alpha, omega, kappa : array_like, shape (...)
-        Azimuth, elevation and roll of the camera in radians.
+    Takes a ray (x, z, -f) to the ground; its columns are the ground components of the photo's x axis, of its z axis and
+    of the optical axis turned round.
 
-    Returns
-    -------
-    ndarray, shape (..., 3, 3)
-        Takes a ray (x, z, -f) to the ground; its columns are the ground components of the photo's x axis, of its z
-        axis and of the optical axis turned round.
-
-    Notes
-    -----
     Source: [002] eq. 1 and 2 for omega = kappa = 0; the angles of the general form are not defined there, derived.
     """
     matrix: Floats = GROUND_FROM_HOUSE @ from_alpha_omega_kappa(alpha, omega, kappa)
@@ -52,114 +42,43 @@ def ground_from_photo(alpha: ArrayLike, omega: ArrayLike = 0.0, kappa: ArrayLike
 
 
 def angles_of(rotation: ArrayLike) -> tuple[Floats, Floats, Floats]:
-    """Azimuth, elevation and roll of a camera; the inverse of ``ground_from_photo``.
-
-    Parameters
-    ----------
-    rotation : array_like, shape (..., 3, 3)
-        Photo to ground.
-
-    Returns
-    -------
-    alpha, omega, kappa : ndarray, shape (...)
-        Radians.
-
-    Raises
-    ------
-    GeometryError
-        When the camera looks straight up or down.
-    """
+    """Azimuth, elevation, roll of a camera that does not look straight up or down; inverse of ``ground_from_photo``."""
     return alpha_omega_kappa(GROUND_FROM_HOUSE.T @ np.asarray(rotation, float))
 
 
 def small_turn(turn: ArrayLike) -> Floats:
-    """Rotation of a camera that turned a little in its own axes.
+    """Rotation of a camera that turned a little in its own axes: to the right, up, and counter-clockwise (..., 3).
 
-    Parameters
-    ----------
-    turn : array_like, shape (..., 3)
-        Turn to the right, up, and counter-clockwise about the optical axis, radians.
-
-    Returns
-    -------
-    ndarray, shape (..., 3, 3)
-        Rays after the turn to the camera before it; ``rotation @ small_turn(turn)`` is the rotation after it.
+    It takes rays after the turn to the camera before it; ``rotation @ small_turn(turn)`` is the rotation after it.
     """
     alpha, omega, kappa = np.moveaxis(np.asarray(turn, float), -1, 0)
     return from_alpha_omega_kappa(alpha, omega, kappa)
 
 
 def rays(xz: ArrayLike, principal_distance: ArrayLike) -> Floats:
-    """Rays of image points.
-
-    Parameters
-    ----------
-    xz : array_like, shape (..., 2)
-        Image coordinates in mm, reduced to the principal point.
-    principal_distance : array_like, shape (...)
-        Principal distance in mm.
-
-    Returns
-    -------
-    ndarray, shape (..., 3)
-        Rays (x, z, -f) in the frame of the photo.
-    """
+    """Rays (x, z, -f) of image points (..., 2), mm, reduced to the principal point, in the frame of the photo."""
     points = np.asarray(xz, float)
     depth = np.broadcast_to(-np.asarray(principal_distance, float), points.shape[:-1])
     return np.concatenate([points, depth[..., None]], axis=-1)
 
 
 def directions_of(vector: ArrayLike) -> Floats:
-    """Horizontal and vertical direction of a vector.
-
-    Parameters
-    ----------
-    vector : array_like, shape (..., 3)
-        Vectors in the frame of the ground.
-
-    Returns
-    -------
-    ndarray, shape (..., 2)
-        Azimuth clockwise from the Y axis, in (-pi, pi], and elevation, radians.
-    """
+    """Azimuth clockwise from the Y axis, in (-pi, pi], and elevation of vectors (..., 3) on the ground."""
     u = np.asarray(vector, float)
     level = np.hypot(u[..., 0], u[..., 1])
     return np.stack([np.arctan2(u[..., 0], u[..., 1]), np.arctan2(u[..., 2], level)], axis=-1)
 
 
 def vectors_of(directions: ArrayLike) -> Floats:
-    """Give unit vectors of directions; the inverse of ``directions_of``.
-
-    Parameters
-    ----------
-    directions : array_like, shape (..., 2)
-        Azimuth and elevation in radians.
-
-    Returns
-    -------
-    ndarray, shape (..., 3)
-        Unit vectors in the frame of the ground.
-    """
+    """Give unit vectors of directions; the inverse of ``directions_of``."""
     horizontal, vertical = np.moveaxis(np.asarray(directions, float), -1, 0)
     level = np.cos(vertical)
     return np.stack([level * np.sin(horizontal), level * np.cos(horizontal), np.sin(vertical)], axis=-1)
 
 
 def direction_gradient(vector: ArrayLike) -> Floats:
-    """Return the derivative of the directions of a vector by the vector.
+    """Return the derivative (..., 2, 3) of azimuth and elevation of a vector, none of them vertical, by the vector.
 
-    Parameters
-    ----------
-    vector : array_like, shape (..., 3)
-        Vectors in the frame of the ground, none of them vertical.
-
-    Returns
-    -------
-    ndarray, shape (..., 2, 3)
-        Rows: azimuth, elevation.
-
-    Notes
-    -----
     Source: derived; tested against differences.
     """
     u = np.asarray(vector, float)

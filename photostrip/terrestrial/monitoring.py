@@ -35,8 +35,8 @@ REASONS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
-    """How displacements are judged."""
+class MonitoringSettings:
+    """How displacements are tested."""
 
     significance: float = 0.05  # probability of calling a point, or a camera, moved that did not move
     # ``"always"`` takes out the turn of a camera whenever the stable points determine it: the tests keep their level
@@ -107,7 +107,7 @@ class Monitoring:
 
     series: Series
     pair: StereoPair
-    settings: Settings
+    settings: MonitoringSettings
     positions: tuple[Step, ...]  # coordinates on the ground in each epoch (``values``), with covariance
     # since_first, since_previous: displacements of each epoch after the first, on the ground
     since_first: tuple[Step, ...]
@@ -143,5 +143,5 @@ class Monitoring:
             (number, names[point])
             for number, motion in enumerate(self.motions, 1)
             if motion is not None
-            for point, _, _ in motion.rejected
+            for point, *_ in motion.rejected
         ]

@@ -42,12 +42,7 @@ class StereoPair:
         return float(np.linalg.norm(self.centers[RIGHT] - self.centers[LEFT]))
 
     def ground_from_normal(self) -> Floats:
-        """Rotation from the axes of the normal case to the ground.
-
-        Returns
-        -------
-        ndarray, shape (3, 3)
-            Columns X, Y, Z.
+        """Rotation from the axes of the normal case to the ground; its columns are X, Y, Z.
 
         Raises
         ------
@@ -68,20 +63,7 @@ class StereoPair:
 
 
 def normal_pair(principal_distance: float, base: float) -> StereoPair:
-    """Give two cameras that stand in the normal case; ground axes: X to the right, Y ahead, Z up.
-
-    Parameters
-    ----------
-    principal_distance : float
-        Of both cameras, mm.
-    base : float
-        Length of the base in metres.
-
-    Returns
-    -------
-    StereoPair
-        The left camera stands at the origin.
-    """
+    """Give two cameras in the normal case, the left one at the origin; ground axes: X to the right, Y ahead, Z up."""
     centers = np.array([[0.0, 0.0, 0.0], [base, 0.0, 0.0]])
     return StereoPair((principal_distance,) * 2, centers, np.array([GROUND_FROM_HOUSE] * 2))
 
@@ -104,7 +86,7 @@ class Normal:
 
 
 def to_normal(measured: Floats, variances: Floats, pair: StereoPair, rotations: Floats) -> Normal:
-    """Bring measured image coordinates to the normal case.
+    """Bring measured image coordinates to the normal case, with z_left = z_right.
 
     Parameters
     ----------
@@ -117,13 +99,6 @@ def to_normal(measured: Floats, variances: Floats, pair: StereoPair, rotations: 
     rotations : ndarray, shape (n, 2, 3, 3)
         Photo to ground, for each point and camera.
 
-    Returns
-    -------
-    Normal
-        Coordinates that fulfil z_left = z_right, and their derivatives.
-
-    Notes
-    -----
     Source: derived. [004c] takes transformed coordinates as given and does not use z of the right photo.
     """
     turn = np.einsum("ki,nskj->nsij", pair.ground_from_normal(), rotations)
@@ -164,23 +139,11 @@ def to_normal(measured: Floats, variances: Floats, pair: StereoPair, rotations: 
 
 
 def meeting_z(measured: Floats, pair: StereoPair, rotations: Floats) -> Floats:
-    """Give z of the right photo for which the rays meet.
+    """Give z of the right photo, shape (n,), for which the rays meet: both rays and the base lie in one plane.
 
-    Parameters
-    ----------
-    measured : ndarray, shape (n, 4)
-        x, z of the left and x of the right photo in mm; the last column is not used.
-    rotations : ndarray, shape (n, 2, 3, 3)
-        Photo to ground, for each point and camera.
+    Arguments are those of ``to_normal``; the last column of `measured` is not used.
 
-    Returns
-    -------
-    ndarray, shape (n,)
-        z of the right photo in mm.
-
-    Notes
-    -----
-    Source: derived; both rays and the base lie in one plane.
+    Source: derived.
     """
     focal = pair.principal_distances
     turn = np.einsum("ki,nskj->nsij", pair.ground_from_normal(), rotations)
@@ -205,24 +168,13 @@ def _blocks(parts: Floats) -> Floats:
 def intersect(coordinates: Floats, principal_distance: float, base: float) -> tuple[Floats, Floats]:
     """Points of the normal case.
 
-    Parameters
-    ----------
-    coordinates : ndarray, shape (n, 4)
-        x, z of the left and of the right photo in mm.
-    principal_distance : float
-        f in mm.
-    base : float
-        B in metres.
-
     Returns
     -------
     xyz : ndarray, shape (n, 3)
         Coordinates from the left station, metres; NaN where the parallax is too small.
     by_coordinates : ndarray, shape (n, 3, 4)
-        Their derivatives, m/mm.
+        Their derivatives by x, z of the left and of the right photo, m/mm.
 
-    Notes
-    -----
     Source: [004c] eq. 1.
     """
     x, z, x_right = coordinates[:, 0], coordinates[:, 1], coordinates[:, 2]

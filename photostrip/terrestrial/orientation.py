@@ -35,12 +35,12 @@ if TYPE_CHECKING:
 ANGLES = ("alpha", "omega", "kappa")
 FREE = {"principal-distance": ("f",), "principal-point": ("x0", "z0")}  # what may be determined besides
 SCREENINGS = ("deletion", "stated", "none")
-ITERATIONS = 50
+MOST_ITERATIONS = 50
 CONVERGED = 1e-11  # of the normalised unknowns: rad, and mm over the principal distance
-WEAKEST = 1e6  # condition number of the scaled equations from which a photo counts as not determined
+WORST_CONDITION = 1e6  # condition number of the scaled equations from which a photo counts as not determined
 SINGULAR = 1e-100  # eigenvalue that stands for zero
-MINIMUM_POINTS = 2
-NEGLIGIBLE = 1e-18  # weighted sum of squares of error-free data: rounding, nothing to be screened
+LEAST_POINTS = 2
+NEGLIGIBLE_SQUARES = 1e-18  # weighted sum of squares of error-free data: rounding, nothing to be screened
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class Sightings:
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class OrientationSettings:
     """How a photo is oriented."""
 
     free: tuple[str, ...] = ()  # what is determined besides the angles: ``"principal-distance"``, ``"principal-point"``
@@ -72,7 +72,7 @@ class Settings:
 
 
 @dataclass(frozen=True, slots=True)
-class Rejection:
+class PointRejection:
     """A point that was taken out."""
 
     point: int
@@ -86,7 +86,7 @@ class Rejection:
 
 
 @dataclass(frozen=True, eq=False)
-class Orientation:
+class PhotoOrientation:
     """A photo oriented by directions."""
 
     names: tuple[str, ...]  # unknowns: alpha, omega, kappa, then what else was determined: f, x0, z0
@@ -101,7 +101,7 @@ class Orientation:
     weighted_sum: float  # weighted sum of squared residuals, chi-square with `dof` degrees of freedom
     dof: int
     condition: float  # condition number of the equations, columns scaled to equal length
-    rejected: tuple[Rejection, ...] = ()  # points taken out, in order
+    rejected: tuple[PointRejection, ...] = ()  # points taken out, in order
 
     @property
     def rotation(self) -> Floats:
@@ -119,17 +119,9 @@ class Orientation:
         return float(np.sqrt(self.weighted_sum / self.dof)) if self.dof else float("nan")
 
     def sigma0_range(self, significance: float) -> tuple[float, float]:
-        """Return the range in which sigma0 should lie when the stated standard deviations are right.
+        """Range of sigma0 when the stated standard deviations are right; NaN without redundancy.
 
-        Parameters
-        ----------
-        significance : float
-            Probability of lying outside by chance.
-
-        Returns
-        -------
-        tuple of float
-            Lower and upper limit; NaN without redundancy.
+        `significance` is the probability of lying outside by chance.
         """
         if not self.dof:
             return float("nan"), float("nan")
@@ -151,8 +143,8 @@ def orient(
     sightings: Sightings,
     principal_distance: float,
     principal_point: tuple[float, float] = (0.0, 0.0),
-    settings: Settings | None = None,
-) -> Orientation:
+    settings: OrientationSettings | None = None,
+) -> PhotoOrientation:
     """Orient a photo by the directions of its points.
 
     Parameters
@@ -161,30 +153,21 @@ def orient(
         f in mm; the start value when it is free.
     principal_point : tuple of float
         x0, z0 in mm; the start values when they are free.
-    settings : Settings, optional
-        What is determined and how it is screened.
-
-    Returns
-    -------
-    Orientation
-        Angles, interior elements if free, precision, residuals and rejected points.
 
     Raises
     ------
     GeometryError
         When the points do not determine what is asked for, or the solution does not converge.
 
-    Notes
-    -----
     Source: the condition is [002] eq. 1; its least-squares solution is derived.
     """
-    chosen = settings or Settings()
+    chosen = settings or OrientationSettings()
     names = (*ANGLES, *(name for key, keys in FREE.items() if key in chosen.free for name in keys))
     interior = np.array([principal_distance, *principal_point])
     used = np.asarray(sightings.measured.any(axis=1), bool)
     _enough(sightings, used, names)
     solution = _solve(sightings, used, names, interior)
-    rejected: list[Rejection] = []
+    rejected: list[PointRejection] = []
     while chosen.screening != "none":
         found = _worst(solution, sightings, chosen)
         if found is None:
@@ -201,20 +184,20 @@ def _enough(sightings: Sightings, used: Flags, names: Sequence[str]) -> None:
     """Refuse a photo with too few directions."""
     number = int(sightings.measured[used].sum())
     points = int(used.sum())
-    if points < MINIMUM_POINTS or number < len(names):
+    if points < LEAST_POINTS or number < len(names):
         msg = (
             f"{points} points with {number} directions do not determine {', '.join(names)}: at least "
-            f"{len(names)} directions to at least {MINIMUM_POINTS} points are needed"
+            f"{len(names)} directions to at least {LEAST_POINTS} points are needed"
         )
         raise GeometryError(msg, points=sightings.ids, code="too-few-directions")
 
 
-def _solve(sightings: Sightings, used: Flags, names: tuple[str, ...], interior: Floats) -> Orientation:
+def _solve(sightings: Sightings, used: Flags, names: tuple[str, ...], interior: Floats) -> PhotoOrientation:
     """Gauss-Newton from a start that needs no approximate values."""
     values = np.concatenate([_start(sightings, used, interior), interior])
     active = np.flatnonzero([name in names for name in (*ANGLES, "f", "x0", "z0")])
     scale = np.where(active < len(ANGLES), 1.0, interior[0])
-    for _ in range(ITERATIONS):
+    for _ in range(MOST_ITERATIONS):
         system = _linearised(sightings, values, active)
         normal, right = _normal(system, used)
         condition = _condition(normal, names, sightings)
@@ -232,7 +215,7 @@ def _start(sightings: Sightings, used: Flags, interior: Floats) -> Floats:
     """Angles from the rotation that brings the rays closest to the directions; level where that is not determined."""
     ray = rays(sightings.xz - interior[1:], interior[0])
     both = used & sightings.measured.all(axis=1)
-    if both.sum() >= MINIMUM_POINTS:
+    if both.sum() >= LEAST_POINTS:
         unit = ray[both] / np.linalg.norm(ray[both], axis=1, keepdims=True)
         left, size, right = np.linalg.svd(vectors_of(sightings.directions[both]).T @ unit)
         if size[1] > 1e-9 * size[0]:  # two different directions
@@ -298,7 +281,7 @@ def _condition(normal: Floats, names: Sequence[str], sightings: Sightings) -> fl
         raise _undetermined(lost, sightings)
     values, vectors = np.linalg.eigh(normal / np.outer(length, length))
     condition = float(np.sqrt(values[-1] / max(values[0], SINGULAR)))
-    if condition > WEAKEST:
+    if condition > WORST_CONDITION:
         share = np.abs(vectors[:, 0])
         raise _undetermined([n for n, each in zip(names, share, strict=True) if each > 0.3 * share.max()], sightings)
     return condition
@@ -318,7 +301,7 @@ def _result(
     values: Floats,
     active: NDArray[np.intp],
     condition: float,
-) -> Orientation:
+) -> PhotoOrientation:
     system = _linearised(sightings, values, active)
     normal, _ = _normal(system, used)
     cofactors = np.asarray(np.linalg.inv(normal), float)
@@ -329,31 +312,31 @@ def _result(
     redundancy = np.where(sightings.measured & used[:, None], 1.0 - hat[:, [0, 1], [0, 1]], np.nan)
     values = values.copy()
     values[:3] = np.array(angles_of(ground_from_photo(*values[:3])))
-    return Orientation(
-        names,
-        values[active],
-        cofactors,
-        float(values[3]),
-        (float(values[4]), float(values[5])),
-        -system.misclosure,
-        redundancy,
-        used,
-        float(squares[used].sum()),
-        int(sightings.measured[used].sum()) - len(names),
-        condition,
+    return PhotoOrientation(
+        names=names,
+        values=values[active],
+        cofactors=cofactors,
+        principal_distance=float(values[3]),
+        principal_point=(float(values[4]), float(values[5])),
+        residuals=-system.misclosure,
+        redundancy=redundancy,
+        used=used,
+        weighted_sum=float(squares[used].sum()),
+        dof=int(sightings.measured[used].sum()) - len(names),
+        condition=condition,
     )
 
 
 # ---------------------------------------------------------------------------------------------------- screening
 
 
-def _worst(solution: Orientation, sightings: Sightings, settings: Settings) -> Rejection | None:
+def _worst(solution: PhotoOrientation, sightings: Sightings, settings: OrientationSettings) -> PointRejection | None:
     """Find the point that fits worst, if it should be taken out.
 
     The drop of the weighted sum of squares when a point is deleted is v^T (C - A Q A^T)^-1 v, exactly the sum of
     squares of its own predicted residuals.
     """
-    if solution.dof < 2 or solution.weighted_sum < NEGLIGIBLE:
+    if solution.dof < 2 or solution.weighted_sum < NEGLIGIBLE_SQUARES:
         return None
     rows = np.flatnonzero(solution.used)
     drop, parts = _drops(solution, sightings, rows)
@@ -368,7 +351,7 @@ def _worst(solution: Orientation, sightings: Sightings, settings: Settings) -> R
         worst = int(np.argmax(ratio))
         if ratio[worst] <= 1:
             return None
-        return Rejection(int(rows[worst]), "stated", float(drop[worst]), float(limits[worst]), (np.nan, np.nan))
+        return PointRejection(int(rows[worst]), "stated", float(drop[worst]), float(limits[worst]), (np.nan, np.nan))
     p_values = np.ones(len(rows))
     for number in np.flatnonzero(testable):
         rest = max((solution.weighted_sum - drop[number]) / left[number], np.finfo(float).tiny)
@@ -376,22 +359,22 @@ def _worst(solution: Orientation, sightings: Sightings, settings: Settings) -> R
     worst = int(np.lexsort([-drop, p_values])[0])  # of p values that are all zero the largest drop
     if p_values[worst] >= level:
         return None
-    return Rejection(int(rows[worst]), "deletion", float(p_values[worst]), level, (np.nan, np.nan))
+    return PointRejection(int(rows[worst]), "deletion", float(p_values[worst]), level, (np.nan, np.nan))
 
 
-def _drops(solution: Orientation, sightings: Sightings, rows: NDArray[np.intp]) -> tuple[Floats, NDArray[np.intp]]:
+def _drops(solution: PhotoOrientation, sightings: Sightings, rows: NDArray[np.intp]) -> tuple[Floats, NDArray[np.intp]]:
     """By how much the sum of squares falls without each point, and with how many degrees of freedom."""
     values = np.array([*solution.values[:3], solution.principal_distance, *solution.principal_point])
     active = np.flatnonzero([name in solution.names for name in (*ANGLES, "f", "x0", "z0")])
     system = _linearised(sightings, values, active)
     drop, parts = np.zeros(len(rows)), np.zeros(len(rows), np.intp)
     for number, row in enumerate(rows):
-        there = sightings.measured[row]
-        weight = system.weight[row][np.ix_(there, there)]
-        design, miss = system.design[row][there], system.misclosure[row][there]
+        measured = sightings.measured[row]
+        weight = system.weight[row][np.ix_(measured, measured)]
+        design, miss = system.design[row][measured], system.misclosure[row][measured]
         covariance = np.linalg.inv(weight) - design @ solution.cofactors @ design.T
         size, axes = np.linalg.eigh((covariance + covariance.T) / 2)
-        seen = size > 1e-9 * np.abs(np.linalg.inv(weight)).max()  # the rest is not controlled at all
-        drop[number] = float((((axes.T @ miss)[seen]) ** 2 / size[seen]).sum())
-        parts[number] = int(seen.sum())
+        controlled = size > 1e-9 * np.abs(np.linalg.inv(weight)).max()  # the rest is not controlled at all
+        drop[number] = float((((axes.T @ miss)[controlled]) ** 2 / size[controlled]).sum())
+        parts[number] = int(controlled.sum())
     return drop, parts

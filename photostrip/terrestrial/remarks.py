@@ -26,13 +26,7 @@ MICROMETRES = 1000.0  # in a millimetre
 
 
 def remarks(result: Monitoring) -> Iterator[Note]:
-    """Give warnings and remarks on displacements.
-
-    Yields
-    ------
-    Note
-        What is missing, what moved that should not, what does not fit.
-    """
+    """Give warnings and remarks on displacements: what is missing, what moved that should not, what does not fit."""
     yield from _cameras(result)
     yield from _stable_points(result)
     yield from _parallaxes(result)

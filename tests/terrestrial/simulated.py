@@ -9,7 +9,7 @@ import numpy as np
 
 from photostrip.simulate.draws import Draws, Purpose
 from photostrip.terrestrial.epochs import monitor
-from photostrip.terrestrial.monitoring import Series, Settings
+from photostrip.terrestrial.monitoring import MonitoringSettings, Series
 from photostrip.terrestrial.normal_case import StereoPair
 
 if TYPE_CHECKING:
@@ -153,11 +153,11 @@ def weighted(error: Floats, covariance: Floats) -> Floats:
     return np.asarray(np.einsum("ni,nij,nj->n", error, np.linalg.inv(covariance), error), float)
 
 
-def repeated(truth: World, runs: int, settings: Settings | None = None, first: int = 1) -> Count:
+def repeated(truth: World, runs: int, settings: MonitoringSettings | None = None, first: int = 1) -> Count:
     """Measure and compute a survey many times."""
     count = Count()
     for seed in range(first, first + runs):
-        count.add(truth, monitor(truth.measure(seed), truth.pair, settings or Settings()))
+        count.add(truth, monitor(truth.measure(seed), truth.pair, settings or MonitoringSettings()))
     return count
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from photostrip.terrestrial.epochs import monitor
 from photostrip.terrestrial.frame import small_turn
-from photostrip.terrestrial.monitoring import Series, Settings, Step
+from photostrip.terrestrial.monitoring import MonitoringSettings, Series, Step
 from photostrip.terrestrial.normal_case import intersect, to_normal
 from tests.terrestrial.simulated import CENTERS, SIGMA, World, repeated, turned, weighted, world
 
@@ -24,7 +24,7 @@ TURN = (60.0, -30.0, 45.0)  # seconds of arc
 
 
 def run(truth: World, seed: int = 1, sigma: float = SIGMA, **settings: str | float) -> Monitoring:
-    return monitor(truth.measure(seed, sigma), truth.pair, Settings(**settings))  # type: ignore[arg-type]
+    return monitor(truth.measure(seed, sigma), truth.pair, MonitoringSettings(**settings))  # type: ignore[arg-type]
 
 
 # --------------------------------------------------------------------------------------------------------- exact
@@ -39,7 +39,7 @@ def test_displacements_are_the_difference_of_two_space_intersections(
     truth = turned(truth, *TURN) if turned_camera else truth
     series = truth.measure(1, 0.0)
     weights = np.full_like(series.own, SIGMA**2)
-    result = monitor(replace(series, own=weights), truth.pair, Settings())
+    result = monitor(replace(series, own=weights), truth.pair, MonitoringSettings())
     (step,) = result.since_first
     np.testing.assert_allclose(step.values, truth.velocity, atol=NANOMETRE)
     np.testing.assert_allclose(result.positions[0].values, truth.points, atol=NANOMETRE)
@@ -50,7 +50,7 @@ def test_displacements_are_the_difference_of_two_space_intersections(
 def test_without_turns_displacements_are_differences_of_two_intersections_also_of_noisy_rays() -> None:
     truth = world(size=0.5)
     series = truth.measure(5)
-    result = monitor(series, truth.pair, Settings(moved_camera="never"))
+    result = monitor(series, truth.pair, MonitoringSettings(moved_camera="never"))
     rotations = np.broadcast_to(truth.pair.rotations, (30, 2, 3, 3))
     points = [
         intersect(to_normal(each, series.own[0], truth.pair, rotations).coordinates, 190.0, truth.pair.base)[0]
@@ -147,12 +147,12 @@ def test_a_point_does_not_testify_for_itself() -> None:
     series = truth.measure(4)
     other = series.coordinates.copy()
     other[1, 3] += [0.004, -0.003, 0.0, 0.0]
-    first = monitor(series, truth.pair, Settings())
-    second = monitor(replace(series, coordinates=other), truth.pair, Settings())
+    first = monitor(series, truth.pair, MonitoringSettings())
+    second = monitor(replace(series, coordinates=other), truth.pair, MonitoringSettings())
     np.testing.assert_allclose(  # its covariance and the displacement that the measurement itself makes
         second.since_first[0].covariance[3], first.since_first[0].covariance[3], rtol=1e-3
     )
-    plain = Settings(moved_camera="never")
+    plain = MonitoringSettings(moved_camera="never")
     by = [
         monitor(replace(series, coordinates=each), truth.pair, plain).since_first[0].values[3]
         for each in (series.coordinates, other)
@@ -197,7 +197,7 @@ def test_a_motion_that_is_not_uniform_has_a_large_misfit() -> None:
     jumped = truth.exact(3)[-1] + 0.1
     coordinates = series.coordinates.copy()
     coordinates[3, -1] = jumped
-    result = monitor(replace(series, coordinates=coordinates), truth.pair, Settings())
+    result = monitor(replace(series, coordinates=coordinates), truth.pair, MonitoringSettings())
     assert result.rates is not None
     assert result.rates.misfit[-1] > 100
     assert result.rates.misfit[10] < 30
@@ -217,7 +217,7 @@ def test_points_that_are_missing_are_named_with_the_reason() -> None:
     truth = replace(world(), epochs=3)
     series = spoil(spoil(truth.measure(1), 1, 20), 0, 21)
     series = spoil(series, 2, 22, [10.0, 5.0, 60.0, 5.0])
-    result = monitor(series, truth.pair, Settings())
+    result = monitor(series, truth.pair, MonitoringSettings())
     assert np.isnan(result.since_first[0].values[20]).all()
     assert np.isfinite(result.since_first[1].values[20]).all()
     assert np.isnan(result.since_previous[1].values[20]).all()
@@ -240,7 +240,7 @@ def test_z_of_the_right_photo_counts_in_all_epochs_or_in_none() -> None:
     series = truth.measure(1)
     coordinates = series.coordinates.copy()
     coordinates[1, 7, 3] = np.nan
-    result = monitor(replace(series, coordinates=coordinates), truth.pair, Settings())
+    result = monitor(replace(series, coordinates=coordinates), truth.pair, MonitoringSettings())
     assert np.isnan(result.parallax[:, 7]).all()
     assert np.isfinite(result.since_first[0].values[7]).all()
     assert np.isfinite(result.parallax[:, 8]).all()
@@ -269,7 +269,7 @@ def test_a_wrong_measurement_shows_in_the_vertical_parallax() -> None:
     series = truth.measure(1)
     coordinates = series.coordinates.copy()
     coordinates[1, 25, 1] += 0.08
-    result = monitor(replace(series, coordinates=coordinates), truth.pair, Settings())
+    result = monitor(replace(series, coordinates=coordinates), truth.pair, MonitoringSettings())
     (note,) = [note for note in result.notes if note.code == "parallax-change"]
     assert note.points == ("P25",)
     assert "standard deviations" in note.message
@@ -280,7 +280,7 @@ def test_a_wrong_orientation_shows_and_cancels() -> None:
     pair = truth.pair
     rotations = pair.rotations.copy()
     rotations[1] = rotations[1] @ small_turn(np.array([0.0, 3e-4, 0.0]))
-    result = monitor(truth.measure(1), replace(pair, rotations=rotations), Settings())
+    result = monitor(truth.measure(1), replace(pair, rotations=rotations), MonitoringSettings())
     assert [note.code for note in result.notes if note.severity == "warning"] == ["orientation"]
     error = (result.since_first[0].values - truth.velocity) / result.since_first[0].sigma
     assert np.abs(error).max() < 5
@@ -300,7 +300,7 @@ def test_vertical_parallaxes_are_as_large_as_stated() -> None:
 def test_a_survey_without_noise_and_without_motion_has_no_displacement() -> None:
     truth = world(moving=0)
     series = truth.measure(1, 0.0)
-    result = monitor(replace(series, own=np.full_like(series.own, SIGMA**2)), truth.pair, Settings())
+    result = monitor(replace(series, own=np.full_like(series.own, SIGMA**2)), truth.pair, MonitoringSettings())
     step: Step = result.since_first[0]
     assert np.abs(step.values).max() < 1e-9
     assert np.nanmax(step.statistic) < 1e-9
@@ -310,8 +310,8 @@ def test_everything_moves_with_the_stations() -> None:
     """Displacements do not depend on where the origin of the ground is."""
     truth = world()
     series = truth.measure(2)
-    here = monitor(series, truth.pair, Settings())
+    here = monitor(series, truth.pair, MonitoringSettings())
     away = np.array([5000.0, -7000.0, 900.0])
-    there = monitor(series, replace(truth.pair, centers=CENTERS + away), Settings())
+    there = monitor(series, replace(truth.pair, centers=CENTERS + away), MonitoringSettings())
     np.testing.assert_allclose(there.since_first[0].values, here.since_first[0].values, atol=1e-9)
     np.testing.assert_allclose(there.positions[0].values - here.positions[0].values, [away] * 30, atol=1e-8)

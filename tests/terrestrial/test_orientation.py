@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from photostrip.errors import GeometryError
 from photostrip.simulate.draws import Draws, Purpose
 from photostrip.terrestrial.frame import ground_from_photo
-from photostrip.terrestrial.orientation import Settings, Sightings, orient
+from photostrip.terrestrial.orientation import OrientationSettings, Sightings, orient
 from tests.terrestrial.simulated import ARCSECOND, attitude
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def without(given_: Sightings, *cells: tuple[int, int]) -> Sightings:
 
 @given(st.floats(-np.pi, np.pi), st.floats(-1.2, 1.2), st.floats(-np.pi, np.pi))
 def test_any_orientation_comes_back_from_points_without_errors(alpha: float, omega: float, kappa: float) -> None:
-    found = orient(sightings((alpha, omega, kappa)), 100.0, settings=Settings(EVERYTHING))
+    found = orient(sightings((alpha, omega, kappa)), 100.0, settings=OrientationSettings(EVERYTHING))
     np.testing.assert_allclose(found.rotation, ground_from_photo(alpha, omega, kappa), atol=1e-11)
     np.testing.assert_allclose(found.values[3:], [F, *CENTRE], atol=1e-8)
     assert (found.principal_distance, found.principal_point) == (found.values[3], tuple(found.values[4:]))
@@ -122,7 +122,7 @@ def test_the_estimate_is_that_of_a_full_adjustment(free: tuple[str, ...]) -> Non
 
     angles = (0.9, 0.2, -0.1)
     given_ = sightings(angles, seed=11)
-    found = orient(given_, F, CENTRE, Settings(free, screening="none"))
+    found = orient(given_, F, CENTRE, OrientationSettings(free, screening="none"))
     count = len(found.names)
 
     def misfit(unknown: Floats) -> Floats:
@@ -149,7 +149,7 @@ def test_the_estimate_is_that_of_a_full_adjustment(free: tuple[str, ...]) -> Non
 def test_stated_precision_is_the_scatter_of_repeated_measurements() -> None:
     angles, runs = (1.2, 0.25, -0.15), 300
     truth = np.array([*angles, F, *CENTRE])
-    found = [orient(sightings(angles, seed), 100.0, settings=Settings(EVERYTHING)) for seed in range(runs)]
+    found = [orient(sightings(angles, seed), 100.0, settings=OrientationSettings(EVERYTHING)) for seed in range(runs)]
     errors = np.array([(each.values - truth) / each.sigma for each in found])
     assert np.abs(errors.mean(axis=0)).max() < 4 / np.sqrt(runs)
     spread = errors.std(axis=0)
@@ -165,7 +165,7 @@ def test_stated_precision_is_the_scatter_of_repeated_measurements() -> None:
 
 @pytest.mark.parametrize(("method", "low", "high"), [("deletion", 0.02, 0.08), ("stated", 0.02, 0.08)])
 def test_clean_photos_lose_points_as_rarely_as_stated(method: str, low: float, high: float) -> None:
-    settings = Settings(("principal-distance",), method)
+    settings = OrientationSettings(("principal-distance",), method)
     lost = [bool(orient(sightings((0.3, 0.1, 0.0), seed), 100.0, CENTRE, settings).rejected) for seed in range(300)]
     assert low < np.mean(lost) < high
 
@@ -175,7 +175,7 @@ def test_clean_photos_lose_points_as_rarely_as_stated(method: str, low: float, h
 @pytest.mark.parametrize("image", [(0.1, 0.0), (0.0, -0.1)])
 def test_a_gross_error_is_found_and_named(method: str, point: int, image: tuple[float, float]) -> None:
     angles = (0.3, 0.1, 0.0)
-    found = orient(spoiled(sightings(angles, 5), point, image), F, CENTRE, Settings(screening=method))
+    found = orient(spoiled(sightings(angles, 5), point, image), F, CENTRE, OrientationSettings(screening=method))
     (rejected,) = found.rejected
     assert (rejected.point, rejected.test) == (point, method)
     assert not found.used[point]
@@ -192,7 +192,9 @@ def test_two_gross_errors_are_found_one_after_the_other() -> None:
 
 
 def test_without_screening_a_gross_error_stays_and_shows_in_sigma0() -> None:
-    found = orient(spoiled(sightings((0.3, 0.1, 0.0), 5), 2, (0.15, 0.0)), F, CENTRE, Settings(screening="none"))
+    found = orient(
+        spoiled(sightings((0.3, 0.1, 0.0), 5), 2, (0.15, 0.0)), F, CENTRE, OrientationSettings(screening="none")
+    )
     assert not found.rejected
     assert found.sigma0 > found.sigma0_range(0.05)[1] * 2
 
@@ -209,13 +211,13 @@ def test_too_few_directions_are_refused() -> None:
     with pytest.raises(GeometryError, match=r"1 points with 2 directions do not determine alpha, omega, kappa"):
         orient(sightings((0.3, 0.1, 0.0), places=PLACES[:1]), F)
     with pytest.raises(GeometryError, match=r"2 points with 4 directions do not determine .*, f, x0, z0"):
-        orient(sightings((0.3, 0.1, 0.0), places=PLACES[[0, 8]]), F, settings=Settings(EVERYTHING))
+        orient(sightings((0.3, 0.1, 0.0), places=PLACES[[0, 8]]), F, settings=OrientationSettings(EVERYTHING))
 
 
 def test_what_the_points_cannot_separate_is_named() -> None:
     close = np.array([(0.0, 0.0), (0.001, 0.001), (0.0, 0.001), (0.001, 0.0)])
     with pytest.raises(GeometryError, match=r"cannot separate .*(f|x0|z0)") as error:
-        orient(sightings((0.3, 0.1, 0.0), places=close), F, settings=Settings(EVERYTHING))
+        orient(sightings((0.3, 0.1, 0.0), places=close), F, settings=OrientationSettings(EVERYTHING))
     assert error.value.exit_code == 3
     assert error.value.points == ("P0", "P1", "P2", "P3")
 
@@ -229,7 +231,7 @@ def test_directions_of_other_points_are_refused_or_scatter() -> None:
     given_ = sightings((0.3, 0.1, 0.0), 5)
     wrong = replace(given_, directions=given_.directions[::-1] * [1.0, -1.0])
     try:
-        found = orient(wrong, F, CENTRE, Settings(screening="none"))
+        found = orient(wrong, F, CENTRE, OrientationSettings(screening="none"))
     except GeometryError as error:
         assert error.code in {"not-converged", "undetermined"}  # noqa: PT017
     else:

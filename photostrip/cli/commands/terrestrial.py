@@ -111,7 +111,7 @@ def _from_table(
     from photostrip.project.terrestrial.ranges import BASE, IMAGE_SIGMA, MILLIMETRES, within
     from photostrip.project.terrestrial.series import Table
     from photostrip.project.terrestrial.survey import load_normal_case
-    from photostrip.terrestrial.monitoring import Settings
+    from photostrip.terrestrial.monitoring import MonitoringSettings
 
     if assignments:
         raise InputError(Fault("a table has no keys that could be set", "set", key="--set", fix="use the options"))
@@ -125,7 +125,7 @@ def _from_table(
     kind = (table.kind or "pseudo-parallaxes").replace("-", "_")
     meaning = Table(kind=kind, unit=table.unit, z_axis="up", sigma=table.sigma, sigma_d=table.sigma_d)
     names = [part.strip() for part in (table.stable or "").split(",") if part.strip()]
-    return load_normal_case(str(file), chosen, within("--base", base, BASE), meaning, names, Settings())
+    return load_normal_case(str(file), chosen, within("--base", base, BASE), meaning, names, MonitoringSettings())
 
 
 def _from_project(

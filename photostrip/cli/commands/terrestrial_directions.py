@@ -317,7 +317,7 @@ def orient(  # noqa: PLR0913 (an argument for each option)
         from photostrip.terrestrial import orientation
 
         chosen = camera.chosen()
-        settings = orientation.Settings(
+        settings = orientation.OrientationSettings(
             options.free_elements(free), screening, within("--significance", significance, SIGNIFICANCE)
         )
         measured = options.theodolite_sigmas(sigma_arcsec, vertical_arcsec, rounds)

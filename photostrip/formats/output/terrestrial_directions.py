@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.result.numbers import Document
-    from photostrip.terrestrial.orientation import Orientation, Settings, Sightings
+    from photostrip.terrestrial.orientation import OrientationSettings, PhotoOrientation, Sightings
 
     Floats = NDArray[np.float64]
     Grid = tuple[Floats, Floats]  # x and z of a table over the photo in mm, from the principal point
@@ -243,7 +243,7 @@ def worked_examples() -> Document:
 
 
 def oriented(
-    camera: Phototheodolite, sightings: Sightings, found: Orientation, settings: Settings, unit: str
+    camera: Phototheodolite, sightings: Sightings, found: PhotoOrientation, settings: OrientationSettings, unit: str
 ) -> Document:
     """Return a photo oriented by directions."""
     document = head("photo-orientation", camera)
@@ -301,7 +301,7 @@ def _element(name: str, value: float, sigma: float, unit: str) -> Document:
     }
 
 
-def _sighted(sightings: Sightings, found: Orientation) -> list[Document]:
+def _sighted(sightings: Sightings, found: PhotoOrientation) -> list[Document]:
     residuals = rounded(found.residuals * ARCSECONDS, ARCSEC)
     shares = rounded(found.redundancy, RATIO)
     return [

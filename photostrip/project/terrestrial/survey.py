@@ -20,7 +20,7 @@ from photostrip.project.yaml.reading import Reading
 from photostrip.project.yaml.validation import valid_section
 from photostrip.terrestrial.directions import Phototheodolite
 from photostrip.terrestrial.frame import ground_from_photo
-from photostrip.terrestrial.monitoring import Series, Settings
+from photostrip.terrestrial.monitoring import MonitoringSettings, Series
 from photostrip.terrestrial.normal_case import SIDES, StereoPair, normal_pair
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ class Survey:
     name: str
     series: Series
     pair: StereoPair  # stations; ground axes are east, north, up, or right, ahead, up in the normal case
-    settings: Settings
+    settings: MonitoringSettings
     cameras: tuple[Phototheodolite, Phototheodolite]
     frame: ReportFrame
     files: tuple[str, ...]
@@ -69,7 +69,7 @@ def load_survey(path: Path, overrides: Sequence[str] = ()) -> Survey:
         name=str(given.name),
         series=reading.complete(series),
         pair=_pair(given, cameras),
-        settings=Settings(given.processing.significance, str(given.processing.moved_camera)),
+        settings=MonitoringSettings(given.processing.significance, str(given.processing.moved_camera)),
         cameras=(cameras[0], cameras[1]),
         frame=ReportFrame(axes, (east, north, up), str(given.time_unit)),
         files=tuple(reading.files),
@@ -83,7 +83,7 @@ def load_normal_case(
     base: float,
     table: Table,
     stable: Sequence[str],
-    settings: Settings,
+    settings: MonitoringSettings,
 ) -> Survey:
     """Read a table of pseudo-parallaxes or coordinates of the normal case, without a project file.
 

@@ -22,10 +22,10 @@ from photostrip.project.schema.values import (
 )
 from photostrip.project.terrestrial.cameras import Distance, Place, Size
 from photostrip.project.terrestrial.ranges import BASE, DEGREES, IMAGE_SIGMA, MILLIMETRES, POSITION, SIGNIFICANCE, TIME
-from photostrip.terrestrial.monitoring import MOVED_CAMERA, Settings
+from photostrip.terrestrial.monitoring import MOVED_CAMERA, MonitoringSettings
 
 SCHEMA_NUMBER = "1"
-USUAL = Settings()
+USUAL = MonitoringSettings()
 Coordinate = Annotated[Number, AfterValidator(bounded(POSITION))]
 Three = tuple[Coordinate, Coordinate, Coordinate]
 Angle = Annotated[Number, AfterValidator(bounded(DEGREES))]
