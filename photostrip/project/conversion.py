@@ -53,12 +53,7 @@ def cameras(project: ProjectFile) -> dict[str, camera.Camera]:
 
 
 def certificate_of(given: Camera) -> Certificate | None:
-    """Solve the distances between the fiducial marks of a camera.
-
-    Returns
-    -------
-    Certificate or None
-        Coordinates of the marks; None when no distances are given.
+    """Solve the distances between the fiducial marks of a camera; None when no distances are given.
 
     Raises
     ------
@@ -115,18 +110,9 @@ def strips(project: ProjectFile, known: Mapping[str, camera.Camera]) -> tuple[St
 
 
 def photo_points(read: Measurements, system: ImageSystem, photos: Mapping[str, camera.Camera]) -> PhotoPoints:
-    """Bring measured image coordinates into millimetres with y up.
+    """Bring measured image coordinates into millimetres, x to the right, y up.
 
-    Parameters
-    ----------
-    photos : mapping of str to Camera
-        Camera of each photo of the strips; rows of other photos are left out.
-
-    Returns
-    -------
-    PhotoPoints
-        Image coordinates in mm, x to the right, y up; the origin is the middle of the photo, unless `system` has
-        its own.
+    The origin is the middle of the photo, unless `system` has its own. Rows of other photos than `photos` are left out.
     """
     wanted = np.array([name in photos for name in read.photo_ids], bool)
     rows = np.flatnonzero(wanted[read.photo])
@@ -200,10 +186,7 @@ def semi_axes(given: Ellipsoid | None) -> tuple[float, float] | None:
 def first_frame(project: ProjectFile) -> FrameSpec:
     """Return the frame that stands in where the output says nothing.
 
-    Returns
-    -------
-    FrameSpec
-        That of the first control list, of the camera positions or of the orientations; ``local`` when nothing is given.
+    It is that of the first control list, the camera positions or the orientations; ``local`` when nothing is given.
     """
     for given in (*project.control, project.camera_positions, project.orientations):
         if given is not None:
@@ -212,18 +195,7 @@ def first_frame(project: ProjectFile) -> FrameSpec:
 
 
 def output_spec(output: Output, first: FrameSpec) -> FrameSpec | None:
-    """Return the frame of the results.
-
-    Parameters
-    ----------
-    first : FrameSpec
-        Frame of the first control list, which stands in for what is not said.
-
-    Returns
-    -------
-    FrameSpec or None
-        None when nothing is said.
-    """
+    """Return the frame of the results, `first` standing in for what is not given; None when nothing is given."""
     said = (output.crs, output.axes, output.height, output.geoid_undulation, output.ellipsoid)
     if all(each is None for each in said):
         return None
@@ -240,13 +212,7 @@ def output_spec(output: Output, first: FrameSpec) -> FrameSpec | None:
 
 
 def control_points(tables: Sequence[ControlTable], lists: Sequence[Control]) -> ControlPoints:
-    """Put all control lists into one table, in the internal order of axes.
-
-    Returns
-    -------
-    ControlPoints
-        All points that are used; ``frame`` counts in `lists`.
-    """
+    """Put the used points of all control lists into one table; ``frame`` counts in `lists`."""
     ids: list[str] = []
     parts = []
     for number, (read, given) in enumerate(zip(tables, lists, strict=True)):
@@ -274,13 +240,7 @@ def _columns(spec: FrameSpec) -> list[int]:
 def camera_positions(
     read: PositionTable, given: PositionsBlock, photos: Mapping[str, camera.Camera]
 ) -> CameraPositions:
-    """Return the measured positions of the cameras, in the internal order of axes.
-
-    Parameters
-    ----------
-    photos : mapping of str to Camera
-        Photos of the strips; rows of others are left out.
-    """
+    """Return the measured positions of the cameras of `photos`, in the internal order of axes."""
     rows = np.array([row for row, name in enumerate(read.ids) if name in photos and read.used[row]], np.intp)
     spec = frame_spec(given)
     columns = _columns(spec)
@@ -301,13 +261,7 @@ def camera_positions(
 def given_orientations(
     read: OrientationTable, given: Orientations, photos: Mapping[str, camera.Camera]
 ) -> GivenOrientations:
-    """Return the orientations that are known beforehand, in the internal order of axes and in radians.
-
-    Parameters
-    ----------
-    photos : mapping of str to Camera
-        Photos of the strips; rows of others are left out.
-    """
+    """Return the given orientations of `photos`, in the internal order of axes and in radians."""
     rows = np.array([row for row, name in enumerate(read.ids) if name in photos], np.intp)
     spec = frame_spec(given)
     columns, radians = _columns(spec), RADIANS[given.angles.unit]
@@ -332,13 +286,7 @@ def _filled(sigma: Floats, default: Sequence[float] | None) -> Floats:
 
 
 def settings(project: ProjectFile) -> Settings:
-    """Return what is to be done.
-
-    Returns
-    -------
-    pipeline.Settings
-        Settings of every operation; what the project does not say keeps the default that stands there.
-    """
+    """Return the settings of every operation; what the project does not give keeps the default that stands there."""
     wanted, usual = project.processing, Settings()
     return Settings(
         adjustment=wanted.adjustment,

@@ -31,18 +31,7 @@ NEAR_NAMED = 3
 
 
 def hints(project: ProjectFile, tables: Tables, root: Node) -> Iterator[Note]:
-    """Explain every row and every definition that is not used.
-
-    Parameters
-    ----------
-    root : Node
-        The project file, which knows where its values stand.
-
-    Yields
-    ------
-    Note
-        One for each kind of thing in each file.
-    """
+    """Explain every row and every definition that is not used: a note for each kind in each file."""
     photos = {str(photo) for strip in project.strips for photo in strip.photos}
     yield from _unused_cameras(project, root)
     for name, camera in project.cameras.items():

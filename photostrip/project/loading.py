@@ -93,13 +93,7 @@ class Project:
         return replace(result, findings=tuple(seen))
 
     def files_read(self, result: Result) -> tuple[Path, ...]:
-        """Return every file that a run read, grids of geoids and datum shifts included.
-
-        Returns
-        -------
-        tuple of Path
-            The project file first; grids beside it as the other files are named.
-        """
+        """Return every file that a run read, the project file first, grids of geoids and datum shifts included."""
         grids = [Path(grid) for frame in (*result.frames, result.output) for grid in frame.grids]
         here = self.directory.resolve()
         near = [self.directory / grid.relative_to(here) if grid.is_relative_to(here) else grid for grid in grids]

@@ -65,13 +65,7 @@ def model_tables(points: ModelTable | None, centers: ModelTable | None, root: No
 
 
 def read_model_points(path: str, root: Node, findings: Findings, *, centers: bool) -> ModelTable | None:
-    """Read one of the two tables of model coordinates.
-
-    Parameters
-    ----------
-    root : Node
-        The project, which says what rows without standard deviations get.
-    """
+    """Read one of the two tables of model coordinates; the project says what rows without standard deviations get."""
     node = root.find("models", "centers") if centers else root.find("models")
     declared = None if node is None else node.find("columns")
     columns = {name: each.text for name, each in declared.entries.items() if each.text} if declared else {}
@@ -80,12 +74,9 @@ def read_model_points(path: str, root: Node, findings: Findings, *, centers: boo
 
 
 def check_models(root: Node, tables: ModelTables, findings: Findings) -> dict[int, tuple[str, ...]]:
-    """Find the models of every strip, in flight order, and refuse what does not fit.
+    """Return the models of every strip, in flight order, by number of the strip, and refuse what does not fit.
 
-    Returns
-    -------
-    dict of int to tuple of str
-        Models by number of the strip; strips at fault are missing.
+    Strips at fault are missing.
     """
     photos = [photo.id for photo in listed_photos(root)]
     centers = tables.centers_of(photos)
@@ -197,18 +188,7 @@ def _as_listed(
 def measured_models(
     tables: ModelTables, given: Models, strips: Sequence[tuple[str, Sequence[str], Sequence[str]]]
 ) -> MeasuredModels:
-    """Bring model coordinates into millimetres and right-handed axes.
-
-    Parameters
-    ----------
-    strips : sequence of tuple
-        Id, photos and models of each strip in flight order.
-
-    Returns
-    -------
-    MeasuredModels
-        The models of the strips; others are left out.
-    """
+    """Bring the model coordinates of the strips into millimetres and right-handed axes."""
     photos = [photo for _, names, _ in strips for photo in names]
     flights = tuple(ModelStrip(name, tuple(shown), tuple(models)) for name, shown, models in strips)
     wanted = [model for strip in flights for model in strip.models]

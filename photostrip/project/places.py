@@ -21,13 +21,9 @@ if TYPE_CHECKING:
 def places_of(
     findings: Iterable[Finding], tree: Node, tables: Tables, strips: Sequence[Strip | ModelStrip]
 ) -> Iterator[Finding]:
-    """Give findings with the places of what they name.
+    """Return findings with the places of what they name.
 
-    Yields
-    ------
-    Finding
-        The same, with file, line and column: those of the key, else of the first point in a control list, else of the
-        first photo in its strip.
+    That is the place of the key, else of the first point in a control list, else of the first photo in its strip.
     """
     for each in findings:
         if each.key:

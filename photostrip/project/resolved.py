@@ -46,17 +46,9 @@ _NOT_PRINTED = re.compile("[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
 
 
 def completed(project: ProjectFile, root: Node, path: str) -> ProjectFile:
-    """Fill in the defaults that depend on other keys.
+    """Fill in the defaults that depend on other keys, and make paths relative to the project's folder.
 
-    Parameters
-    ----------
-    root : Node
-        Its tree, which knows which file names which path.
-
-    Returns
-    -------
-    ProjectFile
-        The same project; only keys for which nothing stands in are left empty. Paths are relative to its folder.
+    Only keys for which nothing stands in are left empty.
     """
     observations, models = project.observations, project.models
     if observations is not None:
@@ -126,13 +118,9 @@ def _relative(root: Node, project: str, *owner: str | int) -> Text:
 
 
 def text_of(project: ProjectFile) -> str:
-    """Write a project as YAML.
+    """Write a project as YAML that reads as the same project; the same text for the same project everywhere.
 
-    Returns
-    -------
-    str
-        YAML that reads as the same project; the same text for the same project everywhere. Texts of the user stand
-        between quotation marks, so that other programs read ids as texts, too.
+    Texts of the user stand between quotation marks, so that other programs read ids as texts, too.
     """
     plain = _plain(project)
     for name in OF_PHOTOS if project.models is not None else OF_MODELS:

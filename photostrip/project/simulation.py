@@ -232,13 +232,7 @@ class Specification:
     reading: Reading
 
     def simulate(self) -> simulate.Simulation:
-        """Simulate what is specified.
-
-        Raises
-        ------
-        InputError
-            With all that cannot be simulated, each fault at its place in the file.
-        """
+        """Simulate what is specified, or raise all that cannot be simulated, each fault at its place in the file."""
         with self.reading.places():
             return simulate.simulate(self.spec)
 

@@ -184,15 +184,7 @@ def _known_marks(root: Node, photos: list[ListedPhoto], read: Measurements) -> I
 def loose(names: Sequence[str]) -> list[str]:
     """Reduce ids to what survives slips of the pen: no signs, no case, no leading zeros, one alphabet.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Ids of photos or points; a photo's id may end like a file.
-
-    Returns
-    -------
-    list of str
-        The same text for ``GCP-7``, ``gcp 07`` and ``GCP7``, and for ``1001`` and ``1001.tif``.
+    ``GCP-7``, ``gcp 07`` and ``GCP7`` become the same text, and so do ``1001`` and ``1001.tif``.
     """
     if not names:
         return []
@@ -204,13 +196,7 @@ def loose(names: Sequence[str]) -> list[str]:
 
 
 def alike(names: Sequence[str], candidates: Iterable[str]) -> dict[str, str]:
-    """Find names that differ only by slips of the pen.
-
-    Returns
-    -------
-    dict of str to str
-        The candidate for each name that has exactly one.
-    """
+    """Find the candidate for each name that has exactly one which differs only by slips of the pen."""
     others = list(candidates)
     forms = loose(others)
     times = Counter(forms)
@@ -220,13 +206,7 @@ def alike(names: Sequence[str], candidates: Iterable[str]) -> dict[str, str]:
 
 
 def rays(read: Measurements, photos: set[str]) -> dict[str, int]:
-    """Count the photos of strips on which each point is measured.
-
-    Returns
-    -------
-    dict of str to int
-        Number of photos by point, only of points that are measured on at least one.
-    """
+    """Count the photos of strips on which each point is measured; points on none are left out."""
     kept = np.array([name in photos for name in read.photo_ids], bool)[read.photo]
     count = np.bincount(read.target[kept], minlength=len(read.target_ids))
     return {name: int(number) for name, number in zip(read.target_ids, count, strict=True) if number}

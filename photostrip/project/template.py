@@ -76,13 +76,7 @@ FIDUCIALS = "photo,mark,x,y\n"
 
 
 def template_files(name: str) -> dict[str, str]:
-    """Return the files of a new project.
-
-    Returns
-    -------
-    dict of str to str
-        Content by file name. ``photostrip check`` names what is to be filled in, and nothing else.
-    """
+    """Return the files of a new project; ``photostrip check`` names what is to be filled in, and nothing else."""
     quoted = json.dumps(name)  # YAML reads it as the same text, whatever it is
     return {
         "observations.csv": OBSERVATIONS,
@@ -93,13 +87,7 @@ def template_files(name: str) -> dict[str, str]:
 
 
 def refuse_existing(folder: Path, names: list[str]) -> None:
-    """Refuse to overwrite what a user may have written.
-
-    Raises
-    ------
-    InputError
-        With one fault for each file that exists.
-    """
+    """Refuse to overwrite what a user may have written."""
     there = [folder / name for name in names if (folder / name).exists() or (folder / name).is_symlink()]
     if there:
         fix = "choose another folder, or remove it"

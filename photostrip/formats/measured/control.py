@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from photostrip.formats.measured.columns import AXES, POINT, SIGMAS, numbers, sigmas
 from photostrip.formats.text.tables import Column, Table, read_table
 
 if TYPE_CHECKING:
@@ -20,23 +21,20 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Flags = NDArray[np.bool_]
 
-AXES = ("x", "y", "z")
 USES = ("xyz", "xy", "z", "off")
 ROLES = ("control", "check")
+USE = Column("use", required=False, words=USES)
 CONTROL = (
-    Column("point", aliases=("point_id", "id")),
-    *(Column(axis, number=True, filled=False) for axis in AXES),
-    Column("use", required=False, words=USES),
+    POINT,
+    *numbers(*AXES, filled=False),
+    USE,
     Column("role", required=False, words=ROLES),
-    *(
-        Column(f"s{axis}", number=True, required=False, filled=False, positive=True, aliases=(f"sigma_{axis}",))
-        for axis in AXES
-    ),
+    *sigmas(*AXES),
 )
 
 
-@dataclass(frozen=True, eq=False)
-class ControlTable:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class GivenTable:
     """Given coordinates as the table has them: columns in the order of the list's axes."""
 
     table: Table
@@ -45,7 +43,6 @@ class ControlTable:
     xyz: Floats
     sigma: Floats
     use: Flags  # (n, 3): which columns count
-    check: Flags  # (n,): true for check points
 
     @cached_property
     def used(self) -> Flags:
@@ -53,10 +50,17 @@ class ControlTable:
         return np.asarray(self.use.any(axis=1), bool)
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ControlTable(GivenTable):
+    """Given coordinates of points on the ground."""
+
+    check: Flags  # (n,): true for check points
+
+
 def read_control(
     file: str, up: int, findings: Findings, *, default_sigma: bool = True, columns: Mapping[str, str] | None = None
 ) -> ControlTable | None:
-    """Read a table of given ground coordinates.
+    """Read a table of given ground coordinates; None when the header is wrong.
 
     Parameters
     ----------
@@ -65,46 +69,46 @@ def read_control(
     default_sigma : bool
         Whether the project file has standard deviations for rows without them.
     columns : mapping of str to str, optional
-        Names in the header of columns that are called otherwise than here.
-
-    Returns
-    -------
-    ControlTable or None
-        What could be read; None when the header is wrong.
+        Names in the header of columns that have another name there.
     """
     table = read_table(file, CONTROL, findings, columns=columns)
     if table is None:
         return None
-    n = len(table)
-    uses = table.cells("use") if "use" in table.ids else [USES[0]] * n
-    roles = table.cells("role") if "role" in table.ids else [ROLES[0]] * n
-    height = np.arange(3) == up
-    meaning = {"xyz": np.ones(3, bool), "xy": ~height, "z": height}
-    nothing = np.zeros(3, bool)
-    read = ControlTable(
-        table,
-        table.cells("point"),
-        np.column_stack([table.column(axis) for axis in AXES]),
-        np.column_stack([table.column(f"s{axis}") for axis in AXES]),
-        np.array([meaning.get(word, nothing) for word in uses], bool).reshape(n, 3),
-        np.array([word == "check" for word in roles], bool),
-    )
+    roles = table.cells("role") if "role" in table.ids else [ROLES[0]] * len(table)
+    check = np.array([word == "check" for word in roles], bool)
+    read = ControlTable(**given_columns(table, "point", up), check=check)
     if findings.number(file) == 0:
-        _refuse_empty(read, uses, findings)
+        refuse_empty(read, "point", findings)
         if not default_sigma:
             _refuse_without_sigma(read, findings)
     return read
 
 
-def _refuse_empty(read: ControlTable, uses: Sequence[str], findings: Findings) -> None:
+def given_columns(table: Table, name: str, up: int) -> dict[str, Any]:
+    """Return the columns of a ``GivenTable``, whose ids stand in the column `name`."""
+    height = np.arange(3) == up
+    meaning = {"xyz": np.ones(3, bool), "xy": ~height, "z": height}
+    uses = _uses(table)
+    return {
+        "table": table,
+        "ids": table.cells(name),
+        "xyz": table.columns(*AXES),
+        "sigma": table.columns(*SIGMAS),
+        "use": np.array([meaning.get(word, np.zeros(3, bool)) for word in uses], bool).reshape(len(table), 3),
+    }
+
+
+def _uses(table: Table) -> list[str]:
+    return table.cells("use") if "use" in table.ids else [USES[0]] * len(table)
+
+
+def refuse_empty(read: GivenTable, name: str, findings: Findings) -> None:
     """Refuse an empty cell where the coordinate counts."""
-    for row, axis in np.argwhere(read.use & np.isnan(read.xyz)):
-        if findings.full(read.table.file):
-            findings.count(read.table.file, 1)
-            continue
-        message = f"point {read.ids[row]} has no {AXES[axis]}, but its use is {uses[row]}"
+    uses = _uses(read.table)
+    for row, axis in np.argwhere(read.use & np.isnan(read.xyz)).tolist():
+        message = f"{name} {read.ids[row]} has no {AXES[axis]}, but its use is {uses[row]}"
         fix = "fill it in, or set use to xy, z or off"
-        findings.add(read.table.fault(int(row), AXES[axis], message, "no-coordinate", fix=fix))
+        findings.add(read.table.fault(row, AXES[axis], message, "no-coordinate", fix=fix))
 
 
 def _refuse_without_sigma(read: ControlTable, findings: Findings) -> None:
@@ -118,13 +122,7 @@ def _refuse_without_sigma(read: ControlTable, findings: Findings) -> None:
 
 
 def refuse_repeated(tables: Sequence[ControlTable | None], findings: Findings) -> None:
-    """Refuse ids that stand twice, in one list or in two.
-
-    Parameters
-    ----------
-    tables : sequence of ControlTable or None
-        Control lists of the project; rows with ``use: off`` do not count.
-    """
+    """Refuse ids that stand twice, in one list or in two; rows with ``use: off`` do not count."""
     first: dict[str, tuple[ControlTable, int]] = {}
     for read in tables:
         if read is None:

@@ -6,15 +6,21 @@ another system, and their standard deviations in ``s_alpha`` and so on; ``photos
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.formats.measured.control import AXES, USES
-from photostrip.formats.measured.observations import PHOTO
-from photostrip.formats.text.findings import counted
+from photostrip.formats.measured.columns import (
+    AXES,
+    PHOTO,
+    SIGMAS,
+    numbers,
+    refuse_without_sigma,
+    repeated_rows,
+    sigmas,
+)
+from photostrip.formats.measured.control import USE, GivenTable, given_columns, refuse_empty
 from photostrip.formats.text.tables import Column, Table, read_table
 
 if TYPE_CHECKING:
@@ -25,37 +31,24 @@ if TYPE_CHECKING:
     from photostrip.formats.text.findings import Findings
 
     Floats = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
+    Numbers = NDArray[np.intp]
 
-SIGMAS = tuple(
-    Column(f"s{axis}", number=True, required=False, filled=False, positive=True, aliases=(f"sigma_{axis}",))
-    for axis in AXES
-)
+FIX = "set `{}` in the project file, or fill the columns"
+
 POSITIONS = (
     PHOTO,
-    *(Column(axis, number=True, filled=False) for axis in AXES),
-    Column("use", required=False, words=USES),
+    *numbers(*AXES, filled=False),
+    USE,
     Column("time", number=True, required=False),
-    *SIGMAS,
+    *sigmas(*AXES),
 )
 
 
-@dataclass(frozen=True, eq=False)
-class PositionTable:
-    """Measured positions of cameras as the table has them: columns in the order of the list's axes."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PositionTable(GivenTable):
+    """Measured positions of cameras."""
 
-    table: Table
-    ids: list[str]
-    # xyz, sigma: (n, 3): coordinates and standard deviations, columns x, y, z; NaN where a cell is empty
-    xyz: Floats
-    sigma: Floats
-    use: Flags  # (n, 3): which columns count
     time: Floats  # (n,): time of exposure in the table's unit; NaN where there is none
-
-    @cached_property
-    def used(self) -> Flags:
-        """Rows of which anything counts."""
-        return np.asarray(self.use.any(axis=1), bool)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,41 +66,17 @@ class OrientationTable:
 
 
 def read_positions(file: str, up: int, findings: Findings, *, default_sigma: bool = True) -> PositionTable | None:
-    """Read a table of measured positions of cameras.
-
-    Parameters
-    ----------
-    up : int
-        Which of the columns x, y, z is the height, for ``use: xy`` and ``use: z``.
-    default_sigma : bool
-        Whether the project file has standard deviations for rows without them.
-
-    Returns
-    -------
-    PositionTable or None
-        What could be read; None when the header is wrong.
-    """
+    """Read a table of measured positions of cameras as ``read_control`` reads control."""
     table = read_table(file, POSITIONS, findings)
     if table is None:
         return None
-    n = len(table)
-    uses = table.cells("use") if "use" in table.ids else [USES[0]] * n
-    height = np.arange(3) == up
-    meaning = {"xyz": np.ones(3, bool), "xy": ~height, "z": height}
-    read = PositionTable(
-        table,
-        table.cells("photo"),
-        np.column_stack([table.column(axis) for axis in AXES]),
-        np.column_stack([table.column(f"s{axis}") for axis in AXES]),
-        np.array([meaning.get(word, np.zeros(3, bool)) for word in uses], bool).reshape(n, 3),
-        table.column("time"),
-    )
+    read = PositionTable(**given_columns(table, "photo", up), time=table.column("time"))
     if findings.number(file) == 0:
-        _refuse_repeated(table, read.ids, read.used, findings)
-        _refuse_empty(read, uses, findings)
+        _refuse_repeated(table, read.ids, np.flatnonzero(read.used), findings)
+        refuse_empty(read, "photo", findings)
         if not default_sigma:
-            wanted = read.use & np.isnan(read.sigma)
-            _refuse_without_sigma(table, wanted, [f"s{axis}" for axis in AXES], "camera_positions.sigma", findings)
+            missing = read.use & np.isnan(read.sigma)
+            refuse_without_sigma(table, missing, SIGMAS, FIX.format("camera_positions.sigma"), findings)
     return read
 
 
@@ -119,7 +88,7 @@ def read_orientations(
     *,
     needs_sigma: tuple[bool, bool] = (False, False),
 ) -> OrientationTable | None:
-    """Read a table of given exterior orientations.
+    """Read a table of given exterior orientations; None when the header is wrong.
 
     Parameters
     ----------
@@ -130,70 +99,36 @@ def read_orientations(
     needs_sigma : tuple of bool
         Whether rows must have standard deviations of the position and of the angles: they are observations, and
         the project file gives none.
-
-    Returns
-    -------
-    OrientationTable or None
-        What could be read; None when the header is wrong.
     """
     angle = tuple(Column(name, number=True, aliases=(f"{name}_{unit}",)) for name in names)
+    sigma_names = [f"s_{name}" for name in names]
     sigma_angle = tuple(
-        Column(
-            f"s_{name}",
-            number=True,
-            required=False,
-            filled=False,
-            positive=True,
-            aliases=(f"sigma_{name}", f"sigma_{name}_{unit}"),
-        )
-        for name in names
+        replace(each, name=name, aliases=(*each.aliases, f"{each.aliases[0]}_{unit}"))
+        for each, name in zip(sigmas(*names), sigma_names, strict=True)
     )
-    layout = (PHOTO, *(Column(axis, number=True) for axis in AXES), *angle, *SIGMAS, *sigma_angle)
-    table = read_table(file, layout, findings)
+    table = read_table(file, (PHOTO, *numbers(*AXES), *angle, *sigmas(*AXES), *sigma_angle), findings)
     if table is None:
         return None
     read = OrientationTable(
-        table,
-        table.cells("photo"),
-        np.column_stack([table.column(axis) for axis in AXES]),
-        np.column_stack([table.column(f"s{axis}") for axis in AXES]),
-        np.column_stack([table.column(name) for name in names]),
-        np.column_stack([table.column(f"s_{name}") for name in names]),
+        table=table,
+        ids=table.cells("photo"),
+        xyz=table.columns(*AXES),
+        sigma=table.columns(*SIGMAS),
+        angles=table.columns(*names),
+        sigma_angles=table.columns(*sigma_names),
     )
     if findings.number(file) == 0:
-        _refuse_repeated(table, read.ids, np.ones(len(table), bool), findings)
-        for needed, sigma, columns, key in (
-            (needs_sigma[0], read.sigma, [f"s{axis}" for axis in AXES], "orientations.sigma"),
-            (needs_sigma[1], read.sigma_angles, [f"s_{name}" for name in names], "orientations.sigma_angles"),
-        ):
-            if needed:
-                _refuse_without_sigma(table, np.isnan(sigma), columns, key, findings)
+        _refuse_repeated(table, read.ids, np.arange(len(table)), findings)
+        if needs_sigma[0]:
+            refuse_without_sigma(table, np.isnan(read.sigma), SIGMAS, FIX.format("orientations.sigma"), findings)
+        if needs_sigma[1]:
+            fix = FIX.format("orientations.sigma_angles")
+            refuse_without_sigma(table, np.isnan(read.sigma_angles), sigma_names, fix, findings)
     return read
 
 
-def _refuse_repeated(table: Table, ids: Sequence[str], used: Flags, findings: Findings) -> None:
+def _refuse_repeated(table: Table, ids: Sequence[str], rows: Numbers, findings: Findings) -> None:
     """Refuse a second row of the same photo."""
-    first: dict[str, int] = {}
-    for row in np.flatnonzero(used).tolist():
-        before = first.setdefault(ids[row], row)
-        if before != row:
-            message = f"photo {ids[row]} is given already, in line {table.lines[before]}"
-            findings.add(table.fault(row, "photo", message, "given-twice", fix="keep one of the two"))
-
-
-def _refuse_empty(read: PositionTable, uses: Sequence[str], findings: Findings) -> None:
-    """Refuse an empty cell where the coordinate counts."""
-    for row, axis in np.argwhere(read.use & np.isnan(read.xyz)).tolist():
-        message = f"photo {read.ids[row]} has no {AXES[axis]}, but its use is {uses[row]}"
-        fix = "fill it in, or set use to xy, z or off"
-        findings.add(read.table.fault(row, AXES[axis], message, "no-coordinate", fix=fix))
-
-
-def _refuse_without_sigma(table: Table, missing: Flags, columns: Sequence[str], key: str, findings: Findings) -> None:
-    """Ask for the standard deviations that neither rows nor project give."""
-    rows, axes = np.nonzero(missing)
-    if len(rows):
-        number = counted(len(np.unique(rows)), "row has no standard deviation", "rows have no standard deviation")
-        message = f"{number} ({', '.join(columns)}), and the project file gives none"
-        fix = f"set `{key}` in the project file, or fill the columns"
-        findings.add(table.fault(int(rows[0]), columns[int(axes[0])], message, "no-sigma", fix=fix))
+    for again, before in repeated_rows(ids[row] for row in rows.tolist()):
+        message = f"photo {ids[rows[again]]} is given already, in line {table.lines[rows[before]]}"
+        findings.add(table.fault(int(rows[again]), "photo", message, "given-twice", fix="keep one of the two"))

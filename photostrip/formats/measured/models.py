@@ -10,9 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.formats.measured.control import AXES
-from photostrip.formats.measured.observations import PHOTO, POINT
-from photostrip.formats.text.findings import counted
+from photostrip.formats.measured.columns import AXES, PHOTO, POINT, SIGMAS, numbers, refuse_without_sigma, sigmas
 from photostrip.formats.text.tables import Column, Table, read_table
 
 if TYPE_CHECKING:
@@ -26,13 +24,7 @@ if TYPE_CHECKING:
     Numbers = NDArray[np.intp]
 
 MODEL = Column("model", aliases=("model_id", "pair", "stereopair"))
-COORDINATES = (
-    *(Column(axis, number=True) for axis in AXES),
-    *(
-        Column(f"s{axis}", number=True, required=False, filled=False, positive=True, aliases=(f"sigma_{axis}",))
-        for axis in AXES
-    ),
-)
+COORDINATES = (*numbers(*AXES), *sigmas(*AXES))
 END = "-99"  # of a model, in a file of blocks
 MODEL_POINTS = (MODEL, POINT, *COORDINATES)
 MODEL_CENTERS = (MODEL, PHOTO, *COORDINATES)
@@ -62,19 +54,14 @@ def read_models(
     has_sigma: bool = True,
     columns: Mapping[str, str] | None = None,
 ) -> ModelTable | None:
-    """Read a table of model coordinates.
+    """Read a table of model coordinates; None when the header is wrong.
 
     Parameters
     ----------
     has_sigma : bool
         Whether the project has standard deviations for rows without them.
     columns : mapping of str to str, optional
-        Names in the header of columns that are called otherwise than here.
-
-    Returns
-    -------
-    ModelTable or None
-        What could be read; None when the header is wrong.
+        Names in the header of columns that have another name there.
     """
     target = "photo" if centers else "point"
     rewritten = None if centers else rows_of_blocks
@@ -83,34 +70,28 @@ def read_models(
     if table is None:
         return None
     read = ModelTable(
-        table,
-        target,
-        table.ids["model"],
-        table.ids[target],
-        table.codes["model"],
-        table.codes[target],
-        np.column_stack([table.column(axis) for axis in AXES]),
-        np.column_stack([table.column(f"s{axis}") for axis in AXES]),
+        table=table,
+        target=target,
+        model_ids=table.ids["model"],
+        target_ids=table.ids[target],
+        models=table.codes["model"],
+        targets=table.codes[target],
+        xyz=table.columns(*AXES),
+        sigma=table.columns(*SIGMAS),
     )
-    if not has_sigma:
-        _refuse_without_sigma(read, findings)
+    if not has_sigma and not findings.number(file):
+        fix = "set `models.sigma: [sx, sy, sz]` in the project file, or fill the columns sx, sy, sz"
+        missing = np.asarray(np.isnan(read.sigma).any(axis=1, keepdims=True))
+        refuse_without_sigma(table, missing, SIGMAS, fix, findings)
     _refuse_repeated(read, findings)
     return read
 
 
 def rows_of_blocks(data: bytes) -> bytes:
-    """Make a table of a file of blocks, as programs for independent models write it: model, ``point x y z``, -99.
+    """Make a table of a file of blocks, as programs for independent models write it; any other file stays as it is.
 
-    Parameters
-    ----------
-    data : bytes
-        A file: each model begins with a line that has its id alone, holds lines of a point, three coordinates and
-        whatever else, parted by blanks, and ends with -99.
-
-    Returns
-    -------
-    bytes
-        A table with each row in the line of its point; any other file as it is.
+    Each model begins with a line that has its id alone, holds lines of a point, three coordinates and whatever else,
+    parted by blanks, and ends with -99. Each row of the table stands in the line of its point.
     """
     lines = data.decode().splitlines()
     filled = [line.split() for line in lines if line.strip()]
@@ -131,17 +112,6 @@ def rows_of_blocks(data: bytes) -> bytes:
 
 def _quoted(text: str) -> str:
     return '"' + text.replace('"', '""') + '"' if '"' in text or "," in text else text
-
-
-def _refuse_without_sigma(read: ModelTable, findings: Findings) -> None:
-    """Ask for the standard deviations that neither rows nor project give."""
-    rows = np.flatnonzero(np.isnan(read.sigma).any(axis=1))
-    if not len(rows) or findings.number(read.table.file):
-        return
-    number = counted(len(rows), "row has no standard deviation", "rows have no standard deviation")
-    message = f"{number} (sx, sy, sz), and the project file gives none"
-    fix = "set `models.sigma: [sx, sy, sz]` in the project file, or fill the columns sx, sy, sz"
-    findings.add(read.table.fault(int(rows[0]), "sx", message, "no-sigma", fix=fix))
 
 
 def _refuse_repeated(read: ModelTable, findings: Findings) -> None:

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.formats.measured import pairs, repeated
+from photostrip.formats.measured.columns import PHOTO, POINT, numbers, refuse_without_sigma, sigmas
 from photostrip.formats.measured.measurements import Measurements
-from photostrip.formats.text.findings import counted
-from photostrip.formats.text.tables import Column, Table, read_table
+from photostrip.formats.text.tables import Column, read_table
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -25,15 +25,8 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
 
-PHOTO = Column("photo", aliases=("photo_id", "image", "image_id"))
-POINT = Column("point", aliases=("point_id", "id"))
 MARK = Column("mark", aliases=("mark_id", "fiducial", "fiducial_mark"))
-COORDINATES = (
-    Column("x", number=True),
-    Column("y", number=True),
-    Column("sx", number=True, required=False, filled=False, positive=True, aliases=("sigma_x",)),
-    Column("sy", number=True, required=False, filled=False, positive=True, aliases=("sigma_y",)),
-)
+COORDINATES = (*numbers("x", "y"), *sigmas("x", "y"))
 OBSERVATIONS = (PHOTO, POINT, *COORDINATES)
 FIDUCIALS = (PHOTO, MARK, *COORDINATES)
 
@@ -54,17 +47,9 @@ class Manner:
 
 
 def read_measurements(file: str, findings: Findings, manner: Manner | None = None) -> Measurements | None:
-    """Read a table of measured image coordinates.
+    """Read a table of measured image coordinates: points of photos or of pairs, or marks.
 
-    Parameters
-    ----------
-    file : str
-        Path of a ``.csv`` or ``.csv.gz`` file: points of photos or of pairs, or marks.
-
-    Returns
-    -------
-    Measurements or None
-        What could be read, one row for each point of a photo; None when the header is wrong or pairs are none.
+    One row of the result is one point of a photo. None when the header is wrong, or when pairs are none.
     """
     manner = manner or Manner()
     layout, others = (FIDUCIALS, ()) if manner.marks else (OBSERVATIONS, pairs.LAYOUTS)
@@ -77,30 +62,21 @@ def read_measurements(file: str, findings: Findings, manner: Manner | None = Non
         return None
     target = "mark" if manner.marks else "point"
     read = Measurements(
-        table,
-        table.ids["photo"],
-        table.ids[target],
-        table.codes["photo"],
-        table.codes[target],
-        np.column_stack([table.column("x"), table.column("y")]),
-        np.column_stack([table.column("sx"), table.column("sy")]),
-        np.ones(len(table), np.intp),
+        table=table,
+        photo_ids=table.ids["photo"],
+        target_ids=table.ids[target],
+        photo=table.codes["photo"],
+        target=table.codes[target],
+        xy=table.columns("x", "y"),
+        sigma=table.columns("sx", "sy"),
+        times=np.ones(len(table), np.intp),
     )
-    if not manner.has_sigma:
+    if not manner.has_sigma and not findings.number(file):
         key = "fiducial_measurements.sigma or observations.sigma" if manner.marks else "observations.sigma"
-        _refuse_without_sigma(table, read.sigma, key, findings)
+        fix = f"set `{key}` in the project file, or fill the columns sx and sy"
+        missing = np.asarray(np.isnan(read.sigma).any(axis=1, keepdims=True))
+        refuse_without_sigma(table, missing, ("sx", "sy"), fix, findings)
     if manner.repeated == "average" or (in_pairs and not manner.repeated):
         return repeated.averaged(read, target, manner.sigma, findings)
     repeated.refuse(read, target, findings)
     return read
-
-
-def _refuse_without_sigma(table: Table, sigma: Floats, key: str, findings: Findings) -> None:
-    """Ask for the standard deviations that neither rows nor project give."""
-    rows = np.flatnonzero(np.isnan(sigma).any(axis=1))
-    if not len(rows) or findings.number(table.file):
-        return
-    number = counted(len(rows), "row has no standard deviation", "rows have no standard deviation")
-    message = f"{number} (sx, sy), and the project file gives none"
-    fix = f"set `{key}` in the project file, or fill the columns sx and sy"
-    findings.add(table.fault(int(rows[0]), "sx", message, "no-sigma", fix=fix))

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.formats.measured.columns import POINT, numbers, sigmas
 from photostrip.formats.text.tables import Column, Table
 
 if TYPE_CHECKING:
@@ -23,23 +24,20 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
 
-POINT = Column("point", aliases=("point_id", "id"))
 PAIR = (Column("pair", aliases=("pair_id", "model", "stereopair")),)
 BOTH = (
     Column("left", aliases=("left_photo", "photo_left")),
     Column("right", aliases=("right_photo", "photo_right")),
 )
-PARALLAXES = tuple(Column(name, number=True) for name in "xypq")
+PARALLAXES = numbers(*"xypq")
 TWO_POINTS = tuple(
     Column(f"{axis}{side}", number=True, aliases=(f"{axis}_{word}",))
     for side, word in (("l", "left"), ("r", "right"))
     for axis in "xy"
 )
-SIGMA = tuple(
-    Column(f"s{axis}", number=True, required=False, filled=False, positive=True, aliases=(f"sigma_{axis}",))
-    for axis in "xy"
+LAYOUTS = tuple(
+    (*names, POINT, *columns, *sigmas(*"xy")) for names in (PAIR, BOTH) for columns in (PARALLAXES, TWO_POINTS)
 )
-LAYOUTS = tuple((*names, POINT, *numbers, *SIGMA) for names in (PAIR, BOTH) for numbers in (PARALLAXES, TWO_POINTS))
 SIGNS = "-–—/:_+ "  # dashes as spreadsheets write them
 
 
@@ -49,20 +47,9 @@ def is_pair_list(table: Table) -> bool:
 
 
 def photos_of_pairs(table: Table, photos: AbstractSet[str], findings: Findings) -> Table | None:
-    """Make a table of photos of a table of pairs.
+    """Make a table of photos of a table of pairs, two rows for each row: left, then right.
 
-    Parameters
-    ----------
-    table : Table
-        A table in one of ``LAYOUTS``.
-    photos : set of str
-        Photos of the strips, by which the name of a pair is divided.
-
-    Returns
-    -------
-    Table or None
-        Columns ``photo``, ``point``, ``x``, ``y``, ``sx``, ``sy``, two rows for each row: left, then right; None when
-        a pair names no two photos of the strips.
+    `photos` are those of the strips, by which the name of a pair is divided. None when a pair names no two of them.
     """
     ids, codes = _photos(table, photos, findings)
     if (codes < 0).any():

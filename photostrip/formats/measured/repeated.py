@@ -24,13 +24,7 @@ FARTHEST = 10.0  # standard deviations from the mean; beyond, two measurements a
 
 
 def refuse(read: Measurements, target: str, findings: Findings) -> None:
-    """Refuse a second measurement of the same point on the same photo.
-
-    Parameters
-    ----------
-    target : str
-        What is measured, ``point`` or ``mark``.
-    """
+    """Refuse a second measurement of the same point, or mark, on the same photo."""
     key = _key(read)
     order = np.argsort(key, kind="stable")
     again = np.flatnonzero(key[order][1:] == key[order][:-1]) + 1
@@ -48,22 +42,15 @@ def refuse(read: Measurements, target: str, findings: Findings) -> None:
 
 
 def averaged(read: Measurements, target: str, default: float | None, findings: Findings) -> Measurements:
-    """Replace several measurements of a point on a photo by their weighted mean.
+    """Replace several measurements of a point, or mark, on a photo by their weighted mean.
+
+    The mean stands where the first measurement stood. Its standard deviation follows from those of the measurements,
+    not from their spread, which becomes a note. Measurements too far apart to be of one point are refused.
 
     Parameters
     ----------
-    target : str
-        What is measured, ``point`` or ``mark``.
     default : float or None
         Standard deviation of rows without one, in the unit of the table.
-    findings : Findings
-        Gets a fault for measurements too far apart to be of one point, and a note with the spread of the others.
-
-    Returns
-    -------
-    Measurements
-        One row for each point of a photo, where its first measurement stood; the same table when no point is measured
-        twice. Standard deviations of means follow from those of their measurements, not from the spread.
     """
     _, first, group, count = np.unique(_key(read), return_index=True, return_inverse=True, return_counts=True)
     if (count == 1).all():

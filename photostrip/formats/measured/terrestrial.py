@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.formats.measured.columns import POINT, repeated_rows
 from photostrip.formats.text.tables import Column, Table, read_table
 
 if TYPE_CHECKING:
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     Numbers = NDArray[np.intp]
 
 SIDES = ("left", "right")
-POINT = Column("point", aliases=("point_id", "id"))
 EPOCH = Column("epoch", aliases=("epoch_id",))
 IMAGE = (Column("x", number=True), Column("z", number=True, aliases=("y",)))
 DIRECTIONS = (
@@ -60,19 +60,9 @@ class PointTable:
     table: Table
     ids: tuple[str, ...]
 
-    def columns(self, *names: str) -> Floats:
-        """Give columns of numbers side by side, shape (n, number of names)."""
-        return np.column_stack([self.table.column(name) for name in names])
-
 
 def read_points(file: str, layout: Sequence[Column], findings: Findings) -> PointTable | None:
-    """Read a table with one row for each point.
-
-    Returns
-    -------
-    PointTable or None
-        What could be read; None when the header is wrong.
-    """
+    """Read a table with one row for each point; None when the header is wrong."""
     table = read_table(file, layout, findings)
     if table is None:
         return None
@@ -80,16 +70,13 @@ def read_points(file: str, layout: Sequence[Column], findings: Findings) -> Poin
     return PointTable(table, tuple(table.cells("point")))
 
 
-def _refuse_repeated(table: Table, key: Numbers, where: str, findings: Findings) -> None:
-    """Refuse a second row for the same thing."""
-    first: dict[int, int] = {}
+def _refuse_repeated(table: Table, keys: Numbers, where: str, findings: Findings) -> None:
+    """Refuse a second row of one point."""
     names = table.cells("point")
-    for row, each in enumerate(key.tolist()):
-        before = first.setdefault(each, row)
-        if before != row:
-            message = f"point {names[row]} stands in line {table.lines[before]} already{where}"
-            fix = "keep one of the two, or give one another id"
-            findings.add(table.fault(row, "point", message, "measured-twice", fix=fix))
+    for row, before in repeated_rows(keys.tolist()):
+        message = f"point {names[row]} stands in line {table.lines[before]} already{where}"
+        fix = "keep one of the two, or give one another id"
+        findings.add(table.fault(row, "point", message, "measured-twice", fix=fix))
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,10 +91,6 @@ class EpochTable:
     epoch: Numbers
     point: Numbers
 
-    def columns(self, *names: str) -> Floats:
-        """Give columns of numbers side by side, shape (n, number of names)."""
-        return np.column_stack([self.table.column(name) for name in names])
-
     @property
     def side(self) -> Numbers:
         """Photo of each row of a table of coordinates: 0 left, 1 right, shape (n,)."""
@@ -116,13 +99,7 @@ class EpochTable:
 
 
 def read_coordinates(file: str, findings: Findings) -> EpochTable | None:
-    """Read a table of image coordinates ``epoch,photo,point,x,z[,sx,sz]``, photo being left or right.
-
-    Returns
-    -------
-    EpochTable or None
-        What could be read; None when the header is wrong.
-    """
+    """Read a table of image coordinates ``epoch,photo,point,x,z[,sx,sz]``, photo being left or right."""
     table = read_table(file, COORDINATES, findings)
     if table is None:
         return None
@@ -139,11 +116,6 @@ def read_pseudo_parallaxes(file: str, findings: Findings) -> EpochTable | None:
     The columns are ``point[,epoch],x,z,p[,q],dx,dz,dx_right[,dz_right][,sigma][,sigma_d]``: coordinates on the left
     photo of the reference epoch, parallaxes to the right one, and what changed on both photos until the epoch. x, z, p
     and q may be empty where an earlier row of the point has them.
-
-    Returns
-    -------
-    EpochTable or None
-        What could be read; None when the header is wrong.
     """
     table = read_table(file, PSEUDO_PARALLAXES, findings)
     if table is None:
@@ -158,22 +130,14 @@ def read_pseudo_parallaxes(file: str, findings: Findings) -> EpochTable | None:
 
 
 def reference_values(read: EpochTable, findings: Findings) -> Floats:
-    """Give x, z, p and q of each point of a table of pseudo-parallaxes.
+    """Return x, z, p and q of each point of a table of pseudo-parallaxes, shape (points, 4); NaN for q not measured.
 
-    Parameters
-    ----------
-    findings : Findings
-        Where faults go: a point without values, or with different ones in different rows.
-
-    Returns
-    -------
-    ndarray, shape (points, 4)
-        In the unit of the table; NaN for q where it was not measured.
+    A point without values, or with different ones in different rows, is refused.
     """
     names = ("x", "z", "p", "q")
     found = np.full((len(read.points), len(names)), np.nan)
     source = np.zeros(found.shape, np.intp)
-    values = read.columns(*names)
+    values = read.table.columns(*names)
     for row, point in enumerate(read.point.tolist()):
         for column, name in enumerate(names):
             value = values[row, column]

@@ -25,13 +25,7 @@ PLACED = 6  # decimals of metres that decide which point is the worst: strips ar
 
 
 def strip_document(name: str, report: DesignReport) -> Document:
-    """Return the plan of a strip as a document.
-
-    Returns
-    -------
-    dict
-        Its keys carry the units; plan is both coordinates together. Photos and rows count from 1.
-    """
+    """Return the plan of a strip: keys carry units, plan is both coordinates, photos and rows count from 1."""
     geometry, design = report.design.geometry, report.design
     spots = {each.layout.name: each.spots for each in report.outcomes}
     return {

@@ -28,13 +28,7 @@ IN_PHOTO = 2  # decimals of mm: places of points
 
 
 def model_document(name: str, camera: str, forecast: Forecast) -> Document:
-    """Return the plan of one model as a document.
-
-    Returns
-    -------
-    dict
-        Its keys carry the units; plan is both coordinates together.
-    """
+    """Return the plan of one model as a document: keys carry units, plan is both coordinates together."""
     spec = forecast.spec
     unit = spec.ground_unit
     shares = forecast.shares()
@@ -142,13 +136,7 @@ def _share(source: str, sigmas: Floats) -> Document:
 
 
 def camera_document(name: str, cameras: Sequence[ComparedCamera], reference: ComparedCamera) -> Document:
-    """Return a comparison of cameras as a document.
-
-    Returns
-    -------
-    dict
-        One row for each camera, in the order given.
-    """
+    """Return a comparison of cameras as a document, one row for each camera in the order given."""
     order = [camera.name for camera in by_efficiency(cameras)]
     return {
         "kind": "cameras",
@@ -178,13 +166,7 @@ def _camera(camera: ComparedCamera, reference: ComparedCamera) -> Document:
 
 
 def source_document() -> Document:
-    """Return the table of the source, computed again beside what is printed.
-
-    Returns
-    -------
-    dict
-        As ``camera_document``, with the printed numbers in each row.
-    """
+    """Return the table of the source, computed again, with the printed numbers in each row."""
     cameras = source_cameras()
     document = camera_document("the table of the source", cameras, cameras[-1])
     for row, printed in zip(document["cameras"], PRINTED_TABLE, strict=True):

@@ -31,18 +31,7 @@ CONTROL = dict.fromkeys([*range(9), 11, 12, *range(14, 32), 127])  # characters 
 
 
 def refuse(file: str, code: str, message: str, *, expected: str = "", fix: str = "") -> NoReturn:
-    """Refuse a whole file.
-
-    Parameters
-    ----------
-    file, code, message, expected, fix : str
-        As in ``errors.Fault``.
-
-    Raises
-    ------
-    InputError
-        Always.
-    """
+    """Refuse a whole file: raise an ``InputError`` of one fault."""
     raise InputError(Fault(message, code=code, file=file, expected=expected, fix=fix))
 
 
@@ -134,13 +123,7 @@ def _neighbours(folder: str) -> list[str]:
 
 
 def decode(file: str, data: bytes) -> tuple[str, bool]:
-    """Turn the bytes of a text file into text.
-
-    Raises
-    ------
-    InputError
-        When it is not UTF-8 text.
-    """
+    """Turn the bytes of a text file into text, and say whether a byte order mark was skipped."""
     if data.startswith(UTF16):
         refuse(file, "encoding", "is UTF-16 text", expected="UTF-8", fix="save it as UTF-8")
     if data.startswith(ZIP):

@@ -49,16 +49,10 @@ class Findings:
         """Count faults of a full file without making them."""
         self._count[file] += number
 
-    def absorb(self, other: Findings, told: Callable[[Fault], Fault]) -> None:
-        """Take over the faults of another collection.
-
-        Parameters
-        ----------
-        told : callable
-            Gives each fault the place where it is told.
-        """
+    def absorb(self, other: Findings, place: Callable[[Fault], Fault]) -> None:
+        """Take over the faults of another collection, each with the place that `place` gives it."""
         kept = Counter(fault.file for fault in other._faults)
-        self.add(*map(told, other._faults))
+        self.add(*map(place, other._faults))
         for file, number in other._count.items():
             self._count[file] += number - kept[file]
 
@@ -79,25 +73,13 @@ class Findings:
         return (*found, *rest)
 
     def stop(self) -> None:
-        """Raise one error for all faults, if there are any.
-
-        Raises
-        ------
-        InputError
-            With every fault.
-        """
+        """Raise one error for all faults, if there are any."""
         if self._faults:
             raise InputError(self.faults)
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:
-    """Ask whether a similar known name was meant.
-
-    Returns
-    -------
-    str
-        ``did you mean `...`?``, empty when nothing is similar.
-    """
+    """Ask whether a similar known name was meant, ``did you mean `...`?``; empty when nothing is similar."""
     names = list(known)
     folded = {each.casefold(): each for each in reversed(names)}
     close = get_close_matches(name.casefold(), list(folded), n=1, cutoff=0.65)
@@ -105,13 +87,7 @@ def suggestion(name: str, known: Iterable[str]) -> str:
 
 
 def listed(ids: Iterable[str], limit: int = IDS_NAMED) -> str:
-    """Name some ids and count the rest.
-
-    Returns
-    -------
-    str
-        For example ``A1, A2 and 7 more``.
-    """
+    """Name some ids and count the rest: ``A1, A2 and 7 more``."""
     names = list(ids)
     head = ", ".join(names[:limit])
     return head if len(names) <= limit else f"{head} and {len(names) - limit} more"

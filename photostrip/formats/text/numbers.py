@@ -25,17 +25,7 @@ class NotANumber(ValueError):  # noqa: N818 (the name of what it says)
 
 
 def number(text: str) -> float:
-    """Read a decimal number.
-
-    Parameters
-    ----------
-    text : str
-        What the user wrote; blanks around it do not count.
-
-    Returns
-    -------
-    float
-        A number of at most 15 digits before the decimal point.
+    """Read a decimal number of at most 15 digits before the point; blanks around it do not count.
 
     Raises
     ------
@@ -82,13 +72,7 @@ def _ascii(character: str) -> str:
 
 
 def shown(text: str, limit: int = 40) -> str:
-    """Return a text as it can stand in a message: on one line and not too long.
-
-    Returns
-    -------
-    str
-        The text, or its beginning; characters that do not print as their escapes.
-    """
+    """Return a text as it can stand in a message: on one line, not too long, what does not print as its escape."""
     visible = "".join(
         c if c.isprintable() or unicodedata.category(c) == "Cf" else repr(c)[1:-1] for c in text[: limit + 1]
     )

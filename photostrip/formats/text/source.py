@@ -58,12 +58,7 @@ def current() -> Source | None:
 
 
 def seen_from(file: str, folder: str | Path) -> str:
-    """Return a path relative to a folder, with slashes on every system.
-
-    Returns
-    -------
-    str
-        The relative path, as the working folder of the current source lets it be.
+    """Return a path relative to a folder, with slashes on every system, as seen from the current source's folder.
 
     Raises
     ------

@@ -33,31 +33,14 @@ class TableText:
         return self.stream().readlines()
 
     def placed_as(self, column: str, where: str) -> TableText:
-        """Return the text with a column placed where another one stands.
-
-        Parameters
-        ----------
-        column, where : str
-            Name of the column, and of the one in its place.
-        """
+        """Return the text with a column placed where another one stands."""
         places, header = dict(self.where), dict(self.header)
         if where in places:
             places[column], header[column] = places[where], header[where]
         return TableText(self.file, self.data, places, header)
 
     def fault(self, line: int, column: str, message: str, code: str, *, expected: str = "", fix: str = "") -> Fault:
-        """Make a fault with the place of a cell.
-
-        Parameters
-        ----------
-        column : str
-            Name of the column; empty for the line as a whole.
-
-        Returns
-        -------
-        Fault
-            With file, line, and the character at which the cell begins.
-        """
+        """Make a fault at the character where a cell begins; without a column at the line."""
         position = self._position(line, self.where[column]) if column in self.where else 0
         name = self.header.get(column, column)
         return Fault(message, code, self.file, line, position, name, expected, fix)
@@ -80,13 +63,7 @@ class TableText:
 
 
 def content(file: str) -> tuple[bytes, bool]:
-    """Read and unpack a file, make sure that it is text, and take a byte order mark off.
-
-    Raises
-    ------
-    InputError
-        When it cannot be read or is not text.
-    """
+    """Read and unpack a file, refuse it when it is no text, and take a byte order mark off."""
     data = read_bytes(file, LARGEST_TABLE)
     packed = file.casefold().endswith(".gz")
     if packed != data.startswith(GZIP):

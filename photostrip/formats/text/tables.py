@@ -75,31 +75,23 @@ class Table:
         """Return a column of numbers; NaN in every row when the table has no such column."""
         return self.numbers[name] if name in self.numbers else np.full(len(self), np.nan)
 
+    def columns(self, *names: str) -> Floats:
+        """Return columns of numbers side by side, shape (n, number of names)."""
+        return np.column_stack([self.column(name) for name in names])
+
     def cells(self, name: str) -> list[str]:
         """Return a column of ids, or of words, row by row."""
         ids = self.ids[name]
         return [ids[code] for code in self.codes[name]]
 
     def take(self, rows: Numbers) -> Table:
-        """Return the table of some rows.
-
-        Parameters
-        ----------
-        rows : ndarray of int
-            Numbers of the rows to keep, in their order.
-        """
+        """Return the table of some rows, in their order."""
         numbers = {name: each[rows] for name, each in self.numbers.items()}
         codes = {name: each[rows] for name, each in self.codes.items()}
         return replace(self, lines=self.lines[rows], numbers=numbers, codes=codes)
 
     def placed_as(self, column: str, where: str) -> Table:
-        """Return the table with the faults of a column that it does not have placed at one that it has.
-
-        Parameters
-        ----------
-        column, where : str
-            Name of the column, and of the one in its place.
-        """
+        """Return the table with the faults of a column that it does not have placed at one that it has."""
         return replace(self, _source=self._source.placed_as(column, where))
 
     def fault(self, row: int, column: str, message: str, code: str, *, expected: str = "", fix: str = "") -> Fault:
@@ -116,7 +108,7 @@ def read_table(
     columns: Mapping[str, str] | None = None,
     rewritten: Callable[[bytes], bytes] | None = None,
 ) -> Table | None:
-    """Read a table.
+    """Read a table; None when not even the header can be read.
 
     Parameters
     ----------
@@ -126,11 +118,6 @@ def read_table(
         Names in the header of columns that the user calls otherwise.
     rewritten : callable, optional
         Makes a table, line for line, of the text of another layout; gives a table as it is.
-
-    Returns
-    -------
-    Table or None
-        What could be read; None when not even the header could.
     """
     findings.meet(file)
     try:

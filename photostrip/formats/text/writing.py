@@ -20,35 +20,18 @@ if TYPE_CHECKING:
 
 
 def write_text(path: Path, text: str | bytes) -> None:
-    """Write one file, whole or not at all.
+    """Write one file, whole or not at all; missing folders are made, a device or a pipe is written to as it is.
 
-    Parameters
-    ----------
-    path : Path
-        The file; missing folders are made. A device or a pipe is written to as it is.
-    text : str or bytes
-        Its content; a text is written as UTF-8 with the line ends that it has.
-
-    Raises
-    ------
-    InputError
-        When the path is a folder or lies below a file.
-    OSError
-        When the disk is full or the folder must not be written to.
+    A text is written as UTF-8 with the line ends that it has. Errors are those of ``write_files``.
     """
     write_files(path.parent, {path.name: text})
 
 
 def write_files(folder: Path, files: Mapping[str, str | bytes]) -> None:
-    """Write the files of one folder, all of them or none.
+    """Write the files of one folder, all of them or none; the folder is made when it is missing.
 
     All contents are written first and renamed then, in the order given: put the file last that make or another program
     looks at.
-
-    Parameters
-    ----------
-    folder : Path
-        The folder; made when it is missing.
 
     Raises
     ------
@@ -95,12 +78,9 @@ def _refuse(path: Path, what: str, expected: str) -> None:
 
 
 def make_rule(target: str | Path, sources: Iterable[str | Path]) -> str:
-    """Say to make what a file was made from.
+    """Say to make what a file was made from, as a rule for its ``include``.
 
-    Returns
-    -------
-    str
-        A rule for make's ``include``; an empty rule for each source keeps make going when one is deleted.
+    An empty rule for each source keeps make going when one is deleted.
     """
     names = [_for_make(name) for name in dict.fromkeys(map(str, sources))]
     rule = f"{_for_make(str(target))}: {' '.join(names)}\n"

@@ -78,13 +78,7 @@ class Checked:
 
 
 def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
-    """Check a project as far as that goes without adjusting it.
-
-    Returns
-    -------
-    Checked
-        Every fault and every note; nothing is raised for a faulty project.
-    """
+    """Check a project as far as that goes without adjusting it; nothing is raised for a faulty project."""
     try:
         project = load_project(path, overrides)
     except InputError as error:

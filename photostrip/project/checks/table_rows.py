@@ -35,12 +35,9 @@ NOT_MEASURED = "not measured on any photo of the strips"
 
 
 def observations_used(inputs: Inputs) -> Numbers:
-    """Find the strip in which each image point takes part.
+    """Return the number of the strip in which each image point takes part, shape (n,).
 
-    Returns
-    -------
-    ndarray of int, shape (n,)
-        Number of the strip; -1 for points that no neighbouring photo of the strip shows: they are in no pair.
+    -1 stands for points that no neighbouring photo of the strip shows: they are in no pair.
     """
     observations = inputs.observations
     places = {photo: (i, j) for i, strip in enumerate(inputs.strips) for j, photo in enumerate(strip.photos)}
@@ -71,13 +68,9 @@ def gaps_of(inputs: Inputs) -> list[str]:
 
 
 def table_rows(project: Project) -> list[Document]:
-    """Count what became of the rows of each table.
+    """Count what became of the rows of each table; used and unused rows add up to all rows.
 
-    Returns
-    -------
-    list of dict
-        ``file``, ``rows``, ``used`` and ``unused``: reason, number of rows, ids, first line. Used and unused rows add
-        up to all rows.
+    The keys are ``file``, ``rows``, ``used`` and ``unused``: reason, number of rows, ids, first line.
     """
     tables, inputs = project.tables, project.inputs
     photos = {photo for strip in inputs.strips for photo in strip.photos}
@@ -100,13 +93,7 @@ def table_rows(project: Project) -> list[Document]:
 
 
 def model_rows(tables: Tables, models: MeasuredModels) -> list[Document]:
-    """Count what became of the rows of each table of a project of independent models.
-
-    Returns
-    -------
-    list of dict
-        As ``table_rows``.
-    """
+    """Count what became of the rows of each table of a project of independent models, as ``table_rows``."""
     found = []
     known = set(models.points.model_ids)
     read = tables.models

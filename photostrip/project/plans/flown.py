@@ -72,13 +72,7 @@ class Flown(Section):
 
 
 def read_plan(kind: type[T], path: Path | None, assignments: Sequence[str]) -> tuple[T, Reading]:
-    """Read a plan file, or make one of assignments alone.
-
-    Raises
-    ------
-    InputError
-        With every fault.
-    """
+    """Read a plan file, or make one of assignments alone, or raise every fault."""
     if path is None:
         place, number = Place(COMMAND_LINE), next(name for name in kind.model_fields if name in NUMBER_KEYS)
         root = Node({number: Node(SCHEMA_NUMBER, place)}, place, {number: place})

@@ -177,13 +177,7 @@ class StripPlan:
     reading: Reading
 
     def computed(self) -> DesignReport:
-        """Compute what the plan asks for.
-
-        Raises
-        ------
-        InputError
-            With all that cannot be planned, each fault at its place in the file.
-        """
+        """Compute what the plan asks for, or raise all that cannot be planned, each fault at its place in the file."""
         with self.reading.places(SIMULATED):
             return plan_strip(self.design)
 

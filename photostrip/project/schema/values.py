@@ -227,13 +227,7 @@ Height = Annotated[str, *choice(("ellipsoidal", "orthometric"))]
 
 
 def key(description: str, default: Any = ..., *, unit: str = "") -> Any:  # noqa: ANN401 (pydantic's own manner)
-    """Describe one key.
-
-    Parameters
-    ----------
-    default : object
-        Its default; without one the key is required.
-    """
+    """Describe one key; without a default it is required."""
     extra: dict[str, Any] | None = {"unit": unit} if unit else None
     return Field(default, description=f"{description} [{unit}]" if unit else description, json_schema_extra=extra)
 

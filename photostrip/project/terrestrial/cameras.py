@@ -55,13 +55,7 @@ def own_presets() -> dict[str, Phototheodolite]:
 
 
 def read_presets(file: str | None) -> dict[str, Phototheodolite]:
-    """Return all cameras that can be named; those of the user's list replace cameras of the program of the same name.
-
-    Raises
-    ------
-    InputError
-        With every fault of the file.
-    """
+    """Return all cameras that can be named; those of the user's list come before those of the program."""
     if file is None:
         return own_presets()
     findings = Findings()
@@ -82,18 +76,7 @@ def listed_cameras(root: Node | None, findings: Findings) -> dict[str, Phototheo
 
 
 def preset(name: str, known: dict[str, Phototheodolite], where: str) -> Phototheodolite:
-    """Return a camera by name.
-
-    Parameters
-    ----------
-    where : str
-        Option or key with the name, for the message.
-
-    Raises
-    ------
-    InputError
-        When there is no camera of this name.
-    """
+    """Return a camera by name, or refuse a name that no camera has; `where` is the option or key of it."""
     if name not in known:
         fix = suggestion(name, known) or "give --principal-distance, or a list of your own with --presets"
         message = f"there is no camera `{shown(name)}`"

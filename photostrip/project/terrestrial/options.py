@@ -54,13 +54,7 @@ def chosen_camera(
     principal_point: str | None = None,
     photo_format: str | None = None,
 ) -> Phototheodolite:
-    """Return the camera that the options name: one of a list, with what is given instead of the list's numbers.
-
-    Raises
-    ------
-    InputError
-        With everything that is wrong with the options.
-    """
+    """Return the camera that the options name: one of a list, with what is given instead of the list's numbers."""
     if name is None and principal_distance is None:
         expected = f"one of {', '.join(read_presets(presets))}, or --principal-distance"
         raise InputError(Fault("nothing says which camera it is", "no-camera", key="--camera", expected=expected))
@@ -97,13 +91,7 @@ def theodolite_sigmas(horizontal: float, vertical: float | None, rounds: int) ->
 
 
 def pair(option: str, text: str) -> tuple[float, float]:
-    """Read two numbers with a comma between them.
-
-    Raises
-    ------
-    InputError
-        When it is something else.
-    """
+    """Read two numbers with a comma between them, or refuse what is something else."""
     parts = text.split(",")
     try:
         if len(parts) == 2:
@@ -119,13 +107,7 @@ def _pair_within(option: str, text: str, limits: Range) -> tuple[float, float]:
 
 
 def attitude(alpha: float, omega: float, kappa: float, unit: str) -> Attitude:
-    """Return the attitude of a camera, whose angles are in deg or gon.
-
-    Raises
-    ------
-    InputError
-        When one of them is no number, or the camera looks straight up or down.
-    """
+    """Return the attitude of a camera by its angles in deg or gon; one that looks straight up or down is refused."""
     for option, value in (("--alpha", alpha), ("--omega", omega), ("--kappa", kappa)):
         within(option, value, DEGREES if unit == "deg" else GON)
     angles = (alpha * RADIANS[unit], omega * RADIANS[unit], kappa * RADIANS[unit])
@@ -148,25 +130,13 @@ class Points(NamedTuple):
 
 
 def image_points(file: str | None, at: Sequence[str], unit: str) -> Points:
-    """Read image points from a table ``point,x,z``, or from the command line.
-
-    Raises
-    ------
-    InputError
-        With every fault.
-    """
+    """Read image points from a table ``point,x,z``, or from the command line."""
     points = _points(file, at, IMAGE_POINTS, COORDINATE.scaled(MILLIMETRES[unit], unit))
     return points._replace(values=points.values * MILLIMETRES[unit])
 
 
 def direction_points(file: str | None, at: Sequence[str], camera: Phototheodolite, looking: Attitude) -> Points:
-    """Read directions from a table ``point,lambda,beta``, or from the command line.
-
-    Raises
-    ------
-    InputError
-        With every fault; what the photo cannot show is one.
-    """
+    """Read directions from a table ``point,lambda,beta`` or the command line; refuse what the photo cannot show."""
     points = _points(file, at, DIRECTION_POINTS, DEGREES.scaled(1.0, looking.unit))
     directions = points.values * RADIANS[looking.unit]
     steep = np.abs(directions[:, 1]) > STEEPEST
@@ -206,7 +176,7 @@ def _points(file: str | None, at: Sequence[str], layout: Sequence[Column], limit
         raise InputError(findings.faults)
     refuse_outside(read.table, names, limits, findings)
     findings.stop()
-    return Points(read.ids, read.columns(*names), tuple(findings.notes), read)
+    return Points(read.ids, read.table.columns(*names), tuple(findings.notes), read)
 
 
 class SightingOptions(NamedTuple):
@@ -219,23 +189,9 @@ class SightingOptions(NamedTuple):
 
 
 def read_sightings(file: str, options: SightingOptions) -> tuple[Sightings, tuple[Note, ...]]:
-    """Read the points of a photo with their directions.
+    """Read the points of a photo with their directions ``point,x,z,lambda,beta[,sx,sz][,s_lambda,s_beta]``.
 
-    Parameters
-    ----------
-    file : str
-        Table ``point,x,z,lambda,beta[,sx,sz][,s_lambda,s_beta]``; standard deviations in the unit of the coordinates
-        and in seconds of arc. One of lambda and beta may be empty.
-
-    Returns
-    -------
-    Sightings
-        Points; millimetres and radians.
-
-    Raises
-    ------
-    InputError
-        With every fault.
+    Standard deviations are in the unit of the coordinates and in seconds of arc. One of lambda and beta may be empty.
     """
     findings = Findings()
     read = read_points(file, SIGHTINGS, findings)
@@ -246,7 +202,7 @@ def read_sightings(file: str, options: SightingOptions) -> tuple[Sightings, tupl
     refuse_outside(read.table, ("sx", "sz"), IMAGE_SIGMA, findings, scale=scale, unit=options.unit)
     refuse_outside(read.table, ("s_lambda", "s_beta"), DIRECTION_SIGMA, findings)
     refuse_outside(read.table, ("lambda",), DEGREES, findings, unit=options.angles)
-    directions = read.columns("lambda", "beta")
+    directions = read.table.columns("lambda", "beta")
     for row in np.flatnonzero(np.isnan(directions).all(axis=1)):
         if not findings.number(file):
             message = f"neither direction to point {read.ids[row]} is given"
@@ -256,11 +212,11 @@ def read_sightings(file: str, options: SightingOptions) -> tuple[Sightings, tupl
         expected = "an elevation between -90 and 90 degrees, not a zenith distance"
         findings.add(read.table.fault(int(row), "beta", message, "range", expected=expected))
     findings.stop()
-    image, angular = read.columns("sx", "sz") * scale, read.columns("s_lambda", "s_beta")
+    image, angular = read.table.columns("sx", "sz") * scale, read.table.columns("s_lambda", "s_beta")
     usual = np.array([options.theodolite.horizontal, options.theodolite.vertical]) / options.theodolite.rounds**0.5
     sightings = Sightings(
         ids=read.ids,
-        xz=read.columns("x", "z") * scale,
+        xz=read.table.columns("x", "z") * scale,
         directions=directions * RADIANS[options.angles],
         sigma_xz=np.where(np.isnan(image), options.sigma, image),
         sigma_directions=np.where(np.isnan(angular), usual, angular) / ARCSECONDS,
@@ -269,18 +225,7 @@ def read_sightings(file: str, options: SightingOptions) -> tuple[Sightings, tupl
 
 
 def free_elements(text: str | None) -> tuple[str, ...]:
-    """Read what is to be determined besides the angles.
-
-    Returns
-    -------
-    tuple of str
-        Keys of ``orientation.FREE``.
-
-    Raises
-    ------
-    InputError
-        When a name is not known.
-    """
+    """Read what is to be determined besides the angles: keys of ``orientation.FREE``."""
     names = tuple(part.strip() for part in (text or "").split(",") if part.strip())
     unknown = [name for name in names if name not in FREE]
     if unknown:

@@ -35,13 +35,7 @@ SIGNIFICANCE = Range(1e-6, 0.5, "")
 
 
 def within(option: str, value: float, limits: Range) -> float:
-    """Require that the value of an option lies within limits.
-
-    Raises
-    ------
-    InputError
-        When it lies outside.
-    """
+    """Return the value of an option, or refuse one outside limits."""
     if not limits.holds(value):
         raise InputError(Fault(f"{value:g} is out of range", "range", key=option, expected=str(limits)))
     return value
@@ -50,15 +44,7 @@ def within(option: str, value: float, limits: Range) -> float:
 def refuse_outside(
     table: Table, columns: Sequence[str], limits: Range, findings: Findings, *, scale: float = 1.0, unit: str = ""
 ) -> None:
-    """Refuse numbers of a table outside limits; empty cells do not count.
-
-    Parameters
-    ----------
-    scale : float
-        How much of the unit of the limits one unit of the table is.
-    unit : str
-        Unit of the table; default: that of the limits.
-    """
+    """Refuse numbers of a table outside limits in its unit; empty cells do not count."""
     bounds = limits.scaled(scale, unit)
     for name in columns:
         values = table.column(name)

@@ -58,17 +58,12 @@ class Wanted:
 
 
 def read_series(file: str, table: Table, centre: Floats, wanted: Wanted, findings: Findings) -> Series | None:
-    """Read a table of measurements.
+    """Read a table of measurements, in mm, reduced to the principal points, z up; None when there are faults.
 
     Parameters
     ----------
     centre : ndarray, shape (2, 2)
         Principal points of the left and right camera in mm, z up.
-
-    Returns
-    -------
-    Series or None
-        Measurements in mm, reduced to the principal points, z up; None when there are faults.
     """
     reader = read_coordinates if table.kind == "coordinates" else read_pseudo_parallaxes
     read = reader(file, findings)
@@ -153,7 +148,7 @@ def _from_coordinates(
     where = (number[rows], read.point[rows], read.side[rows])
     flip = np.array([1.0, -1.0 if table.z_axis == "down" else 1.0])
     scale = MILLIMETRES[table.unit]
-    coordinates[where] = read.columns("x", "z")[rows] * scale * flip - centre[read.side[rows]]
+    coordinates[where] = read.table.columns("x", "z")[rows] * scale * flip - centre[read.side[rows]]
     own[where] = (sigma[rows] * scale) ** 2
     flat = (*shape[:2], 4)
     return coordinates.reshape(flat), own.reshape(flat), np.zeros(flat[1:])
@@ -179,7 +174,7 @@ def _from_pseudo_parallaxes(
     shape = (len(epochs), len(read.points), 4)
     coordinates, own = np.full(shape, np.nan), np.zeros(shape)
     coordinates[0] = first
-    change = read.columns("dx", "dz", "dx_right", "dz_right")[rows] * scale
+    change = read.table.columns("dx", "dz", "dx_right", "dz_right")[rows] * scale
     coordinates[number[rows], read.point[rows]] = first[read.point[rows]] + change
     own[1:] = 1.0
     own[number[rows], read.point[rows]] = (sigma_d[rows] * MILLIMETRES[table.unit]) ** 2
@@ -192,7 +187,7 @@ def _filled(
     read: EpochTable, columns: tuple[str, ...], usual: float | None, key: str, findings: Findings
 ) -> Floats | None:
     """Give standard deviations row by row, in the unit of the table."""
-    sigma = read.columns(*columns)
+    sigma = read.table.columns(*columns)
     missing = np.flatnonzero(np.isnan(sigma).any(axis=1))
     if usual is not None:
         return np.where(np.isnan(sigma), usual, sigma)

@@ -51,13 +51,7 @@ class Survey:
 
 
 def load_survey(path: Path, overrides: Sequence[str] = ()) -> Survey:
-    """Read a terrestrial project and its table.
-
-    Raises
-    ------
-    InputError
-        With every fault of every file.
-    """
+    """Read a terrestrial project and its table, or raise every fault of every file."""
     reading = Reading.of(str(path), overrides)
     checked = reading.checked(TerrestrialFile)
     cameras = _cameras(checked, reading) if checked is not None else []
@@ -85,13 +79,7 @@ def load_normal_case(
     stable: Sequence[str],
     settings: MonitoringSettings,
 ) -> Survey:
-    """Read a table of pseudo-parallaxes or coordinates of the normal case, without a project file.
-
-    Raises
-    ------
-    InputError
-        With every fault of the table.
-    """
+    """Read a table of the normal case, without a project file, or raise its faults."""
     findings = Findings()
     centre = np.array([camera.principal_point] * 2)
     series = read_series(file, table, centre, Wanted(stable=tuple(stable)), findings)

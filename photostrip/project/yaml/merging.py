@@ -22,30 +22,16 @@ LONGEST_CHAIN = 8
 
 
 def path_of(node: Node, project: str) -> str:
-    """Path of the file that a value names.
+    """Return the path of the file that a value names, as the user could type it.
 
-    Parameters
-    ----------
-    project : str
-        Path of the project file; values from the command line are relative to it.
-
-    Returns
-    -------
-    str
-        The path as the user could type it: relative to where `project` is relative to.
+    Values from the command line are relative to the project file.
     """
     owner = project if node.place.file == COMMAND_LINE else node.place.file
     return str(FilePath(owner).parent / node.text)  # `..` stays: behind a link it does not cancel the folder before it
 
 
 def read_tree(file: str, findings: Findings, files: list[str]) -> Node | None:
-    """Read a project file and what it extends.
-
-    Returns
-    -------
-    Node or None
-        The project; None when the file cannot be read.
-    """
+    """Read a project file and what it extends; None when the file cannot be read."""
     files.append(file)
     root = read_document(file, findings)
     if root is None:
@@ -92,17 +78,9 @@ def where_named(fault: Fault, owner: Node, key: Path) -> Fault:
 
 
 def merge(base: Node, own: Node) -> Node:
-    """Lay one tree over another: mappings are merged, lists and values replaced.
+    """Lay one tree over another: mappings are merged, lists and values replaced; where both have a value, `own` counts.
 
-    Parameters
-    ----------
-    base, own : Node
-        Trees; where both say something, `own` counts.
-
-    Returns
-    -------
-    Node
-        The merged tree; every value keeps the place where it stands.
+    Every value keeps the place where it stands.
     """
     if not (isinstance(base.value, dict) and isinstance(own.value, dict)):
         return own
@@ -113,14 +91,9 @@ def merge(base: Node, own: Node) -> Node:
 
 
 def override(root: Node, assignments: Sequence[str], findings: Findings) -> Node:
-    """Apply ``path=value`` assignments.
+    """Apply ``path=value`` assignments, the value being YAML, such as ``strips[0].camera=RC30``.
 
-    Parameters
-    ----------
-    assignments : sequence of str
-        For example ``processing.relative.grubbs_alpha=0.01`` or ``strips[0].camera=RC30``; the value is YAML.
-    findings : Findings
-        Where faults go; unknown keys are found by the schema later.
+    Unknown keys are found by the schema later.
     """
     for assignment in assignments:
         name, equals, text = assignment.partition("=")

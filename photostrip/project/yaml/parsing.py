@@ -29,13 +29,7 @@ _CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x84\x86-\x9f\ufffe\ufff
 
 
 def read_document(file: str, findings: Findings) -> Node | None:
-    """Read a YAML file.
-
-    Returns
-    -------
-    Node or None
-        Its mapping; None when it cannot be read further.
-    """
+    """Read a YAML file as a mapping; None when it cannot be read further."""
     findings.meet(file)
     try:
         text, marked = decode(file, read_bytes(file, LARGEST_PROJECT))
@@ -59,13 +53,7 @@ def read_document(file: str, findings: Findings) -> Node | None:
 
 
 def parse(text: str, file: str, findings: Findings) -> Node | None:
-    """Turn YAML text into a tree.
-
-    Returns
-    -------
-    Node or None
-        The tree; None when it cannot be trusted. A text without content gives an empty text.
-    """
+    """Turn YAML text into a tree; None when it cannot be trusted. A text without content gives an empty text."""
     bad = _CONTROL.search(text)
     if bad:
         line = text.count("\n", 0, bad.start()) + 1

@@ -34,13 +34,7 @@ class Reading:
 
     @classmethod
     def of(cls, file: str, assignments: Sequence[str] = ()) -> Reading:
-        """Read a file and apply what the command line sets.
-
-        Raises
-        ------
-        InputError
-            When the file cannot be read as YAML.
-        """
+        """Read a file and apply what the command line sets, or raise why it is no YAML."""
         findings, files = Findings(), list[str]()
         root = read_tree(file, findings, files)
         if root is None:
@@ -56,13 +50,7 @@ class Reading:
         return checked(kind, self.root, self.findings)
 
     def complete(self, read: T | None) -> T:
-        """Return what was read.
-
-        Raises
-        ------
-        InputError
-            With every fault of every file.
-        """
+        """Return what was read, or raise every fault of every file."""
         self.findings.stop()
         if read is None:  # cannot be: whatever is not read has a fault, and stop() raised it
             raise InputError(f"{self.file} is not valid")
@@ -108,12 +96,6 @@ class Reading:
 
 
 def read_file(kind: type[S], file: str, assignments: Sequence[str] = ()) -> tuple[S, Reading]:
-    """Read a file of a kind.
-
-    Raises
-    ------
-    InputError
-        With every fault of every file.
-    """
+    """Read a file of a kind, or raise every fault of every file."""
     reading = Reading.of(file, assignments)
     return reading.read(kind), reading

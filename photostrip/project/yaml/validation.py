@@ -30,13 +30,7 @@ EXPECTED = {
 
 
 def checked(kind: type[T], root: Node, findings: Findings) -> T | None:
-    """Check a file against its schema.
-
-    Returns
-    -------
-    Section or None
-        The file with types and defaults; None when there are faults.
-    """
+    """Return a file with types and defaults; None when there are faults."""
     try:
         return kind.model_validate(root.plain)
     except ValidationError as error:
@@ -47,17 +41,9 @@ def checked(kind: type[T], root: Node, findings: Findings) -> T | None:
 
 
 def valid_section(kind: type[T], node: Node | None) -> T | None:
-    """Return one section of a project of which other parts may be at fault.
+    """Return one section of a project of which other parts may be at fault; that of all defaults without a node.
 
-    Parameters
-    ----------
-    node : Node or None
-        Where it stands; None gives the section of all defaults.
-
-    Returns
-    -------
-    Section or None
-        The section; None when it is at fault itself, which ``checked`` reports.
+    None when it is at fault itself, which ``checked`` reports.
     """
     try:
         return kind.model_validate({} if node is None else node.plain)
@@ -164,13 +150,7 @@ def _described(schema: Model, path: Path) -> str:
 
 @cache
 def homes(schema: Model) -> dict[str, str]:
-    """Where keys belong that stand below another one: name of the key to the path above it.
-
-    Returns
-    -------
-    dict of str to str
-        For example ``grubbs_alpha`` to ``processing.relative``.
-    """
+    """Return the path above each key that stands below another one: ``processing.relative`` for ``grubbs_alpha``."""
     found: dict[str, str] = {}
 
     def walk(model: type[BaseModel], above: str) -> None:

@@ -18,13 +18,7 @@ PLACES_SHOWN = 6
 
 
 def strip_sections(document: Document) -> tuple[Section, ...]:
-    """Make the report of the plan of a strip.
-
-    Returns
-    -------
-    tuple of Section
-        What was asked for, accuracy, along the strip, reliability; bands needed and best places when asked for.
-    """
+    """Make the report of the plan of a strip, with bands needed and best places when asked for."""
     near = "near each photo, m"
     sections = [
         Section("", (Facts(_facts(document)), _layouts(document))),

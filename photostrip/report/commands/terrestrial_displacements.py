@@ -16,13 +16,7 @@ VERDICTS = {True: "moved", False: "", None: "not tested"}
 
 
 def displacement_report(document: Document) -> tuple[str, tuple[Section, ...]]:
-    """Return the report of displacements.
-
-    Returns
-    -------
-    sections : tuple of Section
-        Verdict and set-up, the cameras, displacements of each epoch, rates, notes.
-    """
+    """Return the report of displacements: verdict and set-up, the cameras, each epoch, rates, notes."""
     sections = [_overview(document)]
     if any(row["determined"] for row in document["cameras"]):
         sections.append(_camera_section(document))
