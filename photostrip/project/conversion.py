@@ -6,7 +6,7 @@ Here the user's units, axes and directions end: inside there are millimetres wit
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -114,13 +114,10 @@ def photo_points(read: Measurements, system: ImageSystem, photos: Mapping[str, c
 
     The origin is the middle of the photo, unless `system` has its own. Rows of other photos than `photos` are left out.
     """
-    wanted = np.array([name in photos for name in read.photo_ids], bool)
-    rows = np.flatnonzero(wanted[read.photo])
+    rows = np.flatnonzero(np.array([name in photos for name in read.photo_ids], bool)[read.photo])
     owners = [photos.get(name) for name in read.photo_ids]
     scale = _per_photo([_millimetres(system.unit, each) for each in owners], read, rows)
-    sigma = read.sigma[rows]
-    if system.sigma is not None:
-        sigma = np.where(np.isnan(sigma), system.sigma, sigma)
+    sigma = _filled(read.sigma[rows], system.sigma)
     xy = _scaled(read.xy[rows], scale)
     if system.y_axis == "down":
         xy[:, 1] = -xy[:, 1]
@@ -129,7 +126,9 @@ def photo_points(read: Measurements, system: ImageSystem, photos: Mapping[str, c
         xy += _per_photo([_corner(each, half_pixel=half) for each in owners], read, rows)
     photo_ids, photo = _renumbered(read.photo_ids, read.photo[rows])
     point_ids, point = _renumbered(read.target_ids, read.target[rows])
-    return PhotoPoints(photo_ids, point_ids, photo, point, xy, _scaled(sigma, scale))
+    return PhotoPoints(
+        photo_ids=photo_ids, point_ids=point_ids, photo=photo, point=point, xy=xy, sigma=_scaled(sigma, scale)
+    )
 
 
 def _millimetres(unit: str, owner: camera.Camera | None) -> tuple[float, float]:
@@ -167,14 +166,14 @@ def _renumbered(ids: Sequence[str], codes: NDArray[np.intp]) -> tuple[tuple[str,
 # --------------------------------------------------------------------------------------------------- the ground
 
 
-def frame_spec(control: GivenList) -> FrameSpec:
+def frame_spec(given: GivenList) -> FrameSpec:
     """Return the frame of a list of ground coordinates."""
     return FrameSpec(
-        str(control.crs),
-        control.axes or CARTESIAN_AXES,
-        control.height,
-        control.geoid_undulation,
-        semi_axes(control.ellipsoid),
+        crs=str(given.crs),
+        axes=given.axes or CARTESIAN_AXES,
+        height=given.height,
+        geoid_undulation=given.geoid_undulation,
+        ellipsoid=semi_axes(given.ellipsoid),
     )
 
 
@@ -206,29 +205,44 @@ def output_spec(output: Output, first: FrameSpec) -> FrameSpec | None:
         if output.geoid_undulation is not None:
             spec = replace(spec, geoid_undulation=output.geoid_undulation)
         return spec if output.ellipsoid is None else replace(spec, ellipsoid=semi_axes(output.ellipsoid))
-    usual = CARTESIAN_AXES if output.crs == "geocentric" else GROUND_AXES
-    height, ellipsoid = output.height or "ellipsoidal", semi_axes(output.ellipsoid)
-    return FrameSpec(str(output.crs), output.axes or usual, height, output.geoid_undulation, ellipsoid)
+    return FrameSpec(
+        crs=str(output.crs),
+        axes=output.axes or (CARTESIAN_AXES if output.crs == "geocentric" else GROUND_AXES),
+        height=output.height or "ellipsoidal",
+        geoid_undulation=output.geoid_undulation,
+        ellipsoid=semi_axes(output.ellipsoid),
+    )
 
 
 def control_points(tables: Sequence[ControlTable], lists: Sequence[Control]) -> ControlPoints:
     """Put the used points of all control lists into one table; ``frame`` counts in `lists`."""
-    ids: list[str] = []
-    parts = []
-    for number, (read, given) in enumerate(zip(tables, lists, strict=True)):
-        rows = np.flatnonzero(read.used)
-        sigma = read.sigma[rows]
-        if given.sigma is not None:
-            sigma = np.where(np.isnan(sigma), given.sigma, sigma)
-        columns = _columns(frame_spec(given))
-        xyz, use = read.xyz[rows][:, columns], read.use[rows][:, columns]
-        parts.append((xyz, use, read.check[rows], sigma[:, columns], np.full(len(rows), number, np.intp)))
-        ids += [read.ids[row] for row in rows]
-    if not parts:
-        nothing = np.zeros((0, 3))
-        return ControlPoints((), nothing, nothing.astype(bool), np.zeros(0, bool), nothing, np.zeros(0, np.intp))
-    enu, use, check, sigma, frame = (np.concatenate(each) for each in zip(*parts, strict=True))
-    return ControlPoints(tuple(ids), enu, use, check, sigma, frame)
+    parts = [_control_points(*each, number) for number, each in enumerate(zip(tables, lists, strict=True))]
+    nothing = np.zeros((0, 3))
+
+    def joined(name: str, empty: NDArray[Any]) -> NDArray[Any]:
+        return np.concatenate([getattr(part, name) for part in parts]) if parts else empty
+
+    return ControlPoints(
+        ids=tuple(name for part in parts for name in part.ids),
+        enu=joined("enu", nothing),
+        use=joined("use", nothing.astype(bool)),
+        check=joined("check", np.zeros(0, bool)),
+        sigma=joined("sigma", nothing),
+        frame=joined("frame", np.zeros(0, np.intp)),
+    )
+
+
+def _control_points(read: ControlTable, given: Control, number: int) -> ControlPoints:
+    """Return the used points of one list, in the internal order of axes."""
+    rows, columns = np.flatnonzero(read.used), _columns(frame_spec(given))
+    return ControlPoints(
+        ids=tuple(read.ids[row] for row in rows),
+        enu=read.xyz[rows][:, columns],
+        use=read.use[rows][:, columns],
+        check=read.check[rows],
+        sigma=_filled(read.sigma[rows], given.sigma)[:, columns],
+        frame=np.full(len(rows), number, np.intp),
+    )
 
 
 def _columns(spec: FrameSpec) -> list[int]:
@@ -244,17 +258,15 @@ def camera_positions(
     rows = np.array([row for row, name in enumerate(read.ids) if name in photos and read.used[row]], np.intp)
     spec = frame_spec(given)
     columns = _columns(spec)
-    sigma = _filled(read.sigma[rows], given.sigma)[:, columns]
-    use = read.use[rows][:, columns]
     return CameraPositions(
-        tuple(read.ids[row] for row in rows),
-        spec,
-        read.xyz[rows][:, columns],
-        use,
-        sigma,
-        read.time[rows],
-        given.lever_arm,
-        given.correction,
+        photos=tuple(read.ids[row] for row in rows),
+        frame=spec,
+        enu=read.xyz[rows][:, columns],
+        use=read.use[rows][:, columns],
+        sigma=_filled(read.sigma[rows], given.sigma)[:, columns],
+        time=read.time[rows],
+        lever_arm=given.lever_arm,
+        correction=given.correction,
     )
 
 
@@ -266,18 +278,18 @@ def given_orientations(
     spec = frame_spec(given)
     columns, radians = _columns(spec), RADIANS[given.angles.unit]
     return GivenOrientations(
-        tuple(read.ids[row] for row in rows),
-        spec,
-        read.xyz[rows][:, columns],
-        read.angles[rows] * radians,
-        given.angles.system,
-        _filled(read.sigma[rows], given.sigma)[:, columns],
-        _filled(read.sigma_angles[rows], given.sigma_angles) * radians,
-        given.role == "observed",
+        photos=tuple(read.ids[row] for row in rows),
+        frame=spec,
+        enu=read.xyz[rows][:, columns],
+        angles=read.angles[rows] * radians,
+        system=given.angles.system,
+        sigma=_filled(read.sigma[rows], given.sigma)[:, columns],
+        sigma_angles=_filled(read.sigma_angles[rows], given.sigma_angles) * radians,
+        observed=given.role == "observed",
     )
 
 
-def _filled(sigma: Floats, default: Sequence[float] | None) -> Floats:
+def _filled(sigma: Floats, default: Sequence[float] | float | None) -> Floats:
     """Put the default where a row has no standard deviation of its own."""
     return sigma if default is None else np.where(np.isnan(sigma), default, sigma)
 

@@ -14,7 +14,7 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.formats.text.source import current, seen_from
 from photostrip.geodesy.crs import grid_names
 from photostrip.geodesy.tying import tie_frames
-from photostrip.pipeline import Inputs, Settings
+from photostrip.pipeline import Inputs, ModelStrip, Settings
 from photostrip.project.conversion import (
     ImageSystem,
     camera_positions,
@@ -239,7 +239,7 @@ def _models(project: ProjectFile, tables: Tables, placed_models: Mapping[int, Se
     if project.models is None or tables.models is None:
         return None
     flights = [
-        (str(strip.id), tuple(map(str, strip.photos)), placed_models[number])
+        ModelStrip(str(strip.id), tuple(map(str, strip.photos)), tuple(placed_models[number]))
         for number, strip in enumerate(project.strips)
     ]
     return measured_models(tables.models, project.models, flights)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from photostrip.project.yaml.document import fault_at
 from photostrip.project.yaml.references import listed_photos
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -85,19 +85,17 @@ def check_models(root: Node, tables: ModelTables, findings: Findings) -> dict[in
     found: dict[int, tuple[str, ...]] = {}
     owner: dict[str, int] = {}
     for number, strip in enumerate(strips.elements if strips is not None else []):
-        listed_here, models = strip.find("photos"), strip.find("models")
-        flight = [each.text for each in listed_here.elements] if listed_here is not None else []
-        named = [each.text for each in models.elements] if models is not None else None
-        faults: list[Fault] = []
-        names = (
-            _by_centers(root, number, flight, centers, faults)
-            if named is None
-            else _as_listed(root, number, (flight, named), (tables, centers), faults)
-        )
+        photos_node, models = strip.find("photos"), strip.find("models")
+        flight = [each.text for each in photos_node.elements] if photos_node is not None else []
+        if models is None:
+            names, faults = _by_centers(root, number, flight, centers)
+        else:
+            names = [each.text for each in models.elements]
+            faults = list(_as_listed(root, number, flight, names, tables, centers))
         for place, name in enumerate(names):
             if owner.setdefault(name, number) != number or names.index(name) != place:
                 message = f"model {name} stands twice in the strips"
-                path = ("strips", number, "photos" if named is None else "models")
+                path = ("strips", number, "photos" if models is None else "models")
                 faults.append(fault_at(root, path, message, "model-twice", fix="list every model once"))
         findings.add(*faults)
         if not faults:
@@ -132,10 +130,10 @@ def _refuse_centers(
 
 
 def _by_centers(
-    root: Node, number: int, flight: Sequence[str], centers: dict[str, dict[str, int]], faults: list[Fault]
-) -> list[str]:
+    root: Node, number: int, flight: Sequence[str], centers: dict[str, dict[str, int]]
+) -> tuple[list[str], list[Fault]]:
     """Find the model of each pair of neighbouring photos by its two perspective centres."""
-    found = []
+    found, faults = [], []
     for place, pair in enumerate(pairwise(flight)):
         names = [name for name, shown in centers.items() if set(pair) <= set(shown)]
         path = ("strips", number, "photos", place + 1)
@@ -147,28 +145,27 @@ def _by_centers(
             fix = "list the models of the strip in flight order in `models`, or measure both centres"
             faults.append(fault_at(root, path, message, "no-model", fix=fix))
         found += names[:1]
-    return found
+    return found, faults
 
 
 def _as_listed(
     root: Node,
     number: int,
-    given: tuple[Sequence[str], Sequence[str]],
-    known: tuple[ModelTables, dict[str, dict[str, int]]],
-    faults: list[Fault],
-) -> list[str]:
+    flight: Sequence[str],
+    named: Sequence[str],
+    tables: ModelTables,
+    centers: dict[str, dict[str, int]],
+) -> Iterator[Fault]:
     """Check the models that a strip lists: they exist, are one fewer than photos, and show the right photos."""
-    (flight, named), (tables, centers) = given, known
     path = ("strips", number, "models")
     if len(named) != len(flight) - 1:
         message = f"{len(named)} models are listed for {len(flight)} photos"
-        faults.append(fault_at(root, path, message, "length", expected="one model for every two neighbouring photos"))
+        yield fault_at(root, path, message, "length", expected="one model for every two neighbouring photos")
     measured = list(tables.points.model_ids)
     for place, name in enumerate(named):
         if name not in measured:
             fix = suggestion(name, measured) or f"the models of {tables.points.table.file} are {listed(measured, 4)}"
-            message = f"model {name} is not measured"
-            faults.append(fault_at(root, (*path, place), message, "unknown-model", fix=fix))
+            yield fault_at(root, (*path, place), f"model {name} is not measured", "unknown-model", fix=fix)
             continue
         pair = flight[place : place + 2]
         strange = [photo for photo in centers.get(name, {}) if photo not in pair]
@@ -178,54 +175,52 @@ def _as_listed(
                 f"{strange[0]}"
             )
             fix = "put the models in flight order, or correct the id of the centre"
-            faults.append(fault_at(root, (*path, place), message, "wrong-center", fix=fix))
-    return list(named)
+            yield fault_at(root, (*path, place), message, "wrong-center", fix=fix)
 
 
 # --------------------------------------------------------------------------------------------------- conversion
 
 
-def measured_models(
-    tables: ModelTables, given: Models, strips: Sequence[tuple[str, Sequence[str], Sequence[str]]]
-) -> MeasuredModels:
+def measured_models(tables: ModelTables, given: Models, strips: Sequence[ModelStrip]) -> MeasuredModels:
     """Bring the model coordinates of the strips into millimetres and right-handed axes."""
-    photos = [photo for _, names, _ in strips for photo in names]
-    flights = tuple(ModelStrip(name, tuple(shown), tuple(models)) for name, shown, models in strips)
-    wanted = [model for strip in flights for model in strip.models]
+    photos = [photo for strip in strips for photo in strip.photos]
+    wanted = [model for strip in strips for model in strip.models]
     factor = MILLIMETRES[given.unit]
     hand = np.array([1.0, -1.0 if given.axes == "left-handed" else 1.0, 1.0])
     points, centers = tables.points, tables.centers
     is_center = np.zeros(len(points.table), bool)
     is_center[tables.center_rows(photos)] = True
-    parts = [
-        _rows(points, np.flatnonzero(~is_center), wanted, given.sigma),
-        _rows(points, np.flatnonzero(is_center), wanted, given.center_sigma or given.sigma),
-    ]
+    measured = _rows(points, np.flatnonzero(~is_center), wanted, given.sigma)
+    parts = [measured, _rows(points, np.flatnonzero(is_center), wanted, given.center_sigma or given.sigma)]
     if centers is not None:
         parts.append(_rows(centers, np.arange(len(centers.table)), wanted, given.center_sigma or given.sigma))
-    point_ids = tuple(dict.fromkeys(parts[0][1]))
+    point_ids = tuple(dict.fromkeys(measured.targets))
     number = {name: k for k, name in enumerate(point_ids)}
     center = {name: len(point_ids) + k for k, name in enumerate(photos)}
-    node = [number[name] for name in parts[0][1]] + [center[name] for part in parts[1:] for name in part[1]]
+    node = [number[name] for name in measured.targets] + [center[name] for part in parts[1:] for name in part.targets]
     model = {name: k for k, name in enumerate(wanted)}
-    return MeasuredModels(
-        flights,
-        ModelPoints(
-            tuple(wanted),
-            point_ids,
-            tuple(photos),
-            np.array([model[name] for part in parts for name in part[0]], np.intp),
-            np.array(node, np.intp),
-            np.concatenate([part[2] for part in parts]) * factor * hand,
-            np.concatenate([part[3] for part in parts]) * factor,
-        ),
+    model_points = ModelPoints(
+        model_ids=tuple(wanted),
+        point_ids=point_ids,
+        photo_ids=tuple(photos),
+        model=np.array([model[name] for part in parts for name in part.models], np.intp),
+        node=np.array(node, np.intp),
+        xyz=np.concatenate([part.xyz for part in parts]) * factor * hand,
+        sigma=np.concatenate([part.sigma for part in parts]) * factor,
     )
+    return MeasuredModels(tuple(strips), model_points)
 
 
-def _rows(
-    read: ModelTable, rows: Numbers, wanted: Sequence[str], default: Sequence[float] | None
-) -> tuple[list[str], list[str], Floats, Floats]:
-    """Models, ids, coordinates and standard deviations of some rows, as far as their model is in a strip."""
+class _Rows(NamedTuple):
+    """Rows of a table of model coordinates whose model is in a strip."""
+
+    models: list[str]
+    targets: list[str]
+    xyz: Floats
+    sigma: Floats
+
+
+def _rows(read: ModelTable, rows: Numbers, wanted: Sequence[str], default: Sequence[float] | None) -> _Rows:
     known = set(wanted)
     inside = np.array([name in known for name in read.model_ids], bool)
     rows = rows[inside[read.models[rows]]]
@@ -233,7 +228,7 @@ def _rows(
     if default is not None:
         sigma = np.where(np.isnan(sigma), default, sigma)
     models = [read.model_ids[code] for code in read.models[rows]]
-    return models, [read.target_ids[code] for code in read.targets[rows]], read.xyz[rows], sigma
+    return _Rows(models, [read.target_ids[code] for code in read.targets[rows]], read.xyz[rows], sigma)
 
 
 def named_points(models: MeasuredModels) -> PhotoPoints:

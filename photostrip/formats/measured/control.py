@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photostrip.formats.measured.columns import AXES, POINT, SIGMAS, numbers, sigmas
-from photostrip.formats.text.tables import Column, Table, read_table
+from photostrip.formats.text.table_reader import read_table
+from photostrip.formats.text.tables import Column, Table
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

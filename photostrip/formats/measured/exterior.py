@@ -21,7 +21,8 @@ from photostrip.formats.measured.columns import (
     sigmas,
 )
 from photostrip.formats.measured.control import USE, GivenTable, given_columns, refuse_empty
-from photostrip.formats.text.tables import Column, Table, read_table
+from photostrip.formats.text.table_reader import read_table
+from photostrip.formats.text.tables import Column, Table
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.formats.measured.columns import AXES, PHOTO, POINT, SIGMAS, numbers, refuse_without_sigma, sigmas
-from photostrip.formats.text.tables import Column, Table, read_table
+from photostrip.formats.text.table_reader import read_table
+from photostrip.formats.text.tables import Column, Table
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

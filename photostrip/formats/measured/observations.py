@@ -13,7 +13,8 @@ import numpy as np
 from photostrip.formats.measured import pairs, repeated
 from photostrip.formats.measured.columns import PHOTO, POINT, numbers, refuse_without_sigma, sigmas
 from photostrip.formats.measured.measurements import Measurements
-from photostrip.formats.text.tables import Column, read_table
+from photostrip.formats.text.table_reader import read_table
+from photostrip.formats.text.tables import Column
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.formats.measured.columns import POINT, repeated_rows
-from photostrip.formats.text.tables import Column, Table, read_table
+from photostrip.formats.text.table_reader import read_table
+from photostrip.formats.text.tables import Column, Table
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

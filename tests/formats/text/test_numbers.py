@@ -9,7 +9,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from photostrip.formats.text.numbers import LARGEST, NotANumber, number, shown
-from photostrip.formats.text.tables import _fast_floats
+from photostrip.formats.text.table_reader import _fast_floats
 
 
 @given(st.floats(-LARGEST, LARGEST))

@@ -15,9 +15,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from photostrip.formats.measured.observations import OBSERVATIONS, read_measurements
-from photostrip.formats.text import table_text, tables
+from photostrip.formats.text import table_reader, table_text
 from photostrip.formats.text.findings import LARGEST_LIST, Findings, counted, listed, suggestion
-from photostrip.formats.text.tables import read_table
+from photostrip.formats.text.table_reader import read_table
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -41,7 +41,7 @@ def write(path: Path, text: str | bytes) -> Path:
 
 @pytest.mark.parametrize("chunk", [1, 2, 3, 1000])
 def test_chunks_do_not_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, chunk: int) -> None:
-    monkeypatch.setattr(tables, "CHUNK", chunk)
+    monkeypatch.setattr(table_reader, "CHUNK", chunk)
     rows = [(f"p{i % 3}", f"Q{i}", i / 7, -i / 3) for i in range(10)]
     text = HEADER + "\n".join(",".join(map(str, row)) + "\n" * (i % 2) for i, row in enumerate(rows))
     findings = Findings()
@@ -56,7 +56,7 @@ def test_chunks_do_not_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, chu
 
 
 def test_ten_thousand_rows_of_several_chunks(tmp_path: Path) -> None:
-    n = 2 * tables.CHUNK + 5
+    n = 2 * table_reader.CHUNK + 5
     text = HEADER + "".join(f"{i // 100},P{i % 100},{i}.5,-{i}\n" for i in range(n))
     findings = Findings()
     read = read_measurements(str(write(tmp_path / "o.csv", text)), findings)

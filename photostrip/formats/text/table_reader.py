@@ -1,0 +1,381 @@
+"""Reading a CSV table with a header.
+
+Whole columns are converted at once. Only where that fails is a column read cell by cell, to say which cell it was;
+so a clean table costs next to nothing and a wrong one is explained.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from dataclasses import replace
+from itertools import islice
+from operator import itemgetter
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import Fault, InputError
+from photostrip.formats.text.files import BYTE_ORDER_MARK
+from photostrip.formats.text.findings import counted, listed, suggestion
+from photostrip.formats.text.numbers import LARGEST, SMALLEST, NotANumber, number, shown
+from photostrip.formats.text.table_text import TableText, content
+from photostrip.formats.text.tables import CONTROL_CHARACTER, Table
+from photostrip.notes import Note
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.formats.text.findings import Findings
+    from photostrip.formats.text.tables import Column
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+    Cells = tuple[str, ...]
+
+CHUNK = 16_384  # rows turned into columns at a time, so that a big table never stands in memory cell by cell
+STANDARD_DEVIATIONS = {"s", "sd", "std", "sigma", "stdev", "accuracy", "precision"}  # one column for all coordinates
+SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "vertical bars"}
+
+
+def read_table(
+    file: str,
+    layout: Sequence[Column],
+    findings: Findings,
+    *,
+    others: Sequence[Sequence[Column]] = (),
+    columns: Mapping[str, str] | None = None,
+    rewritten: Callable[[bytes], bytes] | None = None,
+) -> Table | None:
+    """Read a table; None when not even the header can be read.
+
+    Parameters
+    ----------
+    others : sequence of sequence of Column
+        Other layouts of the same kind of table; that of which the header has most is taken, the first when in doubt.
+    columns : mapping of str to str, optional
+        Names in the header of columns that the user calls otherwise.
+    rewritten : callable, optional
+        Makes a table, line for line, of the text of another layout; gives a table as it is.
+    """
+    findings.meet(file)
+    try:
+        data, marked = content(file)
+    except InputError as error:
+        findings.extend(error)
+        return None
+    if marked:
+        findings.notes.append(Note("byte-order-mark", BYTE_ORDER_MARK, "note", file=file, line=1))
+    data = data if rewritten is None else rewritten(data)
+    layouts = [_renamed(each, columns or {}) for each in (layout, *others)]
+    return _Reader(TableText(file, data), layouts, findings).read()
+
+
+def _renamed(layout: Sequence[Column], columns: Mapping[str, str]) -> tuple[Column, ...]:
+    """Return a layout the names that the user has for its columns; nothing else is read for those."""
+    return tuple(
+        replace(column, header=columns[column.name].strip().casefold(), required=True)
+        if column.name in columns
+        else column
+        for column in layout
+    )
+
+
+class _Codes(dict[str, int]):
+    """Numbers for ids, given out in order of first appearance."""
+
+    def __missing__(self, key: str) -> int:
+        self[key] = code = len(self)
+        return code
+
+
+class _Reader:
+    """One pass over one table."""
+
+    def __init__(self, source: TableText, layouts: Sequence[Sequence[Column]], findings: Findings) -> None:
+        self.source, self.layouts, self.findings = source, layouts, findings
+        self.layout = layouts[0]
+        self.rows = csv.reader(source.stream(), strict=True, skipinitialspace=True)
+        self.width = 0
+        self.columns: list[Column] = []
+        self.lines: list[Numbers] = []
+        self.numbers: dict[str, list[Floats]] = {}
+        self.codes: dict[str, list[Numbers]] = {}
+        self.index: dict[str, _Codes] = {}
+
+    def read(self) -> Table | None:
+        if not self._header():
+            return None
+        for rows, lines in self._chunks():
+            self._take(rows, lines)
+        places = np.concatenate([np.zeros(0, np.intp), *self.lines])
+        if not len(places) and not self.findings.number(self.source.file):
+            fault = Fault("has a header but no rows", code="no-rows", file=self.source.file, line=1)
+            self.findings.add(fault)
+        numbers = {name: np.concatenate([np.zeros(0), *parts]) for name, parts in self.numbers.items()}
+        codes, ids = {}, {}
+        for column in self.columns:
+            if not column.number:
+                parts = [np.zeros(0, np.intp), *self.codes[column.name]]
+                codes[column.name], ids[column.name] = self._clean(column, np.concatenate(parts), places)
+        return Table(self.source.file, places, numbers, codes, ids, self.source)
+
+    def _add(self, line: int, column: str, message: str, code: str, *, expected: str = "", fix: str = "") -> None:
+        if self.findings.full(self.source.file):
+            self.findings.count(self.source.file, 1)
+        else:
+            self.findings.add(self.source.fault(line, column, message, code, expected=expected, fix=fix))
+
+    # ---------------------------------------------------------------------------------------- the header
+
+    def _header(self) -> bool:
+        """Read the header; False when the table cannot be read without it."""
+        try:
+            cells = next((row for row in self.rows if any(map(str.strip, row))), [])
+        except csv.Error as error:
+            self._unreadable(error, 1)
+            return False
+        line = self.rows.line_num
+        names = [cell.strip() for cell in cells]
+        while names and not names[-1]:
+            names.pop()
+        self.width = len(names)
+        before = self.findings.number(self.source.file)
+        self.layout = self._fitting({name.casefold() for name in names})
+        if self._looks_like_a_header(names, line):
+            self._assign(names, line)
+        return self.findings.number(self.source.file) == before
+
+    def _fitting(self, names: set[str]) -> Sequence[Column]:
+        """Layout that misses the fewest of its columns, of those the one that has most; the first when in doubt."""
+
+        def unlike(layout: Sequence[Column]) -> tuple[int, int]:
+            found = [bool(names & set(column.accepted)) for column in layout if column.required]
+            return len(found) - sum(found), -sum(found)
+
+        return min(self.layouts, key=unlike)
+
+    def _looks_like_a_header(self, names: list[str], line: int) -> bool:
+        """Refuse a first line that is not a header, and say what it is instead."""
+        wanted = ",".join(column.name for column in self.layout if column.required)
+        if not names:
+            self._add(1, "", "has no header and no rows", "no-header", expected=f"a header `{wanted}`")
+            return False
+        other = next((mark for mark in SEPARATORS if mark in names[0]), "") if len(names) <= 2 else ""
+        if other:
+            message = f"fields are separated by {SEPARATORS[other]}"
+            fix = "save as CSV with commas between the fields and points in the numbers"
+            self._add(line, "", message, "separator", expected="commas", fix=fix)
+            return False
+        known = {alias for column in self.layout for alias in column.accepted}
+        if not {name.casefold() for name in names} & known:
+            message = f"the first line `{shown(','.join(names))}` is not a header"
+            self._add(line, "", message, "no-header", expected=f"column names such as `{wanted}`")
+            return False
+        return True
+
+    def _assign(self, names: list[str], line: int) -> None:
+        """Find the columns of the format among the names of the header."""
+        unused = dict(enumerate(names))
+        for column in self.layout:
+            places = [place for place, name in unused.items() if name.casefold() in column.accepted]
+            if places:
+                self.columns.append(column)
+                self.source.where[column.name] = places[0]
+                self.source.header[column.name] = names[places[0]]
+            for place in places:
+                del unused[place]
+            for place in places[1:]:
+                message = f"column `{names[place]}` stands twice in the header (fields {places[0] + 1} and {place + 1})"
+                self._add(line, column.name, message, "duplicate-column", fix="remove or rename one")
+        self._missing(unused, line)
+        self._extra(unused, line)
+        for column in self.columns:
+            if column.number:
+                self.numbers[column.name] = []
+            else:
+                self.codes[column.name], self.index[column.name] = [], _Codes()
+
+    def _missing(self, unused: dict[int, str], line: int) -> None:
+        for column in self.layout:
+            if column.required and column not in self.columns:
+                expected = ",".join(each.name for each in self.layout if each.required)
+                message = f"there is no column `{column.header or column.name}`"
+                near = suggestion(column.name, unused.values()) if len(column.name) > 1 else ""
+                fix = near or f"found: {', '.join(shown(name) or '(no name)' for name in self._names(unused))}"
+                self._add(line, column.name, message, "missing-column", expected=f"a header `{expected}`", fix=fix)
+
+    def _names(self, unused: dict[int, str]) -> list[str]:
+        found = {self.source.where[column.name]: self.source.header[column.name] for column in self.columns}
+        return [name for _, name in sorted((found | unused).items())]
+
+    def _extra(self, unused: dict[int, str], line: int) -> None:
+        """Refuse columns that look like a slip of the pen, and name the others that are not used."""
+        free = [column.name for column in self.layout if column not in self.columns and not column.required]
+        others = []
+        for place, name in unused.items():
+            near = suggestion(name, [each for each in free if len(each) > 2])
+            loose = re.sub(r"[\W_]", "", name.casefold())
+            twin = next((each for each in free if each == loose), "")
+            if near or twin or loose in STANDARD_DEVIATIONS:
+                self.source.where[name] = place
+                fix = near or (f"did you mean `{twin}`?" if twin else f"use the columns {', '.join(free)}")
+                self._add(line, name, f"column `{shown(name)}` is not known", "unknown-column", fix=fix)
+            else:
+                others.append(shown(name) or "(no name)")
+        if others:
+            used = ", ".join(column.name for column in self.columns)
+            message = f"{counted(len(others), 'column')} not used: {listed(others)}; used: {used}"
+            self.findings.notes.append(Note("unused-column", message, "note", file=self.source.file, line=line))
+
+    # ------------------------------------------------------------------------------------------ the rows
+
+    def _chunks(self) -> Iterator[tuple[list[list[str]], list[int]]]:
+        """Give rows with their line numbers, some thousands at a time."""
+        last = self.rows.line_num
+        while True:
+            rows, lines = [], []
+            try:
+                for row in islice(self.rows, CHUNK):
+                    rows.append(row)
+                    lines.append(last + 1)
+                    last = self.rows.line_num
+            except csv.Error as error:
+                yield rows, lines
+                self._unreadable(error, last + 1)
+                return
+            if not rows:
+                return
+            yield rows, lines
+
+    def _unreadable(self, error: csv.Error, line: int) -> None:
+        fix = ""
+        if any(word in str(error) for word in ("unexpected end", "field limit")):
+            message, fix = "a quotation mark is opened and never closed", 'close it, or write `""` for one in a field'
+        elif "expected after" in str(error):
+            message, fix = "something stands between a closing quotation mark and the comma", "remove it"
+        else:
+            message = f"cannot be read as CSV ({error})"
+        self._add(line, "", message, "csv", fix=fix)
+
+    def _take(self, rows: list[list[str]], lines: list[int]) -> None:
+        """Turn a chunk of rows into columns."""
+        if set(map(len, rows)) - {self.width}:
+            rows, lines = self._even(rows, lines)
+        if not rows:
+            return
+        numbered = [column for column in self.columns if column.number]
+        fields = {column: tuple(map(itemgetter(self.source.where[column.name]), rows)) for column in self.columns}
+        values = {column: _fast_floats(fields[column]) for column in numbered}
+        if any(each is None for each in values.values()):
+            kept = [row for row, cells in enumerate(rows) if any(map(str.strip, cells))]
+            if len(kept) < len(rows):  # rows of empty cells, as spreadsheets leave them behind
+                self._take([rows[row] for row in kept], [lines[row] for row in kept])
+                return
+        for column in self.columns:
+            name, cells = column.name, fields[column]
+            if column.number:
+                fast = values[column]
+                self.numbers[name].append(self._floats(column, cells, lines) if fast is None else fast)
+                if column.positive:
+                    self._positive(column, lines)
+            else:
+                codes = map(self.index[name].__getitem__, cells)
+                self.codes[name].append(np.fromiter(codes, np.intp, len(cells)))
+        self.lines.append(np.array(lines, np.intp))
+
+    def _even(self, rows: list[list[str]], lines: list[int]) -> tuple[list[list[str]], list[int]]:
+        """Drop blank rows and refuse rows with too few or too many fields."""
+        kept, places = [], []
+        for row, line in zip(rows, lines, strict=True):
+            extra = row[self.width :]
+            if not any(map(str.strip, row)):
+                continue
+            if len(row) < self.width or any(map(str.strip, extra)):
+                self._uneven(row, line)
+                continue
+            kept.append(row[: self.width])
+            places.append(line)
+        return kept, places
+
+    def _uneven(self, row: list[str], line: int) -> None:
+        message = f"the row has {counted(len(row), 'field')}, the header {self.width}"
+        fix = ""
+        if len(row) == 1 and any(mark in row[0] for mark in SEPARATORS):
+            fix = "separate the fields by commas"
+        elif len(row) > self.width:
+            fix = "write decimal points, not commas; put an id that has a comma between quotation marks"
+        self._add(line, "", message, "row-length", fix=fix)
+
+    def _floats(self, column: Column, cells: Cells, lines: list[int]) -> Floats:
+        """Convert cell by cell and refuse those that are no numbers."""
+        values = np.full(len(cells), np.nan)
+        for row, cell in enumerate(cells):
+            if not cell.strip() and not column.filled:
+                continue
+            try:
+                values[row] = number(cell)
+            except NotANumber as why:
+                self._add(lines[row], column.name, why.message, "number", expected="a number", fix=why.fix)
+        return values
+
+    def _positive(self, column: Column, lines: list[int]) -> None:
+        values = self.numbers[column.name][-1]
+        for row in np.flatnonzero(values < SMALLEST):
+            message = f"{values[row]:g} cannot be a standard deviation"
+            self._add(lines[row], column.name, message, "range", expected="a number larger than 0")
+
+    def _clean(self, column: Column, codes: Numbers, lines: Numbers) -> tuple[Numbers, tuple[str, ...]]:
+        """Take blanks off ids and refuse ids that cannot be."""
+        written = list(self.index[column.name])
+        stripped = [name.strip() for name in written]
+        if column.words:
+            stripped = self._words(column, stripped, codes, lines)
+        elif stripped != written:
+            self._note_blanks(column, written, codes, lines)
+        index = _Codes()
+        renumbered = np.fromiter(map(index.__getitem__, stripped), np.intp, len(stripped))
+        names, codes = tuple(index), renumbered[codes]
+        if not column.words:
+            wrong = np.array([not name or bool(CONTROL_CHARACTER.search(name)) for name in names], bool)
+            for row in np.flatnonzero(wrong[codes]):
+                name = names[codes[row]]
+                what = (
+                    f"the id `{shown(name)}` has a control character in it" if name else f"the {column.name} has no id"
+                )
+                self._add(int(lines[row]), column.name, what, "id", expected="an id on one line")
+        return codes, names
+
+    def _words(self, column: Column, cells: list[str], codes: Numbers, lines: Numbers) -> list[str]:
+        """Read words of a fixed list, whatever their case; an empty cell is the first of them."""
+        words = [cell.casefold() or column.words[0] for cell in cells]
+        wrong = np.array([word not in column.words for word in words], bool)
+        for row in np.flatnonzero(wrong[codes]):
+            word = cells[codes[row]]
+            fix = "" if self.findings.full(self.source.file) else suggestion(word, column.words)
+            expected = f"one of {', '.join(column.words)}"
+            self._add(int(lines[row]), column.name, f"`{shown(word)}` is not known", "word", expected=expected, fix=fix)
+        return words
+
+    def _note_blanks(self, column: Column, written: list[str], codes: Numbers, lines: Numbers) -> None:
+        padded = np.array([name != name.strip() for name in written])
+        rows = np.flatnonzero(padded[codes])
+        example = shown(written[codes[rows[0]]])
+        message = f"blanks around the id of a {column.name} taken off in {counted(len(rows), 'row')}, here `{example}`"
+        name = self.source.header.get(column.name, column.name)
+        note = Note("stray-blanks", message, "note", file=self.source.file, line=int(lines[rows[0]]), key=name)
+        self.findings.notes.append(note)
+
+
+def _fast_floats(cells: Cells) -> Floats | None:
+    """Convert a clean column at once; None when a cell needs a closer look."""
+    joined = "".join(cells)
+    if not joined.isascii() or "_" in joined:  # float() takes digits of every script, and 1_000
+        return None
+    try:
+        values = np.fromiter(map(float, cells), float, len(cells))
+    except ValueError:
+        return None
+    return values if (np.abs(values) <= LARGEST).all() else None
