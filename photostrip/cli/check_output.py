@@ -39,7 +39,7 @@ def print_checked(found: Sequence[Checked], form: Format, width: int | None, *, 
 
 def findings_of(checked: Checked) -> list[dict[str, Any]]:
     """Give faults, findings and notes as plain values."""
-    return [messages.finding_of(each) for each in checked.told]
+    return [messages.finding_of(each) for each in checked.everything]
 
 
 def document_of(found: Sequence[Checked]) -> dict[str, Any]:

@@ -68,7 +68,7 @@ def test_the_sample_is_right(tmp_path: Path) -> None:
     result = triangulate(project.inputs, project.settings)
     for name, xyz in zip(result.refined.observations.point_ids, result.points.ground, strict=True):
         assert np.abs(xyz - GROUND[name]).max() < 1e-4  # the table has six decimals
-    assert check_project(tmp_path / P).told == ()
+    assert check_project(tmp_path / P).everything == ()
 
 
 @pytest.mark.parametrize(("unit", "factor"), [("um", 1e-3), ("m", 1e3)])

@@ -62,7 +62,7 @@ class Checked:
     document: Document  # what was decoded: counts, rows, frames, control; empty when the files could not be read
 
     @property
-    def told(self) -> tuple[Fault | Finding | Note, ...]:
+    def everything(self) -> tuple[Fault | Finding | Note, ...]:
         """Faults, then findings, then notes."""
         return (*self.faults, *self.findings, *self.notes)
 
@@ -74,7 +74,7 @@ class Checked:
     @property
     def remarks(self) -> int:
         """How much else is told."""
-        return len(self.told) - self.wrong
+        return len(self.everything) - self.wrong
 
 
 def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
@@ -90,7 +90,7 @@ def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
         faults += _refused(project, partial(require_named, project.settings.links, project.inputs.models.points))
     notes = list(project.hints)
     notes += _image_coordinates(project, faults)
-    faults += [*_pairs(project), *_joints(project)] if project.inputs.models is None else links_of_models(project)
+    faults += [*_pairs(project), *_junctions(project)] if project.inputs.models is None else links_of_models(project)
     if project.settings.adjustment != "bundle":  # strips of a block may hang on others
         faults += _control_of_strips(project)
     frames = _frames(project, faults)
@@ -173,7 +173,7 @@ def _pairs(project: Project) -> Iterator[Fault]:
                 yield fault_at(project.tree, path, message, "too-few-common-points", expected=expected, fix=fix)
 
 
-def _joints(project: Project) -> Iterator[Fault]:
+def _junctions(project: Project) -> Iterator[Fault]:
     """Refuse three photos in a row without a common point: nothing would carry the scale on."""
     seen = _seen(project.inputs.observations)
     for i, strip in enumerate(project.inputs.strips):

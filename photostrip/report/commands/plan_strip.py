@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from photostrip.report.page.numbers import counted, fixed, listed, metres, micrometres, short
 from photostrip.report.page.parts import DASH, Column, Facts, Part, Section, Table, Words
+from photostrip.report.page.tables import number, tabulated, words
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -206,24 +207,17 @@ def _largest(values: Sequence[Detected]) -> str:
 
 
 def _needed(document: Document) -> Table:
-    columns = (
-        Column("method", left=True),
-        Column("bands"),
-        Column("points"),
-        Column("worst plan", "m"),
-        Column("worst height", "m"),
-    )
-    rows = tuple(
+    return tabulated(
+        document["needed"],
         (
-            row["method"],
-            "not reached" if row["bands"] is None else str(row["bands"]),
-            DASH if row["points"] is None else str(row["points"]),
-            metres(row["worst_plan_m"]),
-            metres(row["worst_z_m"]),
-        )
-        for row in document["needed"]
+            words("method", "method"),
+            number("bands", "bands", lambda bands: "not reached" if bands is None else str(bands)),
+            number("points", "points", lambda points: DASH if points is None else str(points)),
+            number("worst plan", "worst_plan_m", 3, "m"),
+            number("worst height", "worst_z_m", 3, "m"),
+        ),
+        note="evenly spread from the first to the last photo, at most one at every photo",
     )
-    return Table(columns, rows, note="evenly spread from the first to the last photo, at most one at every photo")
 
 
 def _placed(document: Document) -> tuple[Part, ...]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from photostrip.report.commands.plan_strip import strip_sections
 from photostrip.report.page.numbers import counted, fixed, metres, micrometres, short
 from photostrip.report.page.parts import Column, Facts, Part, Section, Table, Words
+from photostrip.report.page.tables import number, tabulated, words
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -86,53 +87,43 @@ def _grid(document: Document, name: str) -> Table:
 
 def _sources(document: Document) -> Table:
     columns = (
-        Column("source", left=True),
-        Column("plan rms", "m"),
-        Column("plan max", "m"),
-        Column("height rms", "m"),
-        Column("height max", "m"),
+        words("source", "source"),
+        number("plan rms", "plan_rms_m", 3, "m"),
+        number("plan max", "plan_max_m", 3, "m"),
+        number("height rms", "z_rms_m", 3, "m"),
+        number("height max", "z_max_m", 3, "m"),
     )
-    names = ("plan_rms_m", "plan_max_m", "z_rms_m", "z_max_m")
-    rows = [(row["source"], *(metres(row[name]) for name in names)) for row in document["sources"]]
-    return Table(
-        columns,
-        tuple(rows[:-2]),
-        tuple(rows[-2:]),
-        "over the points above; dalpha2 is the turn of the right photo against the base",
-    )
+    *single, each, together = document["sources"]
+    foot = tabulated((each, together), columns).rows
+    note = "over the points above; dalpha2 is the turn of the right photo against the base"
+    return tabulated(single, columns, foot, note)
 
 
 def _at_control(document: Document) -> Table:
-    columns = (
-        Column("x", "mm"),
-        Column("y", "mm"),
-        Column("given", left=True),
-        Column("plan", "m"),
-        Column("height", "m"),
-    )
-    rows = (
+    return tabulated(
+        document["control"],
         (
-            fixed(p["x_mm"], 1),
-            fixed(p["y_mm"], 1),
-            USES[p["use"]],
-            metres(p["sigma_plan_m"]),
-            metres(p["sigma_z_m"]),
-        )
-        for p in document["control"]
+            number("x", "x_mm", 1, "mm"),
+            number("y", "y_mm", 1, "mm"),
+            words("given", lambda point: USES[point["use"]]),
+            number("plan", "sigma_plan_m", 3, "m"),
+            number("height", "sigma_z_m", 3, "m"),
+        ),
+        note="of the adjusted model point; the given coordinates stay what they are",
     )
-    return Table(columns, tuple(rows), note="of the adjusted model point; the given coordinates stay what they are")
 
 
 def _simple(document: Document) -> Table:
-    columns = (
-        Column("place", left=True),
-        Column("plan", "source, m"),
-        Column("height", "source, m"),
-        Column("plan", "rigorous, m"),
-        Column("height", "rigorous, m"),
+    return tabulated(
+        document["simple"],
+        (
+            words("place", "place"),
+            number("plan", "source_plan_m", 3, "source, m"),
+            number("height", "source_z_m", 3, "source, m"),
+            number("plan", "rigorous_plan_m", 3, "rigorous, m"),
+            number("height", "rigorous_z_m", 3, "rigorous, m"),
+        ),
     )
-    names = ("source_plan_m", "source_z_m", "rigorous_plan_m", "rigorous_z_m")
-    return Table(columns, tuple((row["place"], *(metres(row[name]) for name in names)) for row in document["simple"]))
 
 
 # ------------------------------------------------------------------------------------------------------- cameras
@@ -150,64 +141,40 @@ def _cameras(document: Document) -> tuple[Section, ...]:
 
 
 def _camera_table(rows: Sequence[Document]) -> Table:
-    columns = (
-        Column("camera", left=True),
-        Column("f", "mm"),
-        Column("m_p", "µm"),
-        Column("base", "mm", rank=1),
-        Column("K = f m_p", "mm²"),
-        Column("H/m_h"),
-        Column("m_h", "equal area"),
-        Column("scale", "equal m_h"),
-        Column("area", "printed"),
-        Column("area", "equal m_h"),
-        Column("photos", "equal m_h"),
-    )
-    cells = (
+    return tabulated(
+        rows,
         (
-            row["camera"],
-            short(row["principal_distance_mm"], 9),
-            micrometres(row["sigma_um"]),
-            fixed(row["base_mm"], 1),
-            fixed(row["coefficient_mm2"], 3),
-            fixed(row["height_ratio"], 0),
-            *(
-                fixed(row[name], 3)
-                for name in ("eta_height", "scale_ratio", "eta_area_printed", "eta_area", "photos_ratio")
-            ),
-        )
-        for row in rows
+            words("camera", "camera"),
+            number("f", "principal_distance_mm", _nine_digits, "mm"),
+            number("m_p", "sigma_um", 1, "µm"),
+            number("base", "base_mm", 1, "mm", rank=1),
+            number("K = f m_p", "coefficient_mm2", 3, "mm²"),
+            number("H/m_h", "height_ratio", 0),
+            number("m_h", "eta_height", 3, "equal area"),
+            number("scale", "scale_ratio", 3, "equal m_h"),
+            number("area", "eta_area_printed", 3, "printed"),
+            number("area", "eta_area", 3, "equal m_h"),
+            number("photos", "photos_ratio", 3, "equal m_h"),
+        ),
     )
-    return Table(columns, tuple(cells))
 
 
 def _source_table(document: Document) -> tuple[Section, ...]:
-    columns = (
-        Column("f", "mm"),
-        Column("m_p", "mm"),
-        Column("K", "mm²"),
-        Column("K", "printed"),
-        Column("H/m_h", "b = 60 mm"),
-        Column("H/m_h", "printed"),
-        Column("eta_S", "lengths"),
-        Column("eta_S", "printed"),
-        Column("area", "true ratio"),
-    )
-    rows = tuple(
+    table = tabulated(
+        document["cameras"],
         (
-            short(row["principal_distance_mm"]),
-            short(row["sigma_um"] / 1000),
-            fixed(row["coefficient_mm2"], 3),
-            short(row["printed_coefficient_mm2"]),
-            fixed(row["height_ratio"], 0),
-            fixed(row["printed_height_ratio"], 0),
-            fixed(row["eta_area_printed"], 3),
-            short(row["printed_eta"]),
-            fixed(row["eta_area"], 3),
-        )
-        for row in document["cameras"]
+            number("f", "principal_distance_mm", short, "mm"),
+            number("m_p", lambda camera: short(camera["sigma_um"] / 1000), str, "mm"),
+            number("K", "coefficient_mm2", 3, "mm²"),
+            number("K", "printed_coefficient_mm2", short, "printed"),
+            number("H/m_h", "height_ratio", 0, "b = 60 mm"),
+            number("H/m_h", "printed_height_ratio", 0, "printed"),
+            number("eta_S", "eta_area_printed", 3, "lengths"),
+            number("eta_S", "printed_eta", short, "printed"),
+            number("area", "eta_area", 3, "true ratio"),
+        ),
     )
-    return (Section("", (Table(columns, rows),)), Section("What is wrong in print", _misprints(document)))
+    return (Section("", (table,)), Section("What is wrong in print", _misprints(document)))
 
 
 def _misprints(document: Document) -> tuple[Part, ...]:
@@ -233,6 +200,11 @@ def _misprints(document: Document) -> tuple[Part, ...]:
         ),
     )
     return tuple(Words(text, mark=f"{number}.") for number, text in enumerate(texts, 1))
+
+
+def _nine_digits(value: float | None) -> str:
+    """Write a calibrated length with all its digits."""
+    return short(value, 9)
 
 
 BUILDERS = {

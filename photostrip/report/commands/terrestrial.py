@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from photostrip.report.page.numbers import counted, fixed, short
 from photostrip.report.page.parts import DASH, Column, Facts, Part, Section, Table, Words
+from photostrip.report.page.tables import number, tabulated, words
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -148,30 +149,19 @@ def _theodolite(document: Document) -> tuple[Section, ...]:
 
 
 def _examples(document: Document) -> tuple[Section, ...]:
-    rows = tuple(
+    table = tabulated(
+        document["examples"],
         (
-            row["camera"],
-            short(row["f_mm"]),
-            fixed(row["horizontal_printed_arcsec"], 1),
-            fixed(row["horizontal_exact_arcsec"], 2),
-            fixed(row["vertical_printed_arcsec"], 1),
-            fixed(row["vertical_with_printed_factor_arcsec"], 2),
-            fixed(row["vertical_eq6_arcsec"], 2),
-            fixed(row["vertical_eq5_arcsec"], 2),
-            fixed(row["vertical_exact_arcsec"], 2),
-        )
-        for row in document["examples"]
-    )
-    columns = (
-        Column("camera", left=True),
-        Column("f", "mm"),
-        Column("m_lambda", "printed ″"),
-        Column("m_lambda", "exact ″"),
-        Column("m_beta", "printed ″"),
-        Column("with 1.18", "″"),
-        Column("eq. 6", "″"),
-        Column("eq. 5", "″"),
-        Column("m_beta", "exact ″"),
+            words("camera", "camera"),
+            number("f", "f_mm", short, "mm"),
+            number("m_lambda", "horizontal_printed_arcsec", 1, "printed ″"),
+            number("m_lambda", "horizontal_exact_arcsec", 2, "exact ″"),
+            number("m_beta", "vertical_printed_arcsec", 1, "printed ″"),
+            number("with 1.18", "vertical_with_printed_factor_arcsec", 2, "″"),
+            number("eq. 6", "vertical_eq6_arcsec", 2, "″"),
+            number("eq. 5", "vertical_eq5_arcsec", 2, "″"),
+            number("m_beta", "vertical_exact_arcsec", 2, "exact ″"),
+        ),
     )
     first = document["examples"][0]
     facts = Facts(
@@ -180,7 +170,7 @@ def _examples(document: Document) -> tuple[Section, ...]:
             ("standard error", f"{short(first['image_sigma_um'])} µm"),
         )
     )
-    return (Section("", (facts, Table(columns, rows))), Section("What is wrong in print", _misprints(document)))
+    return (Section("", (facts, table)), Section("What is wrong in print", _misprints(document)))
 
 
 def _misprints(document: Document) -> tuple[Part, ...]:
@@ -238,25 +228,15 @@ def _orientation(document: Document) -> tuple[Section, ...]:
         (Column("element", left=True), Column("value"), Column("", left=True), Column("sigma"), Column("", left=True)),
         tuple(_element(row) for row in document["elements"]),
     )
-    points = Table(
+    points = tabulated(
+        document["points"],
         (
-            Column("point", left=True),
-            Column("v lambda", "″"),
-            Column("v beta", "″"),
-            Column("redundancy", "lambda"),
-            Column("redundancy", "beta"),
-            Column("", left=True),
-        ),
-        tuple(
-            (
-                row["id"],
-                fixed(row["v_lambda_arcsec"], 1),
-                fixed(row["v_beta_arcsec"], 1),
-                fixed(row["redundancy_lambda"], 2),
-                fixed(row["redundancy_beta"], 2),
-                "" if row["used"] else "rejected",
-            )
-            for row in document["points"]
+            words("point", "id"),
+            number("v lambda", "v_lambda_arcsec", 1, "″"),
+            number("v beta", "v_beta_arcsec", 1, "″"),
+            number("redundancy", "redundancy_lambda", 2, "lambda"),
+            number("redundancy", "redundancy_beta", 2, "beta"),
+            words("", lambda point: "" if point["used"] else "rejected"),
         ),
     )
     parts: list[Part] = [Facts(tuple(facts))]
@@ -285,24 +265,26 @@ def _rejected(row: Document) -> Words:
 
 
 def _cameras(document: Document) -> tuple[Section, ...]:
-    columns = (
-        Column("camera", left=True),
-        Column("f", "mm"),
-        Column("x0", "mm"),
-        Column("z0", "mm"),
-        Column("format", "mm"),
-    )
-    rows = tuple(
+    table = tabulated(
+        document["cameras"],
         (
-            row["id"],
-            short(row["principal_distance_mm"], 9),
-            short(row["x0_mm"], 9),
-            short(row["z0_mm"], 9),
-            DASH if row["width_mm"] is None else f"{short(row['width_mm'])} × {short(row['height_mm'])}",
-        )
-        for row in document["cameras"]
+            words("camera", "id"),
+            number("f", "principal_distance_mm", _nine_digits, "mm"),
+            number("x0", "x0_mm", _nine_digits, "mm"),
+            number("z0", "z0_mm", _nine_digits, "mm"),
+            number("format", _format, str, "mm"),
+        ),
     )
-    return (Section("", (Table(columns, rows),)),)
+    return (Section("", (table,)),)
+
+
+def _format(camera: Document) -> str:
+    return DASH if camera["width_mm"] is None else f"{short(camera['width_mm'])} × {short(camera['height_mm'])}"
+
+
+def _nine_digits(value: float | None) -> str:
+    """Write a calibrated length with all its digits."""
+    return short(value, 9)
 
 
 BUILDERS = {
