@@ -17,6 +17,7 @@ from photostrip.triangulation.covariance_adjustment import system as strip_syste
 from photostrip.triangulation.error_propagation import control_errors, strip_errors
 from photostrip.triangulation.error_propagation.covariances import image_variance
 from photostrip.triangulation.resection import resection as exterior
+from photostrip.triangulation.resection.collinearity import project
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -244,7 +245,7 @@ def resection(adjusted: CovarianceAdjustment, seen: tuple[Numbers, Floats, Float
     """
     photo, xy, points = seen
     count = len(adjusted.centers)
-    computed = exterior.project(points, adjusted.centers, adjusted.rotations, photo, np.full(count, focal))
+    computed = project(points, adjusted.centers, adjusted.rotations, photo, np.full(count, focal))
     residuals = xy - computed
     number = np.bincount(photo, minlength=count)
     squares = np.bincount(photo, (residuals**2).sum(axis=1), count)

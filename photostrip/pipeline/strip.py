@@ -142,7 +142,7 @@ def adjust_formed(
     if settings.adjustment == "polynomial":
         targets = absolute_orientation.Targets(here, frames, intermediate)
         weight = absolute_orientation.weights(targets.turned(xyz[rows]), spread)
-        problem = polynomial.Problem(xyz[rows], targets, weight, *_extent(formed, orientation))
+        problem = polynomial.FitProblem(xyz[rows], targets, weight, *_extent(formed, orientation))
         correction = polynomial.fit(problem, settings.polynomial)
     own = None
     if settings.adjustment == "covariance":

@@ -132,7 +132,7 @@ def _fitted(strip: IdealStrip, ground: _Fit, method: str) -> Accuracy:
     numbers, targets, weight, xyz = ground.numbers, ground.targets, ground.weight, ground.xyz
     terms: list[tuple[str, ...]] = [(), (), ()]
     if method in DEGREES:
-        problem = correction.Problem(xyz[numbers], targets, weight, strip.geometry.base, _breadth(xyz))
+        problem = correction.FitProblem(xyz[numbers], targets, weight, strip.geometry.base, _breadth(xyz))
         terms = [axis.terms for axis in correction.fit(problem, correction.PolynomialSettings(DEGREES[method])).axes]
     axes = targets.axes(xyz[numbers])
     found = control_errors.misclosures(strip.errors.points, ground.control, numbers, axes)

@@ -30,14 +30,14 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-LARGEST_STEP = 5.0  # of the logarithm of the scale, in one iteration
+LARGEST_SCALE_STEP = 5.0  # of the logarithm of the scale, in one iteration
 ITERATIONS = 50
 CONVERGED = 1e-10  # of the strip's half length; the next step would be its square
-SETTLED = 2  # iteration after which the directions of the ground axes no longer change
+LAST_AXES_UPDATE = 2  # iteration; afterwards the directions of the ground axes no longer change
 RANK_LIMIT = 1e-3  # smallest over largest singular value: a motion of the strip of which the control sees a thousandth
 WEAK_LIMIT = 1 / 8  # well spread control has about 1; at an eighth errors of the control grow eightfold somewhere
 PARAMETERS = 7
-NAMED = 6  # ids in a message
+IDS_NAMED = 6  # in a message
 PLAN, HEIGHT = slice(0, 2), 2
 
 
@@ -171,7 +171,7 @@ def orient(
     axes = targets.axes(similarity(strip))
     for iteration in range(1, ITERATIONS + 1):
         xyz = similarity(strip)
-        if iteration == SETTLED:
+        if iteration == LAST_AXES_UPDATE:
             axes = targets.axes(xyz)
         plain, free = _design(xyz, targets, axes, half)
         root = _motion(None if reach is None else similarity(reach), xyz.mean(axis=0), half)
@@ -266,7 +266,7 @@ def _corrected(similarity: Similarity, step: Floats, center: Floats, half: float
     """Compose the similarity with a small one about a centre."""
     turn = from_vector(step[3:6] / half)
     # control that is wrong beyond measure asks for steps that no number holds
-    growth = float(np.exp(np.clip(step[6] / half, -LARGEST_STEP, LARGEST_STEP)))
+    growth = float(np.exp(np.clip(step[6] / half, -LARGEST_SCALE_STEP, LARGEST_SCALE_STEP)))
     shift = center + step[:3] + growth * turn @ (similarity.shift - center)
     return Similarity(similarity.scale * growth, _orthonormal(turn @ similarity.rotation), shift)
 
@@ -332,7 +332,8 @@ def free_motion(direction: Floats, xyz: Floats, control: ControlPoints, half: fl
     offset = np.linalg.norm(np.cross((xyz - xyz.mean(axis=0)) / half - foot, axis), axis=1)
     near = [name for name, distance in zip(control.ids, offset, strict=True) if distance < 0.02]  # noqa: PLR2004
     if len(near) >= 2:
-        named = ", ".join(near) if len(near) <= NAMED else f"{', '.join(near[:NAMED])} and {len(near) - NAMED} more"
+        more = f" and {len(near) - IDS_NAMED} more" if len(near) > IDS_NAMED else ""
+        named = ", ".join(near[:IDS_NAMED]) + more
         return f"the rotation about the line of control points {named}"
     if abs(axis[2]) > 0.7:  # noqa: PLR2004
         return "the azimuth (rotation about the vertical)"

@@ -143,7 +143,7 @@ def corrected_in(azimuth: float, strip: StripResult, result: Result) -> tuple[Fl
     targets = absolute_orientation.Targets(strip.control, result.frames, frame)
     weight = absolute_orientation.weights(strip.control, strip.precision)
     breadth = float(np.quantile(np.abs(xyz[:, 1]), 0.95))
-    problem = correction.Problem(xyz[strip.control_rows], targets, weight, spacing=850.0, breadth=breadth)
+    problem = correction.FitProblem(xyz[strip.control_rows], targets, weight, spacing=850.0, breadth=breadth)
     found = correction.fit(problem, correction.PolynomialSettings("3"))
     return frame.cartesian_from_intermediate(found(xyz)), found
 

@@ -18,7 +18,8 @@ from photostrip.triangulation.bundle.quality.cofactors import cofactors_of as pr
 from photostrip.triangulation.bundle.quality.correlations import correlations
 from photostrip.triangulation.bundle.selection import restarted, selected, supported
 from photostrip.triangulation.bundle.solve import solve
-from photostrip.triangulation.resection.resection import Resection, project
+from photostrip.triangulation.resection.collinearity import project
+from photostrip.triangulation.resection.resection import Resection
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -22,7 +22,7 @@ from photostrip.triangulation.bundle.observations.problem import (
 from photostrip.triangulation.bundle.quality.self_calibration import sigmas
 from photostrip.triangulation.bundle.selection import Selection
 from photostrip.triangulation.gross_errors.control import control_screening
-from photostrip.triangulation.resection.resection import project
+from photostrip.triangulation.resection.collinearity import project
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -20,7 +20,9 @@ from photostrip.pipeline.results import BlockStart
 from photostrip.pipeline.strip import adjust_formed, form_strip, middle_frame
 from photostrip.points import ControlPoints
 from photostrip.triangulation import absolute_orientation
-from photostrip.triangulation.resection.closed_form import approximate, intersect_points
+from photostrip.triangulation.resection.closed_form import approximate
+from photostrip.triangulation.resection.collinearity import KnownPhotos
+from photostrip.triangulation.resection.ray_intersection import intersect_points
 from photostrip.triangulation.resection.resection import resect
 
 if TYPE_CHECKING:
@@ -450,7 +452,7 @@ def _rest(inputs: Inputs, observations: PhotoPoints, oriented: tuple[Floats, Flo
     numbers, point = np.unique(observations.point[rows], return_inverse=True)
     photo = np.array([place[name] for name in observations.photo_ids], np.intp)[observations.photo[rows]]
     found = intersect_points(
-        observations.xy[rows], observations.sigma[rows], (photo, point), (*oriented, focal), len(numbers)
+        observations.xy[rows], observations.sigma[rows], (photo, point), KnownPhotos(*oriented, focal), len(numbers)
     )
     points = points.copy()
     points[numbers] = found.xyz

@@ -147,7 +147,7 @@ def adjust_models(
     if settings.adjustment == "polynomial":
         targets = absolute_orientation.Targets(here, frames, intermediate)
         weight = absolute_orientation.weights(targets.turned(xyz[rows]), spread)
-        correction = polynomial.fit(polynomial.Problem(xyz[rows], targets, weight, *extent), settings.polynomial)
+        correction = polynomial.fit(polynomial.FitProblem(xyz[rows], targets, weight, *extent), settings.polynomial)
     adjusted = xyz if correction is None else correction(xyz)
     places = _centers(formed, orientation, correction)
     depth = float(np.nanmean(places[:, 2]) - adjusted[:, 2].mean()) if np.isfinite(places).any() else float("nan")

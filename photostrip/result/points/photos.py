@@ -13,7 +13,7 @@ from photostrip.result.numbers import Plain, rounded
 from photostrip.result.points.ground import coordinates
 from photostrip.result.points.precision import UNITS, centre_columns, photo_columns
 from photostrip.result.quantities import angle_decimals, grouped, records
-from photostrip.triangulation.resection.resection import project
+from photostrip.triangulation.resection.collinearity import project
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -13,8 +13,8 @@ from photostrip.triangulation.bundle.quality.cofactors import cofactors_of as pr
 from photostrip.triangulation.bundle.quality.self_calibration import image_shift
 from photostrip.triangulation.bundle.selection import Selection, restarted, selected, supported
 from photostrip.triangulation.bundle.solve import solve
-from photostrip.triangulation.resection.closed_form import derivatives, intersect_points
-from photostrip.triangulation.resection.resection import project
+from photostrip.triangulation.resection.collinearity import KnownPhotos, derivatives, project
+from photostrip.triangulation.resection.ray_intersection import intersect_points
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -326,7 +326,7 @@ def _meeting(problem: BundleProblem, rows: Numbers, solution: BundleSolution) ->
         xy,
         images.sigma[rows],
         (images.photo[rows], point),
-        (solution.centers, solution.rotations, focal),
+        KnownPhotos(solution.centers, solution.rotations, focal),
         len(numbers),
     )
     return numbers, found.xyz

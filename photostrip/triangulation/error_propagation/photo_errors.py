@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ErrorRows, ranges
-from photostrip.triangulation.resection import resection as exterior
+from photostrip.triangulation.resection.collinearity import partials
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -87,7 +87,7 @@ def _resected(sightings: Sightings, resection: Resection, starts: Numbers, item:
     rotations = resection.rotations[sightings.photo]
     count = len(sightings.photo)
     arm = sightings.xyz - resection.centers[sightings.photo]
-    by_x, by_y, _ = exterior.partials(arm, rotations, np.full(count, sightings.focal), np.ones(count))
+    by_x, by_y, _ = partials(arm, rotations, np.full(count, sightings.focal), np.ones(count))
     design = np.stack([by_x.T, by_y.T], axis=1)
     distance = np.linalg.norm(arm, axis=1).mean()
     unit = np.array([distance] * 3 + [1.0] * 3)  # so that shifts and rotations are of one size

@@ -15,6 +15,7 @@ import numpy as np
 
 from photostrip.errors import Fault
 from photostrip.geometry import plane
+from photostrip.points import take_rows
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -49,8 +50,7 @@ class Marks:
 
     def take(self, rows: Flags) -> Marks:
         """Return the marks of some photos."""
-        photos = tuple(photo for photo, kept in zip(self.photos, rows, strict=True) if kept)
-        return Marks(self.camera, photos, self.names, self.calibrated, self.measured[rows], self.weights[rows])
+        return take_rows(self, rows, ("photos", "measured", "weights"))
 
     def on_photo(self, row: int) -> tuple[str, ...]:
         """Return the marks measured on one photo."""

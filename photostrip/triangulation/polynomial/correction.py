@@ -1,8 +1,8 @@
 """Strip polynomials: the deformation that a similarity leaves, taken out axis by axis.
 
 Every axis of the intermediate frame, X along the strip, gets its own polynomial in X and Y. How many terms the control
-can carry is decided by where it stands (``polynomial_terms``), how many it should carry by evidence
-(``polynomial_degree``).
+can carry is decided by where it stands (``terms``), how many it should carry by evidence
+(``degree``).
 
 Source: [001] eq. 150-151, the free term of 151 corrected to X - X'.
 """
@@ -17,7 +17,7 @@ import numpy as np
 
 from photostrip.triangulation.polynomial import terms as polynomial_terms
 from photostrip.triangulation.polynomial.degree import GROUPS, Evidence, decide
-from photostrip.triangulation.polynomial.least_squares import AxisFit, Problem, fit_axes
+from photostrip.triangulation.polynomial.least_squares import AxisFit, FitProblem, fit_axes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-__all__ = ["DEGREES", "GROUPS", "AxisFit", "Evidence", "Polynomial", "PolynomialSettings", "Problem", "fit"]
+__all__ = ["DEGREES", "GROUPS", "AxisFit", "Evidence", "FitProblem", "Polynomial", "PolynomialSettings", "fit"]
 
 DEGREES = ("auto", "1", "2", "3")
 
@@ -58,7 +58,7 @@ class Polynomial:
         return xyz + self.corrections(xyz)
 
 
-def fit(problem: Problem, settings: PolynomialSettings) -> Polynomial:
+def fit(problem: FitProblem, settings: PolynomialSettings) -> Polynomial:
     """Fit the polynomial that the settings ask for, or the one that the evidence supports.
 
     It is of degree 0, without terms, when the control carries none or the evidence supports none.
@@ -76,10 +76,10 @@ def fit(problem: Problem, settings: PolynomialSettings) -> Polynomial:
     fits = fits_of(tuple(chosen))
     inside = x[counts.any(axis=1)]
     return Polynomial(
-        max(polynomial_terms.degree_of(terms) for terms in chosen),
-        (fits[0], fits[1], fits[2]),
-        tuple(evidence),
-        (stations[0], stations[1]),
-        (float(inside.min()), float(inside.max())),
-        settings.degree,
+        degree=max(polynomial_terms.degree_of(terms) for terms in chosen),
+        axes=(fits[0], fits[1], fits[2]),
+        evidence=tuple(evidence),
+        stations=(stations[0], stations[1]),
+        reach=(float(inside.min()), float(inside.max())),
+        asked=settings.degree,
     )

@@ -15,14 +15,16 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.polynomial.least_squares import AxisFit, Problem, Terms
+    from photostrip.triangulation.polynomial.least_squares import AxisFit, FitProblem, Terms
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
     Fits = Callable[[Terms], list[AxisFit]]
 
-SURE, LIKELY = 0.10, 0.40  # levels of the F test: enough by itself, and enough when left-out points get better too
-WORSE = 1.5  # left-out errors may not grow by more, however significant the step: such control only bends the strip
+SURE_LEVEL = 0.10  # of the F test: enough by itself
+LIKELY_LEVEL = 0.40  # enough when left-out points get better too
+# left-out errors may not grow by more, however significant the step: such control only bends the strip
+LARGEST_GROWTH = 1.5
 PLAN, HEIGHT = "plan", "height"
 GROUPS = ((PLAN, (0, 1)), (HEIGHT, (2,)))  # decided apart: control can be good in one and poor in the other
 SMALLEST_REST = 1e-6  # smallest eigenvalue of I - H for a group that can be left out
@@ -48,7 +50,7 @@ class Evidence:
     accepted: bool  # whether the step was taken
 
 
-def _candidates(problem: Problem, axis: int, asked: str) -> list[Terms]:
+def _candidates(problem: FitProblem, axis: int, asked: str) -> list[Terms]:
     """Terms of all axes for the similarity alone and for every degree that adds something to one axis.
 
     The other axes get the terms of the same degree as far as their own control carries them.
@@ -64,7 +66,7 @@ def _candidates(problem: Problem, axis: int, asked: str) -> list[Terms]:
 
 
 def decide(
-    problem: Problem, part: tuple[str, tuple[int, ...]], asked: str, fits_of: Fits
+    problem: FitProblem, part: tuple[str, tuple[int, ...]], asked: str, fits_of: Fits
 ) -> tuple[tuple[str, ...], list[Evidence]]:
     """Go up the degrees of plan or height: each step must be asked for by its F test and not spoil left-out points.
 
@@ -93,12 +95,11 @@ def decide(
     for number, terms in enumerate(candidates):
         against = chosen
         f, p = _f_test(fits[against], fits[number], expected) if number else (float("nan"), float("nan"))
-        taken = (
-            number == len(candidates) - 1
-            if forced
-            else number == 0 or _step_taken(p, left_out[number], left_out[against])
-        )
-        chosen = number if taken else chosen
+        if forced:
+            accepted = number == len(candidates) - 1
+        else:
+            accepted = number == 0 or _is_justified(p, left_out[number], left_out[against])
+        chosen = number if accepted else chosen
         of_group = [fits[number][axis] for axis in axes]
         residuals = np.concatenate([a.residuals[_counted(problem, k)] for k, a in zip(axes, of_group, strict=True)])
         evidence.append(
@@ -113,19 +114,19 @@ def decide(
                 f=f,
                 p=p,
                 against=polynomial_terms.degree_of(candidates[against]),
-                accepted=bool(taken or number == 0),
+                accepted=bool(accepted or number == 0),
             )
         )
     return candidates[chosen], evidence
 
 
-def _step_taken(p: float, rich: float, simple: float) -> bool:
-    """Whether a step to more terms is taken: by its F test alone, or by a weaker one that left-out points confirm."""
-    ratio = rich / simple if simple > 0 and np.isfinite(rich) else WORSE
-    return (p < SURE and ratio < WORSE) or (p < LIKELY and ratio < 1.0)
+def _is_justified(p: float, rich: float, simple: float) -> bool:
+    """Whether more terms are justified: by the F test alone, or by a weaker one that left-out points confirm."""
+    ratio = rich / simple if simple > 0 and np.isfinite(rich) else LARGEST_GROWTH
+    return (p < SURE_LEVEL and ratio < LARGEST_GROWTH) or (p < LIKELY_LEVEL and ratio < 1.0)
 
 
-def _expected(problem: Problem) -> Floats:
+def _expected(problem: FitProblem) -> Floats:
     """Return the standard deviation, by axis in metres, of a misclosure from the control and the point alone."""
     weight = problem.by_axis
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -134,7 +135,7 @@ def _expected(problem: Problem) -> Floats:
     return expected
 
 
-def _counted(problem: Problem, axis: int) -> NDArray[np.bool_]:
+def _counted(problem: FitProblem, axis: int) -> NDArray[np.bool_]:
     result: NDArray[np.bool_] = problem.by_axis[:, axis] > 0
     return result
 
@@ -174,7 +175,7 @@ def _f_test(simple: Sequence[AxisFit], rich: Sequence[AxisFit], expected: Floats
 
 
 def _left_out_errors(
-    problem: Problem, candidates: list[tuple[str, ...]], fits: list[list[AxisFit]], axes: tuple[int, ...]
+    problem: FitProblem, candidates: list[tuple[str, ...]], fits: list[list[AxisFit]], axes: tuple[int, ...]
 ) -> tuple[list[float], str]:
     """Errors at control that took no part: inner bands when every degree can do without one, else single points.
 
@@ -189,10 +190,10 @@ def _left_out_errors(
     return [_left_out(problem, all_axes, axes, single) for all_axes in fits], "point"
 
 
-def _carried_without(problem: Problem, counted: Numbers, inner: Sequence[Numbers], terms: tuple[str, ...]) -> bool:
+def _carried_without(problem: FitProblem, counted: Numbers, inner: Sequence[Numbers], terms: tuple[str, ...]) -> bool:
     """Whether the control carries all terms without any one of its inner bands.
 
-    The same choice as ``polynomial_terms.choose_terms`` makes for what is left. A band that goes takes one station
+    The same choice as ``terms.choose_terms`` makes for what is left. A band that goes takes one station
     with it: the next band begins at the same point as before. The squares of singular values are those of the whole
     design less the band's share, so that nothing is fitted again.
     """
@@ -214,7 +215,7 @@ def _carried_without(problem: Problem, counted: Numbers, inner: Sequence[Numbers
     return True
 
 
-def _conditions_without(problem: Problem, counted: Numbers, groups: Numbers, terms: tuple[str, ...]) -> Floats:
+def _conditions_without(problem: FitProblem, counted: Numbers, groups: Numbers, terms: tuple[str, ...]) -> Floats:
     """Condition numbers of the scaled design without each of several groups of points of equal size."""
     scaled = polynomial_terms.columns(problem.xyz, terms) / polynomial_terms.scales(terms, problem.sizes)
     parts = scaled[groups]
@@ -223,7 +224,7 @@ def _conditions_without(problem: Problem, counted: Numbers, groups: Numbers, ter
         return np.where(squares[:, 0] > 0, np.sqrt(squares[:, -1] / squares[:, 0]), np.inf)
 
 
-def _left_out(problem: Problem, fits: Sequence[AxisFit], axes: tuple[int, ...], groups: Sequence[Numbers]) -> float:
+def _left_out(problem: FitProblem, fits: Sequence[AxisFit], axes: tuple[int, ...], groups: Sequence[Numbers]) -> float:
     """Root mean square error at groups of control predicted from all others, without fitting again.
 
     The error of a left-out group is (I - H)^-1 times its residuals, H the part of the hat matrix within the group.

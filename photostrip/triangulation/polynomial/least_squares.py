@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Terms = tuple[tuple[str, ...], ...]  # of the three axes
 
-PASSES = 4  # plan-only and height-only points take their missing coordinate from the fit itself
-SETTLED = 1e-9  # m: nothing moves any more
+ITERATIONS = 4  # plan-only and height-only points take their missing coordinate from the fit itself
+CONVERGED = 1e-9  # m
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class AxisFit:
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class FitProblem:
     """Everything a fit needs: positions, what counts, and the sizes that make columns comparable."""
 
     xyz: Floats  # (n, 3): control points after the similarity, intermediate frame, metres
@@ -90,7 +90,7 @@ class Design:
     condition: float  # condition number of the scaled columns
 
     @classmethod
-    def of(cls, problem: Problem, weight: Floats, terms: tuple[str, ...]) -> Design:
+    def of(cls, problem: FitProblem, weight: Floats, terms: tuple[str, ...]) -> Design:
         """Decompose the columns of one axis."""
         rows, scales = weight > 0, polynomial_terms.scales(terms, problem.sizes)
         columns = polynomial_terms.columns(problem.xyz, terms) / scales
@@ -100,7 +100,16 @@ class Design:
         if terms:
             basis[rows], triangle = np.linalg.qr(columns[rows] * root[rows, None])
             condition = polynomial_terms.condition(problem.xyz[rows], terms, problem.sizes)
-        return cls(terms, rows, columns, scales, root, basis, triangle, condition)
+        return cls(
+            terms=terms,
+            rows=rows,
+            columns=columns,
+            scales=scales,
+            root=root,
+            basis=basis,
+            triangle=triangle,
+            condition=condition,
+        )
 
     def effects(self, misclosure: Floats) -> Floats:
         """Weighted least squares; the misclosure is strip minus given."""
@@ -120,18 +129,33 @@ class Design:
         residuals = np.where(self.rows, misclosure + self.columns @ estimate, 0.0)
         redundancy = int(self.rows.sum()) - len(self.terms)
         if not self.terms:
-            nan = float("nan")
-            return AxisFit((), estimate, estimate, estimate, residuals, self.basis, nan, redundancy, nan)
+            return AxisFit(
+                terms=(),
+                coefficients=estimate,
+                sigmas=estimate,
+                effects=estimate,
+                residuals=residuals,
+                basis=self.basis,
+                sigma0=float("nan"),
+                redundancy=redundancy,
+                condition=float("nan"),
+            )
         squares = float(((residuals * self.root) ** 2).sum())
         sigma0 = float(np.sqrt(squares / redundancy)) if redundancy > 0 else float("nan")
-        sigmas = sigma0 * np.sqrt((np.linalg.inv(self.triangle) ** 2).sum(axis=1)) / self.scales
-        coefficients = estimate / self.scales
         return AxisFit(
-            self.terms, coefficients, sigmas, estimate, residuals, self.basis, sigma0, redundancy, self.condition
+            terms=self.terms,
+            coefficients=estimate / self.scales,
+            sigmas=sigma0 * np.sqrt((np.linalg.inv(self.triangle) ** 2).sum(axis=1)) / self.scales,
+            effects=estimate,
+            residuals=residuals,
+            basis=self.basis,
+            sigma0=sigma0,
+            redundancy=redundancy,
+            condition=self.condition,
         )
 
 
-def fit_axes(problem: Problem, terms: Terms) -> list[AxisFit]:
+def fit_axes(problem: FitProblem, terms: Terms) -> list[AxisFit]:
     """Fit the terms of X, Y, Z; points that give only some of their coordinates need a few iterations.
 
     Source: [001] eq. 151.
@@ -139,10 +163,10 @@ def fit_axes(problem: Problem, terms: Terms) -> list[AxisFit]:
     designs = [Design.of(problem, problem.by_axis[:, axis], terms[axis]) for axis in range(3)]
     misclosure = problem.misclosures
     if not problem.targets.control.use.all():
-        for _ in range(PASSES):
+        for _ in range(ITERATIONS):
             corrections = [design.correction(misclosure[:, axis]) for axis, design in enumerate(designs)]
             before = misclosure
             misclosure = problem.xyz - problem.targets.of(problem.xyz + np.column_stack(corrections))
-            if np.abs(misclosure - before).max() < SETTLED:
+            if np.abs(misclosure - before).max() < CONVERGED:
                 break
     return [design.fit(misclosure[:, axis]) for axis, design in enumerate(designs)]

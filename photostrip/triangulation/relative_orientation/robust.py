@@ -29,16 +29,16 @@ if TYPE_CHECKING:
 
 ABSOLUTE_STEPS = 30
 WELSCH_STEPS = 15
-WELSCH = 2.985  # standard deviations; 95 % efficient without gross errors
+WELSCH_SIGMAS = 2.985  # standard deviations; 95 % efficient without gross errors
 LONGEST_STEP = 0.3  # rad
 RIDGE = 1e-9  # relative, of the normal matrices
-AGREE = 4.0  # standard deviations
-FEW = 3  # points that may disagree before other elements are looked for
-MINIMAL = 5  # points of a set
+AGREEING_SIGMAS = 4.0
+FEW_POINTS = 3  # points that may disagree before other elements are looked for
+SET_POINTS = 5  # points of a set
 SETS = 300  # with a third of the points wrong, 13 % of the sets are right
-MOST = 0.65  # share of the points that a set must suit
-DEGENERATE = 1e-7  # determinant of a set, columns of unit length over the pair
-SETTLED = 1e-6  # rad; what follows is least squares
+SHARE_OF_SET = 0.65  # share of the points that a set must suit
+DEGENERATE_SET = 1e-7  # determinant of a set, columns of unit length over the pair
+CONVERGED = 1e-6  # rad; what follows is least squares
 
 
 def median_by_pair(values: Floats, pairs: Pairs, use: NDArray[np.bool_]) -> Floats:
@@ -94,10 +94,10 @@ def solve(start: Floats, pairs: Pairs, sigma: Floats, *, near: bool = False) -> 
             weight = given / np.maximum(size / sigma[pairs.pair], 1.0)
         else:
             scale = np.maximum(sigma, SIGMA_FROM_MEDIAN * median_by_pair(size, pairs, given > 0))
-            weight = given * np.exp(-((size / (WELSCH * scale[pairs.pair])) ** 2))
+            weight = given * np.exp(-((size / (WELSCH_SIGMAS * scale[pairs.pair])) ** 2))
         change, _ = gauss_newton_steps(Linearised(q, jacobian), replace(pairs, weight=weight), RIDGE, LONGEST_STEP)
         elements = elements + change
-        still = np.abs(change).max() < SETTLED
+        still = np.abs(change).max() < CONVERGED
         if still and not absolute:
             break
         absolute = absolute and not still and step + 1 < ABSOLUTE_STEPS
@@ -112,7 +112,7 @@ def consensus(elements: Floats, pairs: Pairs, sigma: Floats) -> Floats:
     standard deviation of a y parallax of weight one in each pair.
     """
     before = _agreeing(elements, pairs, sigma)
-    todo = np.flatnonzero(pairs.sums((pairs.weight > 0).astype(float)) - before > FEW)
+    todo = np.flatnonzero(pairs.sums((pairs.weight > 0).astype(float)) - before > FEW_POINTS)
     if not len(todo):
         return elements
     part = pairs.take(todo)
@@ -136,22 +136,22 @@ def _agreeing(elements: Floats, pairs: Pairs, sigma: Floats) -> Floats:
     """Count the points of each pair that agree with its elements."""
     with np.errstate(all="ignore"):
         size = np.abs(y_parallaxes(elements, pairs)) * np.sqrt(pairs.weight) / sigma[pairs.pair]
-        good = (size <= AGREE) & (pairs.weight > 0) & in_front_of_cameras(elements, pairs)
+        good = (size <= AGREEING_SIGMAS) & (pairs.weight > 0) & in_front_of_cameras(elements, pairs)
     return pairs.sums(good.astype(float))
 
 
 def _best_set(design: Floats, residual: Floats) -> Floats:
     """Change of the elements by which most residuals become small; zero when there is none."""
     n = len(residual)
-    if n <= MINIMAL:
+    if n <= SET_POINTS:
         return np.zeros(5)
-    draws = np.argsort(np.random.default_rng(n).random((SETS, n)), axis=1)[:, :MINIMAL]
+    draws = np.argsort(np.random.default_rng(n).random((SETS, n)), axis=1)[:, :SET_POINTS]
     matrix = design[draws]
-    regular = np.abs(np.linalg.det(matrix / np.linalg.norm(design, axis=0))) > DEGENERATE
+    regular = np.abs(np.linalg.det(matrix / np.linalg.norm(design, axis=0))) > DEGENERATE_SET
     steps = -np.linalg.solve(matrix[regular], residual[draws[regular]][:, :, None])[:, :, 0]
     steps = steps[np.abs(steps).max(axis=1, initial=0.0) < LONGEST_STEP]
     if not len(steps):
         return np.zeros(5)
     left = np.sort(np.abs(residual + steps @ design.T), axis=1)
-    best: Floats = steps[left[:, int(MOST * (n - 1))].argmin()]
+    best: Floats = steps[left[:, int(SHARE_OF_SET * (n - 1))].argmin()]
     return best

@@ -1,7 +1,6 @@
-"""One thing from what is known: a photo from known points (space resection), points from known photos (intersection).
+"""Space resection of one photo without approximate values, with its precision: closed form, then least squares.
 
-Both need no approximate values, and both come with their precision. A photo starts from three of its points, in closed
-form; a point from the place where its rays come nearest to each other.
+Source: [Grunert 1841] in the form of [Haralick 1994] for three points.
 """
 
 from __future__ import annotations
@@ -14,7 +13,8 @@ import numpy as np
 
 from photostrip.errors import GeometryError
 from photostrip.geometry.similarity import Similarity, collinearity
-from photostrip.triangulation.resection.resection import project, resect
+from photostrip.triangulation.resection.collinearity import derivatives
+from photostrip.triangulation.resection.resection import resect
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -30,9 +30,7 @@ LEAST_POINTS = 4  # of a photo: three have up to four solutions
 TRIPLES = 12  # sets of three points that are tried
 ON_A_LINE = 1e-6  # ratio of the spreads of points that lie on one line
 REAL = 1e-6  # imaginary part of a root, relative, that rounding makes of a double one
-ITERATIONS = 12
-CONVERGED = 1e-12  # of the distance of a point from its photos
-PARALLEL = 1e-9  # reciprocal condition of rays that meet nowhere
+SINGULAR = 1e-9  # smallest over largest singular value: points that do not determine a photo
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,16 +45,6 @@ class OrientedPhoto:
     residuals: Floats  # (n, 2): measured minus computed image coordinates, mm
     sigma0: float  # standard deviation of unit weight; NaN without redundancy
     redundancy: int
-
-
-@dataclass(frozen=True, eq=False)
-class Intersected:
-    """Points from known photos."""
-
-    xyz: Floats  # (q, 3): points, metres; NaN where rays do not meet in front of the cameras
-    covariance: Floats  # (q, 3, 3): their covariances for the stated standard deviations, metres^2
-    residuals: Floats  # (n, 2): measured minus computed image coordinates, mm
-    rays: Numbers  # (q,): number of rays of each point
 
 
 def space_resection(xy: Floats, sigma: Floats, points: Floats, focal: float) -> OrientedPhoto:
@@ -88,7 +76,7 @@ def _inverse(design: Floats) -> Floats:
     """Invert the normal matrix of a weighted design by its singular values, columns brought to one size first."""
     size = np.linalg.norm(design, axis=0)
     _, values, vt = np.linalg.svd(design / size, full_matrices=False)
-    if values[-1] < PARALLEL * values[0]:
+    if values[-1] < SINGULAR * values[0]:
         raise GeometryError("the points do not determine the photo", code="resection")
     root = vt.T / values / size[:, None]
     return np.asarray(root @ root.T, float)
@@ -166,101 +154,3 @@ def _three_points(rays: Floats, points: Floats) -> Iterator[tuple[Floats, Floats
         distance = np.sqrt(b2 / square) * np.array([1.0, u, v])
         moved = Similarity.from_points(rays * distance[:, None], points)
         yield points.mean(axis=0) - moved.rotation @ (rays * distance[:, None]).mean(axis=0), moved.rotation
-
-
-def derivatives(
-    points: Floats, centers: Floats, rotations: Floats, photo: Numbers, focal: Floats
-) -> tuple[Floats, Floats]:
-    """Differentiate the image coordinates of rows, each of a point on a photo.
-
-    Returns
-    -------
-    by_photo : ndarray, shape (n, 2, 6)
-        By the centre (mm/m) and by a small rotation of the photo about the axes of the frame (mm/rad).
-    by_point : ndarray, shape (n, 2, 3)
-        By the point (mm/m).
-    """
-    arm = points - centers[photo]
-    turn = rotations[photo].transpose(0, 2, 1)
-    sight = np.einsum("nij,nj->ni", turn, arm)
-    f, w = focal[photo], sight[:, 2]
-    by_sight = np.zeros((len(points), 2, 3))
-    by_sight[:, 0, 0] = by_sight[:, 1, 1] = -f / w
-    by_sight[:, :, 2] = f[:, None] * sight[:, :2] / w[:, None] ** 2
-    by_point = by_sight @ turn
-    # a small rotation theta about the axes of the frame turns the arm by -theta, seen from the photo
-    by_turn = -np.cross(arm[:, None, :], by_point)
-    return np.concatenate([-by_point, by_turn], axis=2), by_point
-
-
-def intersect_points(
-    xy: Floats, sigma: Floats, rows: tuple[Numbers, Numbers], photos: tuple[Floats, Floats, Floats], count: int
-) -> Intersected:
-    """Intersect points from photos of known orientation, all points in one batch.
-
-    Parameters
-    ----------
-    xy, sigma : ndarray, shape (n, 2)
-        Ideal image coordinates and their standard deviations, mm.
-    rows : tuple of ndarray of int
-        Photo and point of each row.
-    photos : tuple of ndarray
-        Centres (m, 3), rotations (m, 3, 3) and principal distances (m,) in mm.
-
-    Returns
-    -------
-    Intersected
-        Points with their precision, the orientations taken as known. A point with one ray, with parallel rays, or with
-        rays that meet behind a camera has no coordinates.
-    """
-    (photo, point), (centers, rotations, focal) = rows, photos
-    rays = np.bincount(point, minlength=count)
-    direction = np.einsum("nij,nj->ni", rotations[photo], np.column_stack([xy, -focal[photo]]))
-    direction /= np.linalg.norm(direction, axis=1)[:, None]
-    across = np.eye(3) - direction[:, :, None] * direction[:, None, :]
-    nearest = np.einsum("nij,nj->ni", across, centers[photo])
-    xyz, sound = _solved(_summed(across, point, count), _summed(nearest, point, count))
-    far = np.ones(count)
-    np.maximum.at(far, point, np.linalg.norm(np.nan_to_num(xyz[point]) - centers[photo], axis=1))
-    covariance = np.full((count, 3, 3), np.nan)
-    for _ in range(ITERATIONS):
-        with np.errstate(invalid="ignore", divide="ignore"):
-            _, slope = derivatives(xyz[point], centers, rotations, photo, focal)
-            slope = slope / sigma[:, :, None]
-            misfit = (xy - project(xyz[point], centers, rotations, photo, focal)) / sigma
-        bad = ~np.isfinite(slope).all(axis=(1, 2)) | ~np.isfinite(misfit).all(axis=1)
-        slope[bad], misfit[bad] = 0.0, 0.0
-        normal = _summed(np.einsum("nki,nkj->nij", slope, slope), point, count)
-        step, good = _solved(normal, _summed(np.einsum("nki,nk->ni", slope, misfit), point, count))
-        sound &= good
-        xyz = xyz + np.where(sound[:, None], step, 0.0)
-        if not sound.any() or np.abs(step[sound] / far[sound, None]).max() < CONVERGED:
-            break
-    covariance[sound] = np.linalg.inv(normal[sound])
-    ahead = np.einsum("ni,ni->n", xyz[point] - centers[photo], rotations[photo][:, :, 2]) < 0
-    sound &= rays >= 2
-    sound[point[~ahead]] = False
-    xyz[~sound], covariance[~sound] = np.nan, np.nan
-    with np.errstate(invalid="ignore"):
-        residuals = xy - project(xyz[point], centers, rotations, photo, focal)
-    return Intersected(xyz, covariance, residuals, rays)
-
-
-def _summed(values: Floats, point: Numbers, count: int) -> Floats:
-    """Sum rows by point."""
-    flat = values.reshape(len(values), -1)
-    sums = np.column_stack([np.bincount(point, column, count) for column in flat.T])
-    return np.asarray(sums.reshape(count, *values.shape[1:]), np.float64)
-
-
-def _solved(normal: Floats, right: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-    """Solve small systems; NaN where one is singular."""
-    size = np.sqrt(np.maximum(np.einsum("nii->ni", normal), 0.0))
-    size[size == 0.0] = 1.0
-    scaled = normal / size[:, :, None] / size[:, None, :]
-    values = np.linalg.eigvalsh(scaled)
-    sound = values[:, 0] > PARALLEL
-    scaled[~sound] = np.eye(3)
-    solution = np.linalg.solve(scaled, (right / size)[:, :, None])[:, :, 0] / size
-    solution[~sound] = np.nan
-    return solution, sound

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geometry.rotation import from_vector
+from photostrip.triangulation.resection.collinearity import partials, project
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -32,23 +33,6 @@ class Resection:
     rms: Floats  # (n,): root mean square of a photo's residuals in mm
     # (n,): false where a photo kept its start orientation: too few points, or a solution that does not settle
     solved: NDArray[np.bool_]
-
-
-def project(points: Floats, centers: Floats, rotations: Floats, photo: Numbers, focal: Floats) -> Floats:
-    """Ideal image coordinates (m, 2), relative to the principal point, of a point and a photo in each row.
-
-    Parameters
-    ----------
-    rotations : ndarray, shape (n, 3, 3)
-        Photo to the frame of the points and of the centres (n, 3).
-    photo : ndarray of int, shape (m,)
-        Photo of each row.
-    focal : ndarray, shape (n,)
-        Principal distances in mm.
-    """
-    ray = np.einsum("mi,mij->mj", points - centers[photo], rotations[photo])
-    xy: Floats = -focal[photo, None] * ray[:, :2] / ray[:, 2:]
-    return xy
 
 
 def resect(xy: Floats, points: Floats, photo: Numbers, focal: Floats, start: tuple[Floats, Floats]) -> Resection:
@@ -91,29 +75,6 @@ def resect(xy: Floats, points: Floats, photo: Numbers, focal: Floats, start: tup
     squares = np.bincount(photo, (residuals**2).sum(axis=1), len(centers))
     rms = np.sqrt(squares / np.maximum(2 * counts, 1))
     return Resection(centers, rotations, residuals, rms, solved)
-
-
-def partials(arm: Floats, rotations: Floats, focal: Floats, distance: Floats) -> tuple[Floats, Floats, Floats]:
-    """Image coordinates of points, and their derivatives by the orientation of the photo along its own axes.
-
-    Parameters
-    ----------
-    arm : ndarray, shape (m, 3)
-        Points from the perspective centre of their photo.
-    rotations : ndarray, shape (m, 3, 3)
-        Photo to the frame of the points.
-    focal : ndarray, shape (m,)
-        Principal distances in mm.
-    distance : ndarray, shape (m,)
-        Unit in which the centre moves.
-    """
-    u, v, w = np.einsum("mi,mij->jm", arm, rotations)
-    x, y = -focal * u / w, -focal * v / w
-    unit = focal * distance / w  # image shift by moving the centre one distance, at this depth
-    zero = np.zeros_like(x)
-    by_x = np.stack([unit, zero, unit * x / focal, -x * y / focal, focal + x * x / focal, y])
-    by_y = np.stack([zero, unit, unit * y / focal, -(focal + y * y / focal), x * y / focal, -x])
-    return by_x, by_y, np.stack([x, y])
 
 
 def _steps(

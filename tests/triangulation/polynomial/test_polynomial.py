@@ -18,7 +18,7 @@ from photostrip.pipeline import Settings as RunSettings
 from photostrip.pipeline import triangulate
 from photostrip.triangulation.absolute_orientation import weights
 from photostrip.triangulation.polynomial import correction
-from photostrip.triangulation.polynomial.correction import PolynomialSettings, Problem, fit
+from photostrip.triangulation.polynomial.correction import FitProblem, PolynomialSettings, fit
 from photostrip.triangulation.polynomial.terms import bands, choose_terms, count_stations
 from tests.strips import MICROMETRE, control_points, fly, project, targets
 from tests.vectors import cases, section
@@ -56,11 +56,11 @@ def problem(
     *,
     spacing: float = SPACING,
     azimuth_deg: float = 90.0,
-) -> Problem:
+) -> FitProblem:
     """Control points of a strip along X in a frame that is east, north, up."""
     points = {f"{number}": row for number, row in enumerate(np.asarray(given_, float))}
     control = control_points(points, dict(zip(points, use, strict=False)), sigma)
-    return Problem(
+    return FitProblem(
         np.asarray(xyz, float), targets(control, azimuth_deg), weights(control, (0.0, 0.0)), spacing, BREADTH
     )
 
@@ -251,7 +251,7 @@ def test_stations_by_hand(x: list[float], spacing: float) -> None:
 # -------------------------------------------------------------------------------------- what evidence says
 
 
-def noisy(seed: int, deformation: Floats, xyz: Floats, sigma: float = 0.05) -> Problem:
+def noisy(seed: int, deformation: Floats, xyz: Floats, sigma: float = 0.05) -> FitProblem:
     """Control after a similarity: the deformation and noise, as far as seven parameters do not take them up."""
     rng = np.random.default_rng(seed)
     given_ = xyz + deformation + rng.normal(0, sigma, xyz.shape)
@@ -306,7 +306,7 @@ def test_the_f_test_is_that_of_two_sums_of_squares() -> None:
 
 
 def left_out_by_refitting(
-    one: Problem, terms: Sequence[str], axes: Sequence[int], groups: Sequence[ArrayLike]
+    one: FitProblem, terms: Sequence[str], axes: Sequence[int], groups: Sequence[ArrayLike]
 ) -> float:
     """Fit again and again without some of the control, and look at what was left out."""
     errors: list[float] = []

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_alpha_omega_kappa, from_vector
-from photostrip.triangulation.resection.closed_form import derivatives, intersect_points, space_resection
-from photostrip.triangulation.resection.resection import project
+from photostrip.triangulation.resection.closed_form import space_resection
+from photostrip.triangulation.resection.collinearity import KnownPhotos, derivatives, project
+from photostrip.triangulation.resection.ray_intersection import intersect_points
 from tests.source_tree import ROOT
 
 FOCAL = 153.0
@@ -111,7 +112,9 @@ def two_photos(seed: int) -> tuple[np.ndarray, ...]:
 @given(st.integers(0, 10**6))
 def test_points_come_back_from_their_photos(seed: int) -> None:
     xy, photo, point, centers, rotations, points = two_photos(seed)
-    found = intersect_points(xy, np.full(xy.shape, 0.005), (photo, point), (centers, rotations, np.full(3, FOCAL)), 20)
+    found = intersect_points(
+        xy, np.full(xy.shape, 0.005), (photo, point), KnownPhotos(centers, rotations, np.full(3, FOCAL)), 20
+    )
     assert np.abs(found.xyz - points).max() < 1e-8
     assert found.rays.tolist() == [2 + (n % 3 != 0) for n in range(20)]
 
@@ -120,7 +123,7 @@ def test_the_covariance_of_a_point_is_that_of_many_measurements() -> None:
     xy, photo, point, centers, rotations, points = two_photos(4)
     sigma = np.full(xy.shape, 0.005)
     random = np.random.default_rng(2)
-    known = (centers, rotations, np.full(3, FOCAL))
+    known = KnownPhotos(centers, rotations, np.full(3, FOCAL))
     found = [
         intersect_points(xy + random.normal(size=xy.shape) * sigma, sigma, (photo, point), known, 20)
         for _ in range(300)
@@ -133,7 +136,7 @@ def test_the_covariance_of_a_point_is_that_of_many_measurements() -> None:
 
 def test_rays_that_do_not_meet_give_no_point() -> None:
     xy, photo, point, centers, rotations, _ = two_photos(4)
-    known = (centers, rotations, np.full(3, FOCAL))
+    known = KnownPhotos(centers, rotations, np.full(3, FOCAL))
     keep = ~((point == 1) & (photo > 0))  # one ray only
     flipped = xy.copy()
     base = (photo == 0) & (point == 2)
@@ -175,6 +178,6 @@ def test_a_published_pair_comes_back_from_its_points_and_its_points_from_the_pai
         assert np.abs(found.rotation - rotations[number]).max() < 3e-5
     count = len(points)
     rows = np.repeat([0, 1], count), np.tile(np.arange(count), 2)
-    known = (stations, rotations, np.full(2, 75.0))
+    known = KnownPhotos(stations, rotations, np.full(2, 75.0))
     met = intersect_points(np.concatenate([x1, x2]), np.full((2 * count, 2), 0.0005), rows, known, count)
     assert np.abs(met.xyz - points).max() < 0.006

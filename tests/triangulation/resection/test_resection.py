@@ -13,7 +13,8 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from photostrip.triangulation.resection import resection
-from photostrip.triangulation.resection.resection import Resection, project, resect
+from photostrip.triangulation.resection.collinearity import project
+from photostrip.triangulation.resection.resection import Resection, resect
 from tests.strips import MICROMETRE, attitude, photograph
 
 if TYPE_CHECKING:

@@ -82,19 +82,19 @@ class StripAtControl:
     frames: Sequence[GroundFrame]
     intermediate: IntermediateFrame
     precision: tuple[float, float]  # a-priori standard deviation of a strip point in plan and height, metres
-    # spacing, breadth: as in ``correction.Problem``
+    # spacing, breadth: as in ``correction.FitProblem``
     spacing: float
     breadth: float
     # covariance of all misclosures; without it polynomials stand for the strip's deformation
     joint: control_significance.ControlCovariance | None = None
 
-    def problem(self, control: ControlPoints) -> correction.Problem:
+    def problem(self, control: ControlPoints) -> correction.FitProblem:
         """Fit the similarity, and give what is left to a polynomial."""
         targets = Targets(control, self.frames, self.intermediate)
         first = absolute_orientation.orient(self.strip, targets, control.use.astype(float))
         weight = absolute_orientation.weights(targets.turned(first.similarity(self.strip)), self.precision)
         orientation = absolute_orientation.orient(self.strip, targets, weight)
-        return correction.Problem(orientation.similarity(self.strip), targets, weight, self.spacing, self.breadth)
+        return correction.FitProblem(orientation.similarity(self.strip), targets, weight, self.spacing, self.breadth)
 
     def placed(self, kept: ControlPoints) -> Floats:
         """Return all control points after a similarity on what is kept, intermediate frame, metres."""
@@ -190,7 +190,7 @@ def _enough(control: ControlPoints, out: Flags, share: float = LARGEST_SHARE) ->
     return all(suspected[:, axes].sum() <= share * given[:, axes].sum() for axes in (PLAN, slice(2, 3)))
 
 
-def _richest(problem: correction.Problem) -> correction.Polynomial | None:
+def _richest(problem: correction.FitProblem) -> correction.Polynomial | None:
     """Polynomial of the highest degree that leaves redundancy in every axis; None when there is none."""
     for degree in ("3", "2", "1"):
         fit = correction.fit(problem, correction.PolynomialSettings(degree))
@@ -199,7 +199,7 @@ def _richest(problem: correction.Problem) -> correction.Polynomial | None:
     return None
 
 
-def judged(problem: correction.Problem, fit: correction.Polynomial) -> tuple[Floats, Floats, Floats, Floats]:
+def judged(problem: correction.FitProblem, fit: correction.Polynomial) -> tuple[Floats, Floats, Floats, Floats]:
     """Judge every control coordinate by what the others predict.
 
     Returns
@@ -363,7 +363,7 @@ def _predicted(
     return value, limit, np.where(out, gap, size), np.where(out, 1.0, redundancy)
 
 
-def _leverages(problem: correction.Problem, terms: Sequence[str], weight: Floats) -> Floats:
+def _leverages(problem: correction.FitProblem, terms: Sequence[str], weight: Floats) -> Floats:
     """Variance of the fit at every point in units of that of a coordinate of mean weight, shape (n,)."""
     x, y = problem.xyz[:, 0] / problem.sizes.reach, problem.xyz[:, 1] / problem.breadth
     columns = np.column_stack([x**i * y**j for i, j in (polynomial_terms.POWERS[term] for term in terms)])

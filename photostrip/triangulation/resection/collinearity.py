@@ -1,0 +1,98 @@
+"""The collinearity condition: image coordinates of points on photos, and their derivatives.
+
+With (u, v, w) = R^T (X - S): x = -f u / w, y = -f v / w. Source: derived.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+
+class KnownPhotos(NamedTuple):
+    """Photos of known orientation."""
+
+    centers: Floats  # (m, 3): perspective centres
+    rotations: Floats  # (m, 3, 3): photo to the frame of the centres
+    focal: Floats  # (m,): principal distances, mm
+
+
+class PhotoPartials(NamedTuple):
+    """Image coordinates and their derivatives by the orientation of the photo along its own axes."""
+
+    # by_x, by_y: (6, m): derivatives of x and y by a shift of the centre and a small rotation
+    by_x: Floats
+    by_y: Floats
+    xy: Floats  # (2, m): image coordinates in mm
+
+
+def project(points: Floats, centers: Floats, rotations: Floats, photo: Numbers, focal: Floats) -> Floats:
+    """Ideal image coordinates (m, 2), relative to the principal point, of a point and a photo in each row.
+
+    Parameters
+    ----------
+    rotations : ndarray, shape (n, 3, 3)
+        Photo to the frame of the points and of the centres (n, 3).
+    photo : ndarray of int, shape (m,)
+        Photo of each row.
+    focal : ndarray, shape (n,)
+        Principal distances in mm.
+    """
+    ray = np.einsum("mi,mij->mj", points - centers[photo], rotations[photo])
+    xy: Floats = -focal[photo, None] * ray[:, :2] / ray[:, 2:]
+    return xy
+
+
+def derivatives(
+    points: Floats, centers: Floats, rotations: Floats, photo: Numbers, focal: Floats
+) -> tuple[Floats, Floats]:
+    """Differentiate the image coordinates of rows, each of a point on a photo.
+
+    Returns
+    -------
+    by_photo : ndarray, shape (n, 2, 6)
+        By the centre (mm/m) and by a small rotation of the photo about the axes of the frame (mm/rad).
+    by_point : ndarray, shape (n, 2, 3)
+        By the point (mm/m).
+    """
+    arm = points - centers[photo]
+    turn = rotations[photo].transpose(0, 2, 1)
+    sight = np.einsum("nij,nj->ni", turn, arm)
+    f, w = focal[photo], sight[:, 2]
+    by_sight = np.zeros((len(points), 2, 3))
+    by_sight[:, 0, 0] = by_sight[:, 1, 1] = -f / w
+    by_sight[:, :, 2] = f[:, None] * sight[:, :2] / w[:, None] ** 2
+    by_point = by_sight @ turn
+    # a small rotation theta about the axes of the frame turns the arm by -theta, seen from the photo
+    by_turn = -np.cross(arm[:, None, :], by_point)
+    return np.concatenate([-by_point, by_turn], axis=2), by_point
+
+
+def partials(arm: Floats, rotations: Floats, focal: Floats, distance: Floats) -> PhotoPartials:
+    """Image coordinates of points, and their derivatives by the orientation of the photo along its own axes.
+
+    Parameters
+    ----------
+    arm : ndarray, shape (m, 3)
+        Points from the perspective centre of their photo.
+    rotations : ndarray, shape (m, 3, 3)
+        Photo to the frame of the points.
+    focal : ndarray, shape (m,)
+        Principal distances in mm.
+    distance : ndarray, shape (m,)
+        Unit in which the centre moves.
+    """
+    u, v, w = np.einsum("mi,mij->jm", arm, rotations)
+    x, y = -focal * u / w, -focal * v / w
+    unit = focal * distance / w  # image shift by moving the centre one distance, at this depth
+    zero = np.zeros_like(x)
+    by_x = np.stack([unit, zero, unit * x / focal, -x * y / focal, focal + x * x / focal, y])
+    by_y = np.stack([zero, unit, unit * y / focal, -(focal + y * y / focal), x * y / focal, -x])
+    return PhotoPartials(by_x, by_y, np.stack([x, y]))

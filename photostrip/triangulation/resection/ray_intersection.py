@@ -1,0 +1,105 @@
+"""Points where all rays that saw them meet, from photos of known orientation, with their precision.
+
+A point starts at the place where its rays come nearest to each other; least squares on the image coordinates follow.
+Source: derived.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.triangulation.resection.collinearity import KnownPhotos, derivatives, project
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+ITERATIONS = 12
+CONVERGED = 1e-12  # of the distance of a point from its photos
+PARALLEL = 1e-9  # reciprocal condition of rays that meet nowhere
+
+
+@dataclass(frozen=True, eq=False)
+class Intersected:
+    """Points from known photos."""
+
+    xyz: Floats  # (q, 3): points, metres; NaN where rays do not meet in front of the cameras
+    covariance: Floats  # (q, 3, 3): their covariances for the stated standard deviations, metres^2
+    residuals: Floats  # (n, 2): measured minus computed image coordinates, mm
+    rays: Numbers  # (q,): number of rays of each point
+
+
+def intersect_points(
+    xy: Floats, sigma: Floats, rows: tuple[Numbers, Numbers], photos: KnownPhotos, count: int
+) -> Intersected:
+    """Intersect points from photos of known orientation, all points in one batch.
+
+    Parameters
+    ----------
+    xy, sigma : ndarray, shape (n, 2)
+        Ideal image coordinates and their standard deviations, mm.
+    rows : tuple of ndarray of int
+        Photo and point of each row.
+
+    Returns
+    -------
+    Intersected
+        Points with their precision, the orientations taken as known. A point with one ray, with parallel rays, or with
+        rays that meet behind a camera has no coordinates.
+    """
+    (photo, point), (centers, rotations, focal) = rows, photos
+    rays = np.bincount(point, minlength=count)
+    direction = np.einsum("nij,nj->ni", rotations[photo], np.column_stack([xy, -focal[photo]]))
+    direction /= np.linalg.norm(direction, axis=1)[:, None]
+    across = np.eye(3) - direction[:, :, None] * direction[:, None, :]
+    nearest = np.einsum("nij,nj->ni", across, centers[photo])
+    xyz, sound = _solved(_summed(across, point, count), _summed(nearest, point, count))
+    far = np.ones(count)
+    np.maximum.at(far, point, np.linalg.norm(np.nan_to_num(xyz[point]) - centers[photo], axis=1))
+    covariance = np.full((count, 3, 3), np.nan)
+    for _ in range(ITERATIONS):
+        with np.errstate(invalid="ignore", divide="ignore"):
+            _, slope = derivatives(xyz[point], centers, rotations, photo, focal)
+            slope = slope / sigma[:, :, None]
+            misfit = (xy - project(xyz[point], centers, rotations, photo, focal)) / sigma
+        bad = ~np.isfinite(slope).all(axis=(1, 2)) | ~np.isfinite(misfit).all(axis=1)
+        slope[bad], misfit[bad] = 0.0, 0.0
+        normal = _summed(np.einsum("nki,nkj->nij", slope, slope), point, count)
+        step, good = _solved(normal, _summed(np.einsum("nki,nk->ni", slope, misfit), point, count))
+        sound &= good
+        xyz = xyz + np.where(sound[:, None], step, 0.0)
+        if not sound.any() or np.abs(step[sound] / far[sound, None]).max() < CONVERGED:
+            break
+    covariance[sound] = np.linalg.inv(normal[sound])
+    ahead = np.einsum("ni,ni->n", xyz[point] - centers[photo], rotations[photo][:, :, 2]) < 0
+    sound &= rays >= 2
+    sound[point[~ahead]] = False
+    xyz[~sound], covariance[~sound] = np.nan, np.nan
+    with np.errstate(invalid="ignore"):
+        residuals = xy - project(xyz[point], centers, rotations, photo, focal)
+    return Intersected(xyz, covariance, residuals, rays)
+
+
+def _summed(values: Floats, point: Numbers, count: int) -> Floats:
+    """Sum rows by point."""
+    flat = values.reshape(len(values), -1)
+    sums = np.column_stack([np.bincount(point, column, count) for column in flat.T])
+    return np.asarray(sums.reshape(count, *values.shape[1:]), np.float64)
+
+
+def _solved(normal: Floats, right: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """Solve small systems; NaN where one is singular."""
+    size = np.sqrt(np.maximum(np.einsum("nii->ni", normal), 0.0))
+    size[size == 0.0] = 1.0
+    scaled = normal / size[:, :, None] / size[:, None, :]
+    values = np.linalg.eigvalsh(scaled)
+    sound = values[:, 0] > PARALLEL
+    scaled[~sound] = np.eye(3)
+    solution = np.linalg.solve(scaled, (right / size)[:, :, None])[:, :, 0] / size
+    solution[~sound] = np.nan
+    return solution, sound
