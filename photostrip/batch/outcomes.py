@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from photostrip.errors import EXIT_GEOMETRY, EXIT_INPUT, EXIT_INTERNAL, EXIT_TOLERANCE, Fault, InputError
 from photostrip.report.page.messages import findings_of, line_of
 
 if TYPE_CHECKING:
     from photostrip.errors import GeometryError
-
-Document = dict[str, Any]
+    from photostrip.report.page.parts import Document
 
 # How a project can end beside the verdicts of a result (good, look, failed), and the exit code of each.
 FAULTY, UNWRITTEN, WEAK = "faulty", "unwritten", "weak"

@@ -12,7 +12,7 @@ import re
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from photostrip import __version__
 from photostrip.errors import Fault, InputError
@@ -25,8 +25,7 @@ if TYPE_CHECKING:
 
     from photostrip.batch.selection import ChosenProject
     from photostrip.batch.tasks import Answer
-
-    Document = dict[str, Any]
+    from photostrip.report.page.parts import Document
 
 LOCK = ".batch.lock"
 RECORD = "batch.json"

@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from photostrip.batch.local_pool import Executor
     from photostrip.batch.result_folder import ResultFolder
     from photostrip.batch.selection import ChosenProject
-
-    Document = dict[str, Any]
+    from photostrip.report.page.parts import Document
 
 LAST_REFUSALS = 3  # results in a row that cannot be written before the batch gives up
 SIGNALS = (signal.SIGINT, signal.SIGTERM)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from photostrip.batch.parcel import Parcel
-
-Document = dict[str, Any]
+    from photostrip.report.page.parts import Document
 
 
 @dataclass(frozen=True)

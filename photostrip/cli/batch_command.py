@@ -6,7 +6,7 @@ import os
 import sys
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from photostrip.batch.local_pool import LocalPool
 from photostrip.batch.result_folder import opened
@@ -20,6 +20,7 @@ from photostrip.formats.text.writing import make_rule, write_text
 from photostrip.report.commands.batch import batch_junit, batch_sections, outcome_line
 from photostrip.report.page import messages, text
 from photostrip.report.page.numbers import counted
+from photostrip.report.page.parts import Document
 from photostrip.report.page.progress import batch_table
 
 if TYPE_CHECKING:
@@ -31,8 +32,6 @@ if TYPE_CHECKING:
     from photostrip.batch.run import Batch
     from photostrip.batch.tasks import Answer, Limits, Task
     from photostrip.report.page.progress import BatchTable
-
-    Document = dict[str, Any]
 
 EXIT_SIGNAL = 128  # plus its number, as a shell reports it
 

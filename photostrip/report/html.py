@@ -8,10 +8,10 @@ from __future__ import annotations
 import re
 from importlib import resources
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from photostrip.errors import Fault, InputError
-from photostrip.report.page.parts import Facts, Table, Words
+from photostrip.report.page.parts import Document, Facts, Table, Words
 from photostrip.report.pictures.strip import strip_pictures
 from photostrip.report.sections.document import sections_of, title_of
 
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from photostrip.report.page.parts import Part, Section
-
-Document = dict[str, Any]
 
 INSTALL = "pip install 'photostrip[report]'"
 

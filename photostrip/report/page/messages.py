@@ -5,7 +5,7 @@ Whatever the form, the same findings come out with the same file, line, column, 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.notes import Finding
@@ -14,8 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from photostrip.notes import Note
-
-Document = dict[str, Any]
+    from photostrip.report.page.parts import Document
 
 LEVELS = {"error": "error", "warning": "warning", "note": "notice"}  # ours, and those of GitHub
 SCHEMA = 1

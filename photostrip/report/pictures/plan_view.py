@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-Document = dict[str, Any]
+if TYPE_CHECKING:
+    from photostrip.report.page.parts import Document
+
 Pair = tuple[float, float]
 EARTH = 6_371_000.0  # m, for degrees of a body whose size is not said
 
 
 class Spot(NamedTuple):
-    """A thing on the plan."""
+    """A point or photo on the plan."""
 
     id: str
     role: str  # ``photo``, ``new``, ``control`` or ``check``

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NamedTuple
 
 from photostrip.report.page.numbers import counted, short
 from photostrip.report.pictures import svg
@@ -12,10 +12,9 @@ from photostrip.report.pictures.plan_view import plan_of
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from photostrip.report.page.parts import Document
     from photostrip.report.pictures.plan_view import Plan, Spot
     from photostrip.report.pictures.svg import Axis, Picture
-
-Document = dict[str, Any]
 
 WIDTH, LOWEST, HIGHEST = 960.0, 220.0, 560.0  # of a picture
 LEFT, RIGHT, TOP, BOTTOM = 70.0, 24.0, 64.0, 54.0  # margins
@@ -40,38 +39,59 @@ def strip_pictures(document: Document) -> list[Picture]:
 # --------------------------------------------------------------------------------------------------------- plan
 
 
+class Sheet(NamedTuple):
+    """Where the ground and what is enlarged on it lie on the picture of the plan."""
+
+    low: tuple[float, float]  # smallest place along and across, metres
+    origin: tuple[float, float]  # of ``low`` on the picture
+    scale: float  # picture units for each metre of the ground
+    factor: float  # and of a residual or half axis
+    height: float  # of the picture
+
+    def place(self, spot: Spot) -> svg.Point:
+        """Return the place of a spot on the picture."""
+        along, across = spot.along - self.low[0], spot.across - self.low[1]
+        return self.origin[0] + along * self.scale, self.origin[1] - across * self.scale
+
+
+def _sheet(spots: Sequence[Spot], longest: float) -> Sheet:
+    """Fit all spots on the picture, with room for the longest vector around them."""
+    along, across = [spot.along for spot in spots], [spot.across for spot in spots]
+    length, width = max(along) - min(along), max(across) - min(across)
+    scale = min((WIDTH - 2 * LONGEST) / max(length, 1e-9), (HIGHEST - TOP - 2 * LONGEST) / max(width, 1e-9))
+    height = max(TOP + 2 * LONGEST + width * scale + 30.0, LOWEST)
+    return Sheet(
+        low=(min(along), min(across)),
+        origin=((WIDTH - length * scale) / 2, height - 30.0 - LONGEST),
+        scale=scale,
+        factor=LONGEST / longest,
+        height=height,
+    )
+
+
 def _plan_picture(document: Document, plan: Plan) -> Picture:
     """Draw photos, points, residual vectors and ellipses from above."""
     everything = [*plan.spots, *(spot for strip in plan.strips for spot in strip)]
-    low = min(spot.along for spot in everything), min(spot.across for spot in everything)
-    high = max(spot.along for spot in everything), max(spot.across for spot in everything)
-    room = WIDTH - 2 * LONGEST
-    scale = min(room / max(high[0] - low[0], 1e-9), (HIGHEST - TOP - 2 * LONGEST) / max(high[1] - low[1], 1e-9))
-    height = max(TOP + 2 * LONGEST + (high[1] - low[1]) * scale + 30.0, LOWEST)
-    shift = (WIDTH - (high[0] - low[0]) * scale) / 2
-
-    def place(along: float, across: float) -> svg.Point:
-        return shift + (along - low[0]) * scale, height - 30.0 - LONGEST - (across - low[1]) * scale
-
     longest = max(_longest(plan), 1e-9)
     bar = svg.nice(longest / 2)
-    factor = LONGEST / max(longest, bar)  # picture units for each metre of a residual
-    drawn = [svg.path((place(spot.along, spot.across) for spot in strip), "flight") for strip in plan.strips]
-    drawn += _ellipses(plan.spots, place, factor)
-    drawn += [_vector(spot, place, factor) for spot in plan.spots if spot.shift is not None]
-    spacing = (high[0] - low[0]) * scale / max(len(plan.strips[0]), 1)
-    drawn += [_spot(spot, place, min(1.0, spacing / CROWDED)) for spot in everything]
+    sheet = _sheet(everything, max(longest, bar))
+    crowded = sum(spot.ellipse is not None for spot in plan.spots) > MOST_ELLIPSES
+    spacing = max(spot.along - sheet.low[0] for spot in everything) * sheet.scale / max(len(plan.strips[0]), 1)
+    drawn = [svg.path(map(sheet.place, strip), "flight") for strip in plan.strips]
+    drawn += [_ellipse(spot, sheet) for spot in plan.spots if spot.ellipse and not (crowded and spot.role == "new")]
+    drawn += [_vector(spot, sheet) for spot in plan.spots if spot.shift is not None]
+    drawn += [_spot(spot, sheet, min(1.0, spacing / CROWDED)) for spot in everything]
     drawn += _legend([role for role in WORDS if any(spot.role == role for spot in everything)], TOP - 40.0)
-    drawn += _bars(scale, (bar, factor), plan.north, height)
-    enlarged = f"{float(f'{factor / scale:.2g}'):.0f}" if factor > scale else short(factor / scale, 2)
+    drawn += _bars(sheet, bar, plan.north)
+    larger = sheet.factor / sheet.scale
+    enlarged = f"{float(f'{larger:.2g}'):.0f}" if larger > 1 else short(larger, 2)
     caption = (
-        "Vectors: adjusted minus given in plan; ellipses: standard deviations"
-        f"{'' if _all_ellipses(plan.spots) else ' of given points'}. Both are {enlarged} times as large as the ground."
-        " The first strip runs to the right."
+        f"Vectors: adjusted minus given in plan; ellipses: standard deviations{' of given points' if crowded else ''}. "
+        f"Both are {enlarged} times as large as the ground. The first strip runs to the right."
     )
     counts = counted(len(plan.strips), "strip"), counted(len(plan.spots), "point")
     words = f"{', '.join(counts)}; the tables of control and check points have the numbers."
-    return svg.picture("plan", (WIDTH, height), (f"Plan of {document['name']}", caption, words), drawn)
+    return svg.picture("plan", (WIDTH, sheet.height), (f"Plan of {document['name']}", caption, words), drawn)
 
 
 def _longest(plan: Plan) -> float:
@@ -80,32 +100,20 @@ def _longest(plan: Plan) -> float:
     return max([*vectors, *(spot.ellipse[0] for spot in plan.spots if spot.ellipse is not None)], default=0.0)
 
 
-def _all_ellipses(spots: Sequence[Spot]) -> bool:
-    """Whether there is room for the ellipses of new points, too."""
-    return sum(spot.ellipse is not None for spot in spots) <= MOST_ELLIPSES
+def _ellipse(spot: Spot, sheet: Sheet) -> str:
+    a, b, angle = spot.ellipse or (0.0, 0.0, 0.0)
+    x, y = sheet.place(spot)
+    turn = f"rotate({svg.number(-math.degrees(angle))} {svg.number(x)} {svg.number(y)})"
+    return svg.element("ellipse", cx=x, cy=y, rx=a * sheet.factor, ry=b * sheet.factor, transform=turn, kind="ellipse")
 
 
-def _ellipses(spots: Sequence[Spot], place: Any, factor: float) -> list[str]:  # noqa: ANN401 (a function)
-    everything = _all_ellipses(spots)
-    found = []
-    for spot in spots:
-        if spot.ellipse is not None and (everything or spot.role != "new"):
-            a, b, angle = spot.ellipse
-            x, y = place(spot.along, spot.across)
-            turn = f"rotate({svg.number(-math.degrees(angle))} {svg.number(x)} {svg.number(y)})"
-            found.append(
-                svg.element("ellipse", cx=x, cy=y, rx=a * factor, ry=b * factor, transform=turn, kind="ellipse")
-            )
-    return found
-
-
-def _vector(spot: Spot, place: Any, factor: float) -> str:  # noqa: ANN401 (a function)
+def _vector(spot: Spot, sheet: Sheet) -> str:
     along, across = spot.shift or (0.0, 0.0)
-    x, y = place(spot.along, spot.across)
-    return svg.line((x, y), (x + along * factor, y - across * factor), f"vector {spot.role}")
+    x, y = sheet.place(spot)
+    return svg.line((x, y), (x + along * sheet.factor, y - across * sheet.factor), f"vector {spot.role}")
 
 
-def _spot(spot: Spot, place: Any, share: float) -> str:  # noqa: ANN401 (a function)
+def _spot(spot: Spot, sheet: Sheet, share: float) -> str:
     """Draw the mark of a spot, smaller in a long strip; its hint has its id and numbers."""
     hint = f"{WORDS[spot.role]} {spot.id}"
     if spot.shift is not None:
@@ -115,7 +123,7 @@ def _spot(spot: Spot, place: Any, share: float) -> str:  # noqa: ANN401 (a funct
     if spot.ellipse is not None:
         hint += f", ellipse {short(spot.ellipse[0], 3)} x {short(spot.ellipse[1], 3)} m"
     size = {"new": 3.0 * share, "photo": 4.0 * share}.get(spot.role, 5.0)
-    return svg.mark(place(spot.along, spot.across), SHAPES[spot.role], f"mark {spot.role}", hint, size)
+    return svg.mark(sheet.place(spot), SHAPES[spot.role], f"mark {spot.role}", hint, size)
 
 
 def _legend(roles: Iterable[str], y: float, x: float = LEFT) -> list[str]:
@@ -127,13 +135,13 @@ def _legend(roles: Iterable[str], y: float, x: float = LEFT) -> list[str]:
     return found
 
 
-def _bars(scale: float, bar: tuple[float, float], north: tuple[float, float], height: float) -> list[str]:
+def _bars(sheet: Sheet, residual: float, north: tuple[float, float]) -> list[str]:
     """Return the scale bars of the ground and of the residuals, and the direction of north."""
-    ground = svg.nice(90.0 / scale)
-    found, x, y = [], LEFT, height - 18.0
+    ground = svg.nice(90.0 / sheet.scale)
+    found, x, y = [], LEFT, sheet.height - 18.0
     for length, words, kind in (
-        (ground * scale, f"ground {_metres(ground)}", "bar"),
-        (bar[0] * bar[1], f"residuals {_metres(bar[0])}", "bar vector"),
+        (ground * sheet.scale, f"ground {_metres(ground)}", "bar"),
+        (residual * sheet.factor, f"residuals {_metres(residual)}", "bar vector"),
     ):
         found += [svg.line((x, y), (x + length, y), kind), svg.text((x + length + 8.0, y + 4.5), words)]
         x += length + 30.0 + 7.5 * len(words)
