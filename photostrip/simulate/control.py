@@ -36,22 +36,15 @@ class Roles:
 
 
 def roles(spec: Spec, placed: Placed, rays: Rows) -> Roles:
-    """Choose control and check points.
+    """Choose control and check points; `rays` says on how many photos of its own strip each point lies.
 
-    Parameters
-    ----------
-    rays : ndarray of int, shape (n,)
-        On how many photos of its own strip each point lies.
+    Draws (`Purpose.ROLES`): an order of all points for the layout ``random``; an order of the control points for the
+    shares of ``use``; an order of all points for the check points.
 
     Raises
     ------
     InputError
         When there are not enough points on two photos.
-
-    Notes
-    -----
-    Draws (`Purpose.ROLES`): an order of all points for the layout ``random``; an order of the control points for the
-    shares of ``use``; an order of all points for the check points.
     """
     draws = Draws(spec.seed, Purpose.ROLES)
     order = draws.order(len(rays))
@@ -70,15 +63,7 @@ def roles(spec: Spec, placed: Placed, rays: Rows) -> Roles:
 def band_photos(spec: Spec) -> list[int]:
     """Photos of a strip, counted from 0, at whose nadir a band of control points lies.
 
-    Parameters
-    ----------
-    spec : Spec
-        Number of bands, or models between them.
-
-    Returns
-    -------
-    list of int
-        The photos; the first and the last are always among them, except that a single band lies in the middle.
+    The first and the last are always among them, except that a single band lies in the middle.
     """
     last, bands, every = spec.flight.photos - 1, spec.control.bands, spec.control.every
     if every is not None:
@@ -139,25 +124,15 @@ def given_coordinates(
 ) -> ControlPoints:
     """Make the control list: true coordinates with errors, each in its frame.
 
+    Control points, then check points; coordinates that are not given are NaN. Draws (`Purpose.CONTROL`): for each
+    control point, then for each check point east, north, up.
+
     Parameters
     ----------
-    spec : Spec
-        Standard deviations, and where the second frame begins.
-    points : PointTable
-        True Cartesian coordinates of all points, metres.
     offset : ndarray, shape (c, 3)
         Gross errors of the control points east, north, up (X, Y, Z), metres.
     frames : list of GroundFrame
         The frame of the first list and, if there is one, of the second.
-
-    Returns
-    -------
-    ControlPoints
-        Control points, then check points; coordinates that are not given are NaN.
-
-    Notes
-    -----
-    Draws (`Purpose.CONTROL`): for each control point, then for each check point east, north, up.
     """
     rows = np.concatenate([chosen.control, chosen.check])
     n, given = len(rows), len(chosen.control)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.simulate.flight import CUT, position_sigma
+from photostrip.simulate.flight import CUT_SIGMAS, position_sigma
 from photostrip.simulate.imaging import sees
 
 if TYPE_CHECKING:
@@ -18,21 +18,19 @@ if TYPE_CHECKING:
 
     Rows = NDArray[np.intp]
 
-STEEPEST = np.radians(75.0)  # a ray flatter than this is not looked for
+FLATTEST_RAY = np.radians(75.0)  # a ray flatter than this is not looked for
 
 
 def shown(spec: Spec, photos: Photos, placed: Placed) -> tuple[Rows, Rows]:
     """All image points: which photo shows which point.
 
+    Points are sought only around the place of each photo in its strip, so that the time grows with the photos, not with
+    their square.
+
     Returns
     -------
     photo, point : ndarray of int, shape (n,)
         Numbers of photo and point of each image point, by photo, then by point.
-
-    Notes
-    -----
-    Points are sought only around the place of each photo in its strip, so that the time grows with the photos, not
-    with their square.
     """
     n = spec.flight.photos
     reach = _reach(spec, placed)
@@ -58,8 +56,8 @@ def shown(spec: Spec, photos: Photos, placed: Placed) -> tuple[Rows, Rows]:
 
 def _reach(spec: Spec, placed: Placed) -> float:
     """Largest distance on the ground, metres, from a photo's planned place to what it can show."""
-    tilt = CUT * np.radians(np.hypot(*spec.flight.attitude_sigma_deg[:2]))
+    tilt = CUT_SIGMAS * np.radians(np.hypot(*spec.flight.attitude_sigma_deg[:2]))
     view = np.arctan(np.hypot(*spec.format) / 2.0 / spec.camera.principal_distance)
-    moved = CUT * np.asarray(position_sigma(spec))
+    moved = CUT_SIGMAS * np.asarray(position_sigma(spec))
     depth = spec.flying_height + spec.terrain.height - placed.height.min() + moved[2]
-    return float(depth * np.tan(min(view + tilt, STEEPEST)) + np.hypot(moved[0], moved[1]))
+    return float(depth * np.tan(min(view + tilt, FLATTEST_RAY)) + np.hypot(moved[0], moved[1]))

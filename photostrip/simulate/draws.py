@@ -36,30 +36,13 @@ class Purpose(IntEnum):
 
 
 class Draws:
-    """One stream of random numbers.
-
-    Parameters
-    ----------
-    number : int, optional
-        Number of the stream, for purposes that have several.
-    """
+    """One stream of random numbers; `number` is that of the stream, for purposes that have several."""
 
     def __init__(self, seed: int, purpose: Purpose, number: int = 0) -> None:
         self._bits = np.random.PCG64(np.random.SeedSequence(seed, spawn_key=(int(purpose), number)))
 
     def uniform(self, *shape: int) -> NDArray[np.float64]:
-        """Draw uniform numbers in [0, 1).
-
-        Parameters
-        ----------
-        *shape : int
-            Shape of the array.
-
-        Returns
-        -------
-        ndarray
-            The next numbers of the stream, in rows.
-        """
+        """Draw the next uniform numbers of the stream in [0, 1), in rows."""
         words = np.asarray(self._bits.random_raw(int(np.prod(shape))), dtype=np.uint64)
         return np.asarray((words >> np.uint64(11)) * 2.0**-53).reshape(shape)
 
@@ -70,27 +53,13 @@ class Draws:
     def normal(self, *shape: int) -> NDArray[np.float64]:
         """Draw normal numbers with mean 0 and standard deviation 1.
 
-        Parameters
-        ----------
-        *shape : int
-            Shape of the array.
-
-        Returns
-        -------
-        ndarray
-            Two uniform numbers each give one of them (the cosine of Box and Muller): number i of the stream does
-            not depend on how many are asked for.
+        Two uniform numbers each give one of them (the cosine of Box and Muller): number i of the stream does not depend
+        on how many are asked for.
         """
         pairs = self.uniform(int(np.prod(shape)), 2)
         radius = np.sqrt(-2.0 * np.log1p(-pairs[:, 0]))
         return np.asarray(radius * np.cos(2.0 * np.pi * pairs[:, 1])).reshape(shape)
 
     def order(self, count: int) -> NDArray[np.intp]:
-        """Draw the numbers 0 to count - 1 in random order.
-
-        Returns
-        -------
-        ndarray of int, shape (count,)
-            The order in which `count` uniform numbers are sorted.
-        """
+        """Draw the numbers 0 to count - 1 in random order: that in which `count` uniform numbers are sorted."""
         return np.argsort(self.uniform(count), kind="stable")

@@ -32,35 +32,15 @@ class Sheets:
     amplitude: float  # their amplitude, mm
 
     def comparator_from_photo(self, photo: Rows, xy: Array) -> Array:
-        """Give comparator coordinates of points on the film, one for each row.
-
-        Parameters
-        ----------
-        photo : ndarray of int, shape (n,)
-            Number of the photo of each row.
-        xy : ndarray, shape (n, 2)
-            Coordinates in the system of the fiducial marks, mm.
-
-        Returns
-        -------
-        ndarray, shape (n, 2)
-            Comparator coordinates, mm.
-        """
+        """Give comparator coordinates of points (n, 2) in the system of the fiducial marks, mm."""
         angle = np.einsum("ncwk,nk->ncw", self.wave[photo], xy) + self.phase[photo]
         moved = xy + self.amplitude * np.sin(angle).sum(axis=2)
         return np.asarray(np.einsum("nij,nj->ni", self.matrix[photo], moved) + self.offset[photo])
 
 
 def sheets(spec: Spec, count: int) -> Sheets | None:
-    """Deform the film of all photos.
+    """Deform the film of all photos; None when the specification has no film.
 
-    Returns
-    -------
-    Sheets or None
-        None when the specification has no film.
-
-    Notes
-    -----
     Draws (`Purpose.FILM`): for each photo the normal numbers scale x, scale y, shear, turn, offset x, offset y; then
     for each photo, coordinate and wave a direction and a phase.
     """
@@ -76,9 +56,11 @@ def sheets(spec: Spec, count: int) -> Sheets | None:
     number = 2.0 * np.pi / (max(spec.format) * np.asarray(LENGTHS))
     direction = np.stack([np.cos(uniform[..., 0]), np.sin(uniform[..., 0])], axis=-1)
     return Sheets(
-        turn @ stretch,
-        film.offset_mm * normal[:, 4:],
-        number[:, None] * direction,
-        uniform[..., 1],
-        film.irregular_um / 1000.0 * np.sqrt(2.0 / len(LENGTHS)),  # sine waves of this amplitude add up to the rms
+        matrix=turn @ stretch,
+        offset=film.offset_mm * normal[:, 4:],
+        wave=number[:, None] * direction,
+        phase=uniform[..., 1],
+        amplitude=film.irregular_um
+        / 1000.0
+        * np.sqrt(2.0 / len(LENGTHS)),  # sine waves of this amplitude add up to the rms
     )

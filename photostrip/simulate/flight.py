@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-CUT = 3.0  # standard deviations beyond which no photo is displaced or tilted: a pilot would fly again
+CUT_SIGMAS = 3.0  # standard deviations beyond which no photo is displaced or tilted: a pilot would fly again
 BASE_SCATTER = (0.02, 0.02, 0.01)  # of the base: along, across, height
 
 
@@ -39,25 +39,13 @@ class Photos:
 
 
 def strip_id(number: int) -> str:
-    """Letter or letters of a strip: A to Z, then AA, AB and so on.
-
-    Parameters
-    ----------
-    number : int
-        Number of the strip, from 0.
-    """
+    """Letter or letters of a strip, counted from 0: A to Z, then AA, AB and so on."""
     head, last = divmod(number, 26)
     return (strip_id(head - 1) if head else "") + chr(ord("A") + last)
 
 
 def position_sigma(spec: Spec) -> tuple[float, float, float]:
-    """Scatter of the perspective centres.
-
-    Returns
-    -------
-    tuple of float
-        Standard deviations along, across and in height, metres.
-    """
+    """Scatter of the perspective centres along, across and in height: standard deviations, metres."""
     if spec.flight.position_sigma is not None:
         return spec.flight.position_sigma
     along, across, height = (part * spec.base for part in BASE_SCATTER)
@@ -65,20 +53,13 @@ def position_sigma(spec: Spec) -> tuple[float, float, float]:
 
 
 def fly(spec: Spec, space: World) -> Photos:
-    """Take the photos.
+    """Take the photos of all strips; ids are the number of the strip and the number of the photo in flight order.
 
-    Returns
-    -------
-    Photos
-        Photos of all strips. The ids are the number of the strip and the number of the photo in flight order.
-
-    Notes
-    -----
     Draws (`Purpose.FLIGHT`): for each photo along, across, height, alpha, omega, kappa.
     """
     flight = spec.flight
     n, strips = flight.photos, flight.strips
-    scatter = np.clip(Draws(spec.seed, Purpose.FLIGHT).normal(strips, n, 6), -CUT, CUT)
+    scatter = np.clip(Draws(spec.seed, Purpose.FLIGHT).normal(strips, n, 6), -CUT_SIGMAS, CUT_SIGMAS)
     sigma = position_sigma(spec)
     back = np.arange(strips) % 2 == 1 if flight.alternate else np.zeros(strips, dtype=bool)
     sign = np.where(back, -1.0, 1.0)[:, None]
@@ -93,12 +74,12 @@ def fly(spec: Spec, space: World) -> Photos:
     digits = max(3, len(str(n)))
     names = tuple((strip_id(j), tuple(f"{j + 1}{i + 1:0{digits}d}" for i in range(n))) for j in range(strips))
     return Photos(
-        tuple(photo for _, photos in names for photo in photos),
-        names,
-        along,
-        across,
-        height,
-        space.cartesian(along, across, height),
-        frames @ attitude,
-        frames[:, :, 2],
+        ids=tuple(photo for _, photos in names for photo in photos),
+        strips=names,
+        along=along,
+        across=across,
+        height=height,
+        centers=space.cartesian(along, across, height),
+        rotations=frames @ attitude,
+        up=frames[:, :, 2],
     )

@@ -37,30 +37,21 @@ class InjectedError:
 def spoil_control(
     spec: Spec, ids: tuple[str, ...], use: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float64], tuple[InjectedError, ...]]:
-    """Choose gross errors of given coordinates.
+    """Choose gross errors of given coordinates: what is added to them (n, 3), metres, and the list of errors.
+
+    Draws (`Purpose.GROSS`, a stream for each entry of the list): an order of all control points, then for each error a
+    number for the axis and one for the sign. An error whose point is named has the sign of its size. No point gets two
+    errors.
 
     Parameters
     ----------
-    spec : Spec
-        Which ones.
     use : ndarray of bool, shape (n, 3)
-        Which of their coordinates are given.
-
-    Returns
-    -------
-    offset : ndarray, shape (n, 3)
-        What is added to the coordinates east, north, up (X, Y, Z), metres.
+        Which coordinates of the control points are given.
 
     Raises
     ------
     InputError
         When a point named is not a control point, or more errors are asked for than there are control points.
-
-    Notes
-    -----
-    Draws (`Purpose.GROSS`, a stream for each entry of the list): an order of all control points, then for each error
-    a number for the axis and one for the sign. An error whose point is named has the sign of its size. No point gets
-    two errors.
     """
     offset = np.zeros((len(ids), 3))
     free = np.ones(len(ids), dtype=bool)
@@ -86,21 +77,14 @@ def spoil_control(
 def spoil_images(spec: Spec, observations: PhotoPoints) -> tuple[PhotoPoints, tuple[InjectedError, ...]]:
     """Put gross errors into image coordinates.
 
-    Parameters
-    ----------
-    spec : Spec
-        Which ones.
+    Draws (`Purpose.GROSS`, a stream for each entry of the list): an order of all image points, then for each error a
+    number for the axis, one for the sign and one for the partner of a swap. An error whose photo and point are both
+    named has the sign of its size. No image point gets two errors.
 
     Raises
     ------
     InputError
         When a photo does not show the point named, or more errors are asked for than there are image points.
-
-    Notes
-    -----
-    Draws (`Purpose.GROSS`, a stream for each entry of the list): an order of all image points, then for each error a
-    number for the axis, one for the sign and one for the partner of a swap. An error whose photo and point are both
-    named has the sign of its size. No image point gets two errors.
     """
     xy = np.array(observations.xy)
     photo = np.array(observations.photo_ids)[observations.photo]

@@ -3,6 +3,8 @@
 On an ellipsoid the flight follows the normals' great circle through the middle of the strips: the unit normal turns
 evenly with the distance flown. Points and perspective centres lie on these normals at their heights, and everything
 after that happens in geocentric Cartesian space, where rays are straight. In a flat world distances are coordinates.
+``along`` and ``across`` (n,) are distances in metres from the middle of the strips in the direction of flight and to
+its left; heights, metres, are above the ellipsoid, or above the plane.
 """
 
 from __future__ import annotations
@@ -38,20 +40,7 @@ class World:
     radius: float = np.inf  # mean radius of the surface in the middle, metres
 
     def cartesian(self, along: Array, across: Array, height: Array) -> Array:
-        """Points in the Cartesian frame.
-
-        Parameters
-        ----------
-        along, across : ndarray, shape (n,)
-            Distances from the middle of the strips in the direction of flight and to its left, metres.
-        height : ndarray, shape (n,)
-            Heights above the ellipsoid (above the plane), metres.
-
-        Returns
-        -------
-        ndarray, shape (n, 3)
-            Geocentric X, Y, Z, or east, north, up in a flat world, metres.
-        """
+        """Geocentric X, Y, Z of points, or east, north, up in a flat world, shape (n, 3), metres."""
         if self.ellipsoid is None:
             return np.asarray(np.stack([along, across, height], axis=-1) @ self.axes)
         normal = self.frames(along, across)[:, :, 2]
@@ -60,17 +49,9 @@ class World:
         return geocentric_from_geodetic(np.stack([lon, lat, height], axis=-1), self.ellipsoid)
 
     def frames(self, along: Array, across: Array) -> Array:
-        """Direction of flight, left and vertical at places.
+        """Direction of flight, left and vertical at places: columns of (n, 3, 3) in the Cartesian frame.
 
-        Parameters
-        ----------
-        along, across : ndarray, shape (n,)
-            Distances from the middle of the strips, metres.
-
-        Returns
-        -------
-        ndarray, shape (n, 3, 3)
-            Columns are the three directions in the Cartesian frame; the vertical is the ellipsoid's normal.
+        The vertical is the ellipsoid's normal.
         """
         s, t = np.asarray(along) / self.radius, np.asarray(across) / self.radius
         forward, left, up = self.axes
@@ -81,15 +62,7 @@ class World:
 
 
 def world(spec: Spec, ellipsoid: tuple[float, float] | None) -> World:
-    """Lay the world out around the middle of the strips.
-
-    Parameters
-    ----------
-    spec : Spec
-        Heading and middle of the strips.
-    ellipsoid : tuple of float or None
-        Semi-axes of the frame's datum, metres; None for a flat world.
-    """
+    """Lay the world out around the middle of the strips; without semi-axes of an ellipsoid it is flat."""
     heading = np.radians(spec.flight.heading_deg)
     sin, cos = np.sin(heading), np.cos(heading)
     turn = np.array([[sin, cos, 0.0], [-cos, sin, 0.0], [0.0, 0.0, 1.0]])  # rows forward, left, up in east, north, up
@@ -115,38 +88,15 @@ class Surface:
     phase: Array  # (m,): phases, radians
 
     def __call__(self, along: Array, across: Array) -> Array:
-        """Return the heights at places.
-
-        Parameters
-        ----------
-        along, across : ndarray, shape (n,)
-            Distances from the middle of the strips, metres.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            Heights above the ellipsoid, metres.
-        """
+        """Return the heights at places."""
         plane = self.height + self.slope[0] * along + self.slope[1] * across
         angle = np.multiply.outer(along, self.wave[:, 0]) + np.multiply.outer(across, self.wave[:, 1]) + self.phase
         return np.asarray(plane + np.sin(angle) @ self.amplitude)
 
 
 def surface(spec: Spec) -> Surface:
-    """Make the terrain of a simulation.
+    """Make the terrain; the amplitudes of its waves add up to the relief, so that no hill is higher.
 
-    Parameters
-    ----------
-    spec : Spec
-        Relief, wavelength and slope.
-
-    Returns
-    -------
-    Surface
-        The terrain. The amplitudes of its waves add up to the relief, so that no hill is higher.
-
-    Notes
-    -----
     Draws (`Purpose.TERRAIN`): direction, wavelength, phase of each wave.
     """
     drawn = Draws(spec.seed, Purpose.TERRAIN).uniform(WAVES, 3)
@@ -155,9 +105,9 @@ def surface(spec: Spec) -> Surface:
     number = 2.0 * np.pi / wavelength
     along, across = spec.terrain.slope_percent
     return Surface(
-        spec.terrain.height,
-        (along / 100.0, across / 100.0),
-        np.full(WAVES, spec.terrain.relief / WAVES),
-        np.stack([number * np.cos(direction), number * np.sin(direction)], axis=-1),
-        phase,
+        height=spec.terrain.height,
+        slope=(along / 100.0, across / 100.0),
+        amplitude=np.full(WAVES, spec.terrain.relief / WAVES),
+        wave=np.stack([number * np.cos(direction), number * np.sin(direction)], axis=-1),
+        phase=phase,
     )

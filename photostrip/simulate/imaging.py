@@ -1,4 +1,7 @@
-"""From points in space to image coordinates: central projection of straight and of bent rays, limits of the photo."""
+"""From points in space to image coordinates: central projection of straight and of bent rays, limits of the photo.
+
+``photo`` (n,) is the number of the photo of each row; rays (n, 3) lead from its perspective centre, Cartesian frame.
+"""
 
 from __future__ import annotations
 
@@ -23,16 +26,7 @@ BENDING_STEPS = 6  # each gains four digits
 
 
 def project(photos: Photos, photo: Rows, ray: Array, principal_distance: float) -> tuple[Array, Array]:
-    """Central projection of rays into photos, one for each row.
-
-    Parameters
-    ----------
-    photo : ndarray of int, shape (n,)
-        Number of the photo of each row.
-    ray : ndarray, shape (n, 3)
-        Points minus perspective centre, or anything in their direction, in the Cartesian frame.
-    principal_distance : float
-        Principal distance, mm.
+    """Central projection of rays (of any length) into photos, one for each row.
 
     Returns
     -------
@@ -41,8 +35,6 @@ def project(photos: Photos, photo: Rows, ray: Array, principal_distance: float) 
     depth : ndarray, shape (n,)
         Part of the ray along the camera's axis; negative for what lies behind the camera.
 
-    Notes
-    -----
     Source: derived, collinearity of (x, y, -f) with A^T (X - X0).
     """
     turned = np.einsum("ni,nij->nj", ray, photos.rotations[photo])
@@ -52,24 +44,10 @@ def project(photos: Photos, photo: Rows, ray: Array, principal_distance: float) 
 
 
 def bent(photos: Photos, photo: Rows, ray: Array, ground_height: float) -> Array:
-    """Directions in which the cameras see the ends of rays through the standard atmosphere, one for each row.
+    """Directions in which the cameras see the ends of rays, metres, through the standard atmosphere.
 
-    Parameters
-    ----------
-    photo : ndarray of int, shape (n,)
-        Number of the photo of each row.
-    ray : ndarray, shape (n, 3)
-        Points minus perspective centre, in the Cartesian frame, metres.
-    ground_height : float
-        Mean height of the terrain above sea level, metres.
+    `ground_height` is the mean height of the terrain above sea level.
 
-    Returns
-    -------
-    ndarray, shape (n, 3)
-        Rays turned away from the nadir.
-
-    Notes
-    -----
     Source: derived, refraction in plane layers: tan(alpha) = tan(theta) (1 - K / cos(theta)^2) for the straight line
     alpha and the direction theta in which it is seen, both from the nadir, whatever the tilt of the photo.
     """
@@ -85,20 +63,7 @@ def bent(photos: Photos, photo: Rows, ray: Array, ground_height: float) -> Array
 
 
 def sees(spec: Spec, photos: Photos, photo: Rows, xyz: Array) -> NDArray[np.bool_]:
-    """Whether a photo shows a point well within its format, one point for each row.
-
-    Parameters
-    ----------
-    photo : ndarray of int, shape (n,)
-        Number of the photo of each row.
-    xyz : ndarray, shape (n, 3)
-        Points in the Cartesian frame, metres.
-
-    Returns
-    -------
-    ndarray of bool, shape (n,)
-        True where it does.
-    """
+    """Whether a photo shows a point (n, 3), Cartesian frame, well within its format, one point for each row."""
     xy, depth = project(photos, photo, xyz - photos.centers[photo], spec.camera.principal_distance)
     inside = (np.abs(xy + spec.camera.principal_point) <= USABLE / 2.0 * np.asarray(spec.format)).all(axis=1)
     if spec.camera.distortion is not None:

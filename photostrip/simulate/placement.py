@@ -59,21 +59,10 @@ class _Slots:
 
 
 def place(spec: Spec, space: World, terrain: Surface, photos: Photos) -> Placed:
-    """Place all pass points.
+    """Place all pass points, by photo, the Gruber points of a photo before the further ones of its model.
 
-    Parameters
-    ----------
-    photos : Photos
-        Exterior orientations: every point is moved towards the middle until the photos it is meant for show it.
-
-    Returns
-    -------
-    Placed
-        The points, by photo, the Gruber points of a photo before the further ones of its model.
-
-    Notes
-    -----
-    Draws (`Purpose.POINTS`): for each photo and row along, across; then for each model and further point along, across.
+    Every point is moved towards the middle until the photos it is meant for show it. Draws (`Purpose.POINTS`): for each
+    photo and row along, across; then for each model and further point along, across.
     """
     rows, extra, n = spec.points.rows, spec.points.extra_per_model, spec.flight.photos
     draws = Draws(spec.seed, Purpose.POINTS)
@@ -84,7 +73,7 @@ def place(spec: Spec, space: World, terrain: Surface, photos: Photos) -> Placed:
         (_gruber_slots(spec, photos, gruber, draws.between(len(gruber), 2)), GRUBER_TRIES),
         (_extra_slots(spec, photos, further, draws.between(len(further), 2)), EXTRA_TRIES),
     ]
-    found = [_settle(spec, space, terrain, photos, each, tries) for each, tries in slots]
+    found = [_moved_inwards(spec, space, terrain, photos, each, tries) for each, tries in slots]
     home = np.concatenate([gruber, further])
     number = np.concatenate([np.arange(len(gruber)) % rows, rows + np.arange(len(further)) % max(extra, 1)])
     along, across = (np.concatenate(parts) for parts in zip(*found, strict=True))
@@ -92,13 +81,13 @@ def place(spec: Spec, space: World, terrain: Surface, photos: Photos) -> Placed:
     home, number, along, across = home[order], number[order], along[order], across[order]
     height = terrain(along, across)
     return Placed(
-        tuple(f"{photos.ids[k]}-{i + 1}" for k, i in zip(home.tolist(), number.tolist(), strict=True)),
-        home,
-        np.where(number < rows, number, -1),
-        along,
-        across,
-        height,
-        space.cartesian(along, across, height),
+        ids=tuple(f"{photos.ids[k]}-{i + 1}" for k, i in zip(home.tolist(), number.tolist(), strict=True)),
+        home=home,
+        row=np.where(number < rows, number, -1),
+        along=along,
+        across=across,
+        height=height,
+        xyz=space.cartesian(along, across, height),
     )
 
 
@@ -137,7 +126,7 @@ def _leftwards(photos: Photos, n: int) -> Array:
     return np.repeat(np.where(ends[:, -1] < ends[:, 0], -1.0, 1.0), n)
 
 
-def _settle(
+def _moved_inwards(
     spec: Spec, space: World, terrain: Surface, photos: Photos, slots: _Slots, tries: Iterable[tuple[float, float]]
 ) -> tuple[Array, Array]:
     """Try places until the photos meant for a point show it; keep the first try where they never do."""
@@ -152,8 +141,8 @@ def _settle(
         good = np.ones(len(open_), dtype=bool)
         for column in wanted.T:
             good &= (column < 0) | sees(spec, photos, np.maximum(column, 0), xyz)
-        settled = good if number else np.ones_like(good)
-        along[open_[settled]], across[open_[settled]] = s[settled], t[settled]
+        found = good if number else np.ones_like(good)
+        along[open_[found]], across[open_[found]] = s[found], t[found]
         open_ = open_[~good]
         if not len(open_):
             break

@@ -25,14 +25,14 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Rows = NDArray[np.intp]
 
-TILT = np.radians(2.0)  # scatter of the axes of a level model
-SCALES = 0.2  # scatter of the logarithm of the model scales
-REACH = 500.0  # mm from which the origin of a model is drawn
+TILT_SIGMA = np.radians(2.0)  # scatter of the axes of a level model
+LOG_SCALE_SIGMA = 0.2  # scatter of the logarithm of the model scales
+ORIGIN_SIGMA = 500.0  # mm from which the origin of a model is drawn
 STATED_UM = 1.0  # stated of model coordinates without errors
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class TruePlaces:
     """True places of points and photos, in the Cartesian frame."""
 
     photo_ids: tuple[str, ...]
@@ -42,29 +42,13 @@ class Scene:
 
 
 def plotted(
-    spec: Spec, strips: tuple[tuple[str, tuple[str, ...]], ...], observations: PhotoPoints, truth: Scene
+    spec: Spec, strips: tuple[tuple[str, tuple[str, ...]], ...], observations: PhotoPoints, truth: TruePlaces
 ) -> ModelPoints | None:
     """Measure the models of all strips; None when none are asked for.
 
-    Parameters
-    ----------
-    strips : tuple of tuple (str, tuple of str)
-        Id and photos of each strip.
-    observations : PhotoPoints
-        They say which photo shows which point.
-    truth : Scene
-        True places of points and photos.
-
-    Returns
-    -------
-    ModelPoints
-        Models ``M1``, ``M2`` and so on, in flight order, strip by strip; points in the order of the observations, then
-        the two perspective centres.
-
-    Notes
-    -----
-    Random numbers (`Purpose.MODELS`): stream 0, for each model seven numbers, scale, rotation and origin; stream 1, for
-    each row x, y, z.
+    Models ``M1``, ``M2`` and so on, in flight order, strip by strip; points in the order of the observations, which say
+    which photo shows which point, then the two perspective centres. Random numbers (`Purpose.MODELS`): stream 0, for
+    each model seven numbers, scale, rotation and origin; stream 1, for each row x, y, z.
     """
     if spec.models is None:
         return None
@@ -77,14 +61,14 @@ def plotted(
     model, node, xyz = [], [], []
     for k, pair in enumerate(pairs):
         left, right = (shows[number[truth.photo_ids[photo]]] for photo in pair)
-        seen = np.intersect1d(left, right)
+        common = np.intersect1d(left, right)
         rotation, scale = _system(wanted, spec.scale, truth, pair, systems[k])
         centers = truth.centers[list(pair)]
-        ground = np.concatenate([truth.points[seen], centers]) - centers.mean(axis=0)
-        here = [*seen.tolist(), *(points + photo for photo in pair)]
-        model += [k] * len(here)
-        node += here
-        xyz.append(scale * ground @ rotation.T + REACH * systems[k, 4:])
+        ground = np.concatenate([truth.points[common], centers]) - centers.mean(axis=0)
+        nodes = [*common.tolist(), *(points + photo for photo in pair)]
+        model += [k] * len(nodes)
+        node += nodes
+        xyz.append(scale * ground @ rotation.T + ORIGIN_SIGMA * systems[k, 4:])
     rows = ModelPoints(
         tuple(f"M{k + 1}" for k in range(len(pairs))),
         observations.point_ids,
@@ -98,10 +82,10 @@ def plotted(
 
 
 def _system(
-    wanted: Models, photo_scale: float, truth: Scene, pair: tuple[int, int], drawn: Array
+    wanted: Models, photo_scale: float, truth: TruePlaces, pair: tuple[int, int], drawn: Array
 ) -> tuple[Array, float]:
     """Rotation from the ground to the axes of a model, and its scale in mm per metre."""
-    scale = 1000.0 / (wanted.scale or photo_scale) * float(np.exp(SCALES * drawn[0]))
+    scale = 1000.0 / (wanted.scale or photo_scale) * float(np.exp(LOG_SCALE_SIGMA * drawn[0]))
     if wanted.axes == "any":
         return from_vector(np.pi / 2 * drawn[1:4]), scale
     base = truth.centers[pair[1]] - truth.centers[pair[0]]
@@ -110,7 +94,7 @@ def _system(
     z = up - (up @ x) * x
     z = z / np.linalg.norm(z)
     level = np.array([x, np.cross(z, x), z])
-    return from_vector(np.array([TILT * drawn[1], TILT * drawn[2], np.pi / 2 * drawn[3]])) @ level, scale
+    return from_vector(np.array([TILT_SIGMA * drawn[1], TILT_SIGMA * drawn[2], np.pi / 2 * drawn[3]])) @ level, scale
 
 
 def _measured(spec: Spec, wanted: Models, rows: ModelPoints) -> ModelPoints:

@@ -21,7 +21,7 @@ from photostrip.simulate.gross import spoil_control, spoil_images
 from photostrip.simulate.ground import surface, world
 from photostrip.simulate.imaging import bent, project
 from photostrip.simulate.placement import place
-from photostrip.simulate.plotter import Scene, plotted
+from photostrip.simulate.plotter import TruePlaces, plotted
 from photostrip.simulate.validation import LARGEST_ARC, faults_of
 from photostrip.triangulation.image_coordinates.corrections import distort
 
@@ -43,8 +43,8 @@ if TYPE_CHECKING:
     Rows = NDArray[np.intp]
 
 STATED_SIGMA = 0.001  # mm: what is stated of image coordinates that have no errors
-ROUND_TRIP = 1e-4  # metres
-NEEDED = 5  # points common to two photos that relative orientation needs
+MOST_ROUND_TRIP = 1e-4  # metres
+LEAST_COMMON = 5  # points common to two photos that relative orientation needs
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,22 +85,15 @@ class Simulation:
 
 
 def simulate(spec: Spec) -> Simulation:
-    """Simulate strips of photos.
+    """Simulate strips of photos; numbers are not rounded.
 
-    Returns
-    -------
-    Simulation
-        Observations, control and truth. Numbers are not rounded.
+    Random numbers are drawn as ``draws`` says; each function below names its draws. Image noise (`Purpose.IMAGE`): for
+    each row of the observations, by photo and point, x, y.
 
     Raises
     ------
     InputError
         With everything that cannot be simulated; also when neighbouring photos turn out to share too few points.
-
-    Notes
-    -----
-    Random numbers are drawn as ``draws`` says; each function below names its draws. Image
-    noise (`Purpose.IMAGE`): for each row of the observations, by photo and point, x, y.
     """
     if faults := faults_of(spec):
         raise InputError(faults)
@@ -123,28 +116,23 @@ def simulate(spec: Spec) -> Simulation:
     every = PointTable(names, placed.xyz, Frame.CARTESIAN)
     points = PointTable(observations.point_ids, placed.xyz[keep], Frame.CARTESIAN)
     truth = _truth(output, points, photos, image, image_errors + control_errors)
+    places = TruePlaces(photos.ids, points.xyz, photos.centers, truth.rotations)
     return Simulation(
-        spec,
-        photos.strips,
-        spec.camera,
-        observations,
-        given_coordinates(spec, chosen, every, offset, frames),
-        tuple(frame.spec for frame in frames),
-        _fiducials(spec, photos, film),
-        _gnss(spec, photos, output),
-        truth,
-        plotted(spec, photos.strips, observations, Scene(photos.ids, points.xyz, photos.centers, truth.rotations)),
+        spec=spec,
+        strips=photos.strips,
+        camera=spec.camera,
+        observations=observations,
+        control=given_coordinates(spec, chosen, every, offset, frames),
+        frames=tuple(frame.spec for frame in frames),
+        fiducials=_fiducials(spec, photos, film),
+        gnss=_gnss(spec, photos, output),
+        truth=truth,
+        models=plotted(spec, photos.strips, observations, places),
     )
 
 
 def frame_specs(spec: Spec) -> list[FrameSpec]:
-    """Frames of the control lists.
-
-    Returns
-    -------
-    list of FrameSpec
-        One frame, or two when there is a second CRS.
-    """
+    """Frames of the control lists: one, or two when there is a second CRS."""
     g = spec.ground
     frames = [FrameSpec(g.crs, g.axes, g.height, g.geoid_undulation, g.ellipsoid)]
     if spec.control.second_crs is not None:
@@ -153,7 +141,7 @@ def frame_specs(spec: Spec) -> list[FrameSpec]:
 
 
 def _tied(spec: Spec) -> tuple[list[GroundFrame], GroundFrame]:
-    """Make the frames; what is wrong with them is told at the keys of the specification."""
+    """Make the frames; what is wrong with them is reported at the keys of the specification."""
     try:
         return tie_frames(frame_specs(spec))
     except InputError as error:
@@ -177,7 +165,7 @@ def _check_reach(spec: Spec, frames: list[GroundFrame], placed: Placed, photos: 
         except (GeometryError, InputError) as error:
             reason = str(error)
         else:
-            if np.abs(returned - placed.xyz).max() > ROUND_TRIP:
+            if np.abs(returned - placed.xyz).max() > MOST_ROUND_TRIP:
                 reason = "coordinates do not lead back to where they came from"
         if reason:
             key = "control.second_crs" if number else "ground.center_deg"
@@ -197,7 +185,6 @@ def _check_extent(spec: Spec, space: World) -> None:
 def _check_overlap(spec: Spec, photos: Photos, photo: Rows, point: Rows) -> None:
     """Refuse a strip that could not be formed, naming the photos."""
     n = spec.flight.photos
-    on = [np.zeros(0, dtype=np.intp)] * len(photos.ids)
     starts = np.searchsorted(photo, np.arange(len(photos.ids) + 1))
     on = [point[a:b] for a, b in pairwise(starts.tolist())]
     faults = []
@@ -206,8 +193,8 @@ def _check_overlap(spec: Spec, photos: Photos, photo: Rows, point: Rows) -> None
             continue
         common = np.intersect1d(on[k], on[k + 1], assume_unique=True)
         names = f"{photos.ids[k]} and {photos.ids[k + 1]}"
-        if len(common) < NEEDED:
-            faults.append(f"photos {names} show only {len(common)} common points, {NEEDED} are needed")
+        if len(common) < LEAST_COMMON:
+            faults.append(f"photos {names} show only {len(common)} common points, {LEAST_COMMON} are needed")
         elif k % n < n - 2 and not np.isin(common, on[k + 2], assume_unique=True).any():
             faults.append(f"no point lies on photos {photos.ids[k]}, {photos.ids[k + 1]} and {photos.ids[k + 2]}")
     if faults:
@@ -302,13 +289,13 @@ def _truth(
     output: GroundFrame, points: PointTable, photos: Photos, image: Array, errors: tuple[InjectedError, ...]
 ) -> Truth:
     return Truth(
-        points,
-        PointTable(points.ids, output.ground_from_cartesian(points.xyz), Frame.GROUND),
-        photos.ids,
-        photos.centers,
-        output.ground_from_cartesian(photos.centers),
-        photos.rotations,
-        output.axes_at(photos.centers) @ photos.rotations,
-        image,
-        errors,
+        points=points,
+        ground=PointTable(points.ids, output.ground_from_cartesian(points.xyz), Frame.GROUND),
+        photo_ids=photos.ids,
+        centers=photos.centers,
+        centers_ground=output.ground_from_cartesian(photos.centers),
+        rotations=photos.rotations,
+        rotations_local=output.axes_at(photos.centers) @ photos.rotations,
+        image=image,
+        errors=errors,
     )

@@ -26,13 +26,7 @@ LARGEST_ARC = 0.5  # radians of the body that strips may cover
 
 
 def faults_of(spec: Spec) -> list[Fault]:
-    """Everything in a specification that cannot be simulated.
-
-    Returns
-    -------
-    list of Fault
-        Faults with the paths of their keys; empty when there is none.
-    """
+    """Everything in a specification that cannot be simulated, with the paths of the keys."""
     found = [
         *_camera(spec),
         *_flight(spec),
