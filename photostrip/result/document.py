@@ -8,7 +8,7 @@ from photostrip import __version__
 from photostrip.result import conventions, summary
 from photostrip.result.adjustment import bundle, covariance, deformation, junctions, links, pairs, rejected, strips
 from photostrip.result.numbers import Document, natural_rank
-from photostrip.result.points import ground, photos, precision
+from photostrip.result.points import given, ground, photos, precision
 from photostrip.result.verdict import verdict_of
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
     """
     rank = natural_rank(result.refined.observations.point_ids)
     images = photos.image_residuals(result, rank)
-    found = ground.differences(result)
+    found = given.differences(result)
     numbers = summary.summary_of(result, found)
     body: Document = {
         "adjustment": result.settings.adjustment,
@@ -54,8 +54,8 @@ def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
         **covariance.covariances_of(result),
         **precision.precision_of(result),
         **bundle.bundle_of(result),
-        "control": ground.control_of(result, found),
-        "misclosures": ground.misclosures_of(result),
+        "control": given.control_of(result, found),
+        "misclosures": given.misclosures_of(result),
         "ties": ground.ties_of(result, rank),
         "rejected": rejected.rejected_of(result),
         "not_determined": ground.not_determined_of(result),

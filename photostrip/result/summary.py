@@ -11,7 +11,7 @@ from photostrip.result.adjustment.bundle import image_fit
 from photostrip.result.adjustment.pairs import Parallaxes, sigma0
 from photostrip.result.adjustment.rejected import rejected_by_strip
 from photostrip.result.numbers import rms
-from photostrip.result.points.ground import of_used
+from photostrip.result.points.given import of_used
 from photostrip.result.quantities import record
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from photostrip.pipeline import Result
     from photostrip.result.numbers import Document, Plain
-    from photostrip.result.points.ground import Differences
+    from photostrip.result.points.given import Differences
 
     Floats = NDArray[np.float64]
     Flags = NDArray[np.bool_]

@@ -8,13 +8,15 @@ import numpy as np
 
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import angle_rates, angles
-from photostrip.result.numbers import GROUND, Document, micrometres, rms, rounded, significant
+from photostrip.result.numbers import rms
+from photostrip.result.quantities import record, records
 from photostrip.statistics import chi2_quantile, normal_quantile
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.pipeline import Result, StripResult
+    from photostrip.result.numbers import Document
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -25,20 +27,12 @@ INSIDE = {"plan": float(np.sqrt(chi2_quantile(0.95, 2))), "height": normal_quant
 
 
 def turned(covariances: Floats, axes: Floats) -> Floats:
-    """Turn covariances from the Cartesian frame to other axes.
-
-    Parameters
-    ----------
-    covariances : ndarray, shape (n, 3, 3)
-        In the axes of the Cartesian frame.
-    axes : ndarray, shape (n, 3, 3)
-        Rows are the wanted axes, unit vectors in the Cartesian frame.
-    """
+    """Turn covariances from the Cartesian frame to other axes, the rows of `axes`; both of shape (n, 3, 3)."""
     return np.asarray(axes @ covariances @ axes.transpose(0, 2, 1), float)
 
 
 def plan_and_height(level: Floats) -> Floats:
-    """Give standard deviations in plan (of both coordinates together) and in height.
+    """Return standard deviations in plan (of both coordinates together) and in height.
 
     Parameters
     ----------
@@ -55,12 +49,7 @@ def plan_and_height(level: Floats) -> Floats:
 
 
 def ellipses(level: Floats) -> tuple[Floats, Floats]:
-    """Give standard error ellipses in plan.
-
-    Parameters
-    ----------
-    level : ndarray, shape (n, 3, 3)
-        Covariances along east, north and up.
+    """Return standard error ellipses in plan, from covariances along east, north and up.
 
     Returns
     -------
@@ -159,27 +148,21 @@ def _rates(rotations: Floats, system: str) -> Floats:
 
 
 def precision_of(result: Result) -> Document:
-    """Make the block ``precision``: what the covariances rest on, how large they are, how they change along the strips.
+    """Return the block ``precision`` under its key; nothing when no covariances are known.
 
-    Returns
-    -------
-    dict
-        The block under its key; empty when nothing is known.
+    It says what the covariances rest on, how large they are, and how they change along the strips.
     """
     precision = result.precision
     if precision is None:
         return {}
     sigma = plan_and_height(turned(precision.points, result.output.level_axes_at(result.points.cartesian)))
-    ids = result.refined.observations.point_ids
-    block: Document = {
+    names = [result.refined.observations.point_ids[number] for number in result.points.number]
+    block = {
         "basis": [
-            {"strip": strip.strip.id, "sigma_um": micrometres(value), "basis": basis}
+            {"strip": strip.strip.id, "sigma_um": value * 1000.0, "basis": basis}
             for strip, value, basis in zip(result.strips, precision.sigma, precision.basis, strict=True)
         ],
-        "points": {
-            name: _summed(column, [ids[number] for number in result.points.number])
-            for name, column in zip(("plan", "height"), sigma.T, strict=True)
-        },
+        "points": {name: _summed(column, names) for name, column in zip(("plan", "height"), sigma.T, strict=True)},
         "along": [
             row
             for strip, photos in zip(result.strips, precision.photos, strict=True)
@@ -187,7 +170,46 @@ def precision_of(result: Result) -> Document:
         ],
     }
     check = _check(result)
-    return {"precision": block | ({"check": check} if check else {})}
+    return {"precision": record("precision", block | ({"check": check} if check else {}))}
+
+
+def _summed(sigma: Floats, names: list[str]) -> Document:
+    """Sum up standard deviations: root mean square, the largest, and whose it is."""
+    if np.isnan(sigma).all():
+        return {"rms": None, "max": None, "worst": None}
+    worst = int(np.nanargmax(sigma))
+    return {"rms": rms(sigma), "max": sigma[worst], "worst": names[worst]}
+
+
+def _along(result: Result, strip: StripResult, sigma: Floats, photos: Floats) -> list[Document]:
+    """Precision along a strip: of the points nearest to each photo, and of its perspective centre."""
+    centers = strip.centers.copy()
+    known, places = np.isfinite(centers[:, 0]), np.arange(len(centers))
+    if not known.any():
+        return []
+    for column in centers.T:  # a photo without a centre stands at the others' mean distance
+        column[~known] = np.interp(places[~known], places[known], column[known])
+    along = centers[:, 0]
+    order = np.argsort(along, kind="stable")
+    between = (along[order][1:] + along[order][:-1]) / 2
+    nearest = order[np.searchsorted(between, strip.xyz[:, 0])]
+    rows = np.searchsorted(result.points.number, strip.formed.point)
+    count = np.bincount(nearest, minlength=len(centers))
+    with np.errstate(invalid="ignore"):
+        plan, height = (np.sqrt(np.bincount(nearest, column**2, len(centers)) / count) for column in sigma[rows].T)
+    level = result.output.level_axes_at(strip.intermediate.cartesian_from_intermediate(centers))
+    centre_plan, centre_height = plan_and_height(turned(photos[:, :3, :3], level)).T
+    columns = {
+        "strip": strip.strip.id,
+        "photo": strip.strip.photos,
+        "distance": along - along[0],
+        "points": count,
+        "plan": plan,
+        "height": height,
+        "centre_plan": centre_plan,
+        "centre_height": centre_height,
+    }
+    return records("precision.along", columns)
 
 
 def _check(result: Result) -> Document:
@@ -197,36 +219,33 @@ def _check(result: Result) -> Document:
     are counted; their errors go together along a strip, so the test of all of them is made with their joint covariance.
     """
     rows, values = _normalised(result)
-    known = ~np.isnan(values)
-    if result.precision is None or not known.any():
+    if result.precision is None or np.isnan(values).all():
         return {}
-    ids = result.inputs.control.ids
     tests = [
         {
             "strip": strip.strip.id,
             "points": test.points,
             "coordinates": test.coordinates,
-            "squares": significant(test.squares),
-            "p": significant(test.probability),
+            "squares": test.squares,
+            "p": test.probability,
         }
         for strip, test in zip(result.strips, result.precision.checks, strict=False)
         if test is not None
     ]
+    points = {"id": [result.inputs.control.ids[row] for row in rows], "plan": values[:, 0], "height": values[:, 1]}
     return {
-        **{name: _inside(values[:, k], INSIDE[name], k) for k, name in enumerate(("plan", "height"))},
-        "points": [
-            {"id": ids[row], "plan": plan, "height": height}
-            for row, (plan, height) in zip(rows.tolist(), rounded(values, 2), strict=True)
-        ],
+        "plan": _inside(values[:, 0], INSIDE["plan"], 2),
+        "height": _inside(values[:, 1], INSIDE["height"], 1),
+        "points": records("precision.check.points", points),
         "tests": tests,
     }
 
 
-def _inside(values: Floats, limit: float, height: int) -> Document:
-    """Count the differences within their 95 % ellipse or interval."""
+def _inside(values: Floats, limit: float, coordinates: int) -> Document:
+    """Count the differences within their 95 % ellipse or interval; their rms, of one coordinate."""
     known = values[~np.isnan(values)]
-    size = np.sqrt(np.mean(known**2) / (1 if height else 2)) if len(known) else float("nan")
-    return {"count": len(known), "inside_95": int((np.abs(known) <= limit).sum()), "rms": rounded(size, 2)}
+    size = np.sqrt(np.mean(known**2) / coordinates) if len(known) else None
+    return {"count": len(known), "inside_95": int((np.abs(known) <= limit).sum()), "rms": size}
 
 
 def _normalised(result: Result) -> tuple[Numbers, Floats]:
@@ -251,51 +270,3 @@ def _normalised(result: Result) -> tuple[Numbers, Floats]:
             values[place, 0] = np.sqrt(difference[:2] @ np.linalg.solve(covariance[:2, :2], difference[:2]))
         values[place, 1] = difference[2] / np.sqrt(covariance[2, 2])
     return rows, values
-
-
-def _summed(sigma: Floats, names: list[str]) -> Document:
-    """Sum up standard deviations: root mean square, the largest, and whose it is."""
-    if np.isnan(sigma).all():
-        return {"rms": None, "max": None, "worst": None}
-    worst = int(np.nanargmax(sigma))
-    return {"rms": rounded(rms(sigma), GROUND), "max": rounded(sigma[worst], GROUND), "worst": names[worst]}
-
-
-def _along(result: Result, strip: StripResult, sigma: Floats, photos: Floats) -> list[Document]:
-    """Precision along a strip: of the points nearest to each photo, and of its perspective centre."""
-    centers = strip.centers
-    known = np.isfinite(centers[:, 0])
-    if not known.all():  # a photo without a centre stands at the others' mean distance
-        places = np.arange(len(centers))
-        centers = centers.copy()
-        if not known.any():
-            return []
-        centers[~known] = np.column_stack(
-            [np.interp(places[~known], places[known], column[known]) for column in centers.T]
-        )
-    along, count_of = centers[:, 0], len(centers)
-    order = np.argsort(along, kind="stable")
-    between = (along[order][1:] + along[order][:-1]) / 2
-    nearest = order[np.searchsorted(between, strip.xyz[:, 0])]
-    rows = np.searchsorted(result.points.number, strip.formed.point)
-    count = np.bincount(nearest, minlength=count_of)
-    with np.errstate(invalid="ignore"):
-        squares = [np.bincount(nearest, sigma[rows, axis] ** 2, count_of) for axis in (0, 1)]
-        size = np.sqrt(np.column_stack(squares) / count[:, None])
-    place = strip.intermediate.cartesian_from_intermediate(centers)
-    centres = plan_and_height(turned(photos[:, :3, :3], result.output.level_axes_at(place)))
-    columns = zip(
-        strip.strip.photos,
-        rounded(along - along[0], 1),
-        count.tolist(),
-        rounded(size, GROUND),
-        rounded(centres, GROUND),
-        strict=True,
-    )
-    return [
-        {
-            "strip": strip.strip.id, "photo": photo, "distance": distance, "points": points,
-            "plan": plan, "height": height, "centre_plan": centre_plan, "centre_height": centre_height,
-        }
-        for photo, distance, points, (plan, height), (centre_plan, centre_height) in columns
-    ]  # fmt: skip

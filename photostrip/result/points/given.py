@@ -1,0 +1,247 @@
+"""Given points of a result: what is left at control and check points, and what lets that be expected."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.geodesy.frame_spec import GROUND_AXES
+from photostrip.result.numbers import natural_rank
+from photostrip.result.quantities import records
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.geodesy.ground_frame import GroundFrame
+    from photostrip.pipeline import Result
+    from photostrip.result.numbers import Document
+
+    Floats = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
+
+CONTROL = "control"  # kind of observations of a bundle adjustment
+LEAST_SHARE = 0.1  # of its standard deviation that a control point shows of itself at least
+
+
+@dataclass(frozen=True, eq=False)
+class Differences:
+    """Adjusted minus given at every given point, in the order of the inputs' control."""
+
+    axes: Floats  # (c, 3): metres in the order of the result's axes; NaN where it does not count or is not known
+    parts: Floats  # (c, 3): metres to the east, to the north and up at the point
+    # (c, 3): standard deviation of each difference along the point's own axes in the fit, metres: of the given
+    # coordinate and of a point of one model together
+    sigma: Floats
+    normalised: Floats  # (c,): the largest difference of a point in units of that standard deviation
+    scale: Floats  # (c,): denominator of the photo scale at the point; NaN where it has no coordinates
+    strips: tuple[tuple[str, ...], ...]
+    rejected: Flags  # (c, 3): coordinates east, north, up of the control that were found wrong and not used
+
+    @property
+    def plan(self) -> Floats:
+        """Lengths of the differences in plan, metres."""
+        return np.hypot(self.parts[:, 0], self.parts[:, 1])
+
+    @property
+    def height(self) -> Floats:
+        """Differences in height, metres."""
+        return self.parts[:, 2]
+
+
+def differences(result: Result) -> Differences:
+    """Differences at control and check points, in the axes of the result and in plan and height.
+
+    A point that is given in geocentric coordinates and wanted in east, north and up, or the other way round, needs all
+    three differences to be turned.
+    """
+    control = result.inputs.control
+    axes, parts = np.full((len(control), 3), np.nan), np.full((len(control), 3), np.nan)
+    for number, frame in enumerate(result.frames):
+        rows = np.flatnonzero((control.frame == number) & (result.control_rows >= 0))
+        if len(rows):
+            place = result.points.cartesian[result.control_rows[rows]]
+            found = result.control_differences[rows]
+            level = frame.level_axes_at(place)
+            parts[rows] = found if frame.kind != "geocentric" else _turned(found, frame, place, level)
+            same = (frame.kind == "geocentric") == (result.output.kind == "geocentric")
+            axes[rows] = found if same else _turned(found, frame, place, result.output.axes_at(place))
+    held = _held(result)
+    sigma = _expected(result, held)
+    with np.errstate(invalid="ignore"):
+        ratio = np.abs(result.control_differences) / sigma
+    return Differences(
+        axes=result.output.user_from_internal(axes),
+        parts=parts,
+        sigma=sigma,
+        normalised=np.where(np.isnan(ratio).all(axis=1), np.nan, np.nan_to_num(ratio).max(axis=1, initial=0.0)),
+        scale=_scale(result, held),
+        strips=tuple(tuple(s.strip.id for s, yes in zip(result.strips, row, strict=True) if yes) for row in held.T),
+        rejected=_rejected(result),
+    )
+
+
+def of_used(result: Result, found: Differences) -> Differences:
+    """Return the differences without those at control that was rejected: they say nothing about the fit.
+
+    NaN stands in the place of rejected coordinates; of the whole point where its axes are neither plan nor height.
+    """
+    out = found.rejected
+    if not out.any():
+        return found
+    whole = np.repeat(out.any(axis=1, keepdims=True), 3, axis=1)
+    mixed = np.array([frame.kind == "geocentric" for frame in result.frames])[result.inputs.control.frame, None]
+    of_parts = np.where(mixed, whole, out)
+    of_axes = of_parts if result.output.kind != "geocentric" else whole
+    axes = np.where(result.output.user_from_internal(of_axes) > 0, np.nan, found.axes)
+    return replace(found, axes=axes, parts=np.where(of_parts, np.nan, found.parts))
+
+
+def _rejected(result: Result) -> Flags:
+    """Control coordinates that were given for use and that nothing used."""
+    control = result.inputs.control
+    row_of = {name: row for row, name in enumerate(control.ids)}
+    held, used = np.zeros((len(control), 1), bool), np.zeros(control.use.shape, bool)
+    if result.bundle is not None:
+        problem, selection = result.bundle.screened.problem, result.bundle.screened.selection
+        rows = [row_of[problem.point_name(int(point))] for point in problem.control.point]
+        held[rows], used[rows] = True, selection.control
+    for strip in result.photo_strips if result.bundle is None else ():
+        rows = [row_of[name] for name in strip.control.ids]
+        held[rows] = True
+        used[rows] |= strip.control.use
+    return np.asarray(control.use & held & ~used & ~control.check[:, None], bool)
+
+
+def _turned(found: Floats, frame: GroundFrame, place: Floats, axes: Floats) -> Floats:
+    """Differences along the axes of a frame, along other axes; NaN where one of the three is missing."""
+    turned: Floats = np.einsum("nai,nbi,nb->na", axes, frame.axes_at(place), found)
+    return turned
+
+
+def _held(result: Result) -> Flags:
+    """Return which strip holds which given point, shape (s, c)."""
+    number = {name: n for n, name in enumerate(result.refined.observations.point_ids)}
+    numbers = np.array([number.get(name, -1) for name in result.inputs.control.ids], np.intp)
+    held = [np.isin(numbers, strip.formed.point) for strip in result.strips]
+    return np.array(held, bool).reshape(len(result.strips), len(numbers))
+
+
+def _scale(result: Result, held: Flags) -> Floats:
+    """Return the denominator of the photo scale at every given point, mean over its strips; NaN where it has none.
+
+    In a bundle a point of no strip, seen on single photos, has that of all strips.
+    """
+    of_strips = np.array([strip.scale_number for strip in result.strips])
+    scale = (held.T @ of_strips) / np.maximum(held.sum(axis=0), 1)
+    if result.bundle is not None and result.precision is not None:
+        scale = np.where(held.any(axis=0), scale, np.mean(of_strips) if len(of_strips) else np.nan)
+    return np.where(scale > 0, scale, np.nan)
+
+
+def _expected(result: Result, held: Flags) -> Floats:
+    """Return the standard deviation of every difference, of the given coordinate and of the point together.
+
+    That of the point is that of one model; of a bundle adjustment, its own. A control coordinate that took part in a
+    bundle has drawn its point towards itself: what is left is its residual, whose standard deviation its redundancy
+    number gives.
+    """
+    control, bundle = result.inputs.control, result.bundle
+    of_bundle = None if bundle is None or result.precision is None else result.precision.points
+    of_models = np.array([[s.precision[0], s.precision[0], s.precision[1]] for s in result.strips]).reshape(-1, 3)
+    variance = (held.T @ of_models**2) / np.maximum(held.sum(axis=0), 1)[:, None]
+    for index, frame in enumerate(result.frames):
+        rows = np.flatnonzero((control.frame == index) & (result.control_rows >= 0))
+        at = result.control_rows[rows]
+        if of_bundle is not None and len(rows):
+            axes = frame.axes_at(result.points.cartesian[at])
+            variance[rows] = np.einsum("nij,njk,nik->ni", axes, of_bundle[at], axes)
+        elif frame.kind == "geocentric" and len(rows):
+            level = frame.level_axes_at(result.points.cartesian[at])
+            variance[rows] = np.einsum("nka,nk->na", level**2, variance[rows])
+    sigma = np.sqrt(control.sigma**2 + variance)
+    if bundle is not None and of_bundle is not None:
+        problem = bundle.screened.problem
+        row_of = {name: row for row, name in enumerate(control.ids)}
+        rows = np.array([row_of[problem.point_name(int(point))] for point in problem.control.point], np.intp)
+        for group in (each for each in bundle.groups if each.kind == CONTROL):
+            share = np.sqrt(np.clip(group.redundancy, LEAST_SHARE**2, 1.0))
+            residual = group.sigma * share * bundle.unit
+            sigma[rows] = np.where(np.isfinite(residual), residual, sigma[rows])
+    return np.asarray(sigma, float)
+
+
+def control_of(result: Result, found: Differences) -> list[Document]:
+    """Return the list ``control``: every given point with what is left there, in natural order of the ids."""
+    control = result.inputs.control
+    columns = {
+        "id": list(control.ids),
+        "role": ["check" if check else "control" for check in control.check.tolist()],
+        "use": [_use(counts) for counts in control.use.tolist()],
+        "rejected": [_use(out) if any(out) else "" for out in found.rejected.tolist()],
+        "measured": result.control_rows >= 0,
+        **size_columns(found.axes, found.plan, found.height, found.scale),
+        "sigma": _in_list_order(result, control.sigma),
+        "sigma_fit": _in_list_order(result, found.sigma),
+        "normalised": found.normalised,
+        "list": control.frame + 1,
+        "strips": [list(strips) for strips in found.strips],
+    }
+    rows = records("control", columns)
+    return [rows[row] for row in np.argsort(natural_rank(control.ids))]
+
+
+def _in_list_order(result: Result, enu: Floats) -> Floats:
+    """Return standard deviations in the order of the axes of each point's own list."""
+    columns = enu.copy()
+    for number, frame in enumerate(result.frames):
+        rows = result.inputs.control.frame == number
+        columns[rows] = frame.user_from_internal(enu[rows])
+    return columns
+
+
+def _use(counts: list[bool]) -> str:
+    """Return the word of the project file for which coordinates count."""
+    east, north, up = counts
+    return f"{'x' if east else ''}{'y' if north else ''}{'z' if up else ''}" or "off"
+
+
+def size_columns(axes: Floats, plan: Floats, height: Floats, scale: Floats) -> Document:
+    """Return columns of differences: along the axes of the result, in plan and in height, and at photo scale."""
+    return {
+        **{f"d{axis}": axes[:, k] for k, axis in enumerate("xyz")},
+        "plan": plan,
+        "height": height,
+        "plan_um": plan / scale * 1e6,
+        "height_um": height / scale * 1e6,
+    }
+
+
+def misclosures_of(result: Result) -> list[Document]:
+    """Return the list ``misclosures``: strip minus control after the similarity, before any polynomial.
+
+    Beside them, how far each coordinate is checked by all others, and its share in its own polynomial.
+    """
+    found = []
+    for strip in result.strips:
+        nothing = np.full(strip.control.use.shape, np.nan)
+        tested, correction = strip.judged_control, strip.polynomial
+        detectable = nothing if tested is None else tested.detectable
+        redundancy = nothing if tested is None else np.where(np.isfinite(detectable), tested.redundancy, np.nan)
+        leverage = [
+            nothing[:, k] if correction is None or not correction.axes[k].terms else correction.axes[k].leverage
+            for k in range(3)
+        ]
+        misclosures = np.where(strip.control.use, strip.absolute.misclosures, np.nan)
+        columns = {
+            "strip": strip.strip.id,
+            "id": list(strip.control.ids),
+            **dict(zip(GROUND_AXES, misclosures.T, strict=True)),
+            "redundancy": dict(zip(GROUND_AXES, redundancy.T, strict=True)),
+            "detectable": dict(zip(GROUND_AXES, detectable.T, strict=True)),
+            "leverage": dict(zip("xyz", leverage, strict=True)),
+        }
+        rows = records("misclosures", columns)
+        found += [rows[row] for row in np.argsort(natural_rank(strip.control.ids))]
+    return found
