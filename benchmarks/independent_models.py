@@ -25,7 +25,8 @@ import numpy as np  # noqa: E402
 from photostrip.formats.output.simulation import inputs_of  # noqa: E402
 from photostrip.geometry.rotation import from_vector  # noqa: E402
 from photostrip.pipeline import Inputs, MeasuredModels, ModelStrip, Settings, triangulate  # noqa: E402
-from photostrip.pipeline.models.model_strips import adjust_models, form_models  # noqa: E402
+from photostrip.pipeline.strips.adjusting import adjust_formed  # noqa: E402
+from photostrip.pipeline.strips.models import form_models, link_strip  # noqa: E402
 from photostrip.points import ModelPoints, PhotoPoints  # noqa: E402
 from photostrip.simulate import Control, Flight, Image, Models, Points, Simulation, Spec, simulate  # noqa: E402
 from photostrip.triangulation.independent_models import link_screening  # noqa: E402
@@ -150,7 +151,7 @@ def scatter(models: int, settings: Settings, repetitions: int) -> list[Floats]:
     for _ in range(repetitions):
         measured = replace(points, xyz=exact.models.points.xyz + points.sigma * rng.normal(size=points.xyz.shape))
         moved = replace(control, enu=control.enu + control.sigma * rng.normal(size=control.enu.shape))
-        found = adjust_models(strip, measured, moved, whole.frames, settings)
+        found = adjust_formed(link_strip(strip, measured, settings), moved, whole.frames, settings)
         places[0].append(found.cartesian)
         places[1].append(found.intermediate.cartesian_from_intermediate(found.centers))
     stated = [whole.precision.points, whole.precision.photos[0][:, :3, :3]]

@@ -32,7 +32,8 @@ from photostrip.formats.output.simulation import inputs_of  # noqa: E402
 from photostrip.geodesy.frame_spec import FrameSpec  # noqa: E402
 from photostrip.geodesy.tying import tie_frames  # noqa: E402
 from photostrip.pipeline import Inputs, Settings, Strip, triangulate  # noqa: E402
-from photostrip.pipeline.strip import adjust_formed, form_strip  # noqa: E402
+from photostrip.pipeline.strips.adjusting import adjust_formed  # noqa: E402
+from photostrip.pipeline.strips.photos import form_strip  # noqa: E402
 from photostrip.planning.control_layout import ControlLayout, Spot, numbers_of, spots_of  # noqa: E402
 from photostrip.planning.ideal_strip import StripGeometry, ideal_strip  # noqa: E402
 from photostrip.planning.model_plan import (  # noqa: E402
@@ -148,7 +149,7 @@ def repetitions(task: Task) -> dict[tuple[str, str], tuple[Floats, Floats]]:
             else:
                 wanted = run_settings(method)
                 formed = formed or form_strip(inputs.strips[0], inputs.observations, wanted)
-                solved = adjust_formed(formed, inputs.observations, inputs.control, frames, wanted).cartesian
+                solved = adjust_formed(formed, inputs.control, frames, wanted).cartesian
             error = solved - strip.xyz
             found[layout.name, method][0][:] += error
             found[layout.name, method][1][:] += error**2
@@ -395,7 +396,7 @@ def found_share(
         given[point, axis] += size
         control = replace(inputs.control, enu=given)
         formed = form_strip(inputs.strips[0], inputs.observations, wanted)
-        own = adjust_formed(formed, inputs.observations, control, frames, wanted).of_photos.covariance
+        own = adjust_formed(formed, control, frames, wanted).of_photos.covariance
         assert own is not None  # noqa: S101
         row = np.flatnonzero((own.control.point == point) & (own.control.axis == axis))
         seen += bool(np.abs(own.tested.normalised[row]) > LIMIT)

@@ -35,7 +35,8 @@ from benchmarks import accuracy  # noqa: E402
 from photostrip.camera import Camera  # noqa: E402
 from photostrip.formats.output.simulation import inputs_of  # noqa: E402
 from photostrip.pipeline import Settings, triangulate  # noqa: E402
-from photostrip.pipeline.strip import adjust_formed, form_strip  # noqa: E402
+from photostrip.pipeline.strips.adjusting import adjust_formed  # noqa: E402
+from photostrip.pipeline.strips.photos import form_strip  # noqa: E402
 from photostrip.simulate.simulation import simulate  # noqa: E402
 from photostrip.simulate.spec import FILM, Control, Flight, Image, Points, Spec, Terrain  # noqa: E402
 from photostrip.triangulation.covariance_adjustment import conditions  # noqa: E402
@@ -201,7 +202,7 @@ def repeated(task: tuple[Case, int, int]) -> dict[str, list[Floats]]:
         formed = form_strip(strip.of_photos.strip, again.observations, first)
         control = again.control.take(np.flatnonzero(measured))
         for method, asked in wanted.items():
-            found = adjust_formed(formed, again.observations, control, truth.frames, asked)
+            found = adjust_formed(formed, control, truth.frames, asked)
             points, photos = displaced(placed(found, frame), true)
             for place, value in enumerate((points, points**2, photos, photos**2)):
                 sums[method][place] += value

@@ -40,7 +40,7 @@ from photostrip.formats.output.simulation import inputs_of, project_files  # noq
 from photostrip.formats.text.writing import write_files  # noqa: E402
 from photostrip.pipeline import triangulate  # noqa: E402
 from photostrip.pipeline.plausibility import gate  # noqa: E402
-from photostrip.pipeline.precision import strip_precision  # noqa: E402
+from photostrip.pipeline.precision import photo_precision  # noqa: E402
 from photostrip.project.loading import load_project  # noqa: E402
 from photostrip.report import chosen_sections, title_of  # noqa: E402
 from photostrip.report.page import console  # noqa: E402
@@ -56,7 +56,6 @@ from photostrip.triangulation.polynomial import correction  # noqa: E402
 from photostrip.triangulation.relative_orientation.orientation import orient_pairs  # noqa: E402
 from photostrip.triangulation.relative_orientation.pairs import collect_pairs  # noqa: E402
 from photostrip.triangulation.relative_orientation.solution import iterate_elements, start_values  # noqa: E402
-from photostrip.triangulation.resection import resection  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -188,7 +187,8 @@ class Stopwatch:
 
 pipeline = import_module("photostrip.pipeline.run")  # the module; the package gives the function
 # functions imported by name are timed where they are called
-of_strips = import_module("photostrip.pipeline.strip")
+of_strips = import_module("photostrip.pipeline.strips.photos")
+common = import_module("photostrip.pipeline.common_points")
 settling = import_module("photostrip.triangulation.gross_errors.rays.screened_formation")
 STAGES = (
     ("image coordinates", corrections, "refine"),
@@ -201,11 +201,11 @@ STAGES = (
     ("screening of control", control_screening, "screen"),
     ("absolute orientation", absolute_orientation, "orient"),
     ("polynomial", correction, "fit"),
-    ("resection", resection, "resect"),
-    ("points of all strips", pipeline, "_join"),
-    ("differences at given points", pipeline, "_at_given_points"),
-    ("points without coordinates", pipeline, "_not_determined"),
-    ("standard deviations", strip_precision, "of_strip"),
+    ("resection", of_strips, "resect"),
+    ("points of all strips", common, "_joined"),
+    ("differences at given points", pipeline, "compare_with_given"),
+    ("points without coordinates", pipeline, "not_determined"),
+    ("standard deviations", photo_precision, "of_photos"),
     ("search for mistakes", gate, "of_result"),
 )
 WHOLE = "triangulate"

@@ -10,6 +10,8 @@ import numpy as np
 from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline import Settings, triangulate
 from photostrip.pipeline.precision.propagation import Propagation, propagation
+from photostrip.pipeline.strips.absolute import OrientedStrip
+from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.simulate.simulation import simulate
 from photostrip.simulate.spec import Control, Flight, Image, Points, Spec
 from photostrip.triangulation.relative_orientation.orientation import RelativeSettings
@@ -48,7 +50,30 @@ def without_noise(wanted: Spec) -> Inputs:
 
 def errors_of(result: Result, number: int = 0) -> Propagation:
     """Rows and operators of a strip of a result."""
-    return propagation(result.strips[number], result.refined.observations, result.frames)
+    return propagation(result.strips[number], oriented_of(result, number), result.refined.observations)
+
+
+def oriented_of(result: Result, number: int = 0) -> OrientedStrip[StripErrors]:
+    """Return a strip of a result as it lay on its control before its deformation was corrected."""
+    strip = result.strips[number]
+    photos = strip.of_photos
+    stage = FormedPhotos(
+        strip=photos.strip,
+        observations=result.refined.observations,
+        sigma=photos.sigma,
+        screened=photos.screened,
+        formed=photos.formed,
+        contradictions=photos.contradictions,
+    )
+    return OrientedStrip(
+        stage=stage,
+        frames=result.frames,
+        control=strip.control,
+        control_rows=strip.control_rows,
+        intermediate=strip.intermediate,
+        absolute=strip.absolute,
+        precision=strip.precision,
+    )
 
 
 def written_out(rows: ErrorRows, errors: StripErrors) -> Floats:

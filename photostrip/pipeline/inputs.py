@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from photostrip.triangulation import absolute_orientation as absolute
 from photostrip.triangulation.bundle import settings as bundle
 from photostrip.triangulation.covariance_adjustment import conditions
@@ -16,7 +18,6 @@ from photostrip.triangulation.relative_orientation.orientation import RelativeSe
 from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from photostrip.camera import Camera
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
     Flags = NDArray[np.bool_]
+    Numbers = NDArray[np.intp]
 
 ADJUSTMENTS = ("similarity", "polynomial", "covariance", "bundle")
 
@@ -38,6 +40,11 @@ class Strip:
     photos: tuple[str, ...]  # photos in flight order; a single one only in a bundle adjustment
     # parameters of its camera that a bundle adjustment estimates, of ``bundle.settings.CALIBRATION``
     calibrate: tuple[str, ...] = ()
+
+    def positions(self, observations: PhotoPoints) -> Numbers:
+        """Place in the strip of the photo of every image point; -1 for photos of other strips."""
+        place = {photo: number for number, photo in enumerate(self.photos)}
+        return np.array([place.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo]
 
 
 @dataclass(frozen=True)
@@ -105,6 +112,11 @@ class Inputs:
     orientations: GivenOrientations | None = None
     # measured model coordinates; there are then no `strips` of photos, and `observations` only name the points
     models: MeasuredModels | None = None
+
+    @property
+    def cameras(self) -> dict[str, Camera]:
+        """Camera of each photo."""
+        return {photo: strip.camera for strip in self.strips for photo in strip.photos}
 
     @property
     def flights(self) -> tuple[Strip | ModelStrip, ...]:

@@ -16,11 +16,14 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.points import PhotoPoints
+    from photostrip.points import ModelPoints, PhotoPoints
     from photostrip.triangulation.gross_errors.pairs.screening import ScreenedPairs
+    from photostrip.triangulation.independent_models.link_screening import LinkSettings
 
     Numbers = NDArray[np.intp]
     Flags = NDArray[np.bool_]
+
+CENTER = "center of photo "  # before the name of a perspective centre in model coordinates
 
 
 def require(settings: RelativeSettings, observations: PhotoPoints) -> None:
@@ -46,6 +49,38 @@ def require(settings: RelativeSettings, observations: PhotoPoints) -> None:
         ]
     faults += [
         Fault(f"`{entry}` is to be kept and dropped", code="kept-and-dropped", key="processing.relative.drop")
+        for entry in settings.drop
+        if entry in settings.keep
+    ]
+    if faults:
+        raise InputError(faults)
+
+
+def require_named(settings: LinkSettings, measured: ModelPoints) -> None:
+    """Refuse entries of ``keep`` and ``drop`` that name nothing, and those in both.
+
+    Raises
+    ------
+    InputError
+        With a fault for each such entry.
+    """
+    if not (settings.keep or settings.drop):
+        return
+    nodes = [measured.name(node).removeprefix(CENTER) for node in measured.node.tolist()]
+    known = {f"{measured.model_ids[k]}/{name}" for k, name in zip(measured.model.tolist(), nodes, strict=True)}
+    faults = [
+        Fault(
+            f"`{entry}` names no measurement",
+            code="no-such-measurement",
+            key=f"processing.links.{key}",
+            expected="model/point or model/photo, as in the table of models",
+        )
+        for key, entries in (("keep", settings.keep), ("drop", settings.drop))
+        for entry in entries
+        if entry not in known
+    ]
+    faults += [
+        Fault(f"`{entry}` is to be kept and dropped", code="kept-and-dropped", key="processing.links.drop")
         for entry in settings.drop
         if entry in settings.keep
     ]

@@ -13,15 +13,15 @@ if TYPE_CHECKING:
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.geodesy.local_frame import IntermediateFrame
     from photostrip.notes import Finding, Note
-    from photostrip.pipeline.covariance_adjustment import CovarianceAdjustment
     from photostrip.pipeline.inputs import Inputs, ModelStrip, Settings, Strip
-    from photostrip.points import ControlPoints
+    from photostrip.points import ControlPoints, PhotoPoints
     from photostrip.triangulation import absolute_orientation as absolute
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.quality import reliability, self_calibration, variance_components
     from photostrip.triangulation.bundle.quality.correlations import Correlation
     from photostrip.triangulation.bundle.selection import Selection
     from photostrip.triangulation.bundle.snooping import ScreenedBundle
+    from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
     from photostrip.triangulation.error_propagation.covariances import CheckTest
     from photostrip.triangulation.gross_errors.control import control_screening, control_significance
     from photostrip.triangulation.gross_errors.pairs import screening
@@ -265,6 +265,19 @@ class Bundle:
 
 
 @dataclass(frozen=True, eq=False)
+class AdjustedStrips:
+    """All strips adjusted, each by itself or in one bundle adjustment."""
+
+    strips: tuple[StripResult, ...]
+    points: Adjusted
+    ties: Ties
+    observations: PhotoPoints  # ideal image coordinates, a calibration found by a bundle taken into account
+    precision: Precision | None  # None when it was not computed
+    notes: tuple[Note, ...]
+    bundle: Bundle | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class Result:
     """What a run found, stage by stage; everything written and printed is rendered from it."""
 
@@ -273,6 +286,7 @@ class Result:
     settings: Settings
     frames: tuple[GroundFrame, ...]  # ground frames of the control lists
     output: GroundFrame  # ground frame of the result
+    measured: PhotoPoints  # image points in the system of the photo, before any correction
     interior: InteriorOrientation | None
     refined: corrections.Refined  # ideal image coordinates and the size of each correction
     strips: tuple[StripResult, ...]  # of photos or of independent models, never both

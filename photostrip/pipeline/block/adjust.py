@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import GeometryError
-from photostrip.notes import Note
+from photostrip.pipeline.block import block_result
 from photostrip.pipeline.block import problem as block_problem
 from photostrip.pipeline.block import start as block_start
-from photostrip.pipeline.results import Adjusted, Bundle, Precision, SinglePhoto
+from photostrip.pipeline.results import Bundle, SinglePhoto
+from photostrip.pipeline.strips.forming import form_photos
 from photostrip.triangulation.bundle import snooping
 from photostrip.triangulation.bundle.quality import reliability, self_calibration, variance_components
 from photostrip.triangulation.bundle.quality.cofactors import cofactors_of as precision_of
 from photostrip.triangulation.bundle.quality.correlations import correlations
 from photostrip.triangulation.bundle.selection import restarted, selected, supported
 from photostrip.triangulation.bundle.solve import solve
-from photostrip.triangulation.resection.collinearity import project
-from photostrip.triangulation.resection.resection import Resection
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,8 +26,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.geodesy.ground_frame import GroundFrame
+    from photostrip.pipeline.frames import GroundFrames
     from photostrip.pipeline.inputs import Inputs, Settings
-    from photostrip.pipeline.results import BlockProblem, BlockStart, StripResult
+    from photostrip.pipeline.results import AdjustedStrips, BlockProblem, BlockStart
     from photostrip.points import ControlPoints, PhotoPoints
     from photostrip.triangulation.bundle.quality.correlations import Correlation
     from photostrip.triangulation.bundle.snooping import ScreenedBundle
@@ -40,32 +40,6 @@ if TYPE_CHECKING:
 REFILLED = 1e-9  # metres by which targets of plan or height points may still move
 REFILLS = 3
 WITHIN_PHOTOS = 10  # correlations within photos that are kept
-OF_THE_STRIP_METHOD = {
-    "control-doubtful",
-    "control-rejected",
-    "covariance-proposed",
-    "degree-reduced",
-    "extrapolation",
-    "little-control",
-    "little-redundancy",
-    "long-strip",
-    "not-resected",
-    "strip-contradicted",
-    "weak-control",
-}
-"""Notes on strips that say nothing of a bundle adjustment."""
-
-
-@dataclass(frozen=True, eq=False)
-class Block:
-    """A bundle adjustment as the pipeline goes on with it."""
-
-    strips: tuple[StripResult, ...]  # strips with the orientations and points of the bundle
-    points: Adjusted
-    precision: Precision  # covariances of points and photos
-    observations: PhotoPoints  # ideal image coordinates, the calibration found taken into account
-    bundle: Bundle
-    notes: tuple[Note, ...]
 
 
 def adjust_block(
@@ -73,32 +47,28 @@ def adjust_block(
     settings: Settings,
     observations: PhotoPoints,
     control: ControlPoints,
-    frames: tuple[Sequence[GroundFrame], GroundFrame, GroundFrame | None, GroundFrame | None],
-) -> Block:
+    ground: GroundFrames,
+) -> AdjustedStrips:
     """Adjust all strips of a project together.
 
     Parameters
     ----------
-    frames : tuple
-        Frames of the control lists, of the output, of the camera positions and of the orientations.
-
-    Returns
-    -------
-    Block
-        Strips, points and precision, and the adjustment itself.
+    observations : PhotoPoints
+        Ideal image coordinates.
+    control : ControlPoints
+        Measured control of the project, no check points.
 
     Raises
     ------
     GeometryError
-        When a pair, a strip, a photo or the datum cannot be determined, by name.
+        When a strip, a photo or the datum cannot be determined, by name.
     """
-    of_control, output, of_positions, of_orientations = frames
-    known = block_start.known_of(inputs, control, of_control, output, (of_positions, of_orientations))
-    start = block_start.start(inputs, settings, observations, known)
-    places = (of_control, of_positions, of_orientations)
-    block = block_problem.build(inputs, settings, observations, control, places, start)
+    known = block_start.known_of(inputs, control, ground)
+    formed = form_photos(inputs, observations, settings)
+    start = block_start.start(inputs, settings, formed, observations, known)
+    block = block_problem.build(inputs, settings, observations, control, ground, start)
     try:
-        block = _settled(block, control, of_control)
+        block = _settled(block, control, ground.control)
         screened = snooping.screen_bundle(block.problem, block.begin, settings.bundle, block.kept)
     except GeometryError as error:
         _name_undetermined(block, error)
@@ -108,7 +78,8 @@ def adjust_block(
     if settings.bundle.variance_components:
         block, screened, components = _components(block, screened, settings)
     bundle = _bundle(inputs, settings, start, block, screened, sigma0, components)
-    return _block(inputs, observations, output, bundle)
+    adjusted = block_result.adjusted_strips(inputs, observations, ground.output, bundle)
+    return adjusted if settings.precision else replace(adjusted, precision=None)
 
 
 def _settled(block: BlockProblem, control: ControlPoints, frames: Sequence[GroundFrame]) -> BlockProblem:
@@ -236,159 +207,3 @@ def _refuse_inseparable(found: Sequence[Correlation], common: set[str]) -> None:
                 "self_calibration, or give it a calibration_sigma"
             )
             raise GeometryError(message, code="not-determinable")
-
-
-# ------------------------------------------------------------------------------------------------- the result
-
-
-def _block(inputs: Inputs, observations: PhotoPoints, output: GroundFrame, bundle: Bundle) -> Block:
-    """Put the solution where the pipeline has its results."""
-    block, screened, start = bundle.block, bundle.screened, bundle.start
-    solution = screened.solution
-    used = block.rows[screened.selection.images]
-    rays = np.bincount(observations.point[used], minlength=len(observations.point_ids))
-    number = np.flatnonzero(rays)
-    cartesian = solution.points[number] + block.origin
-    ids = [observations.point_ids[n] for n in number]
-    points = Adjusted(number, cartesian, output.ground_from_cartesian(cartesian, ids=ids), rays[number])
-    calibrated = _calibrated(observations, bundle)
-    count = [len(strip.photos) for strip in inputs.strips]
-    first = np.cumsum([0, *count])
-    places = [(n, int(first[n])) for n, strip in enumerate(inputs.strips) if len(strip.photos) > 1]
-    strips = tuple(
-        _strip(strip, begin, calibrated, used, points, bundle)
-        for strip, (_, begin) in zip(start.strips, places, strict=True)
-    )
-    sigma = float(np.median(block.problem.images.sigma)) * bundle.unit
-    covariances = bundle.screened.precision.points[number] * bundle.unit**2
-    photos = tuple(bundle.photo_covariances[begin : begin + count[n]] for n, begin in places)
-    basis = "a-priori" if bundle.unit == 1.0 else "a-posteriori"
-    precision = Precision(covariances, photos, (sigma,) * len(strips), (basis,) * len(strips))
-    notes = (*_strip_notes(start), *_notes(bundle))
-    return Block(strips, points, precision, calibrated, bundle, notes)
-
-
-def _calibrated(observations: PhotoPoints, bundle: Bundle) -> PhotoPoints:
-    """Image coordinates with the calibration that was found."""
-    problem = bundle.block.problem
-    if not len(bundle.screened.solution.common):
-        return observations
-    place = {photo: number for number, photo in enumerate(bundle.start.photos)}
-    photo = np.array([place[name] for name in observations.photo_ids], np.intp)[observations.photo]
-    shift = self_calibration.image_shift(problem, bundle.screened.solution.common, observations.xy, photo)
-    return replace(observations, xy=observations.xy + shift)
-
-
-def _strip(
-    strip: StripResult, begin: int, observations: PhotoPoints, used: Numbers, points: Adjusted, bundle: Bundle
-) -> StripResult:
-    """Return a strip the points and orientations of the bundle, in its own intermediate frame."""
-    solution, frame = bundle.screened.solution, strip.intermediate
-    photos = strip.strip.photos
-    numbers = slice(begin, begin + len(photos))
-    centers = frame.intermediate_from_cartesian(solution.centers[numbers] + bundle.block.origin)
-    rotations = frame.intermediate_rotations(solution.rotations[numbers])
-    place = {photo: number for number, photo in enumerate(photos)}
-    position = np.array([place.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo]
-    rows = used[position[used] >= 0]
-    rows = rows[np.argsort(position[rows], kind="stable")]
-    seen = np.zeros(len(observations.point_ids), bool)
-    seen[observations.point[position >= 0]] = True
-    inside = seen[points.number]
-    number, cartesian = points.number[inside], points.cartesian[inside]
-    xyz = frame.intermediate_from_cartesian(cartesian)
-    formed = strip.of_photos.formed
-    at = np.minimum(np.searchsorted(formed.point, number), len(formed.point) - 1)
-    known = formed.point[at] == number
-    models = np.where(known, formed.model_count[at], 0)
-    shape = np.where(known[:, None], formed.xyz[at], np.nan)
-    control_at = np.searchsorted(number, formed.point[strip.control_rows])
-    focal = np.full(len(photos), strip.of_photos.strip.camera.principal_distance)
-    at_rows = np.searchsorted(number, observations.point[rows])
-    residuals = observations.xy[rows] - project(xyz[at_rows], centers, rotations, position[rows], focal)
-    counts = np.maximum(2 * np.bincount(position[rows], minlength=len(photos)), 1)
-    rms = np.sqrt(np.bincount(position[rows], (residuals**2).sum(axis=1), len(photos)) / counts)
-    stages = replace(
-        strip.of_photos,
-        formed=replace(formed, point=number, xyz=shape, model_count=models),
-        resection=Resection(centers, rotations, residuals, rms, np.ones(len(photos), bool)),
-        rows=rows,
-    )
-    return replace(
-        strip,
-        control_rows=np.minimum(control_at, len(number) - 1),
-        xyz=xyz,
-        cartesian=cartesian,
-        rays=points.rays[inside],
-        polynomial=None,
-        photo_stages=stages,
-    )
-
-
-def _strip_notes(start: BlockStart) -> tuple[Note, ...]:
-    """Return the notes of the strips that still mean something."""
-    return tuple(note for strip in start.strips for note in strip.notes if note.code not in OF_THE_STRIP_METHOD)
-
-
-def _notes(bundle: Bundle) -> list[Note]:
-    """Say what the surveyor should know of the adjustment."""
-    notes = []
-    solution = bundle.screened.solution
-    if solution.free:
-        what = (
-            "frame and scale are those of the first strip" if bundle.start.free else "frame and scale are the start's"
-        )
-        text = f"neither control nor camera positions: a free network, {what}; its accuracy is relative only"
-        notes.append(Note("free-network", text))
-    test = bundle.sigma0
-    if np.isfinite(test.lower) and not test.passed:
-        text = (
-            f"sigma0 is {test.sigma0:.3f}; with the stated standard deviations it would lie between {test.lower:.3f} "
-            f"and {test.upper:.3f}: they are too {'small' if test.sigma0 > 1 else 'large'}"
-        )
-        notes.append(Note("unit-weight", text, severity="note"))
-    notes += _given_notes(bundle)
-    for parameter in bundle.parameters:
-        if not parameter.significant:
-            text = (
-                f"camera {parameter.camera}: {parameter.name} is {parameter.value:.3g} {parameter.unit} with a "
-                f"standard deviation of {parameter.sigma:.3g}: it does not differ from "
-                "zero; leave it out of self_calibration"
-            )
-            notes.append(Note("calibration-insignificant", text))
-    common = set(bundle.screened.problem.common_names())
-    for correlation in bundle.correlations:
-        if not {correlation.first, correlation.second} & common:
-            continue  # within a photo: shift and rotation replace each other in every aerial photo
-        text = f"{correlation.first} and {correlation.second} are correlated by {correlation.value:+.3f}"
-        notes.append(Note("correlated", text, severity="note"))
-    return notes
-
-
-def _given_notes(bundle: Bundle) -> list[Note]:
-    """Name control and camera positions that were taken out."""
-    notes = []
-    problem = bundle.block.problem
-    for each in bundle.screened.rejections:
-        if each.readmitted or each.kind == reliability.IMAGE:
-            continue
-        axis = ("east (X)", "north (Y)", "up (Z)")[each.axis]
-        reached = (
-            f"test value {each.value:.1f}, limit {each.limit:.1f}" if np.isfinite(each.value) else "found in its strip"
-        )
-        if each.kind == reliability.CONTROL:
-            name = problem.point_name(int(problem.control.point[each.row]))
-            text = (
-                f"control point {name} contradicts the photos and the other control: {axis} by about {each.size:+.2f} m"
-            )
-            notes.append(Note("control-rejected", f"{text} ({reached}); not used", points=(name,)))
-            continue
-        part = problem.positions if each.kind == reliability.POSITION else problem.attitudes
-        photo = problem.photo_name(int(part.photo[each.row]))
-        if each.kind == reliability.POSITION:
-            text = f"the given position of photo {photo} does not fit: {axis} by about {each.size:+.2f} m"
-        else:
-            turn = f"{np.degrees(each.size):+.3f} deg"
-            text = f"the given angles of photo {photo} do not fit: about image axis {each.axis + 1} by {turn}"
-        notes.append(Note("position-rejected", f"{text} ({reached}); not used", photos=(photo,)))
-    return notes

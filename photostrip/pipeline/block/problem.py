@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.geodesy.ground_frame import GroundFrame
+    from photostrip.pipeline.frames import GroundFrames
     from photostrip.pipeline.inputs import CameraPositions, GivenOrientations, Inputs, Settings
     from photostrip.pipeline.results import BlockStart
     from photostrip.points import ControlPoints, PhotoPoints
@@ -48,21 +49,10 @@ def build(
     settings: Settings,
     observations: PhotoPoints,
     control: ControlPoints,
-    frames: tuple[Sequence[GroundFrame], GroundFrame | None, GroundFrame | None],
+    ground: GroundFrames,
     start: BlockStart,
 ) -> BlockProblem:
-    """Collect everything that is observed.
-
-    Parameters
-    ----------
-    frames : tuple
-        Frames of the control lists, of the camera positions and of the orientations.
-
-    Returns
-    -------
-    BlockProblem
-        The problem, and what its rows stand for.
-    """
+    """Collect everything that is observed."""
     # whole numbers: nothing is lost when the origin is added back
     origin: Floats = np.round(np.nanmean(start.points, axis=0, dtype=np.float64), -1)
     place = {photo: number for number, photo in enumerate(start.photos)}
@@ -71,9 +61,9 @@ def build(
     images = ImageObservations(
         photo[observations.photo[rows]], observations.point[rows], observations.xy[rows], observations.sigma[rows]
     )
-    given, control_rows = _control(control, frames[0], observations, start, origin)
-    positions = _positions(inputs, frames[1], frames[2], start, origin)
-    attitudes = _attitudes(inputs.orientations, frames[2], start)
+    given, control_rows = _control(control, ground.control, observations, start, origin)
+    positions = _positions(inputs, ground.positions, ground.orientations, start, origin)
+    attitudes = _attitudes(inputs.orientations, ground.orientations, start)
     problem = BundleProblem(
         images,
         _cameras(inputs, settings),
@@ -87,8 +77,10 @@ def build(
         tuple(strip.id for strip in inputs.strips),
     )
     level = {
-        "control": tuple(frames[0][number].kind != "geocentric" for number in control.frame[control_rows].tolist()),
-        "position": _level_positions(inputs, frames[1], frames[2]),
+        "control": tuple(
+            ground.control[number].kind != "geocentric" for number in control.frame[control_rows].tolist()
+        ),
+        "position": _level_positions(inputs, ground.positions, ground.orientations),
     }
     begin = _begin(problem, rows, control, control_rows, start)
     kept = _named(settings.relative.keep, observations)[rows]

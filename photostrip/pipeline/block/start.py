@@ -17,7 +17,8 @@ from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_angles
 from photostrip.geometry.similarity import Similarity, collinearity
 from photostrip.pipeline.results import BlockStart
-from photostrip.pipeline.strip import adjust_formed, form_strip, middle_frame
+from photostrip.pipeline.strips.absolute import middle_frame
+from photostrip.pipeline.strips.adjusting import adjust_formed
 from photostrip.points import ControlPoints
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.resection.closed_form import approximate
@@ -31,9 +32,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.geodesy.ground_frame import GroundFrame
+    from photostrip.pipeline.frames import GroundFrames
     from photostrip.pipeline.inputs import Inputs, Settings
     from photostrip.pipeline.results import StripResult
-    from photostrip.pipeline.strip import Formed
+    from photostrip.pipeline.strips.photos import FormedPhotos
     from photostrip.points import PhotoPoints
 
     Floats = NDArray[np.float64]
@@ -60,65 +62,44 @@ class Known:
     lever: Floats
 
 
-def known_of(
-    inputs: Inputs,
-    control: ControlPoints,
-    frames: Sequence[GroundFrame],
-    output: GroundFrame,
-    cameras: tuple[GroundFrame | None, GroundFrame | None],
-) -> Known:
-    """Collect what is known on the ground.
-
-    Parameters
-    ----------
-    output : GroundFrame
-        Frame of the result.
-    cameras : tuple of GroundFrame or None
-        Frames of camera positions and of orientations.
-
-    Returns
-    -------
-    Known
-        Camera positions of which all three coordinates count, orientations, control.
-    """
+def known_of(inputs: Inputs, control: ControlPoints, ground: GroundFrames) -> Known:
+    """Collect what is known on the ground: control, orientations, camera positions with all three coordinates."""
     centers: dict[str, Floats] = {}
     rotations: dict[str, Floats] = {}
     lever = np.zeros(3)
     positions, orientations = inputs.positions, inputs.orientations
-    if positions is not None and cameras[0] is not None:
+    if positions is not None and ground.positions is not None:
         whole = np.asarray(positions.use.all(axis=1), bool)
         names = [photo for photo, yes in zip(positions.photos, whole, strict=True) if yes]
-        found = cameras[0].cartesian_from_ground(positions.enu[whole], ids=[f"of photo {name}" for name in names])
+        found = ground.positions.cartesian_from_ground(positions.enu[whole], ids=[f"of photo {name}" for name in names])
         centers = dict(zip(names, found, strict=True))
         lever = np.array(positions.lever_arm)
-    if orientations is not None and cameras[1] is not None:
+    if orientations is not None and ground.orientations is not None:
         ids = [f"of photo {name}" for name in orientations.photos]
-        found = cameras[1].cartesian_from_ground(orientations.enu, ids=ids)
-        turned = cameras[1].axes_at(found).transpose(0, 2, 1) @ from_angles(orientations.angles, orientations.system)
+        found = ground.orientations.cartesian_from_ground(orientations.enu, ids=ids)
+        turned = ground.orientations.axes_at(found).transpose(0, 2, 1) @ from_angles(
+            orientations.angles, orientations.system
+        )
         rotations = dict(zip(orientations.photos, turned, strict=True))
         centers |= dict(zip(orientations.photos, found, strict=True))
-    return Known(control, tuple(frames), output, centers, rotations, lever)
+    return Known(control, ground.control, ground.output, centers, rotations, lever)
 
 
-def start(inputs: Inputs, settings: Settings, observations: PhotoPoints, known: Known) -> BlockStart:
+def start(
+    inputs: Inputs, settings: Settings, stages: Sequence[FormedPhotos], observations: PhotoPoints, known: Known
+) -> BlockStart:
     """Bring all strips and photos of a block into the Cartesian frame.
 
     Parameters
     ----------
-    known : Known
-        What is known on the ground.
-
-    Returns
-    -------
-    BlockStart
-        Strips, orientations and points.
+    stages : sequence of FormedPhotos
+        Strips of two photos or more.
 
     Raises
     ------
     GeometryError
         When a strip or photo hangs together with nothing, or the block cannot be brought to the ground.
     """
-    stages = [form_strip(strip, observations, settings) for strip in inputs.strips if len(strip.photos) > 1]
     block = _Block(settings, observations, known)
     waiting = [number for number, stage in enumerate(stages) if not block.take(number, stage)]
     waiting = block.tie(stages, waiting)
@@ -142,13 +123,13 @@ class _Block:
         self.observations, self.known = observations, known
         self.done: dict[int, StripResult] = {}
 
-    def take(self, number: int, stage: Formed) -> bool:
+    def take(self, number: int, stage: FormedPhotos) -> bool:
         """Bring a strip to the ground with its own control; False when that is too little."""
         known = self.known
         if not len(known.control):
             return False
         try:
-            self.done[number] = adjust_formed(stage, self.observations, known.control, known.frames, self.settings)
+            self.done[number] = adjust_formed(stage, known.control, known.frames, self.settings)
         except GeometryError:
             return False
         return True
@@ -161,7 +142,7 @@ class _Block:
             found[strip.formed.point] = strip.cartesian
         return found
 
-    def tie(self, stages: Sequence[Formed], waiting: Sequence[int]) -> list[int]:
+    def tie(self, stages: Sequence[FormedPhotos], waiting: Sequence[int]) -> list[int]:
         """Tie strips to those on the ground, the best tied first; give those that are left."""
         left = list(waiting)
         while left and self.done:
@@ -175,7 +156,7 @@ class _Block:
                 return left
         return left
 
-    def _hang(self, number: int, stage: Formed, points: Floats) -> bool:
+    def _hang(self, number: int, stage: FormedPhotos, points: Floats) -> bool:
         """Bring one strip to the ground with points of the others; False when they do not determine it."""
         shared = stage.formed.point[np.isfinite(points[stage.formed.point, 0])]
         if collinearity(points[shared]) < ON_A_LINE:
@@ -186,7 +167,7 @@ class _Block:
             return False
         return True
 
-    def _on(self, stage: Formed, numbers: Numbers, cartesian: Floats) -> StripResult:
+    def _on(self, stage: FormedPhotos, numbers: Numbers, cartesian: Floats) -> StripResult:
         """Adjust a strip on points with Cartesian coordinates, beside its own control."""
         known = self.known
         chosen = np.unique(np.linspace(0, len(numbers) - 1, min(len(numbers), MOST_TIES)).astype(np.intp))
@@ -205,9 +186,9 @@ class _Block:
             np.concatenate([own.sigma, np.full((count, 3), sigma)]),
             np.concatenate([own.frame, np.full(count, len(known.frames), np.intp)]),
         )
-        return adjust_formed(stage, self.observations, control, (*known.frames, known.output), self.tied)
+        return adjust_formed(stage, control, (*known.frames, known.output), self.tied)
 
-    def place(self, stages: Sequence[Formed], group: _Group) -> bool:
+    def place(self, stages: Sequence[FormedPhotos], group: _Group) -> bool:
         """Bring a block of strips to the ground; True when nothing was known and its own frame was taken."""
         similarity, free = _datum(stages, group, self.observations, self.known, alone=not self.done)
         for number in group.members:
@@ -227,7 +208,7 @@ class _Group:
     points: Floats
 
 
-def _joined(stages: Sequence[Formed], waiting: Sequence[int], count: int) -> _Group:
+def _joined(stages: Sequence[FormedPhotos], waiting: Sequence[int], count: int) -> _Group:
     """Join the strip with the most points to all that share points with it, and so on."""
     first = max(waiting, key=lambda number: (len(stages[number].formed.point), -number))
     identity = Similarity(1.0, np.eye(3), np.zeros(3))
@@ -257,7 +238,7 @@ def _joined(stages: Sequence[Formed], waiting: Sequence[int], count: int) -> _Gr
 
 
 def _datum(
-    stages: Sequence[Formed], group: _Group, observations: PhotoPoints, known: Known, *, alone: bool
+    stages: Sequence[FormedPhotos], group: _Group, observations: PhotoPoints, known: Known, *, alone: bool
 ) -> tuple[Similarity, bool]:
     """Similarity from the frame of a block to the Cartesian frame; True with it when nothing gave it."""
     names = tuple(photo for number in group.members for photo in stages[number].strip.photos)
@@ -294,7 +275,7 @@ def _by_control(xyz: Floats, every: Floats, control: ControlPoints, known: Known
     return Similarity(inner.scale, frame.axes @ inner.rotation, frame.cartesian_from_intermediate(inner.shift))
 
 
-def _oriented(stages: Sequence[Formed], group: _Group) -> tuple[tuple[str, ...], Floats, Floats]:
+def _oriented(stages: Sequence[FormedPhotos], group: _Group) -> tuple[tuple[str, ...], Floats, Floats]:
     """Photos of a block with their orientations in its frame."""
     names: list[str] = []
     centers, rotations = [], []
@@ -306,7 +287,7 @@ def _oriented(stages: Sequence[Formed], group: _Group) -> tuple[tuple[str, ...],
 
 
 def _by_cameras(
-    stages: Sequence[Formed], group: _Group, given: tuple[ControlPoints, Numbers], known: Known
+    stages: Sequence[FormedPhotos], group: _Group, given: tuple[ControlPoints, Numbers], known: Known
 ) -> Similarity:
     """Similarity of a block to known positions and orientations of its cameras, and to full control points.
 
@@ -353,13 +334,13 @@ def _cartesian_of(control: ControlPoints, known: Known) -> Floats:
     return found
 
 
-def _depth(stages: Sequence[Formed], group: _Group) -> float:
+def _depth(stages: Sequence[FormedPhotos], group: _Group) -> float:
     """Distance from a camera to the ground, in the unit of the block."""
     formed = stages[group.members[0]].formed
     return float(np.median(np.linalg.norm(formed.xyz - formed.xyz.mean(axis=0), axis=1)))
 
 
-def _of_its_own(stages: Sequence[Formed], group: _Group) -> Similarity:
+def _of_its_own(stages: Sequence[FormedPhotos], group: _Group) -> Similarity:
     """Frame and scale of a block that nothing ties to the ground: X along the first strip, Z against the view."""
     _, centers, rotations = _oriented(stages, group)
     first = stages[group.members[0]].formed.centers

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import GeometryError
-from photostrip.pipeline.models.model_strips import form_models
+from photostrip.pipeline.strips.models import form_models
 from photostrip.triangulation.plausibility.control.control_strip import StripPoints
 
 if TYPE_CHECKING:

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.pipeline.covariance_adjustment import CovarianceAdjustment
     from photostrip.pipeline.precision.propagation import Propagation
     from photostrip.pipeline.results import StripResult
     from photostrip.points import ControlPoints, PhotoPoints
+    from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
     from photostrip.triangulation.error_propagation.control_errors import Misclosures
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 

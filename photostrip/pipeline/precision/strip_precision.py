@@ -1,4 +1,4 @@
-"""How precise points and photos of a result are: every strip by itself, then all together."""
+"""How precise points and photos of one strip are, and of all strips together."""
 
 from __future__ import annotations
 
@@ -8,21 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.pipeline.covariance_adjustment import measured
-from photostrip.pipeline.precision import check_points
-from photostrip.pipeline.precision.propagation import propagation
 from photostrip.pipeline.results import Precision
-from photostrip.triangulation.error_propagation import covariances
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.pipeline.covariance_adjustment import CovarianceAdjustment
     from photostrip.pipeline.results import Adjusted, StripResult
-    from photostrip.points import ControlPoints, PhotoPoints
+    from photostrip.triangulation.error_propagation import covariances
 
     Floats = NDArray[np.float64]
     Numbers = NDArray[np.intp]
@@ -47,85 +41,6 @@ class StripPrecision:
     sigma: float  # standard deviation of an image coordinate of weight one, mm
     basis: str  # where that comes from
     check: covariances.CheckTest | None  # test of the strip's check points together
-
-
-def of_strip(
-    strip: StripResult, observations: PhotoPoints, frames: Sequence[GroundFrame], given: ControlPoints
-) -> StripPrecision:
-    """Covariances of one strip.
-
-    Parameters
-    ----------
-    strip : StripResult
-        The strip with all its stages.
-    observations : PhotoPoints
-        Ideal image coordinates of the project.
-    frames : sequence of GroundFrame
-        Ground frames of the given points.
-    given : ControlPoints
-        All given points; the check points among them are compared with what is found.
-
-    Returns
-    -------
-    StripPrecision
-        Covariances of points and photos, test of the check points.
-    """
-    checks = check_points.check_points(strip, given, observations)
-    if strip.of_photos.covariance is not None:
-        return _of_covariance(strip, strip.of_photos.covariance, checks, frames)
-    found = propagation(strip, observations, frames)
-    errors, operator = found.errors, found.fit.operator
-    stated = float(np.median(observations.sigma[measured(strip.of_photos.strip, observations) >= 0]))
-    factor, basis = covariances.image_variance(strip.of_photos.orientation, stated)
-    parameters = covariances.of_parameters(errors, found.control, operator, factor)
-    points = covariances.covariances(errors, errors.points, parameters, found.influence) * factor
-    photos = np.full((len(strip.strip.photos), 6, 6), np.nan)
-    photos[found.oriented] = covariances.covariances(errors, found.photos, parameters, found.photo_influence) * factor
-    numbers = strip.formed.point[strip.control_rows][found.control.point]
-    return StripPrecision(
-        *_turned(strip, points, photos),
-        lambda rows, columns: strip.intermediate.axes @ found.influence[rows] @ operator[:, columns],
-        np.column_stack([numbers, found.control.axis]),
-        found.control.variance,
-        stated * float(np.sqrt(factor)),
-        basis,
-        check_points.by_fit(found, check_points.given_at(strip, errors, checks, frames), checks[1], factor)
-        if len(checks[1])
-        else None,
-    )
-
-
-def _of_covariance(
-    strip: StripResult,
-    adjusted: CovarianceAdjustment,
-    checks: tuple[ControlPoints, Numbers],
-    frames: Sequence[GroundFrame],
-) -> StripPrecision:
-    """Covariances that the adjustment with the strip's own covariance has found already."""
-    numbers = strip.formed.point[strip.control_rows][adjusted.control.point]
-
-    def by_control(rows: Numbers, columns: Numbers) -> Floats:
-        axes: Floats = strip.intermediate.axes
-        return np.asarray(axes @ adjusted.by_control(rows, columns), float)
-
-    return StripPrecision(
-        *_turned(strip, adjusted.points, adjusted.photos),
-        by_control,
-        np.column_stack([numbers, adjusted.control.axis]),
-        adjusted.control.variance,
-        adjusted.sigma,
-        adjusted.basis,
-        check_points.by_covariance(adjusted, check_points.given_at(strip, adjusted.system.errors, checks, frames))
-        if len(checks[1])
-        else None,
-    )
-
-
-def _turned(strip: StripResult, points: Floats, photos: Floats) -> tuple[Floats, Floats]:
-    """Covariances from the intermediate to the Cartesian frame."""
-    axes, both = strip.intermediate.axes, np.zeros((6, 6))
-    both[:3, :3] = both[3:, 3:] = axes
-    return axes @ points @ axes.T, both @ photos @ both.T
 
 
 def joined(strips: Sequence[StripPrecision], results: Sequence[StripResult], points: Adjusted) -> Precision:

@@ -18,7 +18,7 @@ from photostrip.formats.text.findings import Findings
 from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline import overruling
 from photostrip.pipeline.plausibility import gate
-from photostrip.pipeline.run import require_whole
+from photostrip.pipeline.refusals import require_whole
 from photostrip.project.checks.models import (
     counts_of_models,
     links_of_models,
@@ -85,7 +85,7 @@ def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
         return Checked(str(path), error.faults, (), (), {})
     faults = _refused(project, partial(overruling.require, project.settings.relative, project.inputs.observations))
     if project.inputs.models is not None:
-        from photostrip.pipeline.models.model_strips import require_named  # strips of photos need none of it
+        from photostrip.pipeline.overruling import require_named
 
         faults += _refused(project, partial(require_named, project.settings.links, project.inputs.models.points))
     notes = list(project.hints)

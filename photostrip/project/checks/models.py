@@ -26,7 +26,7 @@ MICROMETRES = 1000.0  # in a millimetre
 
 def links_of_models(project: Project) -> Iterator[Fault]:
     """Refuse neighbouring models that cannot be linked, and models of the other hand."""
-    from photostrip.pipeline.models.model_strips import form_models  # strips of photos need none of it
+    from photostrip.pipeline.strips.models import form_models  # strips of photos need none of it
 
     models = project.inputs.models
     for number, strip in enumerate(() if models is None else models.strips):

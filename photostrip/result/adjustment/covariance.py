@@ -12,8 +12,8 @@ from photostrip.result.quantities import record, records
 
 if TYPE_CHECKING:
     from photostrip.pipeline import Result, StripResult
-    from photostrip.pipeline.covariance_adjustment import CovarianceAdjustment
     from photostrip.result.numbers import Document
+    from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
 
 
 def covariances_of(result: Result) -> Document:

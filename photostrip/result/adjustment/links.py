@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.pipeline.models.model_notes import far_ends
+from photostrip.pipeline.strips.model_notes import far_ends
 from photostrip.result.adjustment.junctions import DIRECTIONS, PPM, discrepancies
 from photostrip.result.numbers import rms
 from photostrip.result.quantities import grouped, record, records

@@ -35,6 +35,25 @@ class Resection:
     solved: NDArray[np.bool_]
 
 
+def with_residuals(
+    xy: Floats, points: Floats, photo: Numbers, focal: float, centers: Floats, rotations: Floats
+) -> Resection:
+    """Image residuals of photos whose orientation is known already, as a resection.
+
+    Parameters
+    ----------
+    xy, points, photo : ndarray, shapes (m, 2), (m, 3), (m,)
+        Image coordinates in mm, their points, and the photo of each.
+    centers, rotations : ndarray, shapes (n, 3), (n, 3, 3)
+        Perspective centres, and photo to the frame of the points.
+    """
+    count = len(centers)
+    residuals = xy - project(points, centers, rotations, photo, np.full(count, focal))
+    squares = np.bincount(photo, (residuals**2).sum(axis=1), count)
+    rms = np.sqrt(squares / np.maximum(2 * np.bincount(photo, minlength=count), 1))
+    return Resection(centers, rotations, residuals, rms, np.ones(count, bool))
+
+
 def resect(xy: Floats, points: Floats, photo: Numbers, focal: Floats, start: tuple[Floats, Floats]) -> Resection:
     """Orient every photo on its points by least squares on the image coordinates.
 

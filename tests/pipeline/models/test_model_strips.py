@@ -12,7 +12,8 @@ from photostrip.errors import InputError
 from photostrip.formats.output.simulation import inputs_of
 from photostrip.geometry.similarity import Similarity
 from photostrip.pipeline import Inputs, MeasuredModels, ModelStrip, Settings, StripResult, triangulate
-from photostrip.pipeline.models.model_strips import adjust_models, form_models
+from photostrip.pipeline.strips.adjusting import adjust_formed
+from photostrip.pipeline.strips.models import form_models, link_strip
 from photostrip.report.sections.document import sections_of
 from photostrip.result.document import document_of
 from photostrip.simulate import Control, Flight, Ground, Models, Points, Spec, simulate
@@ -235,8 +236,9 @@ def test_the_whole_chain_agrees_with_differences() -> None:
     control = first.control.take(~first.control.check)
 
     def places(xyz: Floats, enu: Floats) -> Floats:
-        moved = replace(measured, xyz=xyz), replace(control, enu=enu)
-        found = adjust_models(strip, *moved, whole.frames, straight("polynomial"))
+        settings = straight("polynomial")
+        linked = link_strip(strip, replace(measured, xyz=xyz), settings)
+        found = adjust_formed(linked, replace(control, enu=enu), whole.frames, settings)
         above = found.intermediate.cartesian_from_intermediate(found.centers)
         return np.concatenate([found.cartesian, above]).ravel()
 
@@ -274,7 +276,12 @@ def test_standard_deviations_are_the_scatter_of_repetitions() -> None:
     for _ in range(repetitions):
         measured = given.measured(rng.normal(size=(len(given.model), 3)))
         enu = control.enu + rng.normal(0, 0.02, control.enu.shape)
-        found = adjust_models(strip, measured, replace(control, enu=enu), whole.frames, straight("similarity"))
+        found = adjust_formed(
+            link_strip(strip, measured, straight("similarity")),
+            replace(control, enu=enu),
+            whole.frames,
+            straight("similarity"),
+        )
         points.append(found.cartesian)
         places.append(found.intermediate.cartesian_from_intermediate(found.centers))
     for samples, covariances in (

@@ -11,10 +11,10 @@ import pytest
 
 from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline import Settings, triangulate
-from photostrip.pipeline.precision import strip_precision
+from photostrip.pipeline.precision import photo_precision
 from photostrip.simulate import Control, Flight, Image, Points, Spec, simulate
 from photostrip.triangulation.polynomial import correction
-from tests.derivatives import UNSCREENED
+from tests.derivatives import UNSCREENED, oriented_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -53,7 +53,10 @@ def test_common_control_makes_common_errors(adjustment: str) -> None:
     result = triangulate(inputs, wanted)
     observations, assured = result.refined.observations, result.precision
     assert assured is not None
-    each = [strip_precision.of_strip(strip, observations, result.frames, inputs.control) for strip in result.strips]
+    each = [
+        photo_precision.of_photos(strip, oriented_of(result, number), observations, inputs.control)
+        for number, strip in enumerate(result.strips)
+    ]
     names = [set(strip.control.ids) for strip in result.strips]
     common = [n for n, name in enumerate(inputs.control.ids) if name in names[0] & names[1]]
     one, other = (np.searchsorted(result.points.number, strip.formed.point) for strip in result.strips)

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from photostrip.pipeline import Inputs, Result, Settings, StripResult, triangulate
-from photostrip.pipeline import covariance_adjustment as pipeline_covariance
-from photostrip.pipeline.strip import adjust_formed, form_strip
+from photostrip.pipeline.strips.adjusting import adjust_formed
+from photostrip.pipeline.strips.photos import form_strip
 from photostrip.report.sections.project import project_section
 from photostrip.result.document import document_of
 from photostrip.triangulation.covariance_adjustment import (
+    adjust,
     block_tridiagonal,
     conditions,
     prediction,
@@ -159,8 +160,8 @@ def test_passes_go_on_until_nothing_is_left_to_be_linear(monkeypatch: pytest.Mon
     inputs = bent(20, 0.2)
     off, passes = [], []
     for most, fresh in ((10, 0.05), (10, 0.0), (1, 0.05)):  # with the first derivatives, with new ones, at once
-        monkeypatch.setattr(pipeline_covariance, "MOST_PASSES", most)
-        monkeypatch.setattr(pipeline_covariance, "FRESH", fresh)
+        monkeypatch.setattr(adjust, "MOST_PASSES", most)
+        monkeypatch.setattr(adjust, "FRESH", fresh)
         result = triangulate(inputs, COVARIANCE)
         assert result.precision is not None
         sigma = np.sqrt(np.trace(result.precision.points, axis1=1, axis2=2))
@@ -286,7 +287,7 @@ def test_repetitions_scatter_as_stated() -> None:
         observations = replace(inputs.observations, xy=xy)
         formed = form_strip(strip, observations, base)
         for name, wanted in settings.items():
-            found = adjust_formed(formed, observations, control, truth.frames, wanted)
+            found = adjust_formed(formed, control, truth.frames, wanted)
             squares[name] += (found.cartesian - true) ** 2
     noisy_xy = inputs.observations.xy + rng.normal(0, 0.005, inputs.observations.xy.shape)
     once = replace(inputs, observations=replace(inputs.observations, xy=noisy_xy))

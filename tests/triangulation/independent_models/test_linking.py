@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from photostrip.errors import GeometryError, InputError
 from photostrip.geometry.similarity import Similarity
 from photostrip.pipeline import ModelStrip, Settings
-from photostrip.pipeline.models.model_strips import form_models, models_of
+from photostrip.pipeline.strips.models import form_models, models_of
 from photostrip.triangulation.independent_models import link_screening, linking
 from tests.models import SIGMA, truth
 

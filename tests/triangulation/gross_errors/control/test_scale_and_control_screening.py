@@ -10,7 +10,8 @@ import pytest
 
 from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline import Settings, triangulate
-from photostrip.pipeline.strip import adjust_strip
+from photostrip.pipeline.strips.adjusting import adjust_formed
+from photostrip.pipeline.strips.photos import form_strip
 from photostrip.result.document import document_of
 from photostrip.triangulation.gross_errors.control import control_screening
 from photostrip.triangulation.relative_orientation.orientation import orient_again
@@ -260,7 +261,8 @@ def test_two_fifths_of_wrong_control_come_out_and_nothing_else(seed: int) -> Non
     for columns, fewest in ((bad[:, 0], 4), (bad[:, 2], 3)):
         assert columns.sum() >= fewest
     inputs, (frames, _) = project(strip, control), tie_frames([LOCAL])
-    kept = adjust_strip(inputs.strips[0], inputs.observations, control, frames, Settings()).control
+    formed = form_strip(inputs.strips[0], inputs.observations, Settings())
+    kept = adjust_formed(formed, control, frames, Settings()).control
     row_of = {name: row for row, name in enumerate(control.ids)}
     rows = [row_of[name] for name in kept.ids]
     assert np.array_equal(kept.use, control.use[rows] & ~bad[rows])

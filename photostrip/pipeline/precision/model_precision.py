@@ -6,16 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
+from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.pipeline.precision.check_points import check_points
 from photostrip.pipeline.precision.strip_precision import StripPrecision
 from photostrip.statistics import chi2_quantile
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.error_propagation import control_errors
 from photostrip.triangulation.error_propagation.covariances import A_POSTERIORI, A_PRIORI, LEVEL, CheckTest
-from photostrip.triangulation.error_propagation.derivatives import ErrorRows
-from photostrip.triangulation.gross_errors.control import control_significance
-from photostrip.triangulation.independent_models import model_errors, perspective_centers
+from photostrip.triangulation.independent_models import model_errors, model_misclosures, perspective_centers
 from photostrip.triangulation.polynomial.terms import POWERS
 
 if TYPE_CHECKING:
@@ -23,11 +21,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.geodesy.local_frame import IntermediateFrame
     from photostrip.pipeline.results import StripResult
+    from photostrip.pipeline.strips.absolute import OrientedStrip
     from photostrip.points import ControlPoints, PhotoPoints
-    from photostrip.triangulation.error_propagation.control_errors import FitOperator, Misclosures
+    from photostrip.triangulation.error_propagation.control_errors import FitOperator
     from photostrip.triangulation.independent_models.formation import FormedModels
     from photostrip.triangulation.independent_models.model_errors import ModelErrors
 
@@ -53,17 +50,13 @@ def variance_factor(formed: FormedModels) -> tuple[float, str]:
     return (1.0, A_PRIORI) if low <= squares <= high else (squares / redundancy, A_POSTERIORI)
 
 
-def of_linked(
-    strip: StripResult, observations: PhotoPoints, frames: Sequence[GroundFrame], given: ControlPoints
+def of_models(
+    strip: StripResult, oriented: OrientedStrip[ModelErrors], observations: PhotoPoints, given: ControlPoints
 ) -> StripPrecision:
     """Covariances of one strip of independent models.
 
     Parameters
     ----------
-    strip : StripResult
-        The strip with all its stages.
-    frames : sequence of GroundFrame
-        Ground frames of the given points.
     given : ControlPoints
         All given points; the check points among them are compared with what is found.
 
@@ -74,11 +67,10 @@ def of_linked(
         known, and neither are their covariances.
     """
     formed, axes = strip.of_models.formed, strip.intermediate.axes
-    found = model_errors.differentiate_models(formed, strip.absolute.similarity)
-    seen, fit = _fit_to_control(strip, found, frames)
+    found, seen, fit = oriented.errors, oriented.misclosures, _fit_to_control(strip, oriented)
     factor, basis = variance_factor(formed)
     influence = _influence(strip, fit)
-    by_parameters = model_errors.sums(found, *_weights(seen, strip.control_rows, fit.operator))
+    by_parameters = model_errors.sums(found, *model_misclosures.weights(seen, strip.control_rows, fit.operator))
     spread = model_errors.covariance_of_sums(found, by_parameters)
     spread += (fit.operator * (seen.variance / factor)) @ fit.operator.T
     mixed = model_errors.with_sums(found, by_parameters) @ influence.transpose(0, 2, 1)
@@ -88,14 +80,14 @@ def of_linked(
     points = len(formed.point)
     sigma = float(np.sqrt(np.median(formed.models.sigma**2) * factor))
     return StripPrecision(
-        nodes[:points],
-        _of_photos(formed, nodes),
-        lambda rows, columns: axes @ influence[rows] @ fit.operator[:, columns],
-        np.column_stack([formed.point[strip.control_rows][seen.point], seen.axis]),
-        seen.variance,
-        sigma,
-        basis,
-        _check(strip, (found, seen, fit, influence), check_points(strip, given, observations), frames, factor),
+        points=nodes[:points],
+        photos=_of_photos(formed, nodes),
+        by_control=lambda rows, columns: axes @ influence[rows] @ fit.operator[:, columns],
+        control=np.column_stack([formed.point[strip.control_rows][seen.point], seen.axis]),
+        variance=seen.variance,
+        sigma=sigma,
+        basis=basis,
+        check=_check(strip, oriented, fit, influence, check_points(strip, given, observations), factor),
     )
 
 
@@ -108,65 +100,12 @@ def _of_photos(formed: FormedModels, nodes: Floats) -> Floats:
     return photos
 
 
-def joint(
-    formed: FormedModels,
-    orientation: absolute_orientation.AbsoluteOrientation,
-    given: tuple[ControlPoints, Numbers],
-    frames: Sequence[GroundFrame],
-    intermediate: IntermediateFrame,
-) -> control_significance.ControlCovariance | None:
-    """Covariance of all misclosures at the control; None where there are too many to form it as a whole.
-
-    Parameters
-    ----------
-    given : tuple of ControlPoints and ndarray of int
-        The control, and its rows in the points of the strip.
-    """
-    control, rows = given
-    if control.use.sum() > control_significance.LARGEST or len(formed.photos) > control_significance.LONGEST:
-        return None
-    found = model_errors.differentiate_models(formed, orientation.similarity)
-    xyz = orientation.similarity(formed.xyz[rows])
-    targets = absolute_orientation.Targets(control, frames, intermediate)
-    seen = _misclosures(targets.turned(xyz), targets.axes(xyz), xyz, found.origin)
-    covariance = (
-        model_errors.covariance_of_sums(found, model_errors.sums(found, *_weights(seen, rows))) * formed.links.factor
-    )
-    moved = similarity_derivatives(xyz[seen.point], found.origin)
-    design = np.einsum("wi,wij->wj", seen.direction, moved)
-    return control_significance.ControlCovariance(seen.point, seen.axis, design, covariance + np.diag(seen.variance))
-
-
-def _fit_to_control(
-    strip: StripResult, found: ModelErrors, frames: Sequence[GroundFrame]
-) -> tuple[Misclosures, FitOperator]:
-    """Misclosures at the control and the operator of the fit, with the weights that were in force."""
-    targets = absolute_orientation.Targets(strip.control, frames, strip.intermediate)
-    xyz = strip.absolute.similarity(strip.formed.xyz[strip.control_rows])
-    control = targets.turned(xyz)
-    seen = _misclosures(control, targets.axes(xyz), xyz, found.origin)
+def _fit_to_control(strip: StripResult, oriented: OrientedStrip[ModelErrors]) -> FitOperator:
+    """Operator of the fit to the control, with the weights that were in force."""
     terms = [axis.terms for axis in strip.polynomial.axes] if strip.polynomial else [(), (), ()]
-    weight = absolute_orientation.weights(control, strip.precision)
-    return seen, control_errors.fit_operator(seen, weight, xyz, terms, found.origin)
-
-
-def _misclosures(control: ControlPoints, axes: Floats, xyz: Floats, origin: Floats) -> Misclosures:
-    """Control coordinates that count, with their derivatives by a similarity of the strip."""
-    point, axis = np.nonzero(control.use)
-    direction = axes[point, axis]
-    frame = direction[:, None] @ similarity_derivatives(xyz[point], origin)
-    nothing = np.zeros(0, np.intp)
-    rows = ErrorRows(nothing, frame, np.zeros((len(point), 0, 1, 0)), nothing, nothing, np.zeros((0, 1, 2)))
-    return control_errors.Misclosures(point, axis, direction, control.sigma[point, axis] ** 2, rows)
-
-
-def _weights(seen: Misclosures, rows: Numbers, operator: Floats | None = None) -> tuple[Numbers, Floats]:
-    """Nodes of given points, and sums of their coordinates as weighted sums of the nodes; by default each one."""
-    if operator is None:
-        operator = np.eye(len(seen.point))
-    weights = np.zeros((len(rows), len(operator), 3))
-    np.add.at(weights, seen.point, operator.T[:, :, None] * seen.direction[:, None, :])
-    return rows, weights.transpose(1, 0, 2)
+    return control_errors.fit_operator(
+        oriented.misclosures, oriented.weights, oriented.at_control, terms, oriented.errors.origin
+    )
 
 
 def _influence(strip: StripResult, fit: FitOperator) -> Floats:
@@ -196,22 +135,23 @@ def _scaled_rows(xyz: Floats, above: Floats, terms: Sequence[tuple[str, ...]], u
 
 def _check(
     strip: StripResult,
-    parts: tuple[ModelErrors, Misclosures, FitOperator, Floats],
+    oriented: OrientedStrip[ModelErrors],
+    fit: FitOperator,
+    influence: Floats,
     checks: tuple[ControlPoints, Numbers],
-    frames: Sequence[GroundFrame],
     factor: float,
 ) -> CheckTest | None:
     """Test of the check points together; None without any."""
-    (found, control, fit, influence), (points, rows) = parts, checks
+    found, control, (points, rows) = oriented.errors, oriented.misclosures, checks
     if not len(rows):
         return None
     xyz = strip.xyz[rows]
-    targets = absolute_orientation.Targets(points, frames, strip.intermediate)
-    seen = _misclosures(targets.turned(xyz), targets.axes(xyz), xyz, found.origin)
+    targets = absolute_orientation.Targets(points, oriented.frames, strip.intermediate)
+    seen = model_misclosures.misclosures(targets.turned(xyz), targets.axes(xyz), xyz, found.origin)
     difference = targets.misclosures(xyz)[seen.point, seen.axis]
     taken = np.einsum("wi,wit->wt", seen.direction, influence[rows][seen.point]) @ fit.operator
-    own = model_errors.sums(found, *_weights(seen, rows))
-    own = own - model_errors.sums(found, *_weights(control, strip.control_rows, taken))
+    own = model_errors.sums(found, *model_misclosures.weights(seen, rows))
+    own = own - model_errors.sums(found, *model_misclosures.weights(control, strip.control_rows, taken))
     spread = model_errors.covariance_of_sums(found, own) * factor + (taken * control.variance) @ taken.T
     squares = float(difference @ np.linalg.solve(spread + np.diag(seen.variance), difference))
     return CheckTest(len(points), len(difference), squares)

@@ -1,0 +1,82 @@
+"""Points of all strips together: the mean where strips share a point, and their differences there."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from photostrip.pipeline.precision.all_strips import precision_of
+from photostrip.pipeline.results import Adjusted, AdjustedStrips, Ties
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.geodesy.ground_frame import GroundFrame
+    from photostrip.pipeline.inputs import Settings
+    from photostrip.pipeline.results import StripResult
+    from photostrip.pipeline.strips.absolute import ScreenedStrip
+    from photostrip.points import ControlPoints, PhotoPoints
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+
+def join_strips(
+    strips: tuple[StripResult, ...],
+    screened: Sequence[ScreenedStrip[Any]],
+    observations: PhotoPoints,
+    given: ControlPoints,
+    output: GroundFrame,
+    settings: Settings,
+) -> AdjustedStrips:
+    """Join strips that were adjusted each by itself.
+
+    Parameters
+    ----------
+    screened : sequence of ScreenedStrip
+        The same strips before their deformation was corrected.
+    given : ControlPoints
+        All given points, check points too.
+    """
+    points, ties = _joined(strips, observations.point_ids, output)
+    precision = None
+    if settings.precision:
+        precision = precision_of(strips, [each.oriented for each in screened], observations, given, points)
+    return AdjustedStrips(
+        strips=strips,
+        points=points,
+        ties=ties,
+        observations=observations,
+        precision=precision,
+        notes=tuple(note for strip in strips for note in strip.notes),
+    )
+
+
+def _joined(strips: Sequence[StripResult], point_ids: Sequence[str], output: GroundFrame) -> tuple[Adjusted, Ties]:
+    """Mean of every point over the strips that hold it, and the ties between strips."""
+    strip = np.concatenate([np.full(len(s.formed.point), number) for number, s in enumerate(strips)])
+    point = np.concatenate([s.formed.point for s in strips])
+    cartesian = np.concatenate([s.cartesian for s in strips])
+    number, inverse = np.unique(point, return_inverse=True)
+    count = np.bincount(inverse)
+    sums = np.column_stack([np.bincount(inverse, cartesian[:, axis]) for axis in range(3)])
+    mean = sums / count[:, None]
+    rays = np.zeros(len(number), np.intp)
+    for s in strips:
+        rays[np.searchsorted(number, s.formed.point)] += s.rays
+    ids = [point_ids[n] for n in number]
+    joined = Adjusted(number, mean, output.ground_from_cartesian(mean, ids=ids), rays)
+    return joined, _ties(strip, point, cartesian, output)
+
+
+def _ties(strip: Numbers, point: Numbers, cartesian: Floats, output: GroundFrame) -> Ties:
+    order = np.lexsort((strip, point))
+    strip, point, cartesian = strip[order], point[order], cartesian[order]
+    second = np.flatnonzero(point[1:] == point[:-1]) + 1
+    difference = cartesian[second] - cartesian[second - 1]
+    if len(second):
+        difference = np.einsum("nij,nj->ni", output.axes_at(cartesian[second]), difference)
+    return Ties(point[second], np.column_stack([strip[second - 1], strip[second]]), difference)

@@ -1,0 +1,82 @@
+"""Ground frames of everything that is given, tied to one Cartesian frame.
+
+Source: [001] eq. 153 for Earth curvature in the frames; see docs/frames.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from photostrip.geodesy.frame_spec import GROUND_AXES, FrameSpec
+from photostrip.geodesy.tying import tie_frames
+from photostrip.notes import Note
+from photostrip.pipeline.refusals import refuse_curvature_twice
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from photostrip.geodesy.ground_frame import GroundFrame
+    from photostrip.pipeline.inputs import Inputs, Settings
+
+CAMERAS = ("camera_positions", "orientations")  # keys of what may be given of cameras
+
+
+@dataclass(frozen=True, eq=False)
+class GroundFrames:
+    """Ground frames of a project, tied together."""
+
+    control: tuple[GroundFrame, ...]  # of the control lists
+    output: GroundFrame  # of the result
+    positions: GroundFrame | None = None  # of the camera positions; None without a bundle adjustment
+    orientations: GroundFrame | None = None  # of the given orientations
+
+
+def tie_ground_frames(inputs: Inputs, settings: Settings, directory: Path | None) -> GroundFrames:
+    """Tie the frames of control, output, camera positions and orientations together.
+
+    With curvature by eq. 153 all share the control's centre of gravity as origin.
+    """
+    radius = settings.absolute.earth_radius if settings.absolute.earth_curvature == "model" else None
+    refuse_curvature_twice(inputs, settings)
+    cameras = [None if given is None else given.frame for given in (inputs.positions, inputs.orientations)]
+    if settings.adjustment != "bundle":
+        cameras = [None, None]
+    if settings.adjustment == "bundle" and _nothing_given(inputs):
+        _, target = tie_frames([FrameSpec("local", GROUND_AXES)])
+        return GroundFrames((), target)
+    named = {f"control[{number}]": spec for number, spec in enumerate(inputs.frames)}
+    named |= {key: spec for key, spec in zip(CAMERAS, cameras, strict=True) if spec is not None}
+    specs = [replace(spec, curvature_radius=radius) for spec in named.values()]
+    output = None if inputs.output is None else replace(inputs.output, curvature_radius=radius)
+    if not specs and output is not None:
+        specs, named = [output], {"output": output}
+    tied, target = tie_frames(specs, output, directory=directory, keys=list(named))
+    plan = inputs.control.use[:, 0] & ~inputs.control.check
+    if radius is not None and plan.any():
+        origin = inputs.control.enu[plan, :2].mean(axis=0)
+        tied, target = [frame.with_origin(origin) for frame in tied], target.with_origin(origin)
+    found = dict(zip(named, tied, strict=True))
+    control = tuple(found[f"control[{number}]"] for number in range(len(inputs.frames)))
+    return GroundFrames(control, target, found.get(CAMERAS[0]), found.get(CAMERAS[1]))
+
+
+def _nothing_given(inputs: Inputs) -> bool:
+    """Whether nothing ties the photos to the ground: a frame of their own is all they can have."""
+    measured = set(inputs.observations.point_ids)
+    control = inputs.control
+    counts = control.use.any(axis=1) & ~control.check
+    given = any(yes and name in measured for name, yes in zip(control.ids, counts.tolist(), strict=True))
+    cameras = any(each is not None and each.photos for each in (inputs.positions, inputs.orientations))
+    return not given and not cameras
+
+
+def curvature_notes(inputs: Inputs, settings: Settings) -> list[Note]:
+    """Say where a setting of Earth curvature changes nothing."""
+    if settings.absolute.earth_curvature != "none" or not inputs.frames or inputs.frames[0].crs == "local":
+        return []
+    text = (
+        "earth_curvature: none changes nothing here: the coordinates go through geocentric space, where the Earth is "
+        "curved"
+    )
+    return [Note("curvature-in-frames", text, severity="note")]

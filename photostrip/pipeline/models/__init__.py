@@ -1,1 +1,0 @@
-"""A strip of independent models, from the measured models to adjusted points."""

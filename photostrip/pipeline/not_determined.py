@@ -1,0 +1,45 @@
+"""Points that were measured and have no coordinates."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from photostrip.pipeline.inputs import Inputs
+    from photostrip.pipeline.results import Adjusted, StripResult
+    from photostrip.points import PhotoPoints
+
+
+def not_determined(
+    observations: PhotoPoints, points: Adjusted, inputs: Inputs, strips: Sequence[StripResult]
+) -> dict[str, str]:
+    """Points that were measured and have no coordinates, with the reason."""
+    done = np.zeros(len(observations.point_ids), bool)
+    done[points.number] = True
+    if inputs.models is not None:
+        why = "its coordinates in the models contradict each other, or were left out"
+        return {observations.point_ids[number]: why for number in np.flatnonzero(~done).tolist()}
+    placed = {photo: (n, k) for n, strip in enumerate(inputs.strips) for k, photo in enumerate(strip.photos)}
+    contradicted = {int(number) for strip in strips for number in strip.of_photos.contradictions.point}
+    seen: dict[int, list[tuple[int, int]]] = {}
+    for row in np.flatnonzero(~done[observations.point]):
+        photo = observations.photo_ids[observations.photo[row]]
+        if photo in placed:
+            seen.setdefault(int(observations.point[row]), []).append(placed[photo])
+    return {
+        observations.point_ids[point]: _reason(places, contradicted=point in contradicted)
+        for point, places in sorted(seen.items())
+    }
+
+
+def _reason(places: list[tuple[int, int]], *, contradicted: bool) -> str:
+    if len(places) == 1:
+        return "measured on one photo"
+    if contradicted:
+        return "its rays contradict each other"
+    neighbours = any((n, k + 1) in places for n, k in places)
+    return "rejected in every pair" if neighbours else "on no two neighbouring photos of one strip"

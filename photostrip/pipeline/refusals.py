@@ -1,0 +1,99 @@
+"""What a run refuses before anything is computed: settings and inputs that contradict each other."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import Fault, InputError
+from photostrip.pipeline.inputs import ADJUSTMENTS
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from photostrip.geodesy.ground_frame import GroundFrame
+    from photostrip.pipeline.inputs import Inputs, Settings
+
+OF_MODELS = ("polynomial", "similarity")  # adjustments that need no image coordinates
+
+
+def require_runnable(inputs: Inputs, settings: Settings) -> None:
+    """Refuse an adjustment that does not exist, and measurements on photos whose camera nobody knows.
+
+    Raises
+    ------
+    InputError
+        By the key in the project file.
+    """
+    if settings.adjustment not in ADJUSTMENTS:
+        fault = Fault(
+            f"adjustment {settings.adjustment!r} is not available",
+            code="not-available",
+            key="processing.adjustment",
+            expected=" or ".join(ADJUSTMENTS),
+        )
+        raise InputError(fault)
+    cameras = inputs.cameras
+    stray = [photo for photo in inputs.observations.photo_ids if photo not in cameras]
+    if stray:
+        message = f"photo {stray[0]} is measured but belongs to no strip ({len(stray)} such photos)"
+        raise InputError(Fault(message, code="photo-without-strip", key="strips"))
+
+
+def require_whole(inputs: Inputs, frames: Sequence[GroundFrame]) -> None:
+    """Refuse geocentric points of which only some coordinates count: X, Y, Z are neither plan nor height.
+
+    Raises
+    ------
+    InputError
+        With a fault for each such point.
+    """
+    control = inputs.control
+    if not frames:
+        return
+    geocentric = np.array([frame.kind == "geocentric" for frame in frames])
+    part = control.use.any(axis=1) & ~control.use.all(axis=1)
+    faults = [
+        Fault(
+            f"point {control.ids[row]} is geocentric, and only some of its coordinates count",
+            code="geocentric-use",
+            key=f"control[{control.frame[row]}]",
+            expected="`use: xyz` or `off`: X, Y and Z are neither plan nor height",
+        )
+        for row in np.flatnonzero(part & geocentric[control.frame]).tolist()
+    ]
+    if faults:
+        raise InputError(faults)
+
+
+def refuse_curvature_twice(inputs: Inputs, settings: Settings) -> None:
+    """Refuse curvature in image space where the ground frames carry it."""
+    curved = [spec.name for spec in (*inputs.frames, *filter(None, [inputs.output])) if spec.crs != "local"]
+    if settings.refinement.earth_radius is not None and curved:
+        fault = Fault(
+            f"Earth curvature would be counted twice: in the images and in {curved[0]}, which carries it",
+            code="curvature-twice",
+            key="processing.earth_curvature",
+            expected="auto",
+            fix="drop `earth_curvature: image`, or give plane coordinates of an unknown projection as `crs: local`",
+        )
+        raise InputError(fault)
+
+
+def require_adjustment_of_models(settings: Settings) -> None:
+    """Refuse adjustments that need image coordinates where models were measured.
+
+    Raises
+    ------
+    InputError
+        By the key in the project file.
+    """
+    if settings.adjustment not in OF_MODELS:
+        fault = Fault(
+            f"adjustment {settings.adjustment!r} needs image coordinates; the project gives model coordinates",
+            code="needs-image-coordinates",
+            key="processing.adjustment",
+            expected=" or ".join(OF_MODELS),
+        )
+        raise InputError(fault)

@@ -1,0 +1,286 @@
+"""A formed strip on its control: intermediate frame, absolute orientation, wrong control taken out.
+
+Source: [001] eq. 142-149.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
+
+import numpy as np
+
+from photostrip.errors import GeometryError, InputError
+from photostrip.geodesy.local_frame import IntermediateFrame, mean_position, strip_azimuth
+from photostrip.triangulation import absolute_orientation
+from photostrip.triangulation.gross_errors.control import control_screening
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.geodesy.ground_frame import GroundFrame
+    from photostrip.geometry.similarity import Similarity
+    from photostrip.pipeline.inputs import ModelStrip, Settings, Strip
+    from photostrip.pipeline.results import StripResult, StripShape
+    from photostrip.points import ControlPoints
+    from photostrip.triangulation.error_propagation.control_errors import Misclosures
+    from photostrip.triangulation.gross_errors.control import control_significance
+    from photostrip.triangulation.polynomial.correction import Polynomial
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+Errors = TypeVar("Errors")  # derivatives of a placed strip by what was measured
+
+
+class StripStage(Protocol[Errors]):
+    """A strip before it meets its control, of photos or of independent models."""
+
+    @property
+    def strip(self) -> Strip | ModelStrip:
+        """What was flown."""
+
+    @property
+    def formed(self) -> StripShape:
+        """Points and perspective centres, in the scale of the first model."""
+
+    @property
+    def point_ids(self) -> Sequence[str]:
+        """Ids of the points as they are numbered."""
+
+    def point_precision(self, scale: float) -> tuple[float, float]:
+        """A-priori standard deviation of a point of one model in plan and height, metres, at a scale of the strip."""
+
+    def extent(self, similarity: Similarity) -> tuple[float, float]:
+        """Mean base and half width of the strip on the ground, metres."""
+
+    def differentiate(self, similarity: Similarity) -> Errors:
+        """Differentiate the strip on the ground by what was measured."""
+
+    def misclosures(self, oriented: OrientedStrip[Errors]) -> Misclosures:
+        """Control coordinates that count, with the derivatives of the strip there."""
+
+    def misclosure_covariance(self, oriented: OrientedStrip[Errors]) -> control_significance.ControlCovariance | None:
+        """Covariance of all misclosures at the control; None where there are too many to form it as a whole."""
+
+    def screens_control(self, settings: Settings) -> bool:
+        """Whether wrong control is looked for."""
+
+    def turned_over(self, refusal: InputError) -> StripStage[Errors]:
+        """Return the strip upside down where nothing has told which way is up; else raise the refusal."""
+
+    def refuse_other_hand(self, oriented: OrientedStrip[Errors]) -> None:
+        """Refuse a strip that its control fits only as a mirror image."""
+
+    def adjusted(
+        self, screened: ScreenedStrip[Errors], correction: Polynomial | None, settings: Settings
+    ) -> StripResult:
+        """Adjust the points and photos, the correction of the deformation being known."""
+
+
+@dataclass(frozen=True, eq=False)
+class OrientedStrip(Generic[Errors]):
+    """A strip with the similarity that lays it on its control."""
+
+    stage: StripStage[Errors]
+    frames: Sequence[GroundFrame]  # ground frames of the control lists
+    control: ControlPoints  # control that the strip holds
+    control_rows: Numbers  # (n,): its rows in the strip's points
+    intermediate: IntermediateFrame
+    absolute: absolute_orientation.AbsoluteOrientation
+    precision: tuple[float, float]  # a-priori standard deviations in plan and height that gave the weights, metres
+
+    @cached_property
+    def targets(self) -> absolute_orientation.Targets:
+        """The control in the intermediate frame."""
+        return absolute_orientation.Targets(self.control, self.frames, self.intermediate)
+
+    @cached_property
+    def xyz(self) -> Floats:
+        """Points of the strip after the similarity, intermediate frame, metres, shape (q, 3)."""
+        return self.absolute.similarity(self.stage.formed.xyz)
+
+    @cached_property
+    def at_control(self) -> Floats:
+        """Those that are control, shape (n, 3)."""
+        xyz: Floats = self.xyz[self.control_rows]
+        return xyz
+
+    @cached_property
+    def weights(self) -> Floats:
+        """Weights of the control coordinates, shape (n, 3)."""
+        return absolute_orientation.weights(self.targets.turned(self.at_control), self.precision)
+
+    @cached_property
+    def extent(self) -> tuple[float, float]:
+        """Mean base and half width of the strip, metres."""
+        return self.stage.extent(self.absolute.similarity)
+
+    @cached_property
+    def errors(self) -> Errors:
+        """Derivatives of the strip by what was measured."""
+        return self.stage.differentiate(self.absolute.similarity)
+
+    @cached_property
+    def misclosures(self) -> Misclosures:
+        """Control coordinates that count, with the derivatives of the strip there."""
+        return self.stage.misclosures(self)
+
+
+@dataclass(frozen=True, eq=False)
+class ScreenedStrip(Generic[Errors]):
+    """A strip on the control that is not contradicted by the strip and the other control."""
+
+    oriented: OrientedStrip[Errors]
+    wrong_control: tuple[control_screening.ControlRejection, ...] = ()
+    # what the covariance of the strip says of each coordinate of the control; None without
+    judged_control: control_significance.ControlTests | None = None
+
+
+def orient_on_control(
+    stage: StripStage[Errors], control: ControlPoints, frames: Sequence[GroundFrame]
+) -> OrientedStrip[Errors]:
+    """Lay a strip on its control: intermediate frame and absolute orientation.
+
+    Parameters
+    ----------
+    control : ControlPoints
+        Measured control of the project, no check points.
+
+    Raises
+    ------
+    GeometryError, InputError
+        When the control does not determine the similarity, or strip and control are of different hands; the strip is
+        named.
+    """
+    inside, rows = control_of(stage.formed, control, stage.point_ids)
+    try:
+        oriented = to_ground(stage, inside, rows, frames)
+    except InputError as refusal:
+        oriented = to_ground(stage.turned_over(refusal), inside, rows, frames)
+    oriented.stage.refuse_other_hand(oriented)
+    return oriented
+
+
+def reject_wrong_control(oriented: OrientedStrip[Errors], settings: Settings) -> ScreenedStrip[Errors]:
+    """Take out control that the strip and all other control contradict, and lay the strip on what is left."""
+    stage, control = oriented.stage, oriented.control
+    if not stage.screens_control(settings):
+        return ScreenedStrip(oriented)
+    place = control_screening.StripAtControl(
+        stage.formed.xyz[oriented.control_rows],
+        oriented.frames,
+        oriented.intermediate,
+        oriented.precision,
+        *oriented.extent,
+        stage.misclosure_covariance(oriented),
+    )
+    kept, wrong = control_screening.screen_control(control, place)
+    judged = place.judged(control, kept)
+    if wrong:
+        oriented = to_ground(stage, kept, oriented.control_rows, oriented.frames)
+    return ScreenedStrip(oriented, wrong, judged)
+
+
+def control_of(formed: StripShape, control: ControlPoints, point_ids: Sequence[str]) -> tuple[ControlPoints, Numbers]:
+    """Control points that have strip coordinates, and their rows there."""
+    number = {name: n for n, name in enumerate(point_ids)}
+    # a point without a model has no place in the strip's covariance
+    row_of = {int(n): row for row, n in enumerate(formed.point) if formed.model_count[row]}
+    found = [(row, row_of.get(number[name], -1)) for row, name in enumerate(control.ids)]
+    kept = np.array([pair for pair in found if pair[1] >= 0], np.intp).reshape(-1, 2)
+    return control.take(kept[:, 0]), kept[:, 1]
+
+
+def to_ground(
+    stage: StripStage[Errors], control: ControlPoints, rows: Numbers, frames: Sequence[GroundFrame]
+) -> OrientedStrip[Errors]:
+    """Intermediate frame with X along the strip, and the similarity into it.
+
+    A provisional similarity in the frame of azimuth 0 gives the direction of the strip and its scale, hence the
+    weights; the final one is made in the frame turned along the strip.
+
+    Parameters
+    ----------
+    control : ControlPoints
+        Control that the strip holds.
+    rows : ndarray of int, shape (n,)
+        Its rows in the points of the strip.
+
+    Raises
+    ------
+    GeometryError
+        When the control does not determine the similarity; the strip is named.
+    """
+    strip, formed = stage.strip, stage.formed
+    if not len(control):
+        msg = f"strip {strip.id}: none of its points is a control point"
+        raise GeometryError(msg, photos=strip.photos, code="no-control")
+    try:
+        provisional_frame = middle_frame(control, frames)
+        provisional = absolute_orientation.orient(
+            formed.xyz[rows],
+            absolute_orientation.Targets(control, frames, provisional_frame),
+            control.use.astype(float),
+            formed.xyz,
+        )
+        ends = provisional.similarity(formed.ends)
+        intermediate = provisional_frame.with_azimuth(strip_azimuth(ends[0], ends[1]))
+        precision = stage.point_precision(provisional.similarity.scale)
+        targets = absolute_orientation.Targets(control, frames, intermediate)
+        cartesian = provisional_frame.cartesian_from_intermediate(provisional.similarity(formed.xyz[rows]))
+        turned = targets.turned(intermediate.intermediate_from_cartesian(cartesian))
+        final = absolute_orientation.orient(
+            formed.xyz[rows], targets, absolute_orientation.weights(turned, precision), formed.xyz
+        )
+    except GeometryError as error:
+        msg = f"strip {strip.id}: {error}"
+        raise GeometryError(msg, photos=strip.photos, points=error.points, code=error.code) from error
+    return OrientedStrip(
+        stage=stage,
+        frames=frames,
+        control=control,
+        control_rows=rows,
+        intermediate=intermediate,
+        absolute=final,
+        precision=precision,
+    )
+
+
+def middle_frame(control: ControlPoints, frames: Sequence[GroundFrame]) -> IntermediateFrame:
+    """Return the frame at the control's centre of gravity, X to the north.
+
+    Parameters
+    ----------
+    control : ControlPoints
+        Control; points without plan position do not count, a missing height is taken from the others.
+    frames : sequence of GroundFrame
+        Their ground frames.
+
+    Raises
+    ------
+    GeometryError
+        When no point gives a plan position.
+    """
+    known = ~np.isnan(control.enu[:, :2]).any(axis=1) & control.use[:, 0]
+    chosen = control.take(known)
+    heights = np.where(control.use[:, 2], control.enu[:, 2], np.nan)
+    mean = float(np.nanmean(heights)) if np.isfinite(heights).any() else 0.0
+    cartesian = np.empty((len(chosen), 3))
+    for number, frame in enumerate(frames):
+        rows = chosen.frame == number
+        if rows.any():
+            enu = chosen.enu[rows].copy()
+            enu[~chosen.use[rows, 2], 2] = mean
+            cartesian[rows] = frame.cartesian_from_ground(enu, ids=[chosen.ids[i] for i in np.flatnonzero(rows)])
+    if not len(chosen):
+        msg = "no control point gives a plan position"
+        raise GeometryError(msg, points=control.ids, code="too-little-control")
+    if frames[0].kind == "local":
+        return IntermediateFrame.at_local_centre(cartesian, 0.0)
+    lon, lat, height = frames[0].geodetic(cartesian).T
+    lat0, lon0, _ = mean_position(lat, lon, height)
+    return IntermediateFrame.at_centre(cartesian, lat0, lon0, 0.0)

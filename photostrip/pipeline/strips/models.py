@@ -1,0 +1,281 @@
+"""A strip of independent models: its models linked, its perspective centres moved with the ground below them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import Fault, GeometryError, InputError
+from photostrip.geometry.similarity import similarity_derivatives
+from photostrip.pipeline.overruling import CENTER
+from photostrip.pipeline.results import ModelStages, StripResult
+from photostrip.pipeline.strips import notes
+from photostrip.pipeline.strips.model_notes import link_notes
+from photostrip.triangulation.gross_errors.control import control_significance
+from photostrip.triangulation.independent_models import (
+    link_screening,
+    linking,
+    model_errors,
+    model_misclosures,
+    perspective_centers,
+)
+from photostrip.triangulation.independent_models.formation import FormedModels, form_from_models, require_links
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from photostrip.geometry.similarity import Similarity
+    from photostrip.pipeline.inputs import ModelStrip, Settings
+    from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip
+    from photostrip.points import ModelPoints
+    from photostrip.triangulation.error_propagation.control_errors import Misclosures
+    from photostrip.triangulation.independent_models.link_screening import ScreenedLinks
+    from photostrip.triangulation.independent_models.linking import StripModels
+    from photostrip.triangulation.polynomial.correction import Polynomial
+
+    Floats = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
+    Oriented = OrientedStrip[model_errors.ModelErrors]
+    WithControlScreened = ScreenedStrip[model_errors.ModelErrors]
+
+LEAST_SOLID = 4  # points that can tell a body from its mirror image
+MILLIMETRES = 1000.0  # in a metre
+
+
+@dataclass(frozen=True, eq=False)
+class LinkedModels:
+    """A strip of independent models before it meets its control."""
+
+    strip: ModelStrip
+    measured: ModelPoints  # model coordinates of the whole project
+    formed: FormedModels
+
+    @property
+    def point_ids(self) -> Sequence[str]:
+        """Ids of the points as they are numbered."""
+        return self.measured.point_ids
+
+    def point_precision(self, scale: float) -> tuple[float, float]:
+        """A-priori standard deviation of a point of one model in plan and height, metres."""
+        models, places = self.formed.models, self.formed.places
+        turn = (scale * places.scale)[:, None, None] * places.rotation
+        variance = np.einsum("nij,nj->ni", turn[models.model] ** 2, models.sigma**2) * self.formed.links.factor
+        point = models.node < models.points
+        plan, height = np.median(variance[point, :2].mean(axis=1)), np.median(variance[point, 2])
+        return float(np.sqrt(plan)), float(np.sqrt(height))
+
+    def extent(self, similarity: Similarity) -> tuple[float, float]:
+        """Mean base and half width of the strip, metres."""
+        xyz = similarity(self.formed.xyz)
+        base = np.linalg.norm(np.diff(similarity(self.formed.centers), axis=0), axis=1)
+        length = np.ptp(xyz[:, 0]) / self.formed.models.count
+        spacing = float(base[np.isfinite(base)].mean()) if np.isfinite(base).any() else float(length)
+        return spacing, max(float(np.quantile(np.abs(xyz[:, 1]), 0.95)), 1e-6)
+
+    def differentiate(self, similarity: Similarity) -> model_errors.ModelErrors:
+        """Differentiate the strip on the ground by the model coordinates."""
+        return model_errors.differentiate_models(self.formed, similarity)
+
+    def misclosures(self, oriented: Oriented) -> Misclosures:
+        """Control coordinates that count, with the derivatives of the strip there."""
+        targets, xyz = oriented.targets, oriented.at_control
+        return model_misclosures.misclosures(targets.turned(xyz), targets.axes(xyz), xyz, oriented.errors.origin)
+
+    def misclosure_covariance(self, oriented: Oriented) -> control_significance.ControlCovariance | None:
+        """Covariance of all misclosures at the control; None where there are too many to form it as a whole."""
+        many = oriented.control.use.sum() > control_significance.LARGEST
+        if many or len(self.formed.photos) > control_significance.LONGEST:
+            return None
+        errors, found, factor = oriented.errors, oriented.misclosures, self.formed.links.factor
+        covariance = model_misclosures.covariance(errors, found, oriented.control_rows, factor)
+        moved = similarity_derivatives(oriented.at_control[found.point], errors.origin)
+        design = np.einsum("wi,wij->wj", found.direction, moved)
+        return control_significance.ControlCovariance(found.point, found.axis, design, covariance)
+
+    def screens_control(self, settings: Settings) -> bool:
+        """Whether wrong control is looked for."""
+        return settings.links.screening != "none"
+
+    def turned_over(self, refusal: InputError) -> LinkedModels:
+        """Return the strip upside down: without centres nothing has told which way is up."""
+        upside_down = any(fault.code == "left-handed-control" for fault in refusal.faults)
+        if not upside_down:
+            raise refusal
+        if self.formed.upright:
+            raise _left_handed(self.strip) from refusal
+        return replace(self, formed=self.formed.overturned())
+
+    def refuse_other_hand(self, oriented: Oriented) -> None:
+        """Refuse a strip that a mirror image of it would fit far better; flat ground does not tell."""
+        control, spread = oriented.control, oriented.precision
+        full = control.use.all(axis=1)
+        if full.sum() < LEAST_SOLID:
+            return
+        xyz = self.formed.xyz[oriented.control_rows]
+        targets = oriented.targets.of(xyz)[full]
+        as_it_is, mirrored = linking.either_hand(xyz[full], targets)
+        expected = ((control.sigma[full] ** 2).sum(axis=1) + 2 * spread[0] ** 2 + spread[1] ** 2).sum()
+        conspicuous = as_it_is > link_screening.CONSPICUOUS * expected
+        if conspicuous and mirrored < link_screening.REFLECTED * as_it_is:
+            raise _left_handed(self.strip)
+
+    def adjusted(self, screened: WithControlScreened, correction: Polynomial | None, _: Settings) -> StripResult:
+        """Adjust the points, and move the perspective centres with them."""
+        oriented, strip, formed = screened.oriented, self.strip, self.formed
+        xyz = oriented.xyz if correction is None else correction(oriented.xyz)
+        similarity = oriented.absolute.similarity
+        centers = _centers(formed, similarity, correction)
+        known = np.isfinite(centers).any()
+        return StripResult(
+            precision=oriented.precision,
+            intermediate=oriented.intermediate,
+            control=oriented.control,
+            control_rows=oriented.control_rows,
+            absolute=oriented.absolute,
+            polynomial=correction,
+            xyz=xyz,
+            cartesian=oriented.intermediate.cartesian_from_intermediate(xyz),
+            rays=formed.photo_count,
+            depth=float(np.nanmean(centers[:, 2]) - xyz[:, 2].mean()) if known else float("nan"),
+            notes=(
+                *link_notes(strip, self.measured, formed),
+                *notes.wrong_control_notes(strip, screened.wrong_control),
+                *notes.control_notes(strip, oriented.absolute),
+                *notes.polynomial_notes(strip, correction, xyz),
+            ),
+            wrong_control=screened.wrong_control,
+            judged_control=screened.judged_control,
+            model_stages=ModelStages(
+                strip=strip,
+                formed=formed,
+                centers=centers,
+                scales=similarity.scale * formed.places.scale * MILLIMETRES,
+            ),
+        )
+
+
+def link_strip(strip: ModelStrip, measured: ModelPoints, settings: Settings) -> LinkedModels:
+    """Link the models of a strip and form it, without any control.
+
+    Parameters
+    ----------
+    measured : ModelPoints
+        Model coordinates of the whole project.
+    """
+    return LinkedModels(strip, measured, form_models(strip, measured, settings))
+
+
+def form_models(strip: ModelStrip, measured: ModelPoints, settings: Settings) -> FormedModels:
+    """Link the models of a strip and form it, without any control.
+
+    Parameters
+    ----------
+    measured : ModelPoints
+        Model coordinates of the whole project.
+
+    Raises
+    ------
+    GeometryError, InputError
+        When a link cannot be determined, or models are mirror images of each other.
+    """
+    models = models_of(strip, measured, settings.links)
+    shared = linking.common(models)
+    try:
+        require_links(shared, models, np.ones(len(shared.link), bool), strip.models)
+    except GeometryError as error:
+        msg = f"strip {strip.id}: {error}"
+        raise GeometryError(msg, photos=strip.photos, code=error.code) from error
+    kept = _named(settings.links.keep, strip, measured, models)
+    links = link_screening.screen_links(shared, models, settings.links, kept[shared.before] | kept[shared.after])
+    _refuse_reflected(strip, links)
+    number = {photo: node for node, photo in enumerate(measured.photo_ids, len(measured.point_ids))}
+    photos = np.array([number.get(photo, -1) for photo in strip.photos], np.intp)
+    return form_from_models(models, links, photos)
+
+
+def models_of(strip: ModelStrip, measured: ModelPoints, settings: link_screening.LinkSettings) -> StripModels:
+    """Take the models of a strip out of those of the project, without what the user drops.
+
+    Returns
+    -------
+    StripModels
+        Rows in the order of the models, then of the points.
+    """
+    number = {name: k for k, name in enumerate(strip.models)}
+    place = np.array([number.get(name, -1) for name in measured.model_ids], np.intp)[measured.model]
+    rows = np.flatnonzero(place >= 0)
+    rows = rows[np.lexsort((measured.node[rows], place[rows]))]
+    whole = linking.StripModels(
+        len(strip.models),
+        len(measured.point_ids),
+        rows,
+        place[rows],
+        measured.node[rows],
+        measured.xyz[rows],
+        measured.sigma[rows],
+    )
+    left = ~_named(settings.drop, strip, measured, whole)
+    return linking.StripModels(
+        whole.count, whole.points, rows[left], whole.model[left], whole.node[left], whole.xyz[left], whole.sigma[left]
+    )
+
+
+def _named(names: Sequence[str], strip: ModelStrip, measured: ModelPoints, models: StripModels) -> Flags:
+    """Rows that the user names as ``model/point`` or ``model/photo``."""
+    found = np.zeros(len(models.model), bool)
+    wanted = set(names)
+    if wanted:
+        for row, (model, node) in enumerate(zip(models.model.tolist(), models.node.tolist(), strict=True)):
+            found[row] = f"{strip.models[model]}/{measured.name(node).removeprefix(CENTER)}" in wanted
+    return found
+
+
+def _refuse_reflected(strip: ModelStrip, links: ScreenedLinks) -> None:
+    """Refuse models that are mirror images of their neighbours; the smaller group is named."""
+    if not links.reflected.any():
+        return
+    hand = np.concatenate([[0], np.cumsum(links.reflected)]) % 2
+    minority = hand if 2 * hand.sum() <= len(hand) else 1 - hand
+    names = [name for name, odd in zip(strip.models, minority.tolist(), strict=True) if odd]
+    listed = (
+        f"model {names[0]} is a mirror image" if len(names) == 1 else f"models {', '.join(names)} are mirror images"
+    )
+    fault = Fault(
+        f"strip {strip.id}: {listed} of the others: x and y are exchanged, or one axis has the other sign",
+        code="mirrored-model",
+        key="models.file",
+        expected="all models in axes of the same hand",
+        fix="exchange x and y in the table, or change the sign of one column",
+    )
+    raise InputError(fault)
+
+
+def _left_handed(strip: ModelStrip) -> InputError:
+    """Say that models and control are of different hands."""
+    return InputError(
+        Fault(
+            f"strip {strip.id} fits its control only as a mirror image: the model coordinates or the control are "
+            "left-handed",
+            code="left-handed-models",
+            key="models.axes",
+            expected="right-handed, or left-handed when the axes of the plotter are",
+            fix="set `models.axes: left-handed`, or put the axes of the control in the order of its columns",
+        )
+    )
+
+
+def _centers(formed: FormedModels, similarity: Similarity, correction: Polynomial | None) -> Floats:
+    """Perspective centres, moved with the ground below them."""
+    placed = similarity(formed.centers)
+    known = np.isfinite(placed).all(axis=1)
+    if correction is None or not known.any():
+        return placed
+    found, axes = placed[known], correction.axes
+    above = perspective_centers.heights_above(found, similarity(formed.xyz))
+    rows = perspective_centers.displacement_rows(found, above, [axis.terms for axis in axes])
+    placed[known] = found + sum(row @ axis.coefficients for row, axis in zip(rows, axes, strict=True))
+    return placed

@@ -1,0 +1,274 @@
+"""A strip of photos: its pairs oriented, its models joined, its photos oriented on the adjusted points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import GeometryError
+from photostrip.geometry.similarity import similarity_derivatives
+from photostrip.pipeline import overruling
+from photostrip.pipeline.results import PhotoStages, StripResult
+from photostrip.pipeline.strips import notes
+from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment, StripOnControl
+from photostrip.triangulation.covariance_adjustment.adjust import adjust as adjust_with_covariance
+from photostrip.triangulation.error_propagation import control_errors, covariances, strip_errors
+from photostrip.triangulation.gross_errors.control import control_significance
+from photostrip.triangulation.gross_errors.pairs import screening
+from photostrip.triangulation.gross_errors.rays import screened_formation, strip_screening
+from photostrip.triangulation.relative_orientation.orientation import Orientation, orient_unchecked, refuse_unusable
+from photostrip.triangulation.relative_orientation.pairs import collect_pairs
+from photostrip.triangulation.resection.resection import Resection, resect, with_residuals
+from photostrip.triangulation.strip_formation.strip import FormedStrip, form_from_pairs
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.errors import InputError
+    from photostrip.geometry.similarity import Similarity
+    from photostrip.pipeline.inputs import Settings, Strip
+    from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip
+    from photostrip.points import PhotoPoints
+    from photostrip.triangulation.polynomial.correction import Polynomial
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+    Oriented = OrientedStrip[strip_errors.StripErrors]
+    WithControlScreened = ScreenedStrip[strip_errors.StripErrors]
+
+
+@dataclass(frozen=True, eq=False)
+class FormedPhotos:
+    """A strip of photos before it meets its control."""
+
+    strip: Strip
+    observations: PhotoPoints  # ideal image coordinates of the whole project
+    sigma: float  # median standard deviation of the strip's image coordinates, mm
+    screened: screening.ScreenedPairs  # the search for gross errors in its pairs
+    formed: FormedStrip
+    contradictions: strip_screening.RayRejections  # points whose rays contradict each other from model to model
+
+    @property
+    def orientation(self) -> Orientation:
+        """Relative orientation of the pairs, as the strip was formed."""
+        return self.screened.orientation
+
+    @property
+    def point_ids(self) -> tuple[str, ...]:
+        """Ids of the points as they are numbered."""
+        return self.observations.point_ids
+
+    def point_precision(self, scale: float) -> tuple[float, float]:
+        """A-priori standard deviation of a point of one model in plan and height, metres.
+
+        Plan: that of an image coordinate at photo scale; height: that of an x parallax times the ratio of depth to
+        base.
+        """
+        formed, pairs = self.formed, self.orientation.pairs
+        arm = formed.model_xyz - formed.centers[pairs.pair]
+        base = np.diff(formed.centers, axis=0)[pairs.pair]
+        length = np.linalg.norm(base, axis=1)
+        depth = np.linalg.norm(np.cross(arm, base), axis=1) / length
+        good = np.isfinite(depth)
+        depth_mean = float(depth[good].mean())
+        plan = self.sigma * depth_mean / pairs.focal * scale
+        return plan, plan * float(np.sqrt(2.0)) * depth_mean / float(length[good].mean())
+
+    def extent(self, similarity: Similarity) -> tuple[float, float]:
+        """Mean base and half width of the strip, metres."""
+        centers, xyz = similarity(self.formed.centers), similarity(self.formed.xyz)
+        spacing = float(np.linalg.norm(np.diff(centers, axis=0), axis=1).mean())
+        return spacing, max(float(np.quantile(np.abs(xyz[:, 1]), 0.95)), 1e-6)
+
+    def differentiate(self, similarity: Similarity) -> strip_errors.StripErrors:
+        """Differentiate the strip on the ground by the image coordinates."""
+        position = self.strip.positions(self.observations)
+        return strip_errors.differentiate_strip(
+            self.orientation, self.formed, similarity, position, self.observations.sigma
+        )
+
+    def misclosures(self, oriented: Oriented) -> control_errors.Misclosures:
+        """Control coordinates that count, with the derivatives of the strip there."""
+        targets, xyz = oriented.targets, oriented.at_control
+        rows = oriented.control_rows
+        return control_errors.misclosures(oriented.errors.points, targets.turned(xyz), rows, targets.axes(xyz))
+
+    def misclosure_covariance(self, oriented: Oriented) -> control_significance.ControlCovariance | None:
+        """Covariance of all misclosures at the control; None where there are too many to form it as a whole."""
+        many = oriented.control.use.sum() > control_significance.LARGEST
+        if many or len(self.strip.photos) > control_significance.LONGEST:
+            return None
+        errors, found = oriented.errors, oriented.misclosures
+        # image coordinates are taken as good as stated, or as bad as the pairs have proved
+        factor = max(1.0, float(np.median(self.screened.scatter.by_pair)) ** 2 / (2 * self.sigma**2))
+        covariance = covariances.of_parameters(errors, found, np.eye(len(found.point)), factor).parameters * factor
+        moved = similarity_derivatives(oriented.at_control[found.point], errors.origin)
+        design = np.einsum("wi,wij->wj", found.direction, moved)
+        return control_significance.ControlCovariance(found.point, found.axis, design, covariance)
+
+    def screens_control(self, settings: Settings) -> bool:
+        """Whether wrong control is looked for."""
+        return settings.relative.screening != "none"
+
+    def turned_over(self, refusal: InputError) -> FormedPhotos:
+        """Cameras look down: there is no other way up."""
+        raise refusal
+
+    def refuse_other_hand(self, oriented: Oriented) -> None:
+        """Photos have no other hand."""
+
+    def adjusted(self, screened: WithControlScreened, correction: Polynomial | None, settings: Settings) -> StripResult:
+        """Adjust the points, and orient every photo on them."""
+        oriented, strip, formed = screened.oriented, self.strip, self.formed
+        covariance = self._by_covariance(oriented, settings) if settings.adjustment == "covariance" else None
+        xyz = oriented.xyz if correction is None else correction(oriented.xyz)
+        if covariance is not None:
+            xyz = covariance.xyz
+        rays = self._rays_in_use()
+        points = np.searchsorted(formed.point, self.observations.point[rays.rows])
+        if covariance is None:
+            resection = self._resected(oriented, rays, points, xyz)
+        else:
+            focal, xy = strip.camera.principal_distance, self.observations.xy[rays.rows]
+            resection = with_residuals(xy, xyz[points], rays.photo, focal, covariance.centers, covariance.rotations)
+        arm = xyz[points] - resection.centers[rays.photo]
+        return StripResult(
+            precision=oriented.precision,
+            intermediate=oriented.intermediate,
+            control=oriented.control,
+            control_rows=oriented.control_rows,
+            absolute=oriented.absolute,
+            polynomial=correction,
+            xyz=xyz,
+            cartesian=oriented.intermediate.cartesian_from_intermediate(xyz),
+            rays=np.bincount(points, minlength=len(formed.point)),
+            depth=float(-(arm * resection.rotations[rays.photo][:, :, 2]).sum(axis=1).mean()),
+            notes=(
+                *overruling.notes(settings.relative, strip.id, strip.photos),
+                *notes.screening_notes(strip, self.screened, self.sigma),
+                *notes.wrong_control_notes(strip, screened.wrong_control),
+                *notes.pair_notes(strip, self.orientation),
+                *notes.junction_notes(strip, formed),
+                *notes.control_notes(strip, oriented.absolute),
+                *notes.polynomial_notes(strip, correction, xyz),
+                *([] if correction is None else notes.covariance_proposal(strip, correction)),
+                *notes.photo_notes(strip, resection),
+                *notes.covariance_notes(strip, oriented.control, covariance),
+            ),
+            wrong_control=screened.wrong_control,
+            judged_control=screened.judged_control,
+            photo_stages=PhotoStages(
+                strip=strip,
+                sigma=self.sigma,
+                screened=self.screened,
+                formed=formed,
+                contradictions=self.contradictions,
+                resection=resection,
+                rows=rays.rows,
+                covariance=covariance,
+            ),
+        )
+
+    def _by_covariance(self, oriented: Oriented, settings: Settings) -> CovarianceAdjustment:
+        """Distribute the misclosures at the control by the strip's own covariance."""
+        start = StripOnControl(
+            photos=self.strip.photos,
+            focal=self.strip.camera.principal_distance,
+            observations=self.observations,
+            position=self.strip.positions(self.observations),
+            sigma=self.sigma,
+            orientation=self.orientation,
+            formed=self.formed,
+            absolute=oriented.absolute,
+            targets=oriented.targets,
+            control_rows=oriented.control_rows,
+            errors=oriented.errors,
+            misclosures=oriented.misclosures,
+        )
+        return adjust_with_covariance(start, settings.covariance)
+
+    def _rays_in_use(self) -> _Rays:
+        """Image points that are used in a model or place a point without one, in the order of the photos."""
+        oriented, formed = self.orientation, self.formed
+        in_models = oriented.rows[oriented.used & np.isfinite(formed.model_xyz).all(axis=1)]
+        rows = np.union1d(in_models, formed.bridging)
+        photo = self.strip.positions(self.observations)[rows]
+        order = np.argsort(photo, kind="stable")
+        return _Rays(rows[order], photo[order])
+
+    def _resected(self, oriented: Oriented, rays: _Rays, points: Numbers, adjusted: Floats) -> Resection:
+        """Orient every photo on its adjusted points, so that orientations and points belong together."""
+        strip, formed, similarity = self.strip, self.formed, oriented.absolute.similarity
+        # A polynomial can move a long strip by much: a photo starts where its points went, on the average.
+        moved = adjusted[points] - similarity(formed.xyz[points])
+        count = np.maximum(np.bincount(rays.photo, minlength=len(strip.photos)), 1)
+        shift = [np.bincount(rays.photo, moved[:, axis], len(strip.photos)) / count for axis in range(3)]
+        start = similarity(formed.centers) + np.column_stack(shift), similarity.rotation @ formed.rotations
+        focal = np.full(len(strip.photos), strip.camera.principal_distance)
+        resection = resect(self.observations.xy[rays.rows], adjusted[points], rays.photo, focal, start)
+        if not resection.solved.any():
+            msg = (
+                f"strip {strip.id}: no photo can be oriented on its adjusted points: strip and control belong to two "
+                "worlds"
+            )
+            raise GeometryError(msg, photos=strip.photos, code="no-photo-oriented")
+        return resection
+
+
+@dataclass(frozen=True, eq=False)
+class _Rays:
+    """Image points of a strip, ordered by photo."""
+
+    rows: Numbers  # (m,): rows of the observations
+    photo: Numbers  # (m,): place of the photo in the strip
+
+
+def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> FormedPhotos:
+    """Orient the pairs of a strip and form it, without any control.
+
+    Parameters
+    ----------
+    observations : PhotoPoints
+        Ideal image coordinates of the whole project.
+
+    Raises
+    ------
+    GeometryError, InputError
+        When a pair or a junction cannot be determined; the strip is named.
+    """
+    sigma = _sigma(strip, observations)
+    pairs = collect_pairs(observations, strip.photos, strip.camera.principal_distance)
+    pairs = pairs.without(overruling.touched(settings.relative.drop, observations, pairs.rows))
+    first, converged = orient_unchecked(pairs)
+    screened = screening.screen_pairs(first, settings.relative, sigma, converged)
+    kept = overruling.touched(settings.relative.keep, observations, pairs.rows)
+    screened = overruling.restored(screened, pairs.weight, kept)
+    oriented, scatter = screened.orientation, screened.scatter.by_pair
+    refuse_unusable(oriented, screened.converged, strip.photos)
+    verdict = strip_screening.RayRejections()
+    if settings.relative.screening == "none":
+        formed = form_from_pairs(oriented, settings.formation, strip.photos, scatter)
+    else:  # the strip decides what its pairs could not
+        named = overruling.rows(settings.relative.keep, observations)
+        measured = screened_formation.Measurements(observations, strip.photos, pairs.weight, scatter, sigma, named)
+        readmit = settings.relative.screening in screening.SEARCHES
+        oriented, formed, verdict = screened_formation.form_screened(
+            oriented, measured, settings.formation, readmit=readmit
+        )
+        rejections = screened_formation.taken_back(screened.rejections, oriented.used)
+        screened = replace(screened, orientation=oriented, rejections=rejections)
+    return FormedPhotos(
+        strip=strip,
+        observations=observations,
+        sigma=sigma,
+        screened=screened,
+        formed=formed,
+        contradictions=verdict,
+    )
+
+
+def _sigma(strip: Strip, observations: PhotoPoints) -> float:
+    """Median standard deviation of the strip's image coordinates, mm."""
+    return float(np.median(observations.sigma[strip.positions(observations) >= 0]))

@@ -1,0 +1,55 @@
+"""Misclosures of a strip of independent models at its control, and their covariance."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.geometry.similarity import similarity_derivatives
+from photostrip.triangulation.error_propagation import control_errors
+from photostrip.triangulation.error_propagation.derivatives import ErrorRows
+from photostrip.triangulation.independent_models import model_errors
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.points import ControlPoints
+    from photostrip.triangulation.error_propagation.control_errors import Misclosures
+    from photostrip.triangulation.independent_models.model_errors import ModelErrors
+
+    Floats = NDArray[np.float64]
+    Numbers = NDArray[np.intp]
+
+
+def misclosures(control: ControlPoints, axes: Floats, xyz: Floats, origin: Floats) -> Misclosures:
+    """Control coordinates that count, with their derivatives by a similarity of the strip."""
+    point, axis = np.nonzero(control.use)
+    direction = axes[point, axis]
+    frame = direction[:, None] @ similarity_derivatives(xyz[point], origin)
+    nothing = np.zeros(0, np.intp)
+    rows = ErrorRows(nothing, frame, np.zeros((len(point), 0, 1, 0)), nothing, nothing, np.zeros((0, 1, 2)))
+    return control_errors.Misclosures(point, axis, direction, control.sigma[point, axis] ** 2, rows)
+
+
+def weights(seen: Misclosures, rows: Numbers, operator: Floats | None = None) -> tuple[Numbers, Floats]:
+    """Nodes of given points, and sums of their coordinates as weighted sums of the nodes; by default each one."""
+    if operator is None:
+        operator = np.eye(len(seen.point))
+    weights = np.zeros((len(rows), len(operator), 3))
+    np.add.at(weights, seen.point, operator.T[:, :, None] * seen.direction[:, None, :])
+    return rows, weights.transpose(1, 0, 2)
+
+
+def covariance(errors: ModelErrors, found: Misclosures, rows: Numbers, factor: float) -> Floats:
+    """Covariance of all misclosures, strip and control together, metres^2, shape (w, w).
+
+    Parameters
+    ----------
+    rows : ndarray of int, shape (n,)
+        Rows of the control points in the points of the strip.
+    factor : float
+        Variance factor of the model coordinates.
+    """
+    spread = model_errors.covariance_of_sums(errors, model_errors.sums(errors, *weights(found, rows)))
+    return np.asarray(spread * factor + np.diag(found.variance), float)
