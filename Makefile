@@ -6,8 +6,9 @@ BIN := $(VENV)/bin
 SOURCES := photostrip tests $(wildcard benchmarks)
 DEMO_PROJECTS ?= $(wildcard sample_data/*/project.yaml)
 WORKERS ?= 2
+unexport PYTHONDONTWRITEBYTECODE # or each of the hundreds of processes that the tests start compiles the program anew
 
-.PHONY: demo test check lint types lowest bench docs golden regress man clean
+.PHONY: demo test check lint types lowest bench mutations docs golden regress man clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/photostrip.installed ## run the main job on every sample project and print its accuracy report
@@ -21,8 +22,8 @@ demo: $(VENV)/photostrip.installed ## run the main job on every sample project a
 test: lint types ## lint, format, types and all tests
 	$(BIN)/python -m pytest -n $(WORKERS)
 
-check: lint types ## the fast gates
-	$(BIN)/python -m pytest -n $(WORKERS) -q -m "not slow"
+check: lint types ## the fast gates: no slow tests, few random examples
+	HYPOTHESIS_PROFILE=quick $(BIN)/python -m pytest -n $(WORKERS) -q -m "not slow"
 
 lint: $(VENV)/dev.installed
 	$(BIN)/ruff check $(SOURCES)
@@ -39,7 +40,10 @@ lowest: ## all tests on exactly the lower bounds of pyproject.toml, in a venv of
 	.venv-lowest/bin/python -m pytest -n $(WORKERS)
 
 bench: $(VENV)/dev.installed ## tables of seconds, memory and accuracy
-	@for program in benchmarks/*.py; do printf '\n==> %s\n' "$$program"; $(BIN)/python "$$program" || exit $$?; done
+	@for program in $(filter-out benchmarks/mutations.py,$(wildcard benchmarks/*.py)); do printf '\n==> %s\n' "$$program"; $(BIN)/python "$$program" || exit $$?; done
+
+mutations: $(VENV)/dev.installed ## change the program in 120 places, one at a time: which changes does no test notice? (hours)
+	$(BIN)/python benchmarks/mutations.py --count 120 --jobs $(WORKERS)
 
 docs: $(VENV)/dev.installed ## rewrite the printed output in README.md and docs/ by running the commands there
 	$(BIN)/python -m tests.renew_docs
