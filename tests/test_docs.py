@@ -31,13 +31,12 @@ def test_links_lead_somewhere(page: Path) -> None:
 
 @pytest.mark.parametrize("page", PAGES)
 def test_console_blocks_are_run_or_say_why_not(page: Path) -> None:
-    for block in blocks(page):
-        assert block.kind, f"{block.place}: say what the block is (text, console, yaml, ...)"
-        if block.runs:
-            for step in steps(block):
-                assert not FRESH_CLONE.search(step.command), f"{block.place}: `{step.command}` belongs into a sh block"
-        elif block.kind == "console":
-            assert block.above.startswith("<!--"), f"{block.place}: a comment above must say why it is not run"
+    found = blocks(page)
+    silent = [block for block in found if block.kind == "console" and not block.runs]
+    commands = [step.command for block in found if block.runs for step in steps(block)]
+    assert [block.place for block in found if not block.kind] == [], "say what the block is (text, console, yaml, ...)"
+    assert [command for command in commands if FRESH_CLONE.search(command)] == [], "this belongs into a sh block"
+    assert [block.place for block in silent if not block.above.startswith("<!--")] == [], "say above why it is not run"
 
 
 def tags_listed() -> set[str]:

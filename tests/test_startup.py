@@ -15,6 +15,7 @@ from photostrip.cli import command_table as table
 from photostrip.cli import main as cli
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.threads import THREAD_VARIABLES, limit_threads
+from tests.loops import nonempty
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -65,7 +66,7 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
 def test_help_lists_every_command(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(arguments) == 0
     out = capsys.readouterr().out
-    for name, entry in table.COMMANDS.items():
+    for name, entry in nonempty(table.COMMANDS.items()):
         assert f"  {name}" in out
         assert entry.help in out
     assert "Example:" in out

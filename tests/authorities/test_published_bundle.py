@@ -12,6 +12,7 @@ import pytest
 from photostrip.pipeline import triangulate
 from photostrip.project.loading import load_project
 from photostrip.result.document import document_of
+from tests.loops import nonempty
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
@@ -62,13 +63,13 @@ def test_the_published_orientations_and_their_standard_deviations(strasbourg: Re
     with (DATA / "published.csv").open(encoding="utf-8", newline="") as file:
         published = list(csv.DictReader(file))
     assert len(published) == 5
-    for row in published:
+    for row in nonempty(published):
         photo = photos[row["photo"]]
         assert [photo[axis] for axis in "xyz"] == pytest.approx([float(row[f"{a}_m"]) for a in "XYZ"], abs=0.001)
         expected = [float(row[f"{name}_deg"]) for name in ("omega", "phi", "kappa")]
         assert photo["angles"]["values"] == pytest.approx(expected, abs=0.0001)
     with (SAMPLES / "sxb-strasbourg" / "reference.csv").open(encoding="utf-8", newline="") as file:
-        for row in csv.DictReader(file):  # published standard deviations, three digits
+        for row in nonempty(csv.DictReader(file)):  # published standard deviations, three digits
             sigma = photos[row["photo"]]["sigma"]
             assert [sigma[a] for a in "xyz"] == pytest.approx([float(row[f"sigma_{a}"]) for a in "xyz"], rel=0.01)
             angles = [float(row[f"sigma_{name}_deg"]) for name in ("omega", "phi", "kappa")]

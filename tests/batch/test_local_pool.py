@@ -16,6 +16,7 @@ from photostrip.batch.worker_process import WorkerProcess, share_of_memory
 from photostrip.errors import Fault, InputError, PhotostripError
 from tests.batch.faulty import WORK
 from tests.batch.projects import write_projects
+from tests.loops import nonempty
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -52,7 +53,7 @@ def test_every_fault_takes_only_its_own_project_along(tmp_path: Path) -> None:
         assert len({worker.pid for worker in pool.workers}) == len(pool.workers) <= 2
     assert sorted(answer.number for answer in answers) == list(range(len(tasks)))  # one for each, none twice
     outcomes = {names[answer.number]: answer for answer in answers}
-    for name, answer in outcomes.items():
+    for name, answer in nonempty(outcomes.items()):
         status, message = FAULTS.get(name, ("good", ""))
         assert answer.outcome["status"] == status, (name, answer.outcome["messages"])
         assert message in "".join(answer.outcome["messages"])
@@ -78,7 +79,7 @@ def test_workers_are_gone_when_the_pool_is(tmp_path: Path) -> None:
     with LocalPool(1, work=WORK, begun=lambda _: stop.append(True)) as pool:
         assert list(pool.answers(iter([task]), lambda: bool(stop))) == []
         pids = [worker.pid for worker in pool.workers]
-        assert all(_alive(pid) for pid in pids)
+        assert all(_alive(pid) for pid in nonempty(pids))
     assert pids
     assert not any(_alive(pid) for pid in pids)
 

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from photostrip.batch.selection import choose, output_names
 from photostrip.errors import InputError
+from tests.loops import nonempty
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -106,7 +107,7 @@ paths = st.builds(lambda folders, name: str(Path("/", *folders, f"{name}.yaml"))
 def test_no_two_results_share_a_folder(projects: list[str]) -> None:
     outputs = output_names(projects)
     assert len({each.casefold() for each in outputs}) == len(projects)
-    for project, output in zip(projects, outputs, strict=True):
+    for project, output in nonempty(zip(projects, outputs, strict=True)):
         assert output
         assert ".." not in output.split("/")
         assert output.split("/")[0] in Path(project).with_suffix("").parts
@@ -115,6 +116,6 @@ def test_no_two_results_share_a_folder(projects: list[str]) -> None:
 @given(st.lists(paths, unique=True, min_size=1, max_size=12))
 def test_a_name_that_nobody_shares_stays_short(projects: list[str]) -> None:
     alone = [output_names([project])[0] for project in projects]
-    for own, together in zip(alone, output_names(projects), strict=True):
+    for own, together in nonempty(zip(alone, output_names(projects), strict=True)):
         clash = sum(own.casefold() == other.casefold() for other in alone) > 1
         assert together == own or clash

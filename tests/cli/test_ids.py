@@ -13,6 +13,7 @@ import yaml
 
 from photostrip.cli.main import main
 from photostrip.simulate.spec import Points
+from tests.loops import nonempty
 from tests.project.test_ids import ODD
 from tests.results import spec, write_project
 
@@ -78,7 +79,7 @@ def test_the_result_has_the_same_numbers_under_the_new_ids(
     assert [row["id"] for row in two["photos"]] == PHOTOS
     there = {row["id"]: row for row in two["points"]}
     assert set(there) == {points[row["id"]] for row in one["points"]}
-    for row in one["points"]:
+    for row in nonempty(one["points"]):
         for key in ("x", "y", "z"):
             assert there[points[row["id"]]][key] == pytest.approx(row[key], abs=1e-3)
     assert {row["id"] for row in two["control"]} == {points[row["id"]] for row in one["control"]}
@@ -119,4 +120,4 @@ def test_the_report_shows_them(
     document = json.loads((both[1] / "result.json").read_text(encoding="utf-8"))
     short = [row["id"] for row in document["control"] if len(row["id"]) < 12]
     assert short
-    assert all(name in out for name in short)
+    assert all(name in out for name in nonempty(short))

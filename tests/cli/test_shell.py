@@ -17,6 +17,7 @@ from photostrip.cli.completion import keys
 from photostrip.cli.main import main
 from photostrip.cli.manual import manual_pages
 from tests.cli.helps import FOLDER
+from tests.loops import nonempty
 from tests.source_tree import ROOT
 
 if TYPE_CHECKING:
@@ -134,7 +135,7 @@ def test_every_command_has_a_page_and_the_first_names_them() -> None:
 
 @pytest.mark.parametrize("name", sorted(pages()))
 def test_a_page_is_sound_roff(name: str) -> None:
-    for line in pages()[name].splitlines():
+    for line in nonempty(pages()[name].splitlines()):
         assert not line.startswith("'")
         assert not line.startswith(".") or line.split()[0] in MACROS, line
         assert line.isascii()

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from photostrip.cli.main import main
+from tests.loops import nonempty
 from tests.project.samples import FILES, MARKED_FILES, PROJECT, sample
 from tests.project.test_faults import MARKS, ONE_FAULT
 from tests.results import spec, write_project
@@ -43,8 +44,10 @@ def test_a_wrong_value_ends_with_2_and_its_words(
     code, printed, err = call(capsys, "run", tmp_path / "project.yaml", "-o", out)
     lines = err.replace(f"{tmp_path}/", "").splitlines()
     assert (code, printed) == (2, "")
-    assert all(line.startswith("error: ") for line in lines)
-    assert [line for line in lines if line.startswith(f"error: {place}") and all(word in line for word in words)]
+    assert all(line.startswith("error: ") for line in nonempty(lines))
+    assert [
+        line for line in lines if line.startswith(f"error: {place}") and all(word in line for word in nonempty(words))
+    ]
     assert not out.exists()
     code, printed, _ = call(capsys, "check", tmp_path / "project.yaml", "--format", "json")
     findings = [each for each in json.loads(printed)["projects"][0]["findings"] if each["severity"] == "error"]

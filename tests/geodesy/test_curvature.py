@@ -12,6 +12,7 @@ from pyproj import Geod
 
 from photostrip.geodesy import curvature
 from photostrip.geodesy.local_frame import IntermediateFrame, axes_matrix, geocentric_from_geodetic
+from tests.loops import nonempty
 from tests.vectors import Vector, cases
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ def test_vectors(example: Vector) -> None:
         "Z_corrected_sphere_exact_azimuth_R": height_on_sphere(inside["Z"], distance, directed),
     }
     assert found.keys() == out.keys()
-    for name, value in found.items():
+    for name, value in nonempty(found.items()):
         assert value == pytest.approx(out[name], rel=example.tol["rel"], abs=example.tol["abs"]), name
 
 

@@ -8,6 +8,7 @@ import pytest
 from photostrip.geodesy.curvature import eccentricity_squared
 from photostrip.geodesy.local_frame import IntermediateFrame, axes_matrix, geocentric_from_geodetic, mean_position
 from tests.geodesy.frames import ENU, NEU, XYZ, columns, frame, pair, rows, spec, with_height
+from tests.loops import nonempty
 from tests.vectors import Vector, cases, section
 
 GIGS = 0.03  # m, tolerance of the GIGS projection tests
@@ -97,7 +98,7 @@ def test_epsg_datum_shifts(own: str, shifted_to: str, xyz: tuple[float, ...], ex
 @pytest.mark.parametrize("crs", ["EPSG:284{zone:02.0f}", "+proj=tmerc +lon_0={meridian} +x_0={east} +ellps=krass"])
 def test_krassovsky_gauss_krueger_with_the_zone_in_front(crs: str) -> None:
     geographic = "EPSG:4284" if crs.startswith("EPSG") else "+proj=longlat +ellps=krass"
-    for row in rows("krassovsky_gk_PROJ_GENERATED.csv"):
+    for row in nonempty(rows("krassovsky_gk_PROJ_GENERATED.csv")):
         zone = row["zone"]
         name = crs.format(zone=zone, meridian=row["central_meridian_deg"], east=zone * 1e6 + 5e5)
         given, grid = pair(geographic, spec(name, axes=NEU))

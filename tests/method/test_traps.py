@@ -17,6 +17,7 @@ from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.simulate import Control, Flight, Ground, Image, Simulation, Spec, Terrain, simulate
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.polynomial import correction
+from tests.loops import nonempty
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -100,7 +101,7 @@ def test_stations_count_not_points(seed: int) -> None:
     assert found is not None
     assert found.stations == (3, 3)
     assert found.degree == 2
-    assert all("X^3" not in axis.terms for axis in found.axes)
+    assert all("X^3" not in axis.terms for axis in nonempty(found.axes))
     assert "degree-reduced" in codes(result)
     assert "3 stations" in next(note.message for note in result.notes if note.code == "degree-reduced")
     assert np.abs(errors(done, result)).max() < 1.5

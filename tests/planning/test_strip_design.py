@@ -18,6 +18,7 @@ from photostrip.planning.strip_design import Design, along_the_strip, bands_need
 from photostrip.planning.strip_methods import BUNDLE, COVARIANCE, METHODS, SIMILARITY, accuracy
 from photostrip.simulate import FILM, Points
 from photostrip.triangulation.gross_errors.pairs.screening import DETECTABLE
+from tests.loops import nonempty
 
 if TYPE_CHECKING:
     from photostrip.planning.ideal_strip import IdealStrip
@@ -111,7 +112,7 @@ def test_expected_precision_is_the_scatter_of_whole_runs() -> None:
     methods = (SIMILARITY, COVARIANCE)
     count = 100
     found = repetitions(Task(geometry, (layout,), methods, 0, count))
-    for method in methods:
+    for method in nonempty(methods):
         expected = accuracy(strip, layout, spots_of(layout, 8, 5), method)
         total, squares = found[layout.name, method]
         scatter = np.sqrt(squares / count - (total / count) ** 2)[expected.new]
@@ -243,7 +244,7 @@ def test_the_number_of_bands_is_the_least(method: str) -> None:
         return
     assert required.met(needed.worst)
     assert needed.points == 2 * needed.bands
-    for bands in range(2, needed.bands):
+    for bands in nonempty(range(2, needed.bands)):
         found = outcome(strip, ControlLayout("", bands=bands, per_band=2), method).accuracy
         assert found is None or not required.met(worst(found))
 
@@ -301,7 +302,7 @@ def test_ways_of_equal_spacing() -> None:
     assert frozenset({Spot(4, 1), Spot(6, 3)}) in ways
     assert frozenset({Spot(4, 2), Spot(6, 2)}) in ways
     assert frozenset({Spot(5, 1), Spot(5, 3)}) in ways
-    assert all(len(way) == 2 for way in ways)
+    assert all(len(way) == 2 for way in nonempty(ways))
     assert list(equal_ways(Placement(30, ""), 5, 3)) == []
 
 

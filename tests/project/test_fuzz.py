@@ -100,7 +100,7 @@ def test_any_tree_at_any_key(changes: list[tuple[str, object]]) -> None:
     with tempfile.TemporaryDirectory() as folder:
         project = sample(Path(folder), MARKED_FILES)
         faults = project.faults([f"{path}={json.dumps(value)}" for path, value in changes])
-        assert all(fault.message for fault in faults)
+        assert "" not in [fault.message for fault in faults]
 
 
 @pytest.mark.parametrize("assignment", ["", "=", ".", "[0]=1", "a=b=c", "cameras.=1", '"="=1', "strips[999999]=1"])

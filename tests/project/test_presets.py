@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from tests.loops import nonempty
 from tests.project.samples import FILES, MARKED_FILES, PROJECT, Sample, sample
 from tests.source_tree import ROOT
 
@@ -52,7 +53,7 @@ def test_film_presets_take_fiducial_marks(tmp_path: Path, preset: Path) -> None:
 
 @pytest.mark.parametrize("preset", PRESETS, ids=lambda path: path.stem)
 def test_every_line_says_what_it_is_for(preset: Path) -> None:
-    for line in preset.read_text(encoding="utf-8").splitlines():
+    for line in nonempty(preset.read_text(encoding="utf-8").splitlines()):
         section = re.fullmatch(r"\s*\w+:", line)
         assert not line or section or " # " in line or line.startswith("# "), line
 

@@ -23,6 +23,7 @@ from photostrip.report.pictures import style
 from photostrip.report.pictures.plan_view import plan_of
 from photostrip.report.pictures.strip import LONGEST, strip_pictures
 from photostrip.report.pictures.svg import Axis, nice
+from tests.loops import nonempty
 from tests.reports import saved
 from tests.results import FRAMES, case, spec, write_project
 from tests.source_tree import ROOT
@@ -96,7 +97,7 @@ def test_the_page_says_everything_that_the_sections_say() -> None:
 
 def test_nothing_is_loaded_from_elsewhere() -> None:
     assert {tag for tag, _ in page().elements} & {"script", "link", "img", "iframe", "object"} == set()
-    for tag, attributes in page().elements:
+    for tag, attributes in nonempty(page().elements):
         assert not {"src", "srcset", "onclick"} & attributes.keys()
         for name, value in attributes.items():
             assert "//" not in value or (tag, name) == ("svg", "xmlns")
@@ -108,7 +109,7 @@ def test_ids_are_there_once_and_links_lead_to_them() -> None:
     ids = [attributes["id"] for _, attributes in page().elements if "id" in attributes]
     assert len(ids) == len(set(ids))
     assert [link["href"] for link in page().of("a") if link["href"].removeprefix("#") not in ids] == []
-    for attributes in (each for _, each in page().elements if "aria-labelledby" in each):
+    for attributes in nonempty((each for _, each in page().elements if "aria-labelledby" in each)):
         assert set(attributes["aria-labelledby"].split()) <= set(ids)
 
 
@@ -116,11 +117,11 @@ def test_readers_that_do_not_see_have_words_for_everything() -> None:
     found = page()
     assert found.of("html") == [{"lang": "en"}]
     assert len(found.of("h1")) == len(found.of("main")) == 1
-    assert all(each["scope"] in {"col", "row"} for each in found.of("th"))
-    assert all(each["role"] == "img" for each in found.of("svg"))
+    assert all(each["scope"] in {"col", "row"} for each in nonempty(found.of("th")))
+    assert all(each["role"] == "img" for each in nonempty(found.of("svg")))
     assert len(found.of("svg")) == 3
     scrolled = [each for each in found.of("div") if each.get("role") == "region"]
-    assert all(each["tabindex"] == "0" and each["aria-label"] for each in scrolled)
+    assert all(each["tabindex"] == "0" and each["aria-label"] for each in nonempty(scrolled))
 
 
 def luminance(colour: str) -> float:
@@ -178,7 +179,7 @@ def test_the_same_result_gives_the_same_page() -> None:
 def test_the_plan_has_the_distances_of_the_ground(frame: str) -> None:
     document = case(frame).document
     plan = plan_of(document)
-    for left, right, model in zip(plan.strips[0], plan.strips[0][1:], document["models"], strict=False):
+    for left, right, model in nonempty(zip(plan.strips[0], plan.strips[0][1:], document["models"], strict=False)):
         distance = math.hypot(right.along - left.along, right.across - left.across)
         assert distance == pytest.approx(model["base"], rel=6e-3)  # a level flight; flattening, scale of the map
         assert right.along > left.along
@@ -194,7 +195,7 @@ def test_vectors_and_heights_are_the_differences(frame: str) -> None:
     rows = {row["id"]: row for row in document["control"]}
     spots = [spot for spot in plan_of(document).spots if spot.shift is not None]
     assert len(spots) >= 9
-    for spot in spots:
+    for spot in nonempty(spots):
         assert spot.shift is not None
         assert math.hypot(*spot.shift) == pytest.approx(rows[spot.id]["plan"], abs=2e-4)
         assert spot.up == rows[spot.id]["height"]

@@ -16,6 +16,7 @@ from photostrip.report.page.layout import cells
 from photostrip.report.page.parts import Column, Facts, Section, Table, Words
 from photostrip.report.page.text import to_markdown, to_text
 from photostrip.report.sections.strip import ALL_SHOWN, WORST_SHOWN
+from tests.loops import nonempty
 from tests.reports import FOLDER, SNAPSHOTS, fresh, saved
 from tests.results import FRAMES, case
 
@@ -203,7 +204,7 @@ def test_every_number_of_a_table_has_its_unit() -> None:
         "points", "rej.", "condition", "scale ratio", "σ0", "redund.", "degree", "terms", "F", "p", "coefficient", "σ",
         "t", "ratio", "photos", "scale 1:", "value", "limit", "found", "allowed", "asked",
     }  # fmt: skip
-    for found in sections_of(saved()):
+    for found in nonempty(sections_of(saved())):
         for table in tables(found):
             assert all(c.unit or c.left or c.name in without for c in table.columns), found.title
 
@@ -216,7 +217,7 @@ def test_ranks_keep_the_point_and_its_differences() -> None:
 
 
 def test_rows_of_a_table_have_all_its_columns() -> None:
-    for found in sections_of(saved(), everything=True):
+    for found in nonempty(sections_of(saved(), everything=True)):
         for table in tables(found):
             assert all(len(row) == len(table.columns) for row in (*table.rows, *table.foot)), found.title
 
@@ -232,7 +233,7 @@ def test_check_points_stand_apart_from_the_control() -> None:
 def test_numbers_are_those_of_the_result() -> None:
     (table,) = tables(section(saved(), "Check points"))
     rows = [row for row in saved()["control"] if row["role"] == "check"]
-    for shown, row in zip(table.rows, rows, strict=True):
+    for shown, row in nonempty(zip(table.rows, rows, strict=True)):
         assert shown[:7] == (
             row["id"], "xyz", *(f"{row[key]:+.3f}" for key in ("dx", "dy", "dz")),
             f"{row['plan_um']:.1f}", f"{row['height_um']:.1f}",
@@ -252,7 +253,7 @@ def test_without_check_points_the_report_says_what_that_means() -> None:
 def test_rejections_give_their_reason() -> None:
     (table,) = tables(section(saved(), "Rejected"))
     assert len(table.rows) == len(saved()["rejected"])
-    for shown, row in zip(table.rows, saved()["rejected"], strict=True):
+    for shown, row in nonempty(zip(table.rows, saved()["rejected"], strict=True)):
         assert (shown[0], shown[2], shown[-1]) == (row["point"], row["test"], row["reason"])
 
 
@@ -312,7 +313,7 @@ def test_markdown_tables_are_whole() -> None:
     text = to_markdown("T", sections_of(saved()))
     blocks = re.findall(r"(?:^\|.*\n)+", text, re.MULTILINE)
     assert len(blocks) == sum(len(tables(each)) for each in sections_of(saved()))
-    for block in blocks:
+    for block in nonempty(blocks):
         assert len({len(re.findall(r"(?<!\\)\|", line)) for line in block.splitlines()}) == 1
 
 

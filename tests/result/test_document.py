@@ -21,6 +21,7 @@ from photostrip.result.numbers import natural, rounded, significant
 from photostrip.result.summary import TOLERANCES
 from photostrip.simulate.simulation import simulate
 from photostrip.simulate.spec import Flight, GrossError
+from tests.loops import nonempty
 from tests.results import FRAMES, NORTH_FIRST, Case, case, solved, spec, written_to
 
 if TYPE_CHECKING:
@@ -97,7 +98,7 @@ FIXED = {
 def check_shape(value: object, shape: object, path: str) -> None:
     if isinstance(shape, dict):
         assert isinstance(value, dict), path
-        for key, each in shape.items():
+        for key, each in nonempty(shape.items()):
             assert key in value, f"{path}.{key}"
             check_shape(value[key], each, f"{path}.{key}")
     elif isinstance(shape, list):
@@ -117,19 +118,19 @@ def test_the_fixed_keys_are_there(frame: str) -> None:
     assert document["frame"]["crs"] == FRAMES[frame].crs
     assert document["frame"]["axes"] == list(FRAMES[frame].axes)
     assert {row["role"] for row in document["points"]} == {"new", "control", "check"}
-    assert all(len(photo["rotation"]) == 9 for photo in document["photos"])
+    assert all(len(photo["rotation"]) == 9 for photo in nonempty(document["photos"]))
 
 
 def test_a_rejection_has_its_fixed_keys() -> None:
     document = case("local", 1, 5.0, GrossError("image", axis="y")).document
-    for row in document["rejected"]:
+    for row in nonempty(document["rejected"]):
         assert row.keys() >= {"photo", "point", "stage", "test", "value", "limit", "reason"}
 
 
 @pytest.mark.parametrize("frame", FRAMES)
 def test_numbers_are_finite_and_never_minus_zero(frame: str) -> None:
     document = case(frame).document
-    for leaf in leaves(document):
+    for leaf in nonempty(leaves(document)):
         assert leaf is None or isinstance(leaf, str | bool | int | float)
         if isinstance(leaf, float):
             assert math.isfinite(leaf)
@@ -177,7 +178,7 @@ def worst_reprojection(found: Case) -> float:
     place = dict(zip(names, geocentric(document, np.array([ground[name] for name in names])), strict=True))
     measured, worst, rays = found.measured, 0.0, 0
     photos = {photo["id"]: photo for photo in document["photos"]}
-    for group in document["residuals"]:
+    for group in nonempty(document["residuals"]):
         photo = photos[group["photo"]]
         center = geocentric(document, in_order(document, xyz(photo))[None])[0]
         rotation = np.array(photo["rotation"]).reshape(3, 3)
@@ -218,7 +219,7 @@ def test_axes_turn_over_what_is_written_and_nothing_else() -> None:
         for a, b in zip(east[key], north[key], strict=True):
             assert a["id"] == b["id"]
             assert xyz(a) == [b["y"], b["x"], b["z"]]
-    for a, b in zip(east["control"], north["control"], strict=True):
+    for a, b in nonempty(zip(east["control"], north["control"], strict=True)):
         assert (a["dx"], a["dy"], a["dz"]) == (b["dy"], b["dx"], b["dz"])
         assert a["sigma"] == [b["sigma"][1], b["sigma"][0], b["sigma"][2]]
     for key in ("control_rms", "check_rms"):
@@ -236,7 +237,7 @@ def test_axes_turn_over_what_is_written_and_nothing_else() -> None:
 def test_angles_are_those_of_the_rotation(system: str, moved: Literal["YXZ", "XYZ"], sign: int, unit: str) -> None:
     document = solved(case("local").inputs, Settings(angle_system=system, angle_unit=unit)).document
     per_radian = {"deg": 180 / math.pi, "gon": 200 / math.pi, "rad": 1.0}[unit]
-    for photo in document["photos"]:
+    for photo in nonempty(document["photos"]):
         expected = Rotation.from_matrix(np.array(photo["rotation"]).reshape(3, 3)).as_euler(moved)
         expected[0] *= sign
         assert photo["angles"]["system"] == system
@@ -252,7 +253,7 @@ def test_differences_are_adjusted_minus_given(frame: str) -> None:
     found = case(frame)
     points = {row["id"]: in_order(found.document, xyz(row)) for row in found.document["points"]}
     given = dict(zip(found.inputs.control.ids, found.inputs.control.enu, strict=True))
-    for row in found.document["control"]:
+    for row in nonempty(found.document["control"]):
         difference = in_order(found.document, [row["dx"], row["dy"], row["dz"]])
         assert difference == pytest.approx(points[row["id"]] - given[row["id"]], abs=2 * GROUND_STEP)
 
@@ -263,7 +264,7 @@ def test_differences_of_longitudes_are_metres_on_the_ground() -> None:
     found = case("geographic")
     points = {row["id"]: row for row in document["points"]}
     given = dict(zip(found.inputs.control.ids, found.inputs.control.enu, strict=True))
-    for row in document["control"]:
+    for row in nonempty(document["control"]):
         point = points[row["id"]]
         a = np.array(to_utm.transform(point["x"], point["y"]))
         b = np.array(to_utm.transform(*given[row["id"]][:2]))
@@ -273,7 +274,7 @@ def test_differences_of_longitudes_are_metres_on_the_ground() -> None:
 
 def test_control_in_a_grid_and_a_geocentric_result_give_the_same_plan_and_height() -> None:
     grid, space = case("projected").document, written_to("geocentric", ("x", "y", "z")).document
-    for a, b in zip(grid["control"], space["control"], strict=True):
+    for a, b in nonempty(zip(grid["control"], space["control"], strict=True)):
         assert b["plan"] == pytest.approx(a["plan"], abs=2 * GROUND_STEP)
         assert b["height"] == pytest.approx(a["height"], abs=2 * GROUND_STEP)
         length = math.hypot(a["dx"], a["dy"], a["dz"])
@@ -286,7 +287,7 @@ def test_control_in_a_grid_and_a_geocentric_result_give_the_same_plan_and_height
 def test_plan_and_height_of_geocentric_control() -> None:
     """Height is along the normal: it grows when the point moves away from the centre of the Earth."""
     document = case("geocentric").document
-    for row in document["control"]:
+    for row in nonempty(document["control"]):
         point = next(p for p in document["points"] if p["id"] == row["id"])
         up = np.array(xyz(point)) / np.linalg.norm(xyz(point))
         radial = float(up @ [row["dx"], row["dy"], row["dz"]])
@@ -346,7 +347,7 @@ def test_the_summary_is_that_of_the_rows(role: str) -> None:
 def test_micrometres_at_photo_scale() -> None:
     document = case("local").document
     (strip,) = document["strips"]
-    for row in document["control"]:
+    for row in nonempty(document["control"]):
         assert row["plan_um"] == pytest.approx(math.hypot(row["dx"], row["dy"]) / strip["photo_scale"] * 1e6, abs=0.1)
     f = case("local").inputs.strips[0].camera.principal_distance / 1000
     assert strip["photo_scale"] == pytest.approx(strip["flying_height"] / f, abs=0.1)
@@ -356,7 +357,7 @@ def test_micrometres_at_photo_scale() -> None:
 def test_the_ratio_counts_the_point_and_the_model() -> None:
     document = case("local").document
     precision = document["strips"][0]["precision"]
-    for row in document["control"]:
+    for row in nonempty(document["control"]):
         point = (precision["plan"], precision["plan"], precision["height"])
         expected = [math.hypot(a, b) for a, b in zip(row["sigma"], point, strict=True)]
         assert row["sigma_fit"] == pytest.approx(expected, abs=2 * GROUND_STEP)
@@ -381,7 +382,7 @@ def test_sigma0_follows_from_the_parallaxes() -> None:
 
 def test_models_are_summed_up_from_their_parallaxes() -> None:
     document = case("projected", 2).document
-    for model, pair in zip(document["models"], document["parallaxes"], strict=True):
+    for model, pair in nonempty(zip(document["models"], document["parallaxes"], strict=True)):
         assert (model["left"], model["right"], model["strip"]) == (pair["left"], pair["right"], pair["strip"])
         used = {p: q for p, q, yes in zip(pair["points"], pair["q_um"], pair["used"], strict=True) if yes}
         assert model["points_used"] == len(used)
@@ -395,7 +396,7 @@ def test_models_are_summed_up_from_their_parallaxes() -> None:
 def test_bases_are_the_distances_of_the_photos() -> None:
     document = case("local").document
     photos = {photo["id"]: np.array(xyz(photo)) for photo in document["photos"]}
-    for model in document["models"]:
+    for model in nonempty(document["models"]):
         distance = np.linalg.norm(photos[model["right"]] - photos[model["left"]])
         assert model["base"] == pytest.approx(distance, abs=2 * GROUND_STEP)
 
@@ -404,13 +405,13 @@ def test_scale_factors_are_products_of_the_ratios() -> None:
     document = case("local").document
     factors = [model["scale_factor"] for model in document["models"]]
     assert factors[0] == 1.0
-    for (before, after), joint in zip(pairwise(factors), document["junctions"], strict=True):
+    for (before, after), joint in nonempty(zip(pairwise(factors), document["junctions"], strict=True)):
         assert after / before == pytest.approx(joint["factor"], rel=1e-9)
 
 
 def test_models_without_errors_agree() -> None:
     document = case("local", 1, 0.0).document
-    for joint in document["junctions"]:
+    for joint in nonempty(document["junctions"]):
         assert joint["spread_ppm"] < 0.1
         assert max(joint["discrepancy"].values()) < GROUND_STEP
     assert document["summary"]["image_rms_um"] < 0.01
@@ -423,7 +424,7 @@ def test_models_with_errors_disagree_most_in_height() -> None:
     along = math.sqrt(np.mean([joint["discrepancy"]["along"] ** 2 for joint in joints]))
     assert 0.05 < up < 0.6
     assert along < up / 3
-    for joint in joints:
+    for joint in nonempty(joints):
         scale = next(s["photo_scale"] for s in case("projected", 2).document["strips"] if s["id"] == joint["strip"])
         assert joint["discrepancy_um"]["up"] == pytest.approx(joint["discrepancy"]["up"] / scale * 1e6, abs=0.1)
 
@@ -434,7 +435,7 @@ def test_a_gross_error_is_rejected_and_its_size_stands_in_the_residuals() -> Non
     big = [row for row in document["rejected"] if abs(row["parallax_um"] or 0) > 100]
     assert big
     (point,) = {row["point"] for row in big}
-    for row in big:
+    for row in nonempty(big):
         assert (row["stage"], row["test"], row["unit"]) == ("relative", "parallax", "um")
         assert row["value"] > row["limit"]
     unused = [
@@ -444,7 +445,7 @@ def test_a_gross_error_is_rejected_and_its_size_stands_in_the_residuals() -> Non
         if name == point and not used and vy is not None
     ]
     shown = {row["photo"] for row in big} | {row["other_photo"] for row in big}
-    assert all(photo in shown and abs(vy) == pytest.approx(300, abs=60) for photo, vy in unused)
+    assert all(photo in shown and abs(vy) == pytest.approx(300, abs=60) for photo, vy in nonempty(unused))
     counts = document["counts"]
     assert counts["rejected_in_pairs"] == len(
         [r for r in document["rejected"] if r["stage"] == "relative" and not r["readmitted"]]
@@ -476,7 +477,7 @@ def test_ties_are_the_differences_of_strips_computed_alone() -> None:
     points = {row["id"]: np.array(xyz(row)) for row in both.document["points"]}
     ties = both.document["ties"]
     assert {tie["id"] for tie in ties} == alone[0].keys() & alone[1].keys()
-    for tie in ties:
+    for tie in nonempty(ties):
         first, second = alone[0][tie["id"]], alone[1][tie["id"]]
         assert [tie["dx"], tie["dy"], tie["dz"]] == pytest.approx(second - first, abs=0.0015)  # scale of the map
         assert points[tie["id"]] == pytest.approx((first + second) / 2, abs=2 * GROUND_STEP)
@@ -491,7 +492,7 @@ def test_the_polynomial_moves_the_control_by_the_stated_misclosures() -> None:
     axes, origin = np.array(absolute["axes"]).reshape(3, 3), np.array(absolute["origin"])
     points = {row["id"]: np.array(xyz(row)) for row in document["points"]}
     left = {row["id"]: np.array([row["dx"], row["dy"], row["dz"]]) for row in document["control"]}
-    for row in document["misclosures"]:
+    for row in nonempty(document["misclosures"]):
         before = np.array([row["east"], row["north"], row["up"]])
         place = axes.T @ (points[row["id"]] - (left[row["id"]] - before) - origin)
         correction = [polynomial(block, axis, place[0], place[1]) for axis in "xyz"]
@@ -645,7 +646,7 @@ def test_a_tolerance_that_cannot_be_tested_is_not_kept() -> None:
 def test_every_tolerance_has_a_value() -> None:
     document = judged(**dict.fromkeys(TOLERANCES, 1e6))
     assert len(document["tolerances"]) == len(TOLERANCES)
-    assert all(row["value"] > 0 for row in document["tolerances"])
+    assert all(row["value"] > 0 for row in nonempty(document["tolerances"]))
 
 
 def test_a_sound_project_is_good() -> None:

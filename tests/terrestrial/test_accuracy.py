@@ -22,6 +22,7 @@ from photostrip.terrestrial.accuracy import (
 )
 from photostrip.terrestrial.directions import directions_from_photo
 from photostrip.terrestrial.frame import ARCSECONDS, ground_from_photo
+from tests.loops import nonempty
 from tests.vectors import cases
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ def test_standard_errors_of_the_vectors(vector: Vector) -> None:
         "m_beta_arcsec_eq6_as_printed": printed.vertical_eq6,
         "m_beta_arcsec_eq5_as_printed": printed.vertical_eq5,
     }
-    for name, value in found.items():
+    for name, value in nonempty(found.items()):
         assert value * RHO == pytest.approx(expected[name], rel=rel), name
     assert printed.horizontal == pytest.approx(float(exact.horizontal), rel=1e-14)
 

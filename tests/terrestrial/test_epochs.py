@@ -14,6 +14,7 @@ from photostrip.terrestrial.epochs import monitor
 from photostrip.terrestrial.frame import small_turn
 from photostrip.terrestrial.monitoring import MonitoringSettings, Series, Step
 from photostrip.terrestrial.normal_case import intersect, to_normal
+from tests.loops import nonempty
 from tests.terrestrial.simulated import CENTERS, SIGMA, World, repeated, turned, weighted, world
 
 if TYPE_CHECKING:
@@ -249,7 +250,7 @@ def test_z_of_the_right_photo_counts_in_all_epochs_or_in_none() -> None:
 def test_without_stable_points_nobody_can_know_of_the_cameras() -> None:
     result = run(replace(world(), stable=0))
     assert [note.code for note in result.notes] == ["no-stable-points"]
-    assert all(state.turn is None for state in result.cameras)
+    assert all(state.turn is None for state in nonempty(result.cameras))
 
 
 def test_one_stable_point_is_too_few() -> None:

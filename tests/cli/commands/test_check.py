@@ -12,6 +12,7 @@ import pytest
 
 from photostrip.cli.main import main
 from photostrip.project.checks.check import check_project
+from tests.loops import nonempty
 from tests.project.samples import MARKED_FILES, OBSERVATIONS, Sample, sample
 from tests.results import spec, write_project
 from tests.source_tree import ROOT
@@ -75,7 +76,7 @@ def test_every_project_is_checked_and_every_fault_told(
 
 def test_quiet_leaves_verdicts_and_findings(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
     _, out, _ = call(capsys, "check", project, "--quiet")
-    assert all(re.match(rf"{project}: OK|(warning|note): ", line) for line in out.splitlines())
+    assert all(re.match(rf"{project}: OK|(warning|note): ", line) for line in nonempty(out.splitlines()))
 
 
 @pytest.mark.parametrize("width", [60, 100, 200])
@@ -209,7 +210,7 @@ def test_every_row_is_accounted_for(tmp_path: Path) -> None:
     made.write("fiducials.csv", MARKED_FILES["fiducials.csv"] + "9999,F1,1,2\n")
     made.change("control.csv", "P2,", "N1,1,2,3,off,control\nN2,1,2,3,,check\nP2,")
     rows = {each["file"].rpartition("/")[2]: each for each in check_project(tmp_path / "project.yaml").document["rows"]}
-    for table in rows.values():
+    for table in nonempty(rows.values()):
         assert table["used"] + sum(each["rows"] for each in table["unused"]) == table["rows"]
     told = {name: [(each["why"], each["ids"], each["first_line"]) for each in rows[name]["unused"]] for name in rows}
     assert told["observations.csv"] == [
@@ -249,7 +250,7 @@ def test_findings_as_json(tmp_path: Path, command: str, capsys: pytest.CaptureFi
     document = json.loads(out)
     assert (code, err) == (2, "")
     findings = document["findings"] if command == "run" else document["projects"][0]["findings"]
-    assert all(each.keys() == FINDING for each in findings)
+    assert all(each.keys() == FINDING for each in nonempty(findings))
     assert [(each["file"], each["line"], each["column"], each["key"], each["code"]) for each in findings] == [
         (f"{tmp_path}/project.yaml", 19, 3, "observations.y_axes", "unknown-key"),
         (f"{tmp_path}/observations.csv", 2, 0, "", "row-length"),

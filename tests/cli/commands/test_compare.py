@@ -19,6 +19,7 @@ from photostrip.formats.output.result_json import to_json
 from photostrip.formats.output.result_lines import line_finder
 from photostrip.project.tolerance_profile import load_tolerances
 from photostrip.report.page.junit import Case, to_junit
+from tests.loops import nonempty
 from tests.results import case
 from tests.source_tree import ROOT
 
@@ -249,7 +250,7 @@ def test_profiles_grow() -> None:
 
 @pytest.mark.parametrize("profile", sorted(PROFILES.iterdir()), ids=lambda path: path.stem)
 def test_every_line_of_a_profile_says_what_it_is_for(profile: Path) -> None:
-    for line in profile.read_text(encoding="utf-8").splitlines():
+    for line in nonempty(profile.read_text(encoding="utf-8").splitlines()):
         assert not line or " # " in line or line.startswith("# "), line
 
 

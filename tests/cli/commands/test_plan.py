@@ -12,6 +12,7 @@ import pytest
 
 from photostrip.cli.main import main
 from photostrip.planning.model_plan import ModelSpec, control_layout, plan_model
+from tests.loops import nonempty
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -212,7 +213,7 @@ def test_the_report_of_a_strip(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     by = {(row["layout"], row["method"]): row for row in document["accuracy"]}
     assert ("gnss", "similarity") not in by  # only the bundle uses perspective centres
     assert by["gnss", "bundle"]["worst_z_m"] < by["ends", "bundle"]["worst_z_m"]
-    for row in by.values():
+    for row in nonempty(by.values()):
         along = row["along"]
         assert max(each["z_m"] for each in along) == pytest.approx(row["worst_z_m"], abs=0.05)
         assert row["meets"] == (row["worst_z_m"] <= 0.5)
@@ -298,4 +299,4 @@ def test_schemas_of_plans_know_every_key(kind: str, capsys: pytest.CaptureFixtur
     schema = json.loads(answer(capsys, "schema", "--plan", kind))
     assert schema["title"] == f"photostrip plan {kind}"
     assert f"photostrip_plan_{kind}s" in schema["properties"] or f"photostrip_plan_{kind}" in schema["properties"]
-    assert all("description" in each for each in schema["properties"].values())
+    assert all("description" in each for each in nonempty(schema["properties"].values()))

@@ -19,6 +19,7 @@ import pytest
 
 from photostrip.cli.main import main
 from photostrip.terrestrial.epochs import monitor
+from tests.loops import nonempty
 from tests.source_tree import ROOT
 from tests.terrestrial.files import TRUTH, coordinates, project, pseudo_parallaxes, write
 from tests.terrestrial.test_orientation import CENTRE, PLACES, directions
@@ -63,7 +64,7 @@ def test_from_photo_and_to_photo_are_inverse(tmp_path: Path, capsys: pytest.Capt
     assert (code, err) == (0, "")
     there = tmp_path / "directions.csv"
     there.write_text(out, encoding="utf-8")
-    assert all(0 <= float(row["lambda"]) < 400 for row in rows(out))
+    assert all(0 <= float(row["lambda"]) < 400 for row in nonempty(rows(out)))
     code, out, err = call(capsys, "directions", "to-photo", there, *PHOTHEO, *held, "--format", "csv", "--quiet")
     assert (code, err) == (0, "")
     assert [row["point"] for row in rows(out)] == ["A", "B", "C"]
@@ -235,7 +236,7 @@ def test_standard_deviations_of_the_rows_count(tmp_path: Path, capsys: pytest.Ca
     )
     first = answer(capsys, *ORIENT, plain, *INTERIOR)
     second = answer(capsys, *ORIENT, own, *INTERIOR)
-    for one, two in zip(first["elements"], second["elements"], strict=True):
+    for one, two in nonempty(zip(first["elements"], second["elements"], strict=True)):
         assert two["sigma"] == pytest.approx(2 * one["sigma"], rel=1e-3)
 
 
@@ -247,7 +248,7 @@ def test_displacement_in_every_form(tmp_path: Path, capsys: pytest.CaptureFixtur
     document = answer(capsys, "displacement", survey)
     result = monitor(TRUTH.measure(1), TRUTH.pair)
     assert document["frame"] == {"axes": ["east", "north", "up"]}
-    for row, point in enumerate(document["points"]):
+    for row, point in nonempty(enumerate(document["points"])):
         step = point["epochs"][2]["since_first"]
         assert point["id"] == f"P{row}"
         found = [step[name] for name in ("dx", "dy", "dz")]
@@ -279,7 +280,7 @@ def test_results_stand_in_the_order_of_the_axes(tmp_path: Path, capsys: pytest.C
     east = answer(capsys, "displacement", write(tmp_path))
     north = answer(capsys, "displacement", write(tmp_path / "north", text))
     assert north["frame"]["axes"] == ["north", "east", "up"]
-    for one, two in zip(east["points"], north["points"], strict=True):
+    for one, two in nonempty(zip(east["points"], north["points"], strict=True)):
         a, b = one["epochs"][1], two["epochs"][1]
         assert (a["x"], a["y"], a["z"]) == (b["y"], b["x"], b["z"])
         c, d = a["since_first"], b["since_first"]
@@ -504,7 +505,7 @@ def test_wrong_usage_and_data_are_told_with_exit_2(
     code, out, err = call(capsys, *(part.replace("~", " ") for part in command.split()))
     assert (code, out) == (2, "")
     lines = err.splitlines()
-    assert all(line.startswith("error: ") for line in lines)
+    assert all(line.startswith("error: ") for line in nonempty(lines))
     assert any(line.removeprefix("error: ").startswith(expected) for line in lines), err
 
 

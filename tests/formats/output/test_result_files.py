@@ -18,6 +18,7 @@ from photostrip.formats.output.result_files import result_files
 from photostrip.formats.output.result_json import read_result, to_json
 from photostrip.pipeline import triangulate
 from photostrip.result.document import document_of
+from tests.loops import nonempty
 from tests.results import FRAMES, case, solved
 from tests.source_tree import ROOT
 
@@ -124,7 +125,7 @@ def test_points_csv_says_what_result_json_says(frame: str) -> None:
     document = case(frame).document
     table = rows(result_files(document)["points.csv"])
     assert len(table) == len(document["points"])
-    for row, point in zip(table, document["points"], strict=True):
+    for row, point in nonempty(zip(table, document["points"], strict=True)):
         assert (row["point"], row["role"]) == (point["id"], point["role"])
         for key in ("x", "y", "z", "sigma_x", "image_rms_um"):
             assert number(row[key]) == point[key]
@@ -141,7 +142,7 @@ def test_longitudes_have_ten_decimals_and_heights_four() -> None:
 def test_photos_csv_says_what_result_json_says() -> None:
     document = case("north first").document
     table = rows(result_files(document)["photos.csv"])
-    for row, photo in zip(table, document["photos"], strict=True):
+    for row, photo in nonempty(zip(table, document["photos"], strict=True)):
         assert (row["photo"], row["strip"]) == (photo["id"], photo["strip"])
         assert [float(row[key]) for key in "xyz"] == [photo[key] for key in "xyz"]
         assert [float(row[f"{name}_deg"]) for name in ("alpha", "omega", "kappa")] == photo["angles"]["values"]

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from photostrip.formats.text.numbers import LARGEST, NotANumber, number, shown
 from photostrip.formats.text.table_reader import _fast_floats
+from tests.loops import nonempty
 
 
 @given(st.floats(-LARGEST, LARGEST))
@@ -97,7 +98,9 @@ def test_a_column_is_converted_at_once_only_if_every_cell_is_a_number(column: li
 def test_a_column_of_numbers_is_converted_at_once(values: list[float]) -> None:
     fast = _fast_floats(tuple(map(repr, values)))
     assert fast is not None
-    assert all(math.copysign(1, a) == math.copysign(1, b) and a == b for a, b in zip(fast, values, strict=True))
+    assert all(
+        math.copysign(1, a) == math.copysign(1, b) and a == b for a, b in nonempty(zip(fast, values, strict=True))
+    )
 
 
 @pytest.mark.parametrize(

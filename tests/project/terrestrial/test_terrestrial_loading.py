@@ -13,6 +13,7 @@ from photostrip.errors import InputError
 from photostrip.project.terrestrial.cameras import own_presets, read_presets
 from photostrip.project.terrestrial.survey import load_survey
 from photostrip.terrestrial.epochs import monitor
+from tests.loops import nonempty
 from tests.terrestrial.files import CENTERS, TRUTH, coordinates, project, pseudo_parallaxes, write
 from tests.test_packaging import build
 
@@ -213,7 +214,7 @@ def test_a_wrong_list_is_told_with_its_place(tmp_path: Path, text: str, expected
     with pytest.raises(InputError) as caught:
         read_presets(str(file))
     told = str(caught.value)
-    for part in expected:
+    for part in nonempty(expected):
         assert part in told
 
 

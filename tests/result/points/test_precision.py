@@ -17,6 +17,7 @@ from photostrip.report import sections_of, title_of
 from photostrip.report.page.text import to_text
 from photostrip.result.document import document_of
 from photostrip.result.points.precision import ellipses
+from tests.loops import nonempty
 from tests.results import FRAMES, Case, case, solved
 
 SAMPLES = 200_000
@@ -123,11 +124,11 @@ def test_tables_carry_the_precision() -> None:
     known = precise("projected")
     files = result_files(known.document)
     points = list(csv.DictReader(StringIO(files["points.csv"])))
-    for line, row in zip(points, known.document["points"], strict=True):
+    for line, row in nonempty(zip(points, known.document["points"], strict=True)):
         for key in ("sigma_x", "sigma_z", "cov_xy", "cov_yz", "ellipse_a", "ellipse_azimuth_deg"):
             assert float(line[key]) == pytest.approx(row[key], abs=1e-9)
     photos = list(csv.DictReader(StringIO(files["photos.csv"])))
-    for line, row in zip(photos, known.document["photos"], strict=True):
+    for line, row in nonempty(zip(photos, known.document["photos"], strict=True)):
         assert float(line["sigma_y"]) == pytest.approx(row["sigma"]["y"])
         assert float(line["sigma_kappa_deg"]) == pytest.approx(row["sigma"]["angles"][2], abs=1e-6)
 
@@ -158,8 +159,8 @@ def test_nothing_is_said_where_nothing_is_known() -> None:
     known = replace(case("projected").result, precision=None)
     document = document_of(known)
     assert "precision" not in document
-    assert all(point["sigma_x"] is None and "cov_xy" not in point for point in document["points"])
-    assert all(photo["sigma"] is None and "covariance" not in photo for photo in document["photos"])
+    assert all(point["sigma_x"] is None and "cov_xy" not in point for point in nonempty(document["points"]))
+    assert all(photo["sigma"] is None and "covariance" not in photo for photo in nonempty(document["photos"]))
     files = result_files(document)
     assert {row["sigma_x"] for row in csv.DictReader(StringIO(files["points.csv"]))} == {""}
     assert {row["sigma_kappa_deg"] for row in csv.DictReader(StringIO(files["photos.csv"]))} == {""}

@@ -16,6 +16,7 @@ from photostrip.report.commands.trace import trace_sections, trace_title
 from photostrip.report.page.text import to_text
 from photostrip.result.trace.trace import SYMBOLS, trace_of
 from photostrip.simulate.spec import GrossError
+from tests.loops import nonempty
 from tests.results import case, spec, write_project
 from tests.source_tree import ROOT
 
@@ -55,7 +56,7 @@ def test_pairs_end_where_the_run_ended(name: str) -> None:
     models = solved(name).document["models"]
     pairs = [pair for strip in trace(name)["strips"] for pair in strip["pairs"]]
     assert [(pair["left"], pair["right"]) for pair in pairs] == [(model["left"], model["right"]) for model in models]
-    for pair, model in zip(pairs, models, strict=True):
+    for pair, model in nonempty(zip(pairs, models, strict=True)):
         end = pair["rounds"][-1]["end"]
         assert [end[e] for e in ELEMENTS] == pytest.approx([pair["elements"][e] for e in ELEMENTS], abs=1e-8)
         assert [end[e] for e in ELEMENTS] == pytest.approx([model["elements"][e] for e in ELEMENTS], abs=2e-6)
@@ -64,7 +65,7 @@ def test_pairs_end_where_the_run_ended(name: str) -> None:
 
 @pytest.mark.parametrize("name", CASES)
 def test_each_step_leads_to_the_next(name: str) -> None:
-    for strip in trace(name)["strips"]:
+    for strip in nonempty(trace(name)["strips"]):
         for pair in strip["pairs"]:
             for each in pair["rounds"]:
                 states = [step["elements"] for step in each["steps"]] + [each["end"]]
@@ -78,7 +79,7 @@ def test_each_step_leads_to_the_next(name: str) -> None:
 
 
 def test_the_sum_of_squares_gives_sigma0() -> None:
-    for pair in trace("projected")["strips"][0]["pairs"]:
+    for pair in nonempty(trace("projected")["strips"][0]["pairs"]):
         each = pair["rounds"][-1]
         # a y parallax is the difference of two coordinates; n points determine five elements
         sigma0 = math.sqrt(each["steps"][-1]["[wqq]"] / 2 / (each["points"] - 5))
@@ -92,20 +93,20 @@ def test_rejected_points_make_a_second_round() -> None:
     wrong = found.document["rejected"]
     assert wrong
     by_pair = {(pair["left"], pair["right"]): pair for pair in trace("gross error")["strips"][0]["pairs"]}
-    for row in wrong:
+    for row in nonempty(wrong):
         pair = by_pair[row["photo"], row["other_photo"]]
         assert row["point"] in [each["point"] for each in pair["rejected"]]
         assert [each["points"] for each in pair["rounds"]] == [len(pair["points"]), len(pair["points"]) - 1]
         first, second = (each["steps"][-1]["[wqq]"] for each in pair["rounds"])
         assert second < first / 4
-    assert all(len(pair["rounds"]) == 1 for key, pair in by_pair.items() if key not in
+    assert all(len(pair["rounds"]) == 1 for key, pair in nonempty(by_pair.items()) if key not in
                {(row["photo"], row["other_photo"]) for row in wrong})  # fmt: skip
 
 
 def test_the_chain_follows_the_formulas() -> None:
     strip = trace("projected")["strips"][0]
     previous = None
-    for row, pair in zip(strip["chain"], [None, *strip["pairs"]], strict=True):
+    for row, pair in nonempty(zip(strip["chain"], [None, *strip["pairs"]], strict=True)):
         a = rotation(row["alpha"], row["omega"], row["kappa"])
         assert np.array(row["A"]).reshape(3, 3) == pytest.approx(a.as_matrix(), abs=1e-9)
         if pair is not None and previous is not None:
@@ -129,7 +130,7 @@ def test_points_lie_on_their_rays() -> None:
     found = solved("projected")
     f = found.inputs.strips[0].camera.principal_distance
     strip = trace("projected")["strips"][0]
-    for pair, left in zip(strip["pairs"], strip["chain"], strict=False):
+    for pair, left in nonempty(zip(strip["pairs"], strip["chain"], strict=False)):
         for point in pair["points"]:
             ray = np.array(left["A"]).reshape(3, 3) @ [point["x1"], point["y1"], -f]
             arm = np.array([point[axis] for axis in "XYZ"]) - left["S"]
@@ -141,7 +142,7 @@ def test_ratios_of_distances_are_the_scale_factors() -> None:
     strip = trace("projected")["strips"][0]
     scales = {row["photo"]: row.get("k") for row in strip["chain"]}
     photos = list(scales)
-    for joint in strip["scale_transfer"]:
+    for joint in nonempty(strip["scale_transfer"]):
         for point in joint["points"]:
             assert point["k_t"] == pytest.approx(point["D"] / point["D'"], rel=1e-6)
         used = [point["k_t"] for point in joint["points"] if point["used"]]
@@ -153,7 +154,7 @@ def test_ratios_of_distances_are_the_scale_factors() -> None:
 def test_the_similarity_brings_the_strip_to_the_control(name: str) -> None:
     found, strip = trace(name)["strips"][0]["absolute"], solved(name).result.strips[0]
     turn = rotation(found["xi"], found["eta"], found["theta"]).as_matrix()
-    for row in found["control"]:
+    for row in nonempty(found["control"]):
         moved = found["s"] * turn @ np.array(row["strip"]) + found["shift"]
         assert row["oriented"] == pytest.approx(moved, abs=2e-3)
     redundancy = strip.absolute.redundancy
@@ -167,7 +168,7 @@ def test_polynomials_take_out_the_free_terms() -> None:
     found = trace("projected")["strips"][0]["polynomial"]
     assert found["degree"] > 0
     powers = {"1": (0, 0), "X": (1, 0), "Y": (0, 1), "XY": (1, 1), "X^2": (2, 0), "X^3": (3, 0)}
-    for row in found["control"]:
+    for row in nonempty(found["control"]):
         for number, axis in enumerate("XYZ"):
             fit = found["axes"][axis]
             value = sum(

@@ -24,6 +24,7 @@ from photostrip.triangulation.covariance_adjustment import (
 )
 from photostrip.triangulation.polynomial import correction
 from tests.derivatives import UNSCREENED, errors_of, spec, without_noise, written_out
+from tests.loops import nonempty
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -85,7 +86,7 @@ def test_the_band_gives_what_the_whole_matrix_gives(photos: int, lap: float, *, 
     images = relinearisation.image_errors(solved)
     expected = by_images.T @ solution[: len(by_images)]
     assert images.ravel() == pytest.approx(expected, abs=1e-8 * np.abs(expected).max())
-    for rows, seen in zip(tables, predicted, strict=True):
+    for rows, seen in nonempty(zip(tables, predicted, strict=True)):
         own = written_out(rows.without_similarity(), errors)
         size = rows.by_similarity.shape[1]
         for thing in range(len(rows.first)):
@@ -117,7 +118,7 @@ def test_blocks_are_eliminated_like_any_system() -> None:
     right = rng.normal(size=(5, 4, 3))
     assert factors.solve(right).reshape(20, 3) == pytest.approx(np.linalg.solve(dense, right.reshape(20, 3)), rel=1e-9)
     inverse = np.linalg.inv(dense)
-    for number, blocks in factors.inverse():
+    for number, blocks in nonempty(factors.inverse()):
         for apart, block in enumerate(blocks):
             first, second = 4 * number, 4 * (number + apart)
             if second < 20:
@@ -291,7 +292,7 @@ def test_repetitions_scatter_as_stated() -> None:
             squares[name] += (found.cartesian - true) ** 2
     noisy_xy = inputs.observations.xy + rng.normal(0, 0.005, inputs.observations.xy.shape)
     once = replace(inputs, observations=replace(inputs.observations, xy=noisy_xy))
-    for name, wanted in settings.items():
+    for name, wanted in nonempty(settings.items()):
         precision = triangulate(once, wanted).precision
         assert precision is not None
         factor = (0.005 / precision.sigma[0]) ** 2 if precision.basis[0] == "a-posteriori" else 1.0

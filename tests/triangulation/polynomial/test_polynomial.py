@@ -20,6 +20,7 @@ from photostrip.triangulation.absolute_orientation import weights
 from photostrip.triangulation.polynomial import correction
 from photostrip.triangulation.polynomial.correction import FitProblem, PolynomialSettings, fit
 from photostrip.triangulation.polynomial.terms import bands, choose_terms, count_stations
+from tests.loops import nonempty
 from tests.strips import MICROMETRE, control_points, fly, project, targets
 from tests.vectors import cases, section
 
@@ -122,7 +123,7 @@ def test_coefficients_of_a_deformation_come_back(seed: int) -> None:
     scale = np.abs(columns(xyz)).max(axis=0)
     truth = rng.uniform(-5, 5, (6, 3)) / scale[:, None]
     found = fit(problem(xyz, xyz + columns(xyz) @ truth), PolynomialSettings("3"))
-    for number, axis in enumerate(found.axes):
+    for number, axis in nonempty(enumerate(found.axes)):
         assert axis.terms == CUBIC
         assert np.abs((axis.coefficients - truth[:, number]) * scale).max() < 1e-8
         assert np.abs(axis.residuals).max() < 1e-8
@@ -169,7 +170,7 @@ def test_standard_deviations_are_those_of_the_errors() -> None:
 def test_an_exact_fit_has_no_standard_deviations() -> None:
     xyz = layout([-9000, 0, 9000], rows=(-1400.0, 1400.0))[:5]
     found = fit(problem(xyz, xyz + 1.0), PolynomialSettings("2"))
-    for axis in found.axes:
+    for axis in nonempty(found.axes):
         assert axis.redundancy == 0
         assert np.isnan(axis.sigma0)
         assert np.isnan(axis.sigmas).all()
@@ -243,8 +244,8 @@ def test_stations_by_hand(x: list[float], spacing: float) -> None:
     order = np.argsort(x, kind="stable")
     assert np.all(np.diff(number[order]) >= 0)
     firsts = [min(v for v, n in zip(x, number, strict=True) if n == band) for band in sorted(set(number))]
-    assert all(b - a >= spacing for a, b in pairwise(firsts))  # no two nearer than the spacing
-    for band, first in enumerate(firsts):
+    assert all(b - a >= spacing for a, b in nonempty(pairwise(firsts)))  # no two nearer than the spacing
+    for band, first in nonempty(enumerate(firsts)):
         assert all(v - first < spacing for v, n in zip(x, number, strict=True) if n == band)
 
 
@@ -334,7 +335,7 @@ def test_bands_left_out_in_closed_form_are_refitted(seed: int) -> None:
     one = problem(xyz, given_, sigma=sigma)
     found = fit(one, PolynomialSettings("3"))
     inner = [np.arange(3 * band, 3 * band + 3) for band in range(1, 6)]
-    for group, axes in correction.GROUPS:
+    for group, axes in nonempty(correction.GROUPS):
         for evidence in steps(found, group)[1:]:
             assert evidence.left_out_by == "band"
             terms = {1: ("1", "X", "Y"), 2: SQUARE, 3: CUBIC}[evidence.degree]
@@ -349,7 +350,7 @@ def test_points_left_out_in_closed_form_are_refitted(seed: int) -> None:
     one = problem(xyz, xyz + rng.normal(0, 0.1, xyz.shape))
     found = fit(one, PolynomialSettings("2"))
     single = [[row] for row in range(9)]
-    for group, axes in correction.GROUPS:
+    for group, axes in nonempty(correction.GROUPS):
         for evidence in steps(found, group)[1:]:
             assert evidence.left_out_by == "point"
             terms = {1: ("1", "X", "Y"), 2: SQUARE}[evidence.degree]
@@ -367,7 +368,7 @@ def test_bands_are_left_out_when_the_ladder_says_so_of_what_is_left(seed: int, s
     one = problem(xyz, xyz + rng.normal(0, 0.1, xyz.shape))
     found = fit(one, PolynomialSettings("auto"))
     group = bands(xyz[:, 0], one.spacing)
-    for kind, _ in correction.GROUPS:
+    for kind, _ in nonempty(correction.GROUPS):
         richest = steps(found, kind)[-1]
         terms = choose_terms(xyz, 3, one.sizes)
         rest = [xyz[group != band] for band in range(1, group.max())]
@@ -453,7 +454,7 @@ def test_plan_and_height_are_fitted_from_what_they_are_given() -> None:
     assert height.terms == SQUARE
     anywhere = np.random.default_rng(1).uniform([-9000, -1400, 0], [9000, 1400, 200], (20, 3))
     assert np.allclose(found(anywhere), anywhere + bent(anywhere, 2.0, 2), rtol=0, atol=1e-7)
-    for axis, kind in zip(found.axes, ("xy", "xy", "z"), strict=True):
+    for axis, kind in nonempty(zip(found.axes, ("xy", "xy", "z"), strict=True)):
         assert np.all(axis.residuals[[u != kind for u in use]] == 0)
 
 
@@ -575,7 +576,7 @@ def test_control_of_one_kind_leaves_the_other_axes_to_themselves(degree: str, fe
     use = [few if n in {0, 2, 18} else many for n in range(21)]  # three full points at two stations
     found = fit(problem(xyz, xyz + bent(xyz, 3.0, 2), use), PolynomialSettings(degree))
     axes = (2,) if many == "z" else (0, 1)
-    for number, axis in enumerate(found.axes):
+    for number, axis in nonempty(enumerate(found.axes)):
         assert len(axis.terms) <= (6 if number in axes else 3)
         assert axis.redundancy >= 0
     if degree in {"2", "auto"}:

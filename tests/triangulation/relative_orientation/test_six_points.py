@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from photostrip.geometry.rotation import alpha_omega_kappa
 from photostrip.triangulation.relative_orientation import six_points
 from photostrip.triangulation.relative_orientation.solution import solve_elements
+from tests.loops import nonempty
 from tests.strips import attitude, batch
 from tests.vectors import cases, section
 
@@ -63,7 +64,7 @@ def test_the_examples_of_the_formula_book(example: Vector) -> None:
         "cov_bz_dependent_alpha": dependent[1, 3],
     }
     assert values.keys() == formulas.keys()
-    for name, value in values.items():
+    for name, value in nonempty(values.items()):
         assert value == pytest.approx(formulas[name], rel=rel), name
 
 

@@ -31,6 +31,7 @@ from photostrip.triangulation.strip_formation.strip import (
     hand_on_rotations,
     mean_points,
 )
+from tests.loops import nonempty
 from tests.strips import MICROMETRE, attitude, batch, fly, measured, photograph
 from tests.vectors import cases, section
 
@@ -90,7 +91,7 @@ def test_the_strip_of_the_formula_book(example: Vector, transfer: str) -> None:
     strip = form_from_pairs(oriented, StripFormationSettings(transfer), names)
     first, base = attitude(example.input["eo1_deg"])[0], example.input["base"]
     bases = np.diff(strip.centers, axis=0) @ first.T
-    for number, model in enumerate(example.expected["models"]):
+    for number, model in nonempty(enumerate(example.expected["models"])):
         degrees = np.degrees(oriented.elements[number])
         assert np.allclose(degrees, model["elements_deg"], rtol=0, atol=tol["angles_deg"])
         assert strip.scale[number] == pytest.approx(model["k"], abs=tol["k"])
@@ -98,7 +99,7 @@ def test_the_strip_of_the_formula_book(example: Vector, transfer: str) -> None:
         assert np.degrees(np.arctan2(by, bx)) == pytest.approx(model["tau_deg"], abs=tol["angles_deg"])
         assert np.degrees(np.arctan2(bz, np.hypot(bx, by))) == pytest.approx(model["nu_deg"], abs=tol["angles_deg"])
         assert np.linalg.norm(bases[number]) == pytest.approx(model["k"], abs=tol["k"])
-    for number, camera in enumerate(example.expected["cameras"]):
+    for number, camera in nonempty(enumerate(example.expected["cameras"])):
         degrees = np.degrees(alpha_omega_kappa(first @ strip.rotations[number]))
         assert np.allclose(degrees, camera["alpha_omega_kappa_deg"], rtol=0, atol=tol["angles_deg"])
         assert np.allclose(base * first @ strip.centers[number], camera["S"], rtol=0, atol=tol["coords"])
@@ -106,7 +107,7 @@ def test_the_strip_of_the_formula_book(example: Vector, transfer: str) -> None:
         observations.point_ids[number]: base * first @ xyz for number, xyz in zip(strip.point, strip.xyz, strict=True)
     }
     assert found.keys() == example.expected["points"].keys()
-    for name, xyz in example.expected["points"].items():
+    for name, xyz in nonempty(example.expected["points"].items()):
         assert np.allclose(found[name], xyz, rtol=0, atol=tol["coords"]), name
 
 
@@ -222,7 +223,7 @@ def test_orientations_are_handed_on() -> None:
     turns = Rotation.random(6, random_state=1).as_matrix()
     chain = hand_on_rotations(turns)
     assert np.array_equal(chain[0], np.eye(3))
-    for number, turn in enumerate(turns):
+    for number, turn in nonempty(enumerate(turns)):
         assert np.allclose(chain[number].T @ chain[number + 1], turn, rtol=0, atol=1e-14)
 
 
@@ -321,7 +322,7 @@ def test_points_of_one_and_of_many_models() -> None:
     strip = formed(flown)
     obs = flown.observations
     rows = {int(point): row for row, point in enumerate(strip.point)}
-    for name, number in flown.at.items():
+    for name, number in nonempty(flown.at.items()):
         on = np.sort(obs.photo[obs.point == number])
         models = int((np.diff(on) == 1).sum())
         if models:
@@ -357,7 +358,7 @@ def test_a_point_of_a_single_model_is_what_its_model_says() -> None:
 def test_coordinates_are_means_over_the_models() -> None:
     flown = fly(10, 6, sigma=5 * MICROMETRE, extra=10)
     strip, oriented = formed(flown), flown.oriented()
-    for row, number in enumerate(strip.point):
+    for row, number in nonempty(enumerate(strip.point)):
         models = strip.model_xyz[oriented.point == number]
         assert np.allclose(strip.xyz[row], models.mean(axis=0), rtol=0, atol=1e-12)
         assert strip.model_count[row] == len(models)
@@ -370,7 +371,7 @@ def test_means_by_hand(rows: list[tuple[int, bool]]) -> None:
     xyz = np.random.default_rng(1).normal(0, 1, (len(rows), 3))
     numbers, mean, count = mean_points(point, xyz, use)
     assert numbers.tolist() == sorted(set(point[use]))
-    for number, average, times in zip(numbers, mean, count, strict=True):
+    for number, average, times in nonempty(zip(numbers, mean, count, strict=True)):
         own = xyz[use & (point == number)]
         assert np.allclose(average, own.mean(axis=0))
         assert times == len(own)

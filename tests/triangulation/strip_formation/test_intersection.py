@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from photostrip.triangulation.strip_formation.intersection import intersect
+from tests.loops import nonempty
 from tests.strips import attitude, photograph
 from tests.vectors import cases, section
 
@@ -96,7 +97,7 @@ def test_with_errors_x_and_z_solve_the_two_equations(seed: int) -> None:
     rng = np.random.default_rng(seed)
     left = left + rng.normal(0, 0.05, left.shape)
     found = intersect(base, left, right, FOCAL)
-    for n in range(left.shape[1]):
+    for n in nonempty(range(left.shape[1])):
         matrix = np.column_stack([left[[0, 2], n], -right[[0, 2], n]])
         s, t = np.linalg.solve(matrix, base[[0, 2]])
         assert np.allclose(found.xyz[n, [0, 2]], s * left[[0, 2], n], rtol=0, atol=1e-9)
