@@ -430,7 +430,8 @@ def test_models_with_errors_disagree_most_in_height() -> None:
 
 
 def test_a_gross_error_is_rejected_and_its_size_stands_in_the_residuals() -> None:
-    inputs = inputs_of(simulate(spec("local", 1, 5.0, GrossError("image", size_um=300.0, axis="y"))))
+    wanted = spec("local", 1, 5.0, GrossError("image", size_um=300.0, axis="y"))
+    inputs = inputs_of(simulate(replace(wanted, seed=5)))  # it hits a point that a third photo has, too
     document = solved(inputs, Settings(relative=replace(Settings().relative, screening="parallax+grubbs"))).document
     big = [row for row in document["rejected"] if abs(row["parallax_um"] or 0) > 100]
     assert big

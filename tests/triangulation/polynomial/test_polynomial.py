@@ -244,9 +244,8 @@ def test_stations_by_hand(x: list[float], spacing: float) -> None:
     order = np.argsort(x, kind="stable")
     assert np.all(np.diff(number[order]) >= 0)
     firsts = [min(v for v, n in zip(x, number, strict=True) if n == band) for band in sorted(set(number))]
-    assert all(b - a >= spacing for a, b in nonempty(pairwise(firsts)))  # no two nearer than the spacing
-    for band, first in nonempty(enumerate(firsts)):
-        assert all(v - first < spacing for v, n in zip(x, number, strict=True) if n == band)
+    assert [(a, b) for a, b in pairwise(firsts) if b - a < spacing] == []  # no two nearer than the spacing
+    assert [v for v, band in zip(x, number, strict=True) if not v - firsts[band] < spacing] == []
 
 
 # -------------------------------------------------------------------------------------- what evidence says
