@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import cache
 from typing import TYPE_CHECKING
 
 import pytest
@@ -39,6 +40,7 @@ def test_console_blocks_are_run_or_say_why_not(page: Path) -> None:
     assert [block.place for block in silent if not block.above.startswith("<!--")] == [], "say above why it is not run"
 
 
+@cache
 def tags_listed() -> set[str]:
     return set(re.findall(r"^\| \[([^\]]+)\] \|", (ROOT / "docs/sources.md").read_text(encoding="utf-8"), re.MULTILINE))
 

@@ -19,12 +19,14 @@ def sections() -> dict[str, str]:
     return {code: re.split(r"(?m)^## ", body)[0].strip() for code, body in zip(parts[1::2], parts[2::2], strict=True)}
 
 
+@pytest.mark.slow
 def test_every_code_has_a_section() -> None:
     known = codes()
     assert len(known) > 150
     assert {code: place for code, place in known.items() if code not in sections()} == {}
 
 
+@pytest.mark.slow
 def test_every_section_is_of_a_code() -> None:
     assert sorted(set(sections()) - set(codes())) == []
 
@@ -37,6 +39,7 @@ def test_a_section_says_cause_and_cure(code: str) -> None:
     assert cure.endswith((".", "?"))
 
 
+@pytest.mark.slow
 def test_codes_are_found_in_all_their_forms() -> None:
     known = codes()
     for code in ("unknown-key", "file-missing", "measured-once", "behind-cameras", "marks-missing", "tag", "no-sigma"):

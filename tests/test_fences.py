@@ -43,6 +43,7 @@ def trespasses(root: Path) -> list[str]:
     return found
 
 
+@pytest.mark.slow
 def test_the_package_keeps_its_fences() -> None:
     assert trespasses(ROOT) == []
 

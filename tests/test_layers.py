@@ -90,6 +90,7 @@ def _circles(edges: Iterable[tuple[str, str]]) -> list[str]:
     return []
 
 
+@pytest.mark.slow
 def test_the_package_keeps_its_layers() -> None:
     assert len(modules()) > len(LAYERS)
     assert [found for found in violations(ROOT) if not found.startswith(UNDER_WORK)] == []

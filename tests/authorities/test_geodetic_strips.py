@@ -92,6 +92,7 @@ def test_the_strip_with_noise(frame: str, adjustment: str, degree: str, referenc
     assert azimuth == pytest.approx(vector("strip-geodetic-2").expected["A0_deg"], abs=0.001)
 
 
+@pytest.mark.slow
 @FRAMES
 def test_auto_is_not_worse_than_the_similarity(frame: str) -> None:
     auto, similarity = (

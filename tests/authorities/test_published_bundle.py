@@ -99,6 +99,7 @@ CALIBRATIONS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("wanted", "expected"), CALIBRATIONS)
 def test_a_joint_fit_of_the_apollo_camera(wanted: tuple[str, ...], expected: tuple[float, ...]) -> None:
     """Principal distance and point that another program fitted to the published points of the strip."""

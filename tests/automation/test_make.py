@@ -61,6 +61,7 @@ def listed(depfile: Path) -> set[str]:
     return {os.path.normpath(re.sub(r"\\(.)", r"\1", name)) for name in re.split(r"(?<!\\) ", rule)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("strip", "more"), [("a", set()), ("b", {"b/own.gtx"})], ids=["tables and presets", "a geoid grid"]
 )

@@ -295,6 +295,7 @@ def test_a_parcel_is_all_that_is_needed(tmp_path: Path, monkeypatch: pytest.Monk
     assert (there.files, there.inputs, there.outcome) == (here.files, here.inputs, here.outcome)
 
 
+@pytest.mark.slow
 def test_a_grid_travels_with_its_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (project,) = write_projects(tmp_path / "strips", 1)
     monkeypatch.chdir(tmp_path)
@@ -313,6 +314,7 @@ def test_a_grid_travels_with_its_project(tmp_path: Path, monkeypatch: pytest.Mon
     assert evaluate(Task(0, str(path))).outcome["status"] == "faulty"
 
 
+@pytest.mark.slow
 def test_a_parcel_of_a_project_that_cannot_be_read_is_refused(tmp_path: Path) -> None:
     (project,) = write_projects(tmp_path, 1)
     (tmp_path / "s1" / "control.csv").unlink()

@@ -63,6 +63,7 @@ def test_every_fault_takes_only_its_own_project_along(tmp_path: Path) -> None:
     assert outcomes["good1"].files == alone.files
 
 
+@pytest.mark.slow
 def test_a_worker_that_has_grown_is_replaced(tmp_path: Path) -> None:
     tasks = tasks_of(tmp_path, ["good1", "grow", "good2"])
     seen = []
@@ -92,6 +93,7 @@ def _alive(pid: int) -> bool:
     return True
 
 
+@pytest.mark.slow
 def test_workers_that_do_not_start_are_an_error_not_a_loop(tmp_path: Path) -> None:
     with (
         LocalPool(1, work="tests.batch.faulty:nothing") as pool,
@@ -101,6 +103,7 @@ def test_workers_that_do_not_start_are_an_error_not_a_loop(tmp_path: Path) -> No
     assert "has no attribute 'nothing'" in str(told.value)
 
 
+@pytest.mark.slow
 def test_too_little_memory_for_anything_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(WorkerProcess, "fate", lambda worker: worker.end() and 71)
     with (
@@ -111,6 +114,7 @@ def test_too_little_memory_for_anything_is_told(monkeypatch: pytest.MonkeyPatch,
     assert "no process of the batch starts with 3 MB" in str(told.value)
 
 
+@pytest.mark.slow
 def test_workers_compute_with_one_thread(tmp_path: Path) -> None:
     worker = WorkerProcess(1000.0)
     try:

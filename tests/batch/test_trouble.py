@@ -64,6 +64,7 @@ def full(monkeypatch: pytest.MonkeyPatch, full_for: str) -> None:
     monkeypatch.setattr(Path, "write_bytes", refused)
 
 
+@pytest.mark.slow
 def test_a_disk_that_is_full_for_a_while_costs_those_projects_only(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -91,6 +92,7 @@ def test_a_disk_that_stays_full_ends_the_batch(
     assert [path for path in (here / "out").rglob("*") if path.is_file()] == [here / "out" / ".batch.lock"]
 
 
+@pytest.mark.slow
 def test_an_earlier_result_survives_a_full_disk(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert main(["batch", "strips", "-o", "out", "-q"]) == 0
     before = {name: content for name, content in tree(here / "out").items() if "/" in name}
@@ -139,6 +141,7 @@ def test_inputs_that_may_not_be_read_in_the_middle(here: Path) -> None:
 # ------------------------------------------------------------------------------------------------ two at once
 
 
+@pytest.mark.slow
 def test_a_second_batch_on_the_same_folder_is_refused(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["batch", "strips", "-o", "out", "-q"]) == 0
     before = tree(here / "out")
@@ -182,6 +185,7 @@ def test_of_two_batches_started_together_one_works(here: Path) -> None:
     assert json.loads((here / "out" / "summary.json").read_text(encoding="utf-8"))["counts"] == {"good": 5}
 
 
+@pytest.mark.slow
 def test_a_summary_that_would_not_be_true_is_removed(here: Path) -> None:
     assert main(["batch", "strips", "-o", "out", "-q"]) == 0
     with opened(here / "out"):

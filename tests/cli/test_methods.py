@@ -25,6 +25,7 @@ def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, 
     return code, captured.out, captured.err
 
 
+@pytest.mark.slow
 def test_all_methods_stand_side_by_side(capsys: pytest.CaptureFixture[str]) -> None:
     code, out, _ = run(capsys, PROJECT, "--compare-methods", "--format", "json")
     document = json.loads(out)
@@ -38,6 +39,7 @@ def test_all_methods_stand_side_by_side(capsys: pytest.CaptureFixture[str]) -> N
     assert single["summary"]["check"]["plan"]["rms"] == rms["bundle"]
 
 
+@pytest.mark.slow
 def test_text_and_files(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     code, out, err = run(capsys, PROJECT, "--compare-methods", "-o", str(tmp_path / "out"))
     assert code == 0
@@ -84,6 +86,7 @@ def test_the_report_of_a_bundle(capsys: pytest.CaptureFixture[str], tmp_path: Pa
     assert len(rest) + 1 == document["counts"]["image_points_used"]
 
 
+@pytest.mark.slow
 def test_the_bundle_is_the_same_every_time(capsys: pytest.CaptureFixture[str]) -> None:
     first, second = (run(capsys, PROJECT, *BUNDLE, "--format", "json")[1] for _ in range(2))
     assert first == second
@@ -160,6 +163,7 @@ def simulated(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "project" / "project.yaml"
 
 
+@pytest.mark.slow
 def test_a_simulated_project_with_positions_from_end_to_end(
     simulated: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
@@ -180,6 +184,7 @@ def test_a_simulated_project_with_positions_from_end_to_end(
     assert again["points"] == document["points"]
 
 
+@pytest.mark.slow
 def test_the_photos_of_a_result_are_orientations(
     simulated: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:

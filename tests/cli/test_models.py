@@ -55,6 +55,7 @@ def test_a_changed_coordinate_is_seen_by_compare(project: Path) -> None:
     assert main(["compare", str(folder / "b" / "result.json"), str(folder / "a" / "result.json")]) == 1
 
 
+@pytest.mark.slow
 def test_batch_and_check_take_models(project: Path) -> None:
     assert main(["check", str(project)]) == 0
     assert main(["batch", str(project), "-o", str(project.parent / "all"), "-j", "1"]) == 0

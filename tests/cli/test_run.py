@@ -60,6 +60,7 @@ def test_the_files_of_the_result(result: Path) -> None:
     assert document["name"] == "small"
 
 
+@pytest.mark.slow
 def test_talk_goes_to_stderr(project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = run(capsys, "run", project, "-o", tmp_path / "out")
     assert code == 0
@@ -77,6 +78,7 @@ def test_quiet_prints_the_verdict(project: Path, tmp_path: Path, capsys: pytest.
     assert len(out.splitlines()) < 5
 
 
+@pytest.mark.slow
 def test_json_is_the_content_of_result_json(project: Path, result: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for quiet in ([], ["--quiet"]):
         code, out, _ = run(capsys, "run", project, "--format", "json", *quiet)
@@ -89,6 +91,7 @@ def test_markdown(project: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert out.startswith("# Accuracy report: small\n\n## Verdict\n\n**")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [60, 120])
 def test_the_width_is_respected(project: Path, width: int, capsys: pytest.CaptureFixture[str]) -> None:
     _, out, _ = run(capsys, "run", project, "--width", width)
@@ -109,6 +112,7 @@ def test_a_key_of_the_project_can_be_overridden(project: Path, capsys: pytest.Ca
 # -------------------------------------------------------------------------------------------------- exit codes
 
 
+@pytest.mark.slow
 def test_a_tolerance_that_is_not_kept_gives_1_and_the_whole_result(
     project: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -166,6 +170,7 @@ def test_weak_geometry_gives_3(tmp_path: Path, capsys: pytest.CaptureFixture[str
 # ----------------------------------------------------------------------------------------------- whole or not at all
 
 
+@pytest.mark.slow
 def test_two_runs_write_the_same_bytes_wherever_they_are(project: Path, result: Path, tmp_path: Path) -> None:
     """Other processes, another folder, another order of sets, another name of the folder of the project."""
     moved = tmp_path / "elsewhere"
@@ -182,6 +187,7 @@ def test_two_runs_write_the_same_bytes_wherever_they_are(project: Path, result: 
         assert str(tmp_path) not in (tmp_path / "again" / name).read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_a_run_that_fails_leaves_the_earlier_result(
     project: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -215,6 +221,7 @@ def test_the_rule_for_make_names_every_file_read(
 # ----------------------------------------------------------------------------------------------- photostrip report
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [[], ["--width", "60"], ["--format", "md"], ["--quiet"], ["--verbose"]])
 def test_report_prints_what_run_printed(
     project: Path, result: Path, options: list[str], capsys: pytest.CaptureFixture[str]
@@ -280,6 +287,7 @@ def test_report_needs_no_mathematics(result: Path) -> None:
     assert done.stderr.strip() == "set()"
 
 
+@pytest.mark.slow
 def test_ascii_terminals_get_ascii(project: Path, result: Path) -> None:
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
     for arguments in (["run", str(project)], ["report", str(result)], ["report", str(result), "--format", "md"]):

@@ -144,6 +144,7 @@ def test_a_shift_that_proj_knows_is_told_with_its_accuracy() -> None:
     )
 
 
+@pytest.mark.slow
 def test_all_points_of_a_datum_are_shifted_by_one_operation() -> None:
     """PROJ would take another one for a point in the North Sea than for a point in Spain, and tear a strip apart."""
     south, north = [[500000.0, 4510000.0, 0.0]], [[500000.0, 6010000.0, 0.0]]
@@ -299,6 +300,7 @@ def test_a_geoid_grid_under_feet(geoid: Path) -> None:
     assert given.ground_from_cartesian(xyz) == pytest.approx(UTM33 / foot, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_a_compound_crs_finds_its_grid_when_it_is_installed(tmp_path: Path) -> None:
     """EGM96 from a data directory, in a process of its own: PROJ remembers where it has looked."""
     write_gtx(tmp_path / "egm96_15.gtx", np.full((11, 11), 44.25), south=40.0, west=10.0, step=1.0)

@@ -158,6 +158,7 @@ def test_any_terrain_comes_back(terrain: Terrain) -> None:
     assert_exact(recovered(exact(Spec(terrain=terrain, flight=Flight(end_lap_percent=68.0)))))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "flight",
     [
@@ -285,6 +286,7 @@ def test_any_camera_comes_back(spec: Spec) -> None:
     assert_exact(recovered(exact(spec)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("tilt_deg", "left"), [(0.0, 0.02), (1.0, 0.5)])
 def test_refraction_is_taken_out(tilt_deg: float, left: float) -> None:
     """The correction takes photos as level and all heights as their mean: with tilts of a degree it leaves a part.
@@ -300,6 +302,7 @@ def test_refraction_is_taken_out(tilt_deg: float, left: float) -> None:
     assert corrected.centers < 0.05 * uncorrected.centers
 
 
+@pytest.mark.slow
 @hypothesis_settings(max_examples=40)
 @given(
     seed=st.integers(0, 10_000),
@@ -425,6 +428,7 @@ def test_image_noise_becomes_errors_of_its_size_no_more_and_no_less() -> None:
     assert 0.003 < float(np.sqrt((strip.of_photos.resection.residuals**2).mean())) < 0.008  # mm
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sigma_um", [0.05, 0.5, 20.0])
 def test_errors_are_proportional_to_the_noise(sigma_um: float) -> None:
     spec = strip_of(6, 3)
@@ -445,6 +449,7 @@ def test_relative_orientation_finds_the_noise() -> None:
     assert variance == pytest.approx(1.0, abs=3 * np.sqrt(2 / redundancy.sum()))
 
 
+@pytest.mark.slow
 def test_second_degree_takes_out_what_the_similarity_leaves() -> None:
     """Limits of ten models and three bands, in units of sigma at photo scale; floors at half of them."""
     found = rms(strip_of(10, 3), 12, "similarity", "2", "auto")
@@ -460,8 +465,9 @@ def test_second_degree_takes_out_what_the_similarity_leaves() -> None:
     ("bands", "degree", "limits"), [(3, "2", (4.8, 4.4, 9.2)), (4, "3", (2.9, 2.9, 5.9))], ids=["3 bands", "4 bands"]
 )
 def test_twenty_models_stay_within_their_limits(bands: int, degree: str, limits: Sequence[float]) -> None:
-    found = rms(strip_of(20, bands), 40, "similarity", degree, "auto")
-    assert (found[degree] < 1.1 * np.array(limits)).all()  # forty strips know their rms to 5 to 8 %
+    found = rms(strip_of(20, bands), 24, "similarity", degree, "auto")
+    # 24 strips know their rms to 6 to 10 %; benchmarks/accuracy.py takes more
+    assert (found[degree] < 1.1 * np.array(limits)).all()
     assert (found[degree] > 0.5 * np.array(limits)).all()
     assert (found["similarity"] > 1.5 * found[degree]).all()
     assert np.linalg.norm(found["auto"]) < 1.1 * np.linalg.norm(found[degree])
@@ -512,6 +518,7 @@ def moved(control: ControlPoints, shift: Floats) -> ControlPoints:
     return replace(control, enu=control.enu + np.where(control.check[:, None], shift, 0.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("curvature", ["auto", "model"])
 @pytest.mark.parametrize("change", ["wild", "slightly", "removed", "first", "plan only", "sure"])
 def test_a_check_point_never_influences_anything(change: str, curvature: str) -> None:
@@ -567,6 +574,7 @@ def coordinates(result: Result) -> dict[str, Floats]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_the_order_of_rows_and_ids_does_not_matter(seed: int) -> None:
     _, inputs = noisy_project()
@@ -577,6 +585,7 @@ def test_the_order_of_rows_and_ids_does_not_matter(seed: int) -> None:
         np.testing.assert_allclose(mixed[name], values, rtol=0, atol=MICRON, err_msg=name)
 
 
+@pytest.mark.slow
 def test_names_do_not_matter() -> None:
     _, inputs = noisy_project()
     names = {name: f"{n * 7919 % 100_003:05d}" for n, name in enumerate(inputs.observations.point_ids)}
@@ -590,6 +599,7 @@ def test_names_do_not_matter() -> None:
         np.testing.assert_array_equal(values, after[name], err_msg=name)
 
 
+@pytest.mark.slow
 def test_twice_is_the_same() -> None:
     _, inputs = noisy_project()
     first, second = (triangulate(inputs, Settings()) for _ in range(2))

@@ -127,6 +127,7 @@ def differences(found: Result, *, check: bool) -> Floats:
 # --------------------------------------------------------------------------------------------------- all samples
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SAMPLES)
 def test_the_command_adjusts_a_sample(name: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     assert main(["run", str(DATA / name / "project.yaml"), "-o", str(tmp_path)]) == 0
@@ -201,6 +202,7 @@ def changes(before: Any, now: Any, path: str = "") -> Iterator[str]:  # noqa: AN
         yield f"{path}: {now!r}, {before!r} before"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SAMPLES)
 def test_a_sample_gives_what_it_gave_before(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
@@ -315,6 +317,7 @@ def test_lunar_pairs_fit_as_others_found() -> None:
     assert size == pytest.approx(128.0, abs=0.5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("screening", ["auto", "parallax+grubbs", "tau", "deletion", "robust"])
 def test_the_lunar_outlier_is_found_and_nothing_else(screening: str) -> None:
     document = document_of(apollo(screening=screening, free=False))
@@ -393,6 +396,7 @@ def on_a_plane(radius: float | None = None) -> tuple[Floats, Floats, Result]:
     return ground, found.control_differences, found
 
 
+@pytest.mark.slow
 def test_a_flat_moon_is_wrong_by_kilometres() -> None:
     ground, flat, found = on_a_plane()
     check = found.inputs.control.check & ~np.isnan(flat[:, 2])
@@ -407,6 +411,7 @@ def test_a_flat_moon_is_wrong_by_kilometres() -> None:
     assert rms(flat[check, 2] - expected[check]) < 0.1 * rms(expected[check])
 
 
+@pytest.mark.slow
 def test_the_curvature_formula_needs_the_radius_of_the_moon() -> None:
     _, flat, found = on_a_plane()
     _, right, _ = on_a_plane(MOON)

@@ -77,6 +77,7 @@ def cubic_columns(xyz: Floats) -> Floats:
     return np.column_stack([np.ones(len(x)), x, y, x * y, x**2, x**3])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_six_points_fit_a_cubic_perfectly_and_say_nothing_between(seed: int) -> None:
     """The trap itself: six unknowns, six equations, no residual, metres to hundreds of metres of error between."""
@@ -93,6 +94,7 @@ def test_six_points_fit_a_cubic_perfectly_and_say_nothing_between(seed: int) -> 
     assert np.abs(bent).max() > 5.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_stations_count_not_points(seed: int) -> None:
     done, inputs = six_points(seed)
@@ -108,6 +110,7 @@ def test_stations_count_not_points(seed: int) -> None:
     assert np.abs(errors(done, triangulate(inputs, degree("auto")))).max() < 2.0
 
 
+@pytest.mark.slow
 def test_four_stations_carry_a_cubic() -> None:
     done = simulate(Spec(flight=Flight(photos=21, end_lap_percent=62.0), control=Control(bands=4, per_band=2)))
     result = triangulate(inputs_of(done), degree("3"))
@@ -149,6 +152,7 @@ def corrected_in(azimuth: float, strip: StripResult, result: Result) -> tuple[Fl
     return frame.cartesian_from_intermediate(found(xyz)), found
 
 
+@pytest.mark.slow
 def test_an_x_axis_along_the_meridian_spoils_the_polynomial_of_an_east_west_strip() -> None:
     done, strip, result = east_west_strip()
     truth = done.truth.points.xyz[strip.formed.point]
@@ -213,6 +217,7 @@ def test_the_square_term_hides_most_of_the_curvature(plane_map: tuple[Simulation
     assert abs(bulge) == pytest.approx(along**2 / (2 * 6_371_000.0), rel=0.02)  # the coefficient is the Earth's radius
 
 
+@pytest.mark.slow
 def test_the_correction_before_and_after_leaves_a_centimetre(plane_map: tuple[Simulation, Inputs, Floats]) -> None:
     """Theory: 0.008 m, from the mean radius instead of that in the direction of the strip."""
     model = height_rms(plane_map, replace(PLANE_MAP, adjustment="similarity"))
@@ -221,6 +226,7 @@ def test_the_correction_before_and_after_leaves_a_centimetre(plane_map: tuple[Si
     assert model < height_rms(plane_map, degree("2"))
 
 
+@pytest.mark.slow
 def test_the_correction_in_the_images_does_the_same_photo_by_photo(
     plane_map: tuple[Simulation, Inputs, Floats],
 ) -> None:
@@ -366,6 +372,7 @@ def test_photos_that_see_no_control_are_carried_by_the_strip() -> None:
 # -------------------------------------------------------------------------------- what polynomials are not made for
 
 
+@pytest.mark.slow
 def test_points_beyond_the_control_are_warned_of() -> None:
     """Control in the first three fifths only: a cubic runs away where it is not held, and the report says so."""
     squares: dict[str, list[float]] = {"similarity": [], "3": [], "inside": []}

@@ -12,6 +12,7 @@ from photostrip.pipeline import triangulate
 from photostrip.simulate import Control, Flight, Spec, simulate
 
 
+@pytest.mark.slow
 def test_control_across_a_very_long_strip_is_no_line() -> None:
     """900 km long and 2 km wide: the control spans the width, which is all that the roll needs."""
     done = simulate(Spec(flight=Flight(photos=1000), control=Control(bands=50)))

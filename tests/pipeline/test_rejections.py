@@ -106,12 +106,14 @@ def test_there_is_something_to_reject() -> None:
     assert blamed <= injected  # nobody else is blamed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
 def test_the_order_of_rows_does_not_decide(seed: int) -> None:
     inputs = inputs_of(flown())
     assert rejected(shuffled(inputs, seed)) == rejected(inputs)
 
 
+@pytest.mark.slow
 def test_names_do_not_decide() -> None:
     inputs, old = renamed(inputs_of(flown()))
     columns = ("photo", "other_photo", "point", "blamed")

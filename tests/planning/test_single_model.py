@@ -314,6 +314,7 @@ def _parallaxes(six: Floats, elements: Floats) -> Floats:
     return parallax
 
 
+@pytest.mark.slow
 def test_expected_errors_against_the_exact_chain() -> None:
     at_control, elsewhere = oriented_errors(1500)
     level = control_at(CORNERS, F)
@@ -362,6 +363,7 @@ def test_adjusting_the_elements_is_generalised_least_squares_and_never_worse() -
     assert np.all(np.diagonal(at_control, axis1=1, axis2=2) < np.diagonal(as_new, axis1=1, axis2=2))
 
 
+@pytest.mark.slow
 def test_covariance_of_the_adjusted_model_is_its_scatter() -> None:
     rng = np.random.default_rng(8)
     xy = np.vstack([CORNERS, [[10.0, -20.0], [55.0, 30.0]]])

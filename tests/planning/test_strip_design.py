@@ -249,6 +249,7 @@ def test_the_number_of_bands_is_the_least(method: str) -> None:
         assert found is None or not required.met(worst(found))
 
 
+@pytest.mark.slow
 def test_steps_over_many_bands_leave_none_out() -> None:
     strip = strip_of(40)
     required = Required(0.0945)
@@ -267,6 +268,7 @@ def test_an_accuracy_that_no_control_gives() -> None:
     assert Required().met((1e9, 1e9))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "count"), [(SIMILARITY, 2), ("degree 2", 2), (BUNDLE, 1)])
 def test_the_search_finds_the_very_best_places_of_a_small_strip(method: str, count: int) -> None:
     strip = strip_of(7)
@@ -284,6 +286,7 @@ def test_the_search_finds_the_very_best_places_of_a_small_strip(method: str, cou
     assert max(placed.found) >= min(every) - 1e-12
 
 
+@pytest.mark.slow
 def test_the_search_beats_equal_spacing_or_says_that_it_cannot() -> None:
     strip = strip_of(9)
     gains = []

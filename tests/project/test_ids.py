@@ -107,6 +107,7 @@ def check(project: Project, photos: list[str], points: list[str], names: list[st
     assert inputs.control.ids == tuple(points)
 
 
+@pytest.mark.slow
 @given(
     photos=st.lists(ids, min_size=2, max_size=5, unique=True),
     points=st.lists(ids, min_size=1, max_size=5, unique=True),

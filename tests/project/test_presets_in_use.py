@@ -12,6 +12,7 @@ def test_every_preset_is_tried() -> None:
     assert sorted(presets.KINDS) == sorted(path.stem for path in (ROOT / "configs").glob("*.yaml"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("preset", ["film-archive", "film-mapping", "digital-frame", "uav-corridor", "teaching"])
 def test_a_preset_does_what_it_is_made_for(preset: str) -> None:
     found = presets.outcome(preset, 1)

@@ -193,11 +193,13 @@ def worst_reprojection(found: Case) -> float:
     return worst
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frame", FRAMES)
 def test_points_project_through_the_photos_to_where_they_were_measured(frame: str) -> None:
     assert worst_reprojection(case(frame)) < MICROMETRE_STEP
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("crs", "axes"),
     [
@@ -689,6 +691,7 @@ def test_wrong_control_is_worth_a_look() -> None:
     assert summary["control"]["normalised"] < 5
 
 
+@pytest.mark.slow
 def test_coordinates_worse_than_stated_are_worth_a_look() -> None:
     inputs = case("projected", 2).inputs
     o = inputs.observations

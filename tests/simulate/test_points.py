@@ -20,6 +20,7 @@ def photos_of(done: Simulation) -> list[set[int]]:
     return [set(observations.point[observations.photo == k].tolist()) for k in range(len(observations.photo_ids))]
 
 
+@pytest.mark.slow
 @hypothesis_settings(max_examples=60)
 @given(
     seed=st.integers(0, 10_000),

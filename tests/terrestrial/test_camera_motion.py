@@ -87,6 +87,7 @@ def test_two_points_in_one_place_do_not_determine_a_turn() -> None:
     assert fit(pair((0, 0, 0), places=PLACES[[0, 0]]), np.ones(2, bool)) is None
 
 
+@pytest.mark.slow
 def test_precision_and_test_value_are_those_of_repeated_measurements() -> None:
     turn, runs = (40 * ARCSECOND, -25 * ARCSECOND, 60 * ARCSECOND), 600
     found = [fit(pair(turn, seed), ALL) for seed in range(runs)]
@@ -138,6 +139,7 @@ def test_a_stable_point_that_moved_is_found(point: int, turn: tuple[float, float
     assert np.abs((motion.turns[0].values - turn) / motion.turns[0].sigma).max() < 4
 
 
+@pytest.mark.slow
 def test_clean_stable_points_are_kept() -> None:
     lost = [bool(find_motion(pair((0, 0, 0), seed), pair((0, 0, 0), 1000 + seed)).rejected) for seed in range(300)]
     assert 0 < sum(lost) < 10  # 1 % of 300 is 3

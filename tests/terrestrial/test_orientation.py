@@ -146,6 +146,7 @@ def test_the_estimate_is_that_of_a_full_adjustment(free: tuple[str, ...]) -> Non
     assert 2 * solved.cost == pytest.approx(found.weighted_sum, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_stated_precision_is_the_scatter_of_repeated_measurements() -> None:
     angles, runs = (1.2, 0.25, -0.15), 300
     truth = np.array([*angles, F, *CENTRE])
@@ -163,6 +164,7 @@ def test_stated_precision_is_the_scatter_of_repeated_measurements() -> None:
 # ----------------------------------------------------------------------------------------------------- screening
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "low", "high"), [("deletion", 0.02, 0.08), ("stated", 0.02, 0.08)])
 def test_clean_photos_lose_points_as_rarely_as_stated(method: str, low: float, high: float) -> None:
     settings = OrientationSettings(("principal-distance",), method)

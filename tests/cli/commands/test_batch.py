@@ -39,6 +39,7 @@ def spoil(project: Path) -> None:
     (project / "observations.csv").unlink()
 
 
+@pytest.mark.slow
 def test_every_project_gets_the_result_that_run_gives(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["batch", "strips", "-o", "out", "-j", "2"]) == 0
     captured = capsys.readouterr()
@@ -131,6 +132,7 @@ def computed(text: str) -> set[str]:
     return {line.split("/")[1] for line in lines if not line.endswith(", unchanged")}
 
 
+@pytest.mark.slow
 def test_only_what_changed_is_computed_again(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     batch = ["batch", "strips", "-o", "out"]
     assert main(batch) == 0
@@ -149,6 +151,7 @@ def test_only_what_changed_is_computed_again(here: Path, capsys: pytest.CaptureF
     assert computed(capsys.readouterr().err) == {"s1", "s2", "s3"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", ["cut", "edited", "removed", "record"])
 def test_a_result_that_is_not_as_it_was_written_is_computed_again(
     here: Path, capsys: pytest.CaptureFixture[str], damage: str
@@ -168,6 +171,7 @@ def test_a_result_that_is_not_as_it_was_written_is_computed_again(
     assert tree(here / "out") == before
 
 
+@pytest.mark.slow
 def test_a_file_that_two_projects_share_changes_both(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     shared = here / "preset.yaml"
     shared.write_text("processing: {relative: {grubbs_alpha: 0.05}}\n", encoding="utf-8")
@@ -196,6 +200,7 @@ def test_a_grid_file_that_appears_changes_its_project(here: Path, capsys: pytest
     assert computed(capsys.readouterr().err) == {"s1"}
 
 
+@pytest.mark.slow
 def test_a_result_stays_when_its_project_fails_later(here: Path) -> None:
     assert main(["batch", "strips", "-o", "out", "--quiet"]) == 0
     before = tree(here / "out" / "s2")
@@ -206,6 +211,7 @@ def test_a_result_stays_when_its_project_fails_later(here: Path) -> None:
     assert summary["projects"][1]["output"] is None
 
 
+@pytest.mark.slow
 def test_a_result_of_another_project_is_not_replaced(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_projects(here / "others", 2)
     assert main(["batch", "strips/s1", "-o", "out", "--quiet"]) == 0
@@ -220,6 +226,7 @@ def test_a_result_of_another_project_is_not_replaced(here: Path, capsys: pytest.
     assert main(["batch", "others", "-o", "out", "--quiet", "--force"]) == 0
 
 
+@pytest.mark.slow
 def test_projects_may_move_together_with_their_results(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["batch", "strips", "-o", "out"]) == 0
     (here / "archive").mkdir()
@@ -276,6 +283,7 @@ def test_wrong_usage_is_told_in_the_form_that_was_asked_for(capsys: pytest.Captu
     assert "no project fits this pattern" in captured.err
 
 
+@pytest.mark.slow
 def test_a_project_that_is_not_there_is_a_fault_among_others(here: Path) -> None:
     done = run(here, "strips/s1", "strips/s9/project.yaml", "--format", "csv", "--quiet")
     assert done.returncode == 2

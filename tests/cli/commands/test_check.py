@@ -277,6 +277,7 @@ def test_weak_geometry_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert document["findings"][0]["photos"] == ["1001", "1002"]
 
 
+@pytest.mark.slow
 def test_notes_of_a_run_know_their_place(tmp_path: Path, project: Path, capsys: pytest.CaptureFixture[str]) -> None:
     import shutil
 
@@ -297,6 +298,7 @@ def test_notes_of_a_run_know_their_place(tmp_path: Path, project: Path, capsys: 
 # ----------------------------------------------------------------------------------------- the environment
 
 
+@pytest.mark.slow
 def test_variables_stand_in_for_options(
     project: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -203,6 +203,7 @@ def test_a_strip_from_options_and_from_a_file(capsys: pytest.CaptureFixture[str]
     assert {row["method"] for row in document["needed"]} == {"similarity", "degree 2"}
 
 
+@pytest.mark.slow
 def test_the_report_of_a_strip(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     file = tmp_path / "s.yaml"
     file.write_text(STRIP)

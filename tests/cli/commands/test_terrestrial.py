@@ -294,6 +294,7 @@ def test_results_stand_in_the_order_of_the_axes(tmp_path: Path, capsys: pytest.C
         assert d["covariance"] == [yy, xy, yz, xx, xz, zz]
 
 
+@pytest.mark.slow
 def test_files_are_written_and_the_same_every_time(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     survey = write(tmp_path)
     seen = []
@@ -313,6 +314,7 @@ def test_files_are_written_and_the_same_every_time(tmp_path: Path, capsys: pytes
     assert not re.search(rb"\de[+-]?\d", files["displacements.csv"])  # no exponents
 
 
+@pytest.mark.slow
 def test_output_does_not_depend_on_the_process(tmp_path: Path) -> None:
     survey = write(tmp_path)
     seen = set()
@@ -387,6 +389,7 @@ def texts(svg: bytes) -> str:
     return " ".join(" ".join(each.itertext()) for each in root.iter("{http://www.w3.org/2000/svg}text"))
 
 
+@pytest.mark.slow
 def test_pictures_are_svg_with_the_numbers_of_the_document(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     plot = tmp_path / "p.svg"
     assert call(capsys, "directions", "accuracy", *UMK, "--plot", plot)[0] == 0
@@ -419,6 +422,7 @@ def test_without_matplotlib_the_extra_is_named(
     assert err == ("error: --plot: pictures need matplotlib, which is not installed; pip install photostrip[report]\n")
 
 
+@pytest.mark.slow
 def test_nothing_but_a_picture_loads_matplotlib(tmp_path: Path) -> None:
     code = (
         "import sys\nfrom photostrip.cli.main import main\n"

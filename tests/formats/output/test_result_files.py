@@ -83,6 +83,7 @@ def test_every_record_stands_on_a_line_of_its_own() -> None:
             assert json.loads(lines[number].removesuffix(",")) == record
 
 
+@pytest.mark.slow
 def test_two_runs_write_the_same_bytes() -> None:
     """In processes of their own, with different orders of sets and dictionaries of texts."""
     code = (

@@ -275,6 +275,7 @@ def test_numbers_have_fixed_decimals() -> None:
     assert "-0.0000" not in "".join(files.values())
 
 
+@pytest.mark.slow
 def test_the_same_specification_gives_the_same_bytes() -> None:
     code = (
         "import hashlib\n"

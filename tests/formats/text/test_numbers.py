@@ -75,6 +75,7 @@ cells = st.one_of(
 )
 
 
+@pytest.mark.slow
 @given(st.lists(cells, min_size=1, max_size=4))
 @example(["1_0"])
 @example(["\u0663"])

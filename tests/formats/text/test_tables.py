@@ -66,6 +66,7 @@ def test_ten_thousand_rows_of_several_chunks(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read.table.lines, np.arange(n) + 2)
 
 
+@pytest.mark.slow
 def test_memory_is_a_few_times_the_file(tmp_path: Path) -> None:
     text = HEADER + "".join(f"{i // 100},P{i:08d},{i / 1000:.4f},{-i / 1000:.4f}\n" for i in range(60_000))
     path = write(tmp_path / "o.csv", text)

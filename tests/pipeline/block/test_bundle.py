@@ -48,6 +48,7 @@ EXACT_BLOCKS = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("title", EXACT_BLOCKS)
 def test_without_noise_the_truth_comes_back(title: str) -> None:
     simulation = simulate(EXACT_BLOCKS[title])
@@ -83,6 +84,7 @@ TIED: dict[str, Callable[[Simulation], Inputs]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("title", TIED)
 def test_whatever_ties_the_photos_to_the_ground(title: str) -> None:
     simulation = simulate(BLOCK)
@@ -186,6 +188,7 @@ def test_a_strip_apart_is_named() -> None:
         adjusted(simulation, replace(with_control(simulation, names), observations=cut))
 
 
+@pytest.mark.slow
 def test_check_points_do_not_influence_a_bundle() -> None:
     simulation = simulate(Spec(flight=Flight(photos=6, strips=2)))
     inputs = inputs_of(simulation)
@@ -196,6 +199,7 @@ def test_check_points_do_not_influence_a_bundle() -> None:
     assert np.array_equal(results[0].points.cartesian, results[1].points.cartesian)
 
 
+@pytest.mark.slow
 def test_sigma0_and_precision_are_those_of_the_noise() -> None:
     """Errors in units of the stated precision, over blocks of 200 points; limits on both sides."""
     ratios, sigma0, squares = [], [], []

@@ -33,6 +33,7 @@ def rays_of(result: Result) -> set[tuple[str, str]]:
     return {(seen.photo_ids[seen.photo[r]], seen.point_ids[seen.point[r]]) for r in rows.tolist()}
 
 
+@pytest.mark.slow
 def test_gross_errors_are_found_and_named() -> None:
     spec = replace(BLOCK, gross_errors=(GrossError("image", count=12, size_um=150.0, axis="y"),))
     simulation = simulate(spec)
@@ -49,6 +50,7 @@ def test_gross_errors_are_found_and_named() -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_size_of_an_error_is_estimated() -> None:
     simulation = simulate(BLOCK)
     inputs = inputs_of(simulation)
@@ -68,6 +70,7 @@ def test_the_size_of_an_error_is_estimated() -> None:
     assert told[0]["size_unit"] == "um"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["snooping", "robust"])
 def test_many_errors_at_once(method: str) -> None:
     spec = replace(BLOCK, gross_errors=(GrossError("image", count=30, size_um=400.0, axis="y"),))
@@ -108,6 +111,7 @@ def test_a_wrong_camera_position_is_named() -> None:
     assert "+2." in told[0].message or "+1.9" in told[0].message
 
 
+@pytest.mark.slow
 def test_good_measurements_stay() -> None:
     """Without gross errors about one ray in five hundred goes, as two tests of level 0.001 each let expect."""
     out = total = 0

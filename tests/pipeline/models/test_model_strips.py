@@ -160,6 +160,7 @@ def nodes_of(measured: ModelPoints) -> FormedModels:
     return form_models(strip, measured, Settings(links=link_screening.LinkSettings("none")))
 
 
+@pytest.mark.slow
 def test_covariances_are_those_of_a_numerical_jacobian() -> None:
     given = truth(4, 3, 6)
     rng = np.random.default_rng(1)
@@ -223,6 +224,7 @@ def straight(adjustment: str) -> Settings:
     )
 
 
+@pytest.mark.slow
 def test_the_whole_chain_agrees_with_differences() -> None:
     """Links, similarity, polynomial and centres: model coordinates and control moved one by one."""
     given, rng = truth(2, 3, 1), np.random.default_rng(5)
@@ -295,6 +297,7 @@ def test_standard_deviations_are_the_scatter_of_repetitions() -> None:
         assert ratio.max() < 1.10
 
 
+@pytest.mark.slow
 def test_check_points_lie_within_what_is_stated() -> None:
     squares = coordinates = 0.0
     for seed in range(12):

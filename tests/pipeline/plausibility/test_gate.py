@@ -98,6 +98,7 @@ def test_a_sound_project_has_no_finding(frame: str) -> None:
     assert gate.of_inputs(inputs_of(made), settings_of(made)) == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "spec",
     [
@@ -155,6 +156,7 @@ def test_latitude_and_longitude_exchanged() -> None:
     assert finding.code == "P401"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("foot", [FOOT, 1200 / 3937])
 def test_projected_control_in_feet(foot: float) -> None:
     (finding,) = told(with_control(inputs_of(simulation("utm")), lambda enu: enu / foot))
@@ -181,6 +183,7 @@ def test_heights_that_count_downwards() -> None:
     assert "downwards" in finding.message
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [1.37, 0.73])
 def test_the_principal_distance_of_another_lens(factor: float) -> None:
     inputs = inputs_of(simulation("utm"))
@@ -205,6 +208,7 @@ def second_list(inputs: Inputs, change: Callable[[Floats], Floats]) -> tuple[Inp
     return replace(inputs, control=control, frames=inputs.frames * 2), names
 
 
+@pytest.mark.slow
 def test_heights_of_two_kinds() -> None:
     wrong, names = second_list(inputs_of(simulation("utm")), lambda enu: enu + np.array([0.0, 0.0, 47.3]))
     (finding,) = told(wrong)
@@ -244,6 +248,7 @@ def test_a_slip_of_a_digit_is_named_with_the_digit(axis: int, step: float, role:
     assert finding.evidence["would_fit"] == pytest.approx(inputs.control.enu[row, axis], abs=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "name", "ray"), [(0, "G03", 0), (2, "G09", 1)])
 def test_a_wrong_image_coordinate_is_no_slip_of_a_digit(seed: int, name: str, ray: int) -> None:
     flown = Flight(photos=5, end_lap_percent=64.0)
@@ -259,6 +264,7 @@ def test_a_wrong_image_coordinate_is_no_slip_of_a_digit(seed: int, name: str, ra
     assert "P406" in codes(told(slipped))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", [2000.0, 7000.0, 30000.0])
 def test_a_height_above_the_cameras_is_a_slip_all_the_same(step: float) -> None:
     inputs = inputs_of(simulation("utm"))
@@ -324,6 +330,7 @@ def four_faults(folder: Path, frame: str) -> tuple[Path, str]:
     return folder / "project.yaml", name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frame", ["local", "utm"])
 def test_four_mistakes_at_once_are_all_told(frame: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     project, name = four_faults(tmp_path, frame)
@@ -340,6 +347,7 @@ def test_four_mistakes_at_once_are_all_told(frame: str, tmp_path: Path, capsys: 
     assert {"P101", "P201", "P401", "P406"} <= checked
 
 
+@pytest.mark.slow
 def test_findings_are_told_in_every_form(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     project, _ = four_faults(tmp_path, "utm")
     assert main(["run", str(project), "--format", "github"]) in {2, 3}
@@ -382,6 +390,7 @@ def test_a_finding_that_does_not_exist_cannot_be_accepted(tmp_path: Path, capsys
     assert "there is no finding `P999`" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_an_error_fails_a_run_that_is_done(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made = simulation("local")
     files = project_files(made)
@@ -488,6 +497,7 @@ def test_given_positions_of_other_photos() -> None:
     assert {each.key for each in findings} == {"camera_positions"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("observed", [False, True])
 @pytest.mark.parametrize(
     ("read", "code"), [([1, 1, 1], None), ([200 / 180] * 3, "P601"), ([np.pi / 180] * 3, "P601"), ([1, 1, -1], "P602")]

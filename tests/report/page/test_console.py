@@ -82,6 +82,7 @@ def test_the_width_is_that_of_the_terminal(columns: str, width: int, monkeypatch
     assert page_width() == width
 
 
+@pytest.mark.slow
 def test_rich_is_not_loaded_for_a_pipe() -> None:
     code = (
         "import sys\nfrom tests.reports import *\nfrom photostrip.report.page.console import print_report\n"

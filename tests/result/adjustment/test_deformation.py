@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pytest
 
 from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline import triangulate
@@ -52,6 +53,7 @@ def documents(result: Result) -> list[dict[str, Any]]:
     return found
 
 
+@pytest.mark.slow
 def test_models_without_deformation_rarely_seem_deformed() -> None:
     t = np.array([model.surface.t_values for seed in range(30) for model in _deformations(run(seed))])
     assert len(t) > 80
@@ -79,6 +81,7 @@ def test_a_twisted_photo_shows_in_its_models() -> None:
     assert any("2 of them deformed" in part.text for s in text for part in s.parts if hasattr(part, "text"))
 
 
+@pytest.mark.slow
 def test_check_points_take_no_part_and_thin_control_gives_none() -> None:
     result = run()
     used = {name for row in documents(result) for name in row["points"]}

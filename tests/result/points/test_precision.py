@@ -92,6 +92,7 @@ def test_an_unknown_system_of_angles_is_refused() -> None:
         angle_rates([0.0, 0.0, 0.0], "roll-pitch-yaw")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("frame", ["north first", "geocentric"])
 def test_photo_covariances_are_those_of_turned_photos(frame: str) -> None:
     """Photos moved and turned by random amounts of the given covariance scatter as the file says."""

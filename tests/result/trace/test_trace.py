@@ -189,6 +189,7 @@ def test_every_symbol_is_explained() -> None:
     assert {"q", "N", "k", "[wqq]", "[wvv]"} <= {name.split(",")[0] for name in SYMBOLS}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", ["txt", "md", "json"])
 def test_the_preset_for_teaching_gives_a_trace_in_gon(tmp_path: Path, ending: str) -> None:
     project = write_project(tmp_path, spec(), f"extends: {ROOT / 'configs/teaching.yaml'}\n")

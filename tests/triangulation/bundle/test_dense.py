@@ -132,6 +132,7 @@ def test_estimate_and_cofactors_are_those_of_a_dense_adjustment(name: str) -> No
         np.testing.assert_allclose(scaled, mixed, atol=SAME)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_redundancy_numbers_are_those_of_a_dense_adjustment(name: str) -> None:
     problem = PROBLEMS[name]()

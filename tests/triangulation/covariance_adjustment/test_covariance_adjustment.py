@@ -156,6 +156,7 @@ def formed_from_what_is_taken_for_true(result: Result) -> Floats:
     return triangulate(again, SIMILARITY).points.cartesian
 
 
+@pytest.mark.slow
 def test_passes_go_on_until_nothing_is_left_to_be_linear(monkeypatch: pytest.MonkeyPatch) -> None:
     """The strip formed from what the adjustment takes for true is the adjusted strip; after one pass it is not."""
     inputs = bent(20, 0.2)
@@ -206,6 +207,7 @@ def adjusted(seed: int, *, wrong: float = 0.0, axis: int = 2) -> tuple[StripResu
     return triangulate(changed, COVARIANCE).strips[0], control.ids[row]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("axis", "size"), [(0, 1.0), (1, -1.0), (2, 1.5)])
 def test_a_wrong_control_point_is_named(axis: int, size: float) -> None:
     """And the error is estimated; without it no point is named."""
@@ -232,6 +234,7 @@ def test_sums_of_squares_follow_chi_square() -> None:
     assert np.sqrt(np.mean(values**2)) == pytest.approx(1.0, abs=0.06)
 
 
+@pytest.mark.slow
 def test_coordinates_worse_than_stated_are_told() -> None:
     """A lens that distorts is in no covariance: the test of the whole fails."""
     inputs = without_noise(spec(12, bands=5))

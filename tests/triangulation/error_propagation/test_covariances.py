@@ -44,6 +44,7 @@ CASES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("adjustment", "lap", "transfer", "use"), CASES)
 def test_derivatives_are_those_of_the_whole_run(
     adjustment: str, lap: float, transfer: str, use: dict[str, float] | None
@@ -69,6 +70,7 @@ def test_derivatives_are_those_of_the_whole_run(
             assert photos[:, part, column] / sigma == pytest.approx(expected, abs=close)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("adjustment", "use"), [("similarity", MIXED), ("3", None), ("1", MIXED)])
 def test_the_fit_passes_on_errors_of_the_control(adjustment: str, use: dict[str, float] | None) -> None:
     inputs, wanted = without_noise(spec(7, use=use)), settings(adjustment)
@@ -135,6 +137,7 @@ def test_a_photo_goes_where_all_its_points_go() -> None:
     assert found.photos.by_similarity[:, 3:, [0, 1, 2, 6]] == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("adjustment", ["similarity", "covariance"])
 def test_points_without_a_model_have_rows_too(adjustment: str) -> None:
     """A point whose middle measurement is wrong is placed by the outer two; its derivatives against differences."""

@@ -115,6 +115,7 @@ def test_every_correction_has_its_inverse(camera: Camera, image: Floats, constan
     assert np.abs(again - ideal).max() < PICOMETRE
 
 
+@pytest.mark.slow
 @given(cameras, image_points)
 def test_a_table_of_points_is_refined_as_its_camera_alone(camera: Camera, image: Floats) -> None:
     settings = ImageCorrectionSettings(refraction=True, flying_height=3000.0, ground_height=200.0)

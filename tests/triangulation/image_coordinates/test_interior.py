@@ -355,6 +355,7 @@ def test_one_photo_mirrored_against_the_others_is_refused(majority: bool) -> Non
 # ------------------------------------------------------------------------------------------- wrong numbers
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("camera", CAMERAS)
 @pytest.mark.parametrize("mirrored", [False, True])
 @given(seed=SEEDS)
@@ -384,6 +385,7 @@ def test_exchanged_marks_of_one_single_photo_are_found_where_the_pattern_shows_t
             assert f"with {a} and {b} exchanged" in message
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("camera", CAMERAS)
 @given(seed=SEEDS)
 def test_a_mark_with_the_number_of_one_not_measured_is_found(camera: Camera, seed: int) -> None:
@@ -395,6 +397,7 @@ def test_a_mark_with_the_number_of_one_not_measured_is_found(camera: Camera, see
     assert f"with {wrong} called {missing}" in message
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("camera", CAMERAS)
 @given(seed=SEEDS)
 def test_a_point_taken_for_a_mark_is_found(camera: Camera, seed: int) -> None:

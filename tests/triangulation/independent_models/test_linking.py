@@ -215,6 +215,7 @@ def test_a_mirrored_model_is_named(models: tuple[str, ...]) -> None:
     assert ", ".join(models) in told.value.faults[0].message
 
 
+@pytest.mark.slow
 def test_detectable_errors_are_found_in_four_of_five_cases() -> None:
     true = truth(1 + 1, 4, 3)
     rng, found, cases = np.random.default_rng(4), 0, 150

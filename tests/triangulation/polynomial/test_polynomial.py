@@ -115,6 +115,7 @@ def test_all_examples_are_here() -> None:
 # ------------------------------------------------------------------------------------ back to the truth
 
 
+@pytest.mark.slow
 @given(SEEDS)
 @examples(max_examples=40)
 def test_coefficients_of_a_deformation_come_back(seed: int) -> None:
@@ -139,6 +140,7 @@ def polynomial_scales(xyz: Floats) -> Floats:
     return np.array([1, reach, BREADTH, reach * BREADTH, reach**2, reach**3])
 
 
+@pytest.mark.slow
 @given(SEEDS)
 @examples(max_examples=40)
 def test_the_fit_is_weighted_least_squares(seed: int) -> None:
@@ -155,6 +157,7 @@ def test_the_fit_is_weighted_least_squares(seed: int) -> None:
         assert np.allclose(axis.residuals, (xyz - given_)[:, number] + design @ theirs, rtol=0, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_standard_deviations_are_those_of_the_errors() -> None:
     rng, xyz, errors, sigmas = np.random.default_rng(3), layout(SEVEN), [], []
     for _ in range(100):
@@ -258,6 +261,7 @@ def noisy(seed: int, deformation: Floats, xyz: Floats, sigma: float = 0.05) -> F
     return problem(Similarity.from_points(xyz, given_)(xyz), given_, sigma=sigma)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("power", "degree"), [(2, 2), (3, 3)])
 def test_a_deformation_asks_for_its_degree(power: int, degree: int) -> None:
     xyz = layout(SEVEN)
@@ -274,6 +278,7 @@ def test_an_affine_deformation_asks_for_the_first_degree() -> None:
     assert degrees.count(1) >= 18
 
 
+@pytest.mark.slow
 def test_without_deformation_the_similarity_is_kept_as_often_as_the_tests_say() -> None:
     xyz = layout(SEVEN)
     degrees = np.array([fit(noisy(seed, 0 * xyz, xyz), PolynomialSettings()).degree for seed in range(120)])
@@ -356,6 +361,7 @@ def test_points_left_out_in_closed_form_are_refitted(seed: int) -> None:
             assert evidence.left_out == pytest.approx(left_out_by_refitting(one, terms, axes, single), rel=1e-6)
 
 
+@pytest.mark.slow
 @given(SEEDS, st.integers(4, 9), st.integers(1, 3))
 @examples(max_examples=40)
 def test_bands_are_left_out_when_the_ladder_says_so_of_what_is_left(seed: int, stations: int, per_band: int) -> None:
@@ -375,6 +381,7 @@ def test_bands_are_left_out_when_the_ladder_says_so_of_what_is_left(seed: int, s
         assert richest.left_out_by == ("band" if rest and all(carried) else "point")
 
 
+@pytest.mark.slow
 def test_the_similarity_left_out_is_nearly_that_refitted() -> None:
     """Its leverage is taken as the same for all points; refitting it without each point agrees within a tenth."""
     xyz, ratios = layout(SEVEN), []

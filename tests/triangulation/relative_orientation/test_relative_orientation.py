@@ -524,6 +524,7 @@ def test_the_same_photo_twice() -> None:
     assert "the same photo twice" in str(error)
 
 
+@pytest.mark.slow
 def test_points_that_are_not_the_same() -> None:
     rng = np.random.default_rng(4)
     for _ in range(5):
@@ -569,6 +570,7 @@ def test_standard_points_lie_where_they_should() -> None:
     assert exact.tolist() == [[0, 0], [70, 0], [0, 65], [70, 65], [0, -65], [70, -65]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("tilt", "share"), [(15.0, 1.0), (20.0, 0.995)])
 def test_large_tilts_come_back_too(tilt: float, share: float) -> None:
     for seed in range(3):

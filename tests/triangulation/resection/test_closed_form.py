@@ -46,6 +46,7 @@ def test_a_photo_comes_back_from_its_points(seed: int, points: int, tilt: float,
     assert np.abs(found.rotation - turn).max() < 1e-9 * max(size[3:].max(), 1.0)
 
 
+@pytest.mark.slow
 def test_the_covariance_is_that_of_many_noisy_photos() -> None:
     xy, xyz, center, turn = scene(5, 10)
     random = np.random.default_rng(1)
@@ -119,6 +120,7 @@ def test_points_come_back_from_their_photos(seed: int) -> None:
     assert found.rays.tolist() == [2 + (n % 3 != 0) for n in range(20)]
 
 
+@pytest.mark.slow
 def test_the_covariance_of_a_point_is_that_of_many_measurements() -> None:
     xy, photo, point, centers, rotations, points = two_photos(4)
     sigma = np.full(xy.shape, 0.005)

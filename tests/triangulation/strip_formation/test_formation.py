@@ -227,6 +227,7 @@ def test_orientations_are_handed_on() -> None:
         assert np.allclose(chain[number].T @ chain[number + 1], turn, rtol=0, atol=1e-14)
 
 
+@pytest.mark.slow
 @TRANSFERS
 @examples(max_examples=30)
 @given(size=st.floats(0.01, 100.0))
@@ -271,6 +272,7 @@ def scale_errors(overlap: float, transfer: str, strips: int = 40) -> float:
     return float(np.sqrt(np.mean(squares)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("overlap", [0.62, 0.8])
 def test_both_transfers_are_equally_good_over_all_common_points(overlap: float) -> None:
     least_squares, distances = (scale_errors(overlap, transfer) for transfer in SCALE_TRANSFERS)

@@ -58,6 +58,7 @@ def test_what_is_not_positive_definite_is_told() -> None:
         assert not Sparse(2, np.arange(2), np.arange(2), blocks).factor()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("free", [False, True])
 def test_a_sparse_factor_gives_the_same_adjustment(monkeypatch: pytest.MonkeyPatch, *, free: bool) -> None:
     spec = Spec(flight=Flight(photos=20, strips=4), points=Points(rows=3, extra_per_model=3))

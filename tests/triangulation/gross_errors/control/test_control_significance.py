@@ -71,6 +71,7 @@ def test_redundancy_numbers_add_up_to_the_redundancy() -> None:
     assert found.redundancy.sum() == pytest.approx(24 - 7, rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("worse", "fewest", "most"), [(1.0, 0, 8), (3.0, 10, 32)])
 def test_good_control_is_called_wrong_no_more_often_than_the_level_says(worse: float, fewest: int, most: int) -> None:
     """One in a hundred where the variance is estimated; fewer where it is as stated, for it is never taken as less."""
@@ -106,6 +107,7 @@ def flown(seed: int = 1) -> Flown:
     return fly(seed, 13, sigma=5 * MICROMETRE, extra=60)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("error", [(0.0, 0.0, 6.0), (4.0, 0.0, 0.0), (0.0, -4.0, 0.0)])
 def test_a_wrong_point_without_a_band_mate_is_found(error: tuple[float, float, float]) -> None:
     strip = flown()

@@ -182,6 +182,7 @@ def test_the_result_is_as_good_as_without_the_wrong_control() -> None:
     assert 0.01 < wrong < 1.15 * rms(adjusted(strip))
 
 
+@pytest.mark.slow
 def test_good_control_is_left_alone() -> None:
     alarms = [bool(adjusted(flown(seed)).strips[0].wrong_control) for seed in range(40)]
     assert sum(alarms) <= 3  # level 1 % a strip
@@ -254,6 +255,7 @@ def scattered(strip: Flown, seed: int, share: float) -> tuple[ControlPoints, Fla
     return control, np.array([[axis in part for axis in "xyz"] for part in parts])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(6))
 def test_two_fifths_of_wrong_control_come_out_and_nothing_else(seed: int) -> None:
     strip = flown(seed % 2)

@@ -127,6 +127,7 @@ def experiment(seed: int, models: int, *, errors: bool = True) -> tuple[Orientat
     return assess_pairs(elements, pairs, steps), error.ravel()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("limit", "published"),
     [

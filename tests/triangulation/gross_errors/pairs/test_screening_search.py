@@ -107,6 +107,7 @@ def test_the_printed_pairs_lose_the_points_of_the_minimum_deletion(vector: Vecto
 # ---------------------------------------------------------------------------------------------- known errors
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [0.1, 1.0, 50.0])
 def test_a_fifth_of_wrong_points_comes_out_and_nothing_else(size: float) -> None:
     flown = level(4, 40, (5,) * 6)

@@ -83,6 +83,7 @@ def some_rays(seed: int, photos: int = 3, points: int = 8) -> tuple[windows.Wind
     return rays, (centers, rotations), xyz
 
 
+@pytest.mark.slow
 @given(SEEDS)
 @examples(max_examples=20)
 def test_derivatives_are_those_of_the_central_projection(seed: int) -> None:
@@ -196,6 +197,7 @@ def test_rays_meet_where_they_do() -> None:
 # ------------------------------------------------------------------------------------------------------- decisions
 
 
+@pytest.mark.slow
 def test_good_points_are_called_wrong_as_often_as_the_level_says() -> None:
     alarms = points = 0
     for seed in range(400):
@@ -277,11 +279,13 @@ def test_two_wrong_points_of_a_corner_do_not_cost_the_good_one() -> None:
     assert sorted(np.flatnonzero(~used)) == sorted(row_of(strip, *each) for each in wrong)
 
 
+@pytest.mark.slow
 def test_strips_without_errors_lose_nothing() -> None:
     lost = [len(adjusted(flown(seed, extra=100)).strips[0].of_photos.contradictions.wrong) for seed in range(20)]
     assert sum(each > 0 for each in lost) <= 2
 
 
+@pytest.mark.slow
 def test_the_users_measurement_stays() -> None:
     strip = spoiled(flown(), {("105", "p4_1"): (0.0, 0.4)})
     inputs = project(strip, control_points({n: strip.xyz[strip.at[n]] for n in strip.bands(*STATIONS)}, sigma=0.02))
@@ -315,6 +319,7 @@ def outcome(strip: Flown, *, name: str = "") -> tuple[set[tuple[str, str]], dict
     return out, {o.point_ids[n]: xyz for n, xyz in zip(result.points.number, result.points.cartesian, strict=True)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [3, 8])
 def test_neither_order_nor_names_decide(seed: int) -> None:
     strip = with_errors(seed)
