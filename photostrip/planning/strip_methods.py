@@ -214,13 +214,13 @@ def bundle_problem(
     observed = strip.observations
     point = np.full(len(observed.point_ids), -1)
     point[strip.formed.point] = np.arange(len(strip.formed.point))
-    seen = np.flatnonzero(point[observed.point] >= 0)
+    rows = np.flatnonzero(point[observed.point] >= 0)
     place = {name: number for number, name in enumerate(strip.photos)}
-    photo = np.array([place[name] for name in observed.photo_ids], np.intp)[observed.photo[seen]]
+    photo = np.array([place[name] for name in observed.photo_ids], np.intp)[observed.photo[rows]]
     axes = np.broadcast_to(np.eye(3), (len(numbers), 3, 3))
     count = len(strip.centers)
     return bundle.BundleProblem(
-        bundle.ImageObservations(photo, point[observed.point[seen]], observed.xy[seen], observed.sigma[seen]),
+        bundle.ImageObservations(photo, point[observed.point[rows]], observed.xy[rows], observed.sigma[rows]),
         bundle.BundleCameras(np.zeros(count, np.intp), np.array([strip.geometry.camera.principal_distance])),
         bundle.StartValues(strip.centers, strip.rotations, strip.xyz),
         bundle.ControlObservations(numbers, strip.xyz[numbers], axes, np.where(control.use, control.sigma, np.inf)),

@@ -99,11 +99,11 @@ def _random(spec: Spec, placed: Placed, rays: Rows, order: Rows) -> Rows:
     """Points anywhere, in every strip."""
     chosen = []
     for j in range(spec.flight.strips):
-        own = order[(placed.home[order] // spec.flight.photos == j) & (rays[order] >= 2)]
-        if len(own) < spec.control.count:
-            message = f"{spec.control.count} control points are asked for, but a strip has only {len(own)} points"
+        of_strip = order[(placed.home[order] // spec.flight.photos == j) & (rays[order] >= 2)]
+        if len(of_strip) < spec.control.count:
+            message = f"{spec.control.count} control points are asked for, but a strip has only {len(of_strip)} points"
             raise InputError(Fault(message, code="simulation-points", key="control.count"))
-        chosen.append(np.sort(own[: spec.control.count]))
+        chosen.append(np.sort(of_strip[: spec.control.count]))
     return np.concatenate(chosen)
 
 

@@ -203,7 +203,7 @@ def _errors(spec: Spec) -> Iterator[Fault]:
 
 
 def _together(spec: Spec) -> Iterator[Fault]:
-    """Look at what can only be seen when the single values are sound."""
+    """Refuse what is only wrong together, the single values being sound."""
     flight, terrain = spec.flight, spec.terrain
     length, width = flight.photos * spec.base, flight.strips * spec.strip_distance
     rise = (abs(terrain.slope_percent[0]) * length + abs(terrain.slope_percent[1]) * width) / 200.0

@@ -54,7 +54,7 @@ EXPLAINED_SHARE = 0.5  # of what heights leave without it: what explains a bend 
 class HeightComparison:
     """Given heights against those of a strip."""
 
-    # usable, took_part: (n,): heights that can be judged, and those that take part in the fit
+    # usable, in_fit: (n,): heights that can be tested, and those that take part in the fit
     usable: Flags
     in_fit: Flags
     value: Floats  # (n,): given minus height in the strip, metres

@@ -108,6 +108,6 @@ def _metres(frame: GroundFrame, enu: Floats) -> Floats:
     if frame.kind in {"local", "geocentric"}:
         return np.broadcast_to([frame.plan_factor, frame.plan_factor, frame.height_factor], enu.shape)
     step = 1e-5 if frame.kind == "geographic" else 1.0
-    here = frame.cartesian_from_ground(enu)
-    there = [frame.cartesian_from_ground(enu + step * np.eye(3)[axis]) for axis in range(3)]
-    return np.column_stack([np.linalg.norm(each - here, axis=1) / step for each in there])
+    start = frame.cartesian_from_ground(enu)
+    stepped = [frame.cartesian_from_ground(enu + step * np.eye(3)[axis]) for axis in range(3)]
+    return np.column_stack([np.linalg.norm(each - start, axis=1) / step for each in stepped])

@@ -108,12 +108,12 @@ def _steps(links: mosaic.PhotoLinks, order: Sequence[int]) -> tuple[complex, ...
     """
     rank = np.full(max((*order, int(links.photo.max(initial=0)))) + 1, -1)
     rank[list(order)] = np.arange(len(order))
-    here, other = (np.concatenate([links.photo[:, k], links.photo[:, 1 - k]]) for k in (0, 1))
+    photo, other = (np.concatenate([links.photo[:, k], links.photo[:, 1 - k]]) for k in (0, 1))
     way, count = np.concatenate(links.bases), np.tile(links.count, 2)
-    lag = rank[other] - rank[here]
+    lag = rank[other] - rank[photo]
     near = np.abs(lag) == 1  # a link of two points serves where there is no better one
-    use = (rank[here] >= 0) & (rank[other] >= 0) & np.isfinite(way) & (near | (count >= SURE_COUNT))
-    at, lag, way = rank[here[use]], lag[use], way[use]
+    use = (rank[photo] >= 0) & (rank[other] >= 0) & np.isfinite(way) & (near | (count >= SURE_COUNT))
+    at, lag, way = rank[photo[use]], lag[use], way[use]
     size = len(order)
     number = np.bincount(at, minlength=size) + 1.0  # with its own centre
     first, second = np.bincount(at, lag, size), np.bincount(at, lag.astype(float) ** 2, size)
@@ -200,8 +200,8 @@ def _by_number(closer: Closer, photos: Sequence[str]) -> Toward:
     """Return the direction of one photo on another, both by number, as the closer look has it."""
 
     def toward(of: int, other: int) -> complex | None:
-        seen = closer(photos[min(of, other)], photos[max(of, other)])
-        return None if seen is None else seen[0 if of < other else 1]
+        directions = closer(photos[min(of, other)], photos[max(of, other)])
+        return None if directions is None else directions[0 if of < other else 1]
 
     return toward
 
@@ -214,17 +214,17 @@ def turned_back(links: mosaic.PhotoLinks, order: Sequence[int], closer: Toward =
     sure = _sure(links)
     found: list[int] = []
     looked_at = 0
-    for before, here, after in zip(order, order[1:], order[2:], strict=False):
-        rows = [links.index.get((min(here, other), max(here, other)), -1) for other in (before, after)]
+    for before, photo, after in zip(order, order[1:], order[2:], strict=False):
+        rows = [links.index.get((min(photo, other), max(photo, other)), -1) for other in (before, after)]
         if min(rows) < 0 or not sure[rows].all():
             continue
-        one, two = links.toward(here, before), links.toward(here, after)
+        one, two = links.toward(photo, before), links.toward(photo, after)
         if not _same_side(one, two):
             continue
         looked_at += 1
-        near = [closer(here, other) for other in (before, after)] if looked_at <= MOST_LOOKED_AT else [None, None]
+        near = [closer(photo, other) for other in (before, after)] if looked_at <= MOST_LOOKED_AT else [None, None]
         if near[0] is None or near[1] is None or _same_side(near[0], near[1]):
-            found.append(here)
+            found.append(photo)
     return found
 
 
@@ -326,9 +326,9 @@ def _exchanged(order: Sequence[int], moved: Sequence[int], photos: Sequence[str]
     place = order.index(moved[0])
     rest = sorted(order)
     for other in (*order[max(place - 1, 0) : place], *order[place + 1 : place + 2]):
-        here, there = rest.index(moved[0]), rest.index(other)
+        one, two = rest.index(moved[0]), rest.index(other)
         swapped = list(rest)
-        swapped[here], swapped[there] = swapped[there], swapped[here]
+        swapped[one], swapped[two] = swapped[two], swapped[one]
         if swapped in (list(order), list(order)[::-1]):
             one, two = sorted((moved[0], other))
             return photos[one], photos[two]
