@@ -1,13 +1,14 @@
-"""Projects as users describe them: reading, checking and completing them, and nothing else.
+"""Projects, plans, simulations and surveys as users describe them: read, checked and completed, and nothing else.
 
-- ``document``: YAML as a tree of texts that know where they stand;
-- ``merging``: presets (``extends``) and overrides (``--set``);
-- ``schema``: every key with its unit and default;
-- ``validation``: the tree against the schema, in words;
-- ``references``: what the values of the file owe each other;
-- ``tables``: the tables that the file names;
-- ``conversion``: units, axes and directions of the house;
-- ``hints``: what is not used, and why;
-- ``resolved``: the project with nothing left unsaid;
-- ``loading``: all of it, in order.
+In comes a YAML file with the tables that it names; out go plain inputs and settings, in millimetres, radians and
+metres, east, north, up. All faults of all files are reported at once, each with its place.
+
+- ``yaml/``: positions, presets (``extends``), overrides (``--set``), validation; ``reading`` is the one reader;
+- ``schema/``: every key with its unit and default;
+- ``loading``: a strip project, in order: ``tables`` and ``models`` read what it names, ``conversion`` brings units and
+  axes into those of the program, ``hints`` says what is not used, ``resolved`` writes the project with nothing left
+  open, ``places`` finds where a finding would be put right;
+- ``checks/``: what can be said before anything is adjusted;
+- ``plans/``, ``terrestrial/``, ``simulation``, ``tolerance_profile``: the other kinds of files;
+- ``template``: the first files of a new project.
 """

@@ -1,6 +1,6 @@
 """A project file and its tables, read and checked: plain inputs and settings for the pipeline.
 
-Everything that is wrong with any of the files is told in one go; see ``errors.Fault``.
+Everything that is wrong with any of the files is reported in one go; see ``errors.Fault``.
 """
 
 from __future__ import annotations
@@ -166,8 +166,7 @@ def _seen_from(file: str, folder: Path) -> str:
 
 def _check_certificates(root: Node) -> Iterator[Fault]:
     """Solve the distances between fiducial marks once, to find out whether that can be done."""
-    known = root.find("cameras")
-    for name, node in (known.entries if known is not None else {}).items():
+    for name, node in root.mapping_at("cameras").items():
         given = valid_section(CameraBlock, node)
         if given is None:
             continue  # the schema says what is wrong with it
@@ -179,9 +178,8 @@ def _check_certificates(root: Node) -> Iterator[Fault]:
 
 def _check_frames(root: Node, directory: Path) -> Iterator[Fault]:
     """Tie the ground frames together once, to find out whether that can be done."""
-    lists = root.find("control")
     blocks: list[tuple[str, type[GivenList], Node | None]] = [
-        (f"control[{i}]", Control, each) for i, each in enumerate(lists.elements if lists is not None else [])
+        (f"control[{i}]", Control, each) for i, each in enumerate(root.list_at("control"))
     ]
     blocks += [("camera_positions", CameraPositionsBlock, root.find("camera_positions"))]
     blocks += [("orientations", Orientations, root.find("orientations"))]

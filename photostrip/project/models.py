@@ -66,9 +66,8 @@ def model_tables(points: ModelTable | None, centers: ModelTable | None, root: No
 
 def read_model_points(path: str, root: Node, findings: Findings, *, centers: bool) -> ModelTable | None:
     """Read one of the two tables of model coordinates; the project says what rows without standard deviations get."""
-    node = root.find("models", "centers") if centers else root.find("models")
-    declared = None if node is None else node.find("columns")
-    columns = {name: each.text for name, each in declared.entries.items() if each.text} if declared else {}
+    where = ("models", "centers") if centers else ("models",)
+    columns = {name: each.text for name, each in root.mapping_at(*where, "columns").items() if each.text}
     has_sigma = root.has("models", "sigma") or (centers and root.has("models", "center_sigma"))
     return read_models(path, findings, centers=centers, has_sigma=has_sigma, columns=columns)
 
@@ -81,12 +80,10 @@ def check_models(root: Node, tables: ModelTables, findings: Findings) -> dict[in
     photos = [photo.id for photo in listed_photos(root)]
     centers = tables.centers_of(photos)
     _refuse_centers(tables, photos, centers, findings)
-    strips = root.find("strips")
     found: dict[int, tuple[str, ...]] = {}
     owner: dict[str, int] = {}
-    for number, strip in enumerate(strips.elements if strips is not None else []):
-        photos_node, models = strip.find("photos"), strip.find("models")
-        flight = [each.text for each in photos_node.elements] if photos_node is not None else []
+    for number, strip in enumerate(root.list_at("strips")):
+        flight, models = [each.text for each in strip.list_at("photos")], strip.find("models")
         if models is None:
             names, faults = _by_centers(root, number, flight, centers)
         else:

@@ -59,8 +59,7 @@ def read_tables(reading: Reading) -> Tables:
     for path, findings in reading.named(("fiducial_measurements", "file")):
         fiducials = read_measurements(path, findings, _manner(root, "fiducial_measurements", photos))
     control: list[ControlTable | None] = []
-    lists = root.find("control")
-    for number, node in enumerate(lists.elements if lists is not None else []):
+    for number, node in enumerate(root.list_at("control")):
         control.append(None)
         for path, findings in reading.named(("control", number, "file")):
             up, columns = _height_column(node), _columns(node)
@@ -87,19 +86,18 @@ def _manner(root: Node, section: str, photos: frozenset[str]) -> Manner:
     source = own if own is not None or not (marks and same_unit) else root.find("observations", "sigma")
     try:
         sigma = None if source is None else read_number(source.text)
-    except NotANumber:  # which the schema has told
+    except NotANumber:  # which the schema refuses
         sigma = None
     return Manner(marks, source is not None, sigma, node.word("repeated"), _columns(node), photos)
 
 
 def _columns(node: Node) -> dict[str, str]:
     """Names that a table has for its columns."""
-    declared = node.find("columns")
-    return {name: each.text for name, each in declared.entries.items() if each.text} if declared is not None else {}
+    return {name: each.text for name, each in node.mapping_at("columns").items() if each.text}
 
 
 def _orientations(path: str, node: Node, findings: Findings) -> OrientationTable | None:
-    """Read given orientations by the names of their angles; nothing when the system is not known, which is told."""
+    """Read given orientations by the names of their angles; nothing when the system is not known, which is reported."""
     system = node.word("angles", "system") or SYSTEMS[0]
     if system not in SYSTEMS:
         return None
@@ -110,9 +108,8 @@ def _orientations(path: str, node: Node, findings: Findings) -> OrientationTable
 
 def _height_column(node: Node) -> int:
     """Which of the columns x, y, z is the height, as far as the axes say it."""
-    axes = node.find("axes")
-    names = [each.text for each in axes.elements] if axes is not None else []
-    return next((number for number, name in enumerate(names[:3]) if name in {"up", "z"}), 2)
+    axes = [each.text for each in node.list_at("axes")]
+    return next((number for number, name in enumerate(axes[:3]) if name in {"up", "z"}), 2)
 
 
 def check_tables(root: Node, tables: Tables) -> Iterator[Fault]:

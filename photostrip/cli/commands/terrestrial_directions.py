@@ -66,41 +66,36 @@ Rounds = Annotated[int, typer.Option("--rounds", min=1, help="Rounds measured.")
 
 
 @dataclass(frozen=True)
-class CameraByPoint:
-    """Options that say which camera it is, for computations that need no format."""
+class CameraOptions:
+    """Options that say which camera it is."""
 
     camera: CameraName = None
     presets: Presets = None
     principal_distance: Distance = None
-    principal_point: Annotated[
-        str | None, typer.Option("--principal-point", metavar="X0,Z0", help="Principal point in mm, likewise.")
-    ] = None
 
     def chosen(self) -> Phototheodolite:
         """Return the camera."""
         from photostrip.project.terrestrial.options import chosen_camera
 
-        return chosen_camera(self.camera, self.presets, self.principal_distance, principal_point=self.principal_point)
+        return chosen_camera(**vars(self))
 
 
 @dataclass(frozen=True)
-class CameraByFormat:
-    """Options that say which camera it is, for computations over the whole photo."""
+class CameraByPoint(CameraOptions):
+    """The same for computations that need no format."""
 
-    camera: CameraName = None
-    presets: Presets = None
-    principal_distance: Distance = None
+    principal_point: Annotated[
+        str | None, typer.Option("--principal-point", metavar="X0,Z0", help="Principal point in mm, likewise.")
+    ] = None
+
+
+@dataclass(frozen=True)
+class CameraByFormat(CameraOptions):
+    """The same for computations over the whole photo."""
+
     photo_format: Annotated[
         str | None, typer.Option("--photo-format", metavar="W,H", help="Width and height of the photo in mm, likewise.")
     ] = None
-
-    def chosen(self) -> Phototheodolite:
-        """Return the camera, which has a format."""
-        from photostrip.project.terrestrial.options import chosen_camera, require_format
-
-        return require_format(
-            chosen_camera(self.camera, self.presets, self.principal_distance, photo_format=self.photo_format)
-        )
 
 
 @dataclass(frozen=True)
@@ -257,13 +252,14 @@ def _over_the_photo(
 ) -> None:
     """Compute a table over the photo and print it; draw it on a finer one."""
     from photostrip.errors import Fault, InputError
+    from photostrip.project.terrestrial.options import require_format
     from photostrip.project.terrestrial.ranges import STEP, within
     from photostrip.report.pictures.terrestrial import FINE, check_plot
     from photostrip.terrestrial.accuracy import grid
 
     if plot is not None:
         check_plot(str(plot))
-    chosen = camera.chosen()
+    chosen = require_format(camera.chosen())
     width, height = chosen.format or (0.0, 0.0)
     step = within("--step", step, STEP)
     if width * height / step**2 > MOST_POINTS:

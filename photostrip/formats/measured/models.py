@@ -122,7 +122,7 @@ def _refuse_repeated(read: ModelTable, findings: Findings) -> None:
     again = order[1:][key[order][1:] == key[order][:-1]]
     first = {int(key[row]): int(row) for row in order[::-1].tolist()}
     whole = _written_twice(read, again)
-    told: set[int] = set()
+    reported: set[int] = set()
     for row in sorted(again.tolist()):
         if findings.full(read.table.file):
             findings.count(read.table.file, 1)
@@ -130,8 +130,8 @@ def _refuse_repeated(read: ModelTable, findings: Findings) -> None:
         model, line = int(read.models[row]), read.table.lines[first[int(key[row])]]
         name = read.model_ids[model]
         if model in whole:
-            if model not in told:
-                told.add(model)
+            if model not in reported:
+                reported.add(model)
                 message = (
                     f"model {name} stands twice: its points begin again here, and are given already in line {line}"
                 )

@@ -77,7 +77,7 @@ def _coordinates(table: Table) -> tuple[tuple[Floats, Floats], tuple[Floats, Flo
 
 
 def _photos(table: Table, photos: AbstractSet[str], findings: Findings) -> tuple[tuple[str, ...], Numbers]:
-    """Left and right photo of each row, shape (n, 2), counted in the ids; -1 where a pair is none, which is told."""
+    """Left and right photo of each row, shape (n, 2), counted in the ids; -1 where a pair is none, which is refused."""
     if "pair" not in table.ids:
         names = tuple(dict.fromkeys((*table.ids["left"], *table.ids["right"])))
         number = {name: code for code, name in enumerate(names)}

@@ -1,4 +1,4 @@
-"""A point measured several times on one photo: refused, or averaged with its spread told."""
+"""A point measured several times on one photo: refused, or averaged with its spread noted."""
 
 from __future__ import annotations
 

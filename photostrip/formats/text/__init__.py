@@ -1,1 +1,6 @@
-"""Files, tables and numbers as text, with findings that name the line."""
+"""Text files: in come bytes, out go arrays and ids that know the file, line and character they come from.
+
+- ``source``, ``files``: where bytes come from, and everything that can go wrong before the first line;
+- ``table_text``, ``table_reader``, ``tables``: the text of a CSV table, reading it, what it holds;
+- ``numbers``: numbers as users write them; ``findings``: faults and notes, collected; ``writing``: files, whole or not.
+"""

@@ -1,7 +1,7 @@
 """Bytes and text of a file: everything that can go wrong before its first line is read, in one form.
 
 Every file of a project is read through ``read_bytes``, so that a missing table, a missing project and a missing
-preset are told in the same words.
+preset are reported in the same words.
 """
 
 from __future__ import annotations

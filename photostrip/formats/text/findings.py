@@ -27,7 +27,7 @@ class Findings:
     _count: Counter[str] = field(default_factory=Counter)
 
     def meet(self, file: str) -> None:
-        """Remember that a file is read now: faults are told in the order in which files were read."""
+        """Remember that a file is read now: faults are reported in the order in which files were read."""
         self._count[file] += 0
 
     def add(self, *faults: Fault) -> None:

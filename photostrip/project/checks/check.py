@@ -73,7 +73,7 @@ class Checked:
 
     @property
     def remarks(self) -> int:
-        """How much else is told."""
+        """How much else is reported."""
         return len(self.everything) - self.wrong
 
 
@@ -112,7 +112,7 @@ def _against_themselves(project: Project) -> tuple[Finding, ...]:
     try:
         return project.placed(gate.of_inputs(project.inputs, project.settings, project.directory))
     except (InputError, GeometryError):
-        return ()  # what is wrong is told as a fault
+        return ()  # what is wrong is reported as a fault
 
 
 def _refused(project: Project, test: Callable[[], None]) -> list[Fault]:

@@ -1,1 +1,5 @@
-"""Files of `photostrip plan`."""
+"""The files of ``photostrip plan``: in comes YAML or options alone, out go the specifications of ``planning``.
+
+- ``flown``: what all plans of something flown have, and how they are read;
+- ``model``, ``strip``, ``cameras``: one kind of plan each; ``schemas``: their JSON Schemas.
+"""

@@ -1,6 +1,6 @@
-"""Single values of a YAML file: what their text must be, and what editors are told of it.
+"""Single values of a YAML file: what their text must be, and what editors show of it.
 
-Values arrive as texts (see ``yaml.document``) and get their type here. What is wrong with one is told by ``wrong``.
+Values arrive as texts (see ``yaml.document``) and get their type here. ``wrong`` says what is wrong with one.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def text(value: object) -> Text:
 
 @dataclass(frozen=True, eq=False)
 class _Described:
-    """What editors are told about a type; each key gets a copy of its own, to which its description is added."""
+    """What editors show of a type; each key gets a copy of its own, to which its description is added."""
 
     schema: dict[str, Any]
 
@@ -111,7 +111,7 @@ def choice(allowed: tuple[str, ...]) -> tuple[PlainValidator, _Described]:
 
 
 def one_of(*allowed: str) -> Callable[[str], str]:
-    """Check of a word from a list, of which editors are told in the description alone."""
+    """Check of a word from a list, of which editors know the description alone."""
     return lambda value: str(known_word(value, allowed))
 
 

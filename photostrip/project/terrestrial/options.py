@@ -47,26 +47,26 @@ GIMBAL = 1e-6  # cosine of the elevation of the camera below which azimuth and r
 
 
 def chosen_camera(
-    name: str | None,
+    *,
+    camera: str | None,
     presets: str | None,
     principal_distance: float | None,
-    *,
     principal_point: str | None = None,
     photo_format: str | None = None,
 ) -> Phototheodolite:
     """Return the camera that the options name: one of a list, with what is given instead of the list's numbers."""
-    if name is None and principal_distance is None:
+    if camera is None and principal_distance is None:
         expected = f"one of {', '.join(read_presets(presets))}, or --principal-distance"
         raise InputError(Fault("nothing says which camera it is", "no-camera", key="--camera", expected=expected))
-    camera = Phototheodolite("camera", 0.0) if name is None else preset(name, read_presets(presets), "--camera")
+    chosen = Phototheodolite("camera", 0.0) if camera is None else preset(camera, read_presets(presets), "--camera")
     if principal_distance is not None:
         distance = within("--principal-distance", principal_distance, PRINCIPAL_DISTANCE)
-        camera = replace(camera, principal_distance=distance)
+        chosen = replace(chosen, principal_distance=distance)
     if principal_point is not None:
-        camera = replace(camera, principal_point=_pair_within("--principal-point", principal_point, COORDINATE))
+        chosen = replace(chosen, principal_point=_pair_within("--principal-point", principal_point, COORDINATE))
     if photo_format is not None:
-        camera = replace(camera, format=_pair_within("--photo-format", photo_format, FORMAT))
-    return camera
+        chosen = replace(chosen, format=_pair_within("--photo-format", photo_format, FORMAT))
+    return chosen
 
 
 def require_format(camera: Phototheodolite) -> Phototheodolite:

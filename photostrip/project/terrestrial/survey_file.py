@@ -133,7 +133,7 @@ class Measurements(Section):
 
 
 class Processing(Section):
-    """How displacements are judged."""
+    """How displacements are tested."""
 
     significance: Annotated[Number, AfterValidator(bounded(SIGNIFICANCE))] = key(
         "Probability of calling a point moved that did not move", USUAL.significance
@@ -166,7 +166,7 @@ class TerrestrialFile(Section):
     time_unit: Words = key("Unit of the times of the epochs, for rates", "year")
     measurements: Measurements = key("The table of measurements")
     stable: list[Id] = key("Points that are taken not to move", [])
-    processing: Processing = key("How displacements are judged", Processing.model_construct())
+    processing: Processing = key("How displacements are tested", Processing.model_construct())
 
     @model_validator(mode="after")
     def _one_geometry(self) -> Self:

@@ -65,6 +65,16 @@ class Node:
                 node = node.entries.get(step)
         return node
 
+    def list_at(self, *path: str | int) -> list[Node]:
+        """Return the elements of the list at a path; none when there is none."""
+        node = self.find(*path)
+        return node.elements if node is not None else []
+
+    def mapping_at(self, *path: str | int) -> dict[str, Node]:
+        """Return the entries of the mapping at a path; none when there is none."""
+        node = self.find(*path)
+        return node.entries if node is not None else {}
+
     def word(self, *path: str | int) -> str:
         """Return the text at a path; empty when there is none."""
         node = self.find(*path)

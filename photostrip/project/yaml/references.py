@@ -32,10 +32,8 @@ class ListedPhoto:
 
 def listed_photos(root: Node) -> Iterator[ListedPhoto]:
     """Return every photo of every strip."""
-    strips = root.find("strips")
-    for i, strip in enumerate(strips.elements if strips is not None else []):
-        photos = strip.find("photos")
-        for j, photo in enumerate(photos.elements if photos is not None else []):
+    for i, strip in enumerate(root.list_at("strips")):
+        for j, photo in enumerate(strip.list_at("photos")):
             if photo.text:
                 yield ListedPhoto(photo.text, ("strips", i, "photos", j), strip.word("camera"))
 
@@ -73,8 +71,7 @@ def _only_photos(root: Node) -> Iterator[Fault]:
     for name, expected in NEEDED.items():
         if not root.has(name):
             yield fault_at(root, (name,), f"`{name}` is missing", "missing-key", expected=expected)
-    strips = root.find("strips")
-    for number, strip in enumerate(strips.elements if strips is not None else []):
+    for number, strip in enumerate(root.list_at("strips")):
         if isinstance(strip.value, dict) and not strip.has("camera"):
             expected = "camera of all its photos, a key of `cameras`"
             path = ("strips", number, "camera")
@@ -100,10 +97,9 @@ def _only_models(root: Node) -> Iterator[Fault]:
 
 def _strips(root: Node) -> Iterator[Fault]:
     """Refuse strips of the same name and cameras that do not exist."""
-    strips, cameras = root.find("strips"), root.find("cameras")
-    known = list(cameras.entries) if cameras is not None else []
+    known = list(root.mapping_at("cameras"))
     first: dict[str, int] = {}
-    for number, strip in enumerate(strips.elements if strips is not None else []):
+    for number, strip in enumerate(root.list_at("strips")):
         name, camera = strip.word("id"), strip.word("camera")
         if name and first.setdefault(name, number) != number:
             line = root.place_of(("strips", first[name], "id")).line
@@ -138,13 +134,12 @@ def marks_of(camera: Node) -> Node | None:
 
 def _cameras(root: Node) -> Iterator[Fault]:
     """Ask cameras for what their photos need: marks to orient by, the size of a pixel."""
-    cameras, strips = root.find("cameras"), root.find("strips")
-    used = dict.fromkeys(strip.word("camera") for strip in (strips.elements if strips is not None else []))
+    used = {strip.word("camera") for strip in root.list_at("strips")}
     pixels = "px" in {root.word("observations", "unit"), root.word("fiducial_measurements", "unit")}
     marked = root.has("fiducial_measurements")
     origin = root.word("observations", "origin") or ("top-left" if root.word("observations", "unit") == "px" else "")
     cornered = origin in {"top-left", "first-pixel"} and not marked
-    for name, camera in (cameras.entries if cameras is not None else {}).items():
+    for name, camera in root.mapping_at("cameras").items():
         path = ("cameras", name)
         marks = marks_of(camera)
         if marks is not None and len(marks.entries) == 1:
@@ -191,8 +186,7 @@ def _curvature(root: Node) -> Iterator[Fault]:
     """Refuse to count the Earth's curvature twice."""
     if root.word("processing", "earth_curvature") not in {"model", "image"}:
         return
-    control = root.find("control")
-    systems = [each.word("crs") for each in (control.elements if control is not None else [])]
+    systems = [each.word("crs") for each in root.list_at("control")]
     curved = next((crs for crs in [*systems, root.word("output", "crs")] if crs not in {"", "local"}), "")
     if curved:
         message = f"Earth curvature would be counted twice: coordinates in {shown(curved)} carry it already"
@@ -205,10 +199,9 @@ def _needs_of_the_strip_method(root: Node) -> Iterator[Fault]:
     """Ask for two photos in each strip and for control, which a bundle adjustment can do without."""
     if root.word("processing", "adjustment") == "bundle":
         return
-    strips, control = root.find("strips"), root.find("control")
-    for number, strip in enumerate(strips.elements if strips is not None else []):
-        photos = strip.find("photos")
-        if photos is not None and len(photos.elements) == 1:
+    control = root.find("control")
+    for number, strip in enumerate(root.list_at("strips")):
+        if len(strip.list_at("photos")) == 1:
             path, fix = ("strips", number, "photos"), "or `processing.adjustment: bundle`, which takes single photos"
             message = "there is only one photo"
             yield fault_at(root, path, message, "length", expected="at least 2 photos", fix=fix)
