@@ -64,7 +64,7 @@ def test_the_linter_knows_the_same_fences() -> None:
         ("formats/text/tables.py", "import csv", False),
         ("simulate.py", "import json as j", True),
         ("batch/cluster.py", "from dask import distributed", False),
-        ("cli/batch_command.py", "import distributed", True),
+        ("cli/jobs/batch.py", "import distributed", True),
         ("pipeline.py", "import richer", False),
     ],
 )

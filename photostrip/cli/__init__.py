@@ -3,6 +3,5 @@
 - ``command_table``: all commands, and ``photostrip --help``; ``options``: options that several commands share;
 - ``stdout``: what is printed, in which form; ``stderr``: what is said meanwhile;
 - ``failures``: which exit code a failure has, and how it is reported;
-- a job that is too long for the file of its command: ``batch_command``, ``method_comparison``, ``check_output``,
-  ``installation``, ``manual``, ``completion``, ``terrestrial_output``.
+- ``jobs``: what is too long for the file of its command: a batch, the baseline, manual pages.
 """

@@ -12,8 +12,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, cast
 
 from photostrip import __version__
-from photostrip.cli import completion
 from photostrip.cli.command_table import COMMANDS, usage
+from photostrip.cli.jobs import completion
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -11,7 +11,7 @@ from photostrip.cli.stdout import Format
 
 def _keys(incomplete: str) -> list[str]:
     """Complete the key of an assignment."""
-    from photostrip.cli.completion import keys
+    from photostrip.cli.jobs.completion import keys
 
     return keys(incomplete)
 

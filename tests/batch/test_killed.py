@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from photostrip.cli import batch_command
+from photostrip.cli.jobs import batch as batch_job
 from photostrip.cli.main import main
 from photostrip.formats.output.batch import parsed_record
 from photostrip.formats.text.source import digest
@@ -35,7 +35,7 @@ BATCH = ["batch", "strips", "-o", "out", "-j", "2"]
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     write_projects(tmp_path / "strips", PROJECTS)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(batch_command, "LocalPool", Alone)
+    monkeypatch.setattr(batch_job, "LocalPool", Alone)
     return tmp_path
 
 

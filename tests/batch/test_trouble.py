@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from photostrip.batch.result_folder import opened
-from photostrip.cli import batch_command
+from photostrip.cli.jobs import batch as batch_job
 from photostrip.cli.main import main
 from photostrip.errors import InputError
 from tests.batch.projects import Alone, command, environment, tree, write_projects
@@ -28,7 +28,7 @@ PR_CAPBSET_DROP, CAP_DAC_OVERRIDE, CAP_DAC_READ_SEARCH = 24, 1, 2
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     write_projects(tmp_path / "strips", 5)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(batch_command, "LocalPool", Alone)
+    monkeypatch.setattr(batch_job, "LocalPool", Alone)
     return tmp_path
 
 

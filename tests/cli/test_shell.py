@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 import pytest
 
 from photostrip.cli.command_table import COMMANDS
-from photostrip.cli.completion import keys
+from photostrip.cli.jobs.completion import keys
+from photostrip.cli.jobs.manual import manual_pages
 from photostrip.cli.main import main
-from photostrip.cli.manual import manual_pages
 from tests.cli.helps import FOLDER
 from tests.loops import nonempty
 from tests.source_tree import ROOT

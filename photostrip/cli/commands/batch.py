@@ -52,7 +52,7 @@ def batch(  # noqa: PLR0913, PLR0917 (an argument for each option)
     project, the highest: 0, 1, 2, 3 or 70.
     """
     from photostrip.batch.tasks import Limits
-    from photostrip.cli.batch_command import BatchOptions, run_batch
+    from photostrip.cli.jobs.batch import BatchOptions, run_batch
     from photostrip.errors import Fault, InputError
 
     if depfile is not None and output is None:

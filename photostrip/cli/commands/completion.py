@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from photostrip.cli.completion import answer
+from photostrip.cli.jobs.completion import answer
 
 
 class Shell(StrEnum):

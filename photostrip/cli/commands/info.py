@@ -18,7 +18,7 @@ def info(
 
     Put it into every report of a problem.
     """
-    from photostrip.cli.installation import as_text, installation
+    from photostrip.cli.jobs.installation import as_text, installation
 
     found = installation()
     if form is Format.JSON:

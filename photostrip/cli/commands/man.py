@@ -24,7 +24,7 @@ def man(
 
     With a pager: photostrip man run | man -l -
     """
-    from photostrip.cli.manual import manual_pages
+    from photostrip.cli.jobs.manual import manual_pages
     from photostrip.formats.text.writing import write_files
 
     pages = manual_pages()

@@ -43,7 +43,7 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
     """
     from photostrip.cli.failures import failures_as
     from photostrip.cli.garbage import without_garbage_collection
-    from photostrip.cli.method_comparison import compare_methods
+    from photostrip.cli.jobs.method_comparison import compare_methods
     from photostrip.cli.stderr import Messages
     from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE
     from photostrip.formats.output.result_files import result_files

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from photostrip.cli import batch_command
+from photostrip.cli.jobs import batch as batch_job
 from photostrip.cli.main import main
 from photostrip.errors import PhotostripError
 from tests.batch.projects import PHOTOS, Alone, run, tree, write_projects
@@ -30,7 +30,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Give a folder with three good projects and stand in it; they are computed in this process, without waiting."""
     write_projects(tmp_path / "strips", 3)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(batch_command, "LocalPool", Alone)
+    monkeypatch.setattr(batch_job, "LocalPool", Alone)
     return tmp_path
 
 

@@ -152,7 +152,7 @@ def test_info_names_versions_threads_and_formats(capsys: pytest.CaptureFixture[s
 
 
 def test_info_says_how_to_get_an_extra(monkeypatch: pytest.MonkeyPatch) -> None:
-    from photostrip.cli import installation
+    from photostrip.cli.jobs import installation
 
     lines = ["numpy>=1", "plotter-of-nothing>=3; extra == 'plots'", "pytest>=8; extra == 'test'"]
     monkeypatch.setattr(importlib.metadata, "requires", lambda _: lines)

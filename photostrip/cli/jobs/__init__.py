@@ -1,0 +1,1 @@
+"""What is too long for the file of its command, a module for each job."""
