@@ -87,13 +87,13 @@ def _read_all(
             continue
         places[spec] = path
         try:
-            own = read_crs(spec, directory)
+            crs = read_crs(spec, directory)
         except Refusal as refusal:
             faults.append(refusal.at(path))
             continue
-        against = contradictions(spec, own.kind, own.vertical, three_dimensional=own.three_dimensional)
+        against = contradictions(spec, crs.kind, crs.vertical, three_dimensional=crs.three_dimensional)
         faults.extend(refusal.at(path) for refusal in against)
-        parts[spec] = own
+        parts[spec] = crs
     return parts
 
 
@@ -120,41 +120,41 @@ def _build_all(
     shifts: list[tuple[CrsParts, DatumShift]] = []
     out = parts[target]
     for path, spec in wanted:
-        own, shift = parts[spec], None
+        crs, shift = parts[spec], None
         if spec in frames:
             continue
         try:
-            vertical = _vertical_operation(spec, own) if own.vertical else None
-            if own.kind != "local" and own is not out and not _same_datum(own, out):
-                shift = next((made for other, made in shifts if _same_datum(own, other)), None)
+            vertical = _vertical_operation(spec, crs) if crs.vertical else None
+            if crs.kind != "local" and crs is not out and not _same_datum(crs, out):
+                shift = next((made for other, made in shifts if _same_datum(crs, other)), None)
                 if shift is None:
-                    shift = _datum_shift(spec, own, target, out)
-                    shifts.append((own, shift))
+                    shift = _datum_shift(spec, crs, target, out)
+                    shifts.append((crs, shift))
         except Refusal as refusal:
             faults.append(refusal.at(path))
             continue
-        frames[spec] = _frame(spec, own, vertical, shift, out.ellipsoid)
+        frames[spec] = _frame(spec, crs, vertical, shift, out.ellipsoid)
     return frames
 
 
 def _frame(
-    spec: FrameSpec, own: CrsParts, vertical: ProjOperation | None, shift: DatumShift | None, cartesian: Ellipsoid
+    spec: FrameSpec, crs: CrsParts, vertical: ProjOperation | None, shift: DatumShift | None, cartesian: Ellipsoid
 ) -> GroundFrame:
     """Put one frame together."""
-    plane = ProjOperation(own.core, own.geographic) if own.kind == "projected" and own.core is not None else None
+    plane = ProjOperation(crs.core, crs.geographic) if crs.kind == "projected" and crs.core is not None else None
     return GroundFrame(
         spec=spec,
-        kind=own.kind,
-        title=own.title,
-        plan_unit=own.units[0],
-        height_unit=own.units[1],
-        plan_factor=own.factors[0],
-        height_factor=own.factors[1],
-        ellipsoid=None if own.kind == "local" else own.ellipsoid,
-        _angle=own.angle if plane is not None else own.factors[0],
+        kind=crs.kind,
+        title=crs.title,
+        plan_unit=crs.units[0],
+        height_unit=crs.units[1],
+        plan_factor=crs.factors[0],
+        height_factor=crs.factors[1],
+        ellipsoid=None if crs.kind == "local" else crs.ellipsoid,
+        _angle=crs.angle if plane is not None else crs.factors[0],
         _plane=plane,
         _vertical=vertical,
-        _geoid=own.vertical,
+        _geoid=crs.vertical,
         _shift=shift,
         _cartesian=cartesian,
     )
@@ -181,21 +181,21 @@ def _same_datum(one: CrsParts, other: CrsParts) -> bool:
     return first is not None and second is not None and first.longitude == second.longitude
 
 
-def _datum_shift(spec: FrameSpec, own: CrsParts, target: FrameSpec, out: CrsParts) -> DatumShift:
+def _datum_shift(spec: FrameSpec, crs: CrsParts, target: FrameSpec, out: CrsParts) -> DatumShift:
     """Find the PROJ operation from one datum to that of the Cartesian frame; refused when there is no sound one."""
-    operation = ProjOperation(own.shift_end, out.shift_end)
-    trouble, missing = trouble_with(operation), missing_own_grids(own) or missing_own_grids(out)
+    operation = ProjOperation(crs.shift_end, out.shift_end)
+    trouble, missing = trouble_with(operation), missing_own_grids(crs) or missing_own_grids(out)
     if not trouble and not missing:
-        return DatumShift(operation, own.angle, out.angle)
+        return DatumShift(operation, crs.angle, out.angle)
     message = f"there is no known way from the datum of {spec.name} to that of {target.name}"
     fix = "give both in one datum"
     if "celestial body" in trouble:
         message += ": they lie on different bodies"
-    elif not (own.datum_is_stated and out.datum_is_stated):
-        which = target.name if own.datum_is_stated else spec.name
+    elif not (crs.datum_is_stated and out.datum_is_stated):
+        which = target.name if crs.datum_is_stated else spec.name
         message += f": {which} states an ellipsoid but no datum"
         fix = "add +towgs84=... (or +datum=...) to it, or use an authority code"
-    elif missing := missing or missing_grids(own.shift_end, out.shift_end):
+    elif missing := missing or missing_grids(crs.shift_end, out.shift_end):
         message += f": the grid {missing} is not installed"
         fix = (
             "put the grid beside the project file or into PROJ's data directory (`projsync`), or give both in one datum"
@@ -203,20 +203,20 @@ def _datum_shift(spec: FrameSpec, own: CrsParts, target: FrameSpec, out: CrsPart
     raise Refusal(message, code="datum-shift", fix=fix)
 
 
-def _vertical_operation(spec: FrameSpec, own: CrsParts) -> ProjOperation:
+def _vertical_operation(spec: FrameSpec, crs: CrsParts) -> ProjOperation:
     """Find the PROJ operation from heights above the geoid to heights above the ellipsoid of the same CRS."""
-    if own.whole is None or own.plane is None:
+    if crs.whole is None or crs.plane is None:
         raise PhotostripError(f"{spec.name} has no vertical part")
-    operation = ProjOperation(own.whole, own.plane.to_3d())
-    trouble, missing = trouble_with(operation), missing_own_grids(own)
+    operation = ProjOperation(crs.whole, crs.plane.to_3d())
+    trouble, missing = trouble_with(operation), missing_own_grids(crs)
     if not trouble and not missing:
         return operation
-    message = f"the heights of {spec.name} ({own.vertical}) cannot be brought to the ellipsoid"
-    if missing := missing or missing_grids(own.whole, own.plane.to_3d()):
+    message = f"the heights of {spec.name} ({crs.vertical}) cannot be brought to the ellipsoid"
+    if missing := missing or missing_grids(crs.whole, crs.plane.to_3d()):
         message += f": the geoid grid {missing} is not installed"
     elif "invalid" in trouble:
         message += ": PROJ cannot read the grid"
-    elif not own.datum_is_stated:
+    elif not crs.datum_is_stated:
         message += ": a geoid grid refers to WGS 84, and the datum of the plan is not stated (add +towgs84 or +datum)"
     else:
         message += ": PROJ knows no geoid for them"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.triangulation.image_coordinates import lens_distortion
-from photostrip.triangulation.image_coordinates.corrections import refraction_constant
+from photostrip.triangulation.image_coordinates.refraction import refraction_constant
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -53,7 +53,7 @@ class AbsoluteSettings:
 
 @dataclass(frozen=True, eq=False)
 class Targets:
-    """Control points seen from an intermediate frame."""
+    """Control points and what an intermediate frame makes of them."""
 
     control: ControlPoints  # the points, none of them a check point
     frames: Sequence[GroundFrame]  # ground frames the points refer to
@@ -193,7 +193,7 @@ def orient(
             )
         )
     misclosures = targets.misclosures(similarity(strip))
-    values = np.linalg.svd(_seen(plain, root), compute_uv=False)
+    values = np.linalg.svd(_scaled_design(plain, root), compute_uv=False)
     redundancy = int(targets.control.use.sum()) - PARAMETERS
     squares = float((weight * misclosures**2).sum())
     sigma0 = float(np.sqrt(squares / redundancy)) if redundancy > 0 else float("nan")
@@ -291,16 +291,16 @@ def _motion(reach: Floats | None, center: Floats, half: float) -> Floats:
     return np.asarray(np.linalg.cholesky(flat.T @ flat / len(arm) + 1e-15 * np.eye(PARAMETERS)), float)
 
 
-def _seen(design: Floats, root: Floats) -> Floats:
+def _scaled_design(design: Floats, root: Floats) -> Floats:
     """Design for motions of unit size, so that its singular values say how much of each the control sees."""
     return np.asarray(np.linalg.solve(root, design.T).T, float)
 
 
 def _refuse_deficient(design: Floats, root: Floats, xyz: Floats, targets: Targets, half: float) -> None:
     """Raise when the control leaves a motion free, and name that motion."""
-    seen = _seen(design, root)
+    scaled = _scaled_design(design, root)
     # the triangular factor has the same singular values and directions, however many control points there are
-    _, values, vt = np.linalg.svd(np.linalg.qr(seen, mode="r") if len(seen) > PARAMETERS else seen)
+    _, values, vt = np.linalg.svd(np.linalg.qr(scaled, mode="r") if len(scaled) > PARAMETERS else scaled)
     if len(values) == PARAMETERS and values[-1] > RANK_LIMIT * values[0]:
         return
     points = targets.control.ids

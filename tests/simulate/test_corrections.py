@@ -17,6 +17,7 @@ from photostrip.simulate.simulation import simulate
 from photostrip.simulate.spec import FILM as CAMERA
 from photostrip.simulate.spec import Film, Flight, Image, Spec, Terrain
 from photostrip.triangulation.image_coordinates import corrections, interior
+from photostrip.triangulation.image_coordinates.refraction import refraction_constant
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -87,7 +88,7 @@ def shift_of_the_lens(xy: Floats) -> Floats:
 def shift_of_the_air(done: Simulation, xy: Floats) -> Floats:
     """Saastamoinen's dr, outwards."""
     flying, ground = (float(each[:, 2].mean()) for each in (done.truth.centers_ground, done.truth.ground.xyz))
-    constant = corrections.refraction_constant(flying, ground)
+    constant = refraction_constant(flying, ground)
     return np.asarray(constant * xy * (1 + (xy**2).sum(1, keepdims=True) / done.camera.principal_distance**2))
 
 

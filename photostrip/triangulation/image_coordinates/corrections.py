@@ -4,7 +4,7 @@ The order of the corrections, from the image to the ideal, is that in which ligh
 
 1. principal point: coordinates are reduced to it;
 2. lens distortion, ``lens_distortion``;
-3. atmospheric refraction;
+3. atmospheric ``refraction``;
 4. Earth curvature, only where the ground frame does not carry it and it is asked for in image space.
 
 Film deformation is taken out before, by the interior orientation. Earth curvature is no error of an image: the ground
@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING, TypeGuard
 import numpy as np
 
 from photostrip.errors import Fault, InputError
-from photostrip.points import PhotoPoints
 from photostrip.triangulation.image_coordinates import lens_distortion
+from photostrip.triangulation.image_coordinates.refraction import curvature_constant, refraction_constant
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -29,20 +29,13 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from photostrip.camera import Camera, Distortion
+    from photostrip.points import PhotoPoints
 
     Floats = NDArray[np.float64]
 
 MICROMETRE = 1e-3  # mm
 SHOWN = 20  # points beyond the distortion table that are named one by one
 
-# Standard atmosphere, ICAO Doc 7488 (ISO 2533): layers to 11 km and above.
-LAPSE = 6.5 / 288.15  # relative fall of temperature per km
-EXPONENT = 5.25588  # of pressure; one less for density
-TROPOPAUSE = 11.0  # km
-STRATOSPHERE_SCALE = 6.341616  # km, height in which the pressure above the tropopause falls to 1/e
-SCALE_HEIGHT = 8.43450  # km, pressure over density and gravity at sea level
-# Refractivity of dry air at sea level in the standard atmosphere, visible light; Saastamoinen 1972.
-REFRACTIVITY = 277e-6
 CONVERGED = 1e-15  # relative to the radius
 ITERATIONS = 20
 
@@ -147,8 +140,7 @@ def refine(
             largest[effect] = max(largest.get(effect, 0.0), length / MICROMETRE)
     if not largest:
         return Refined(observations, largest)
-    o = observations
-    return Refined(PhotoPoints(o.photo_ids, o.point_ids, o.photo, o.point, xy, o.sigma), largest)
+    return Refined(replace(observations, xy=xy), largest)
 
 
 def undistort(image_xy: ArrayLike, camera: Camera, bending: Bending = NOTHING_BENT) -> Floats:
@@ -170,66 +162,6 @@ def distort(ideal_xy: ArrayLike, camera: Camera, bending: Bending = NOTHING_BENT
     if _distorts(camera.distortion):
         xy = lens_distortion.image_from_ideal(xy, camera.distortion)
     return np.asarray(xy + np.array(camera.principal_point), np.float64)
-
-
-def refraction_constant(flying_height: float, ground_height: float) -> float:
-    """Constant K of atmospheric refraction of vertical photos in the standard atmosphere, without unit.
-
-    The mean refractivity of the air between ground and camera minus that at the camera; heights above sea level.
-    Positive, so that images lie too far outside. From n sin(theta) = constant in plane layers follows tan(alpha) =
-    tan(theta) (1 - K / cos(theta)^2) for the direction theta at the camera and the straight line alpha to the ground.
-    An ``InputError`` when the camera is not above the ground.
-
-    Source: [Saastamoinen 1972], whose formula this is for heights to 11 km, with the factor 2335 rounded from 277 x
-    8.4345, and with the layer above of the standard atmosphere, ICAO Doc 7488.
-    """
-    _require_above(flying_height, ground_height, "refraction")
-    camera, ground = flying_height / 1000, ground_height / 1000
-    fall = _pressure(ground) - _pressure(camera)
-    return REFRACTIVITY * (SCALE_HEIGHT * fall / (camera - ground) - _density(camera))
-
-
-def refraction_shift(radius: ArrayLike, principal_distance: float, constant: float) -> Floats:
-    """Outward shift dr = K (r + r^3 / f^2) of image points by refraction, to be subtracted from their radius r.
-
-    Tilts of a few degrees change it by K f tan(tilt), the same for the whole photo, which the orientation takes up.
-
-    Source: [Saastamoinen 1972].
-    """
-    r = np.asarray(radius, float)
-    return np.asarray(constant * r * (1 + (r / principal_distance) ** 2), np.float64)
-
-
-def curvature_constant(flying_height: float, ground_height: float, radius: float) -> float:
-    """Constant C of Earth curvature in image space: height above ground over the diameter of the Earth.
-
-    A point of the plan at distance D lies D^2 / 2R below the plane, so that its image lies too far inside by dr = C r^3
-    / f^2, which is added to the radius. An ``InputError`` when the camera is not above the ground.
-
-    Source: [Kraus], influence of Earth curvature on a near-vertical photo.
-    """
-    _require_above(flying_height, ground_height, "earth_curvature")
-    return (flying_height - ground_height) / (2 * radius)
-
-
-def _require_above(flying_height: float, ground_height: float, what: str) -> None:
-    if flying_height <= ground_height:
-        message = f"{what}: the flying height {flying_height:g} m is not above the ground, {ground_height:g} m"
-        raise InputError(
-            Fault(message, code="flying-height", key="processing.flying_height", expected="heights in metres")
-        )
-
-
-def _pressure(height_km: float) -> float:
-    """Pressure of the standard atmosphere over that at sea level; above 20 km little is left to be wrong."""
-    if height_km <= TROPOPAUSE:
-        return float((1 - LAPSE * height_km) ** EXPONENT)
-    return _pressure(TROPOPAUSE) * float(np.exp((TROPOPAUSE - height_km) / STRATOSPHERE_SCALE))
-
-
-def _density(height_km: float) -> float:
-    """Density of the standard atmosphere relative to sea level: pressure over relative temperature."""
-    return _pressure(height_km) / (1 - LAPSE * min(height_km, TROPOPAUSE))
 
 
 def _bending(settings: ImageCorrectionSettings, flying_height: float | None, ground_height: float | None) -> Bending:

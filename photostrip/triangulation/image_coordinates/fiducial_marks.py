@@ -137,12 +137,12 @@ def right_pattern(marks: Marks) -> tuple[Marks, Flags, list[Fault]]:
     if not marks.photos:
         return marks, np.zeros(0, bool), []
     direct, turned = (_pattern(marks.measured, marks.weights, marks.calibrated, mirrored=m) for m in (False, True))
-    seen = np.maximum(direct.misfit, turned.misfit) > WRONG_PATTERN  # else the marks fit in both hands
-    hand = seen & (turned.misfit < direct.misfit)
+    distinct = np.maximum(direct.misfit, turned.misfit) > WRONG_PATTERN  # else the marks fit in both hands
+    hand = distinct & (turned.misfit < direct.misfit)
     fits = np.minimum(direct.misfit, turned.misfit) <= WRONG_PATTERN
-    votes = hand[seen & fits]
+    votes = hand[distinct & fits]
     camera_hand = bool(2 * votes.sum() > len(votes))
-    right = fits & ((hand == camera_hand) | ~seen)
+    right = fits & ((hand == camera_hand) | ~distinct)
     pattern = turned if camera_hand else direct
     quarters = np.round(pattern.rotation[right] / QUARTER).astype(int) % 4
     usual = int(np.bincount(quarters, minlength=4).argmax()) * QUARTER

@@ -40,10 +40,10 @@ class Deformation:
 
         There is none for photos of fewer than four marks or with all of them on one line.
         """
-        seen = [_spread(each) for each in calibrated]
+        usable = [_spread(each) for each in calibrated]
         none = np.zeros((0, 2))
-        nodes = [c + r if s else none for c, r, s in zip(calibrated, residuals, seen, strict=True)]
-        return cls(tuple(nodes), tuple(-r if s else none for r, s in zip(residuals, seen, strict=True)))
+        nodes = [c + r if s else none for c, r, s in zip(calibrated, residuals, usable, strict=True)]
+        return cls(tuple(nodes), tuple(-r if s else none for r, s in zip(residuals, usable, strict=True)))
 
     def unseen(self) -> Numbers:
         """Return the photos whose marks do not show a deformation."""

@@ -15,7 +15,6 @@ import numpy as np
 
 from photostrip.errors import InputError
 from photostrip.notes import Note
-from photostrip.points import PhotoPoints
 from photostrip.triangulation.image_coordinates.fiducial_marks import enough, fault, gather, right_pattern
 from photostrip.triangulation.image_coordinates.film_deformation import Deformation
 from photostrip.triangulation.image_coordinates.mark_fit import InteriorOrientation, fit_marks, joined_cameras
@@ -31,6 +30,7 @@ if TYPE_CHECKING:
 
     from photostrip.camera import Camera
     from photostrip.errors import Fault
+    from photostrip.points import PhotoPoints
 
 
 @dataclass(frozen=True)
@@ -115,9 +115,7 @@ def transform(observations: PhotoPoints, interior: InteriorOrientation) -> Photo
     if interior.film is not None:
         xy[film] = interior.film.corrected(rows[film], xy[film])
     variance[film] = (photo_from_measured.jacobian(points)[:, 0] ** 2 @ variance[film][:, :, None])[:, :, 0]
-    return PhotoPoints(
-        observations.photo_ids, observations.point_ids, observations.photo, observations.point, xy, np.sqrt(variance)
-    )
+    return replace(observations, xy=xy, sigma=np.sqrt(variance))
 
 
 def measured(photo_points: PhotoPoints, interior: InteriorOrientation) -> PhotoPoints:

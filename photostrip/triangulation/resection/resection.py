@@ -31,7 +31,7 @@ class Resection:
     rotations: Floats  # (n, 3, 3): photo to that frame
     residuals: Floats  # (m, 2): measured minus computed image coordinates in mm
     rms: Floats  # (n,): root mean square of a photo's residuals in mm
-    # (n,): false where a photo kept its start orientation: too few points, or a solution that does not settle
+    # (n,): false where a photo kept its start orientation: too few points, or an iteration that does not converge
     solved: NDArray[np.bool_]
 
 
@@ -76,16 +76,16 @@ def resect(xy: Floats, points: Floats, photo: Numbers, focal: Floats, start: tup
     starts = np.searchsorted(photo, present)
     distance = np.ones(len(centers))
     distance[present] = np.add.reduceat(np.linalg.norm(points - centers[photo], axis=1), starts) / counts[present]
-    settled = np.zeros(len(centers), bool)
+    converged = np.zeros(len(centers), bool)
     for _ in range(ITERATIONS):
         step = _steps(xy, points, photo, focal, (centers, rotations), distance, (present, starts))
         step[~enough] = 0.0
         centers = centers + step[:, :3] * distance[:, None]
         rotations = from_vector(step[:, 3:]) @ rotations
-        settled = np.isfinite(step).all(axis=1) & (np.abs(step).max(axis=1) < CONVERGED)
-        if settled.all():
+        converged = np.isfinite(step).all(axis=1) & (np.abs(step).max(axis=1) < CONVERGED)
+        if converged.all():
             break
-    solved = settled & enough
+    solved = converged & enough
     centers, rotations = (
         np.where(solved[:, None], centers, start[0]),
         np.where(solved[:, None, None], rotations, start[1]),
@@ -123,6 +123,6 @@ def _steps(
     normal[:, UPPER[1], UPPER[0]] = sums[:, : len(UPPER[0])]
     diagonal = np.arange(UNKNOWNS)
     normal[:, diagonal, diagonal] += SINGULAR * np.maximum(normal[:, diagonal, diagonal], 1e-9)
-    own = np.linalg.solve(normal, sums[:, len(UPPER[0]) :, None])[:, :, 0]
-    turned = np.einsum("nij,nkj->nki", rotations, own.reshape(-1, 2, 3))
+    along_axes = np.linalg.solve(normal, sums[:, len(UPPER[0]) :, None])[:, :, 0]
+    turned = np.einsum("nij,nkj->nki", rotations, along_axes.reshape(-1, 2, 3))
     return np.asarray(turned.reshape(-1, UNKNOWNS), float)

@@ -83,9 +83,9 @@ def spreads(
         for side, (row, model) in enumerate(((after, junction + 1), (before, junction))):
             slope = _slopes(orientation, row, side)
             mean = np.column_stack([np.bincount(junction, each) for each in slope.T]) / count
-            own = slope - mean[junction]
-            spread = (own[:, None, :] @ weight[model])[:, 0]
-            variance += (spread * own).sum(axis=1) * scatter[model] ** 2
+            deviation = slope - mean[junction]
+            spread = (deviation[:, None, :] @ weight[model])[:, 0]
+            variance += (spread * deviation).sum(axis=1) * scatter[model] ** 2
     return single, np.sqrt(np.maximum(variance, 0.0))
 
 
@@ -173,10 +173,10 @@ def screen(
     ]
     value = np.log(ratio)
     center = _weighted_medians(value, weight, junction, junctions)
-    own = SIGMA_FROM_MEDIAN * _weighted_medians(
+    scatter = SIGMA_FROM_MEDIAN * _weighted_medians(
         np.abs(value - center[junction]) / size, np.ones(len(value)), junction, junctions
     )
-    scale = np.maximum(1.0, own / (1 + PROOF * MEDIAN_SCATTER / np.sqrt(np.maximum(count, 1))))
+    scale = np.maximum(1.0, scatter / (1 + PROOF * MEDIAN_SCATTER / np.sqrt(np.maximum(count, 1))))
     limit = (level * scale)[junction] * size
     few = (count < FEWEST)[junction]
     used = few | (np.abs(value - center[junction]) <= limit)

@@ -18,6 +18,7 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.points import PhotoPoints
 from photostrip.triangulation.image_coordinates import corrections, lens_distortion
 from photostrip.triangulation.image_coordinates.corrections import Bending, ImageCorrectionSettings, Refined
+from photostrip.triangulation.image_coordinates.refraction import curvature_constant, refraction_constant
 
 Floats = NDArray[np.float64]
 
@@ -29,6 +30,15 @@ FORWARD, BACKWARD = "image_to_ideal", "ideal_to_image"
 directions = pytest.mark.parametrize("direction", [FORWARD, BACKWARD])
 PLAIN = Camera("plain", FOCAL, format=(230.0, 230.0))
 NODES = tuple(np.arange(0.0, 171.0, 10.0))
+
+
+def refraction_shift(radius: Floats | float, principal_distance: float, constant: float) -> Floats:
+    """Outward shift dr = K (r + r^3 / f^2) of image points by refraction [Saastamoinen 1972].
+
+    Tilts of a few degrees change it by K f tan(tilt), the same for the whole photo, which the orientation takes up.
+    """
+    r = np.asarray(radius, float)
+    return np.asarray(constant * r * (1 + (r / principal_distance) ** 2), np.float64)
 
 
 def old_lens(radius: Floats) -> Floats:
@@ -120,7 +130,7 @@ def test_every_correction_has_its_inverse(camera: Camera, image: Floats, constan
 def test_a_table_of_points_is_refined_as_its_camera_alone(camera: Camera, image: Floats) -> None:
     settings = ImageCorrectionSettings(refraction=True, flying_height=3000.0, ground_height=200.0)
     found = refine(image, camera, settings).observations
-    constant = Bending(corrections.refraction_constant(3000.0, 200.0))
+    constant = Bending(refraction_constant(3000.0, 200.0))
     assert np.array_equal(found.xy, corrections.undistort(image, camera, constant))
     assert found.photo_ids == ("1",)
 
@@ -428,8 +438,8 @@ def test_refraction_is_that_of_a_ray_through_the_standard_atmosphere(
 def test_the_curvature_of_the_layers_does_not_matter(flying: float, ground: float) -> None:
     """Two rays that differ by refraction only, through round layers: what the plane formula leaves."""
     bent, _ = traced(150.0, flying, ground, 6_371_000.0)
-    constant = corrections.refraction_constant(flying, ground)
-    assert abs(150.0 - corrections.refraction_shift(150.0, FOCAL, constant) - bent) < 0.1 * MICROMETRE
+    constant = refraction_constant(flying, ground)
+    assert abs(150.0 - refraction_shift(150.0, FOCAL, constant) - bent) < 0.1 * MICROMETRE
 
 
 @pytest.mark.parametrize(
@@ -448,19 +458,19 @@ def test_the_constant_agrees_with_the_printed_formula() -> None:
         H, h = flying / 1000, ground / 1000
         printed = 2335 / (H - h) * ((1 - 0.02257 * h) ** 5.256 - (1 - 0.02257 * H) ** 5.256)
         printed = (printed - 277.0 * (1 - 0.02257 * H) ** 4.256) * 1e-6
-        assert corrections.refraction_constant(flying, ground) == pytest.approx(printed, rel=0.006)
+        assert refraction_constant(flying, ground) == pytest.approx(printed, rel=0.006)
 
 
 def test_the_constant_runs_on_through_the_tropopause() -> None:
-    below, at, above = (corrections.refraction_constant(11_000.0 + d, 0.0) for d in (-1, 0, 1))
+    below, at, above = (refraction_constant(11_000.0 + d, 0.0) for d in (-1, 0, 1))
     assert 0 < at - below < 1e-8
     assert 0 < above - at < 1e-8  # steeper, because the density falls faster above, but without a jump
 
 
 @given(st.floats(0, 170), st.floats(1000, 12_000))
 def test_refraction_shift_is_the_textbook_form(radius: float, flying: float) -> None:
-    constant = corrections.refraction_constant(flying, 0.0)
-    found = corrections.refraction_shift(radius, FOCAL, constant)
+    constant = refraction_constant(flying, 0.0)
+    found = refraction_shift(radius, FOCAL, constant)
     assert found == pytest.approx(constant * (radius + radius**3 / FOCAL**2), rel=1e-12)
     corrected = corrections.undistort(np.array([[radius, 0.0]]), PLAIN, Bending(constant))
     assert corrected[0, 0] == pytest.approx(radius - found, abs=1e-12)
@@ -479,7 +489,7 @@ def test_heights_of_the_settings_go_before_those_of_the_caller() -> None:
         (ImageCorrectionSettings(refraction=True, flying_height=4000.0), 4000.0, 500.0),
         (ImageCorrectionSettings(refraction=True, flying_height=4000.0, ground_height=0.0), 4000.0, 0.0),
     ):
-        expected = corrections.refraction_shift(radius, FOCAL, corrections.refraction_constant(flying, ground))
+        expected = refraction_shift(radius, FOCAL, refraction_constant(flying, ground))
         assert largest(settings) == pytest.approx(expected / MICROMETRE)
 
 
@@ -502,7 +512,7 @@ def test_curvature_is_that_of_a_sphere_seen_from_above(flying: float, angle_deg:
     arc = flying * tangent / radius  # as a plane map has it: distances along the sphere
     below = flying + radius * (1 - np.cos(arc))
     seen = FOCAL * radius * np.sin(arc) / below
-    bending = Bending(curvature=corrections.curvature_constant(flying, 0.0, radius))
+    bending = Bending(curvature=curvature_constant(flying, 0.0, radius))
     found = corrections.undistort(np.array([[0.0, seen]]), PLAIN, bending)
     missing = FOCAL * tangent - seen
     assert missing > 0  # the ground falls away from the plane, so its images lie too far inside
@@ -512,7 +522,7 @@ def test_curvature_is_that_of_a_sphere_seen_from_above(flying: float, angle_deg:
 
 def test_the_textbook_size_of_curvature() -> None:
     # wide angle, 1:30 000, 140 mm from the middle: dr = r^3 H / (2 R f^2)
-    bending = Bending(curvature=corrections.curvature_constant(4590.0, 0.0, 6370000.0))
+    bending = Bending(curvature=curvature_constant(4590.0, 0.0, 6370000.0))
     found = corrections.undistort(np.array([[140.0, 0.0]]), PLAIN, bending)
     assert found[0, 0] - 140.0 == pytest.approx(140.0**3 * 4590.0 / (2 * 6370000.0 * FOCAL**2), rel=1e-9)
     assert 0.0421 < found[0, 0] - 140.0 < 0.0423
