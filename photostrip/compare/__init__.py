@@ -1,9 +1,8 @@
 """Two results beside each other: what differs by more than is allowed, for regression checks.
 
-- ``tolerances``: what is allowed for each kind of quantity;
-- ``ground``: how far two ground points are apart, in plan and in height;
-- ``quantities``: the numbers of a result, each with its kind, id and unit;
-- ``comparison``: the comparison, as one plain document.
+Two documents of results and ``tolerances`` come in, one plain document goes out (``comparison``). ``quantities`` finds
+the numbers, each with its kind, id and unit; ``ground`` says how far two points are apart in plan and in height;
+``members`` compares ids, choices, rejections and findings as sets.
 """
 
 from photostrip.compare.comparison import baseline_of, compare_results

@@ -1,1 +1,8 @@
-"""What is computed for the document of a result: one plain dictionary, rendered by files and reports."""
+"""What is computed for the document of a result: one plain dictionary, rendered by files and reports.
+
+A ``pipeline.Result`` comes in; ``document.document_of`` makes the content of result.json of it: texts, numbers, None,
+lists and dictionaries only. Every key is described in ``quantities.txt`` with unit, decimals and meaning, and records
+are rounded by that (``quantities``); ``columns`` lists those of the CSV files. ``adjustment`` has the blocks of
+adjustments, ``points`` those of points and photos, ``trace`` the iterations once more; ``verdict`` looks at the
+finished document, and ``methods`` puts those of several adjustments side by side.
+"""

@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.result.numbers import GROUND, Document, micrometres, rms, rounded
+from photostrip.result.numbers import rms
+from photostrip.result.quantities import record
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.camera import Camera
     from photostrip.pipeline import Result
+    from photostrip.result.numbers import Document
 
     Floats = NDArray[np.float64]
 
@@ -32,7 +34,7 @@ MEANT_OF_MODELS = {
     "the axes along, across, up of the strip",
     "vx_um, vy_um, vz_um": "model after minus model before at their common points, along the axes of the model before",
 }
-CURVATURE = "earth curvature"  # told with the other ways to treat it
+CURVATURE = "earth curvature"  # named with the other ways to treat it
 
 
 def conventions_of(result: Result) -> Document:
@@ -94,13 +96,11 @@ def _camera(camera: Camera) -> Document:
 def corrections_of(result: Result) -> Document:
     """Return the block ``corrections``: what was done to the measured coordinates, and how large it was."""
     largest = result.refined.largest_um
-    found: Document = {
-        effect.replace(" ", "_"): {"applied": effect in largest, "largest_um": rounded(largest.get(effect, 0.0), 2)}
+    effects = {
+        effect.replace(" ", "_"): {"applied": effect in largest, "largest_um": largest.get(effect, 0.0)}
         for effect in EFFECTS
     }
-    found["interior"] = _interior(result)
-    found["earth_curvature"] = _curvature(result)
-    return found
+    return record("corrections", effects | {"interior": _interior(result), "earth_curvature": _curvature(result)})
 
 
 def _interior(result: Result) -> Document | None:
@@ -114,8 +114,8 @@ def _interior(result: Result) -> Document | None:
     return {
         "photos": len(found.photo_ids),
         "transforms": sorted(set(found.transforms)),
-        "rms_um": micrometres(rms(np.concatenate([each.ravel() for each in found.residuals] or [np.zeros(0)]))),
-        "largest_um": micrometres(lengths[worst][mark]) if mark >= 0 else None,
+        "rms_um": 1000.0 * rms(np.concatenate([each.ravel() for each in found.residuals] or [np.zeros(0)])),
+        "largest_um": 1000.0 * lengths[worst][mark] if mark >= 0 else None,
         "largest_photo": found.photo_ids[worst] if mark >= 0 else None,
         "largest_mark": found.marks[worst][mark] if mark >= 0 else None,
         "without_marks": list(found.without_marks),
@@ -128,7 +128,7 @@ def _curvature(result: Result) -> Document:
     wanted, radius = result.settings.absolute.earth_curvature, result.output.spec.curvature_radius
     if CURVATURE in (shifts := result.refined.largest_um):
         how = f"image points shifted outwards, R = {result.settings.refinement.earth_radius:.0f} m"
-        return {"asked": wanted, "treatment": how, "largest": 0.0, "largest_um": rounded(shifts[CURVATURE], 2)}
+        return {"asked": wanted, "treatment": how, "largest": 0.0, "largest_um": shifts[CURVATURE]}
     if radius is not None:
         points = result.points
         size = float(np.abs(points.ground[:, 2] - points.cartesian[:, 2]).max(initial=0.0))
@@ -139,4 +139,4 @@ def _curvature(result: Result) -> Document:
         a, b = result.output.ellipsoid or (6378137.0, 6356752.3)
         reach = max(float(np.linalg.norm(s.xyz[:, :2], axis=1).max(initial=0.0)) for s in result.strips)
         size, how = reach**2 / (a + b), "carried by the frames: coordinates go through geocentric space"
-    return {"asked": wanted, "treatment": how, "largest": rounded(size, GROUND)}
+    return {"asked": wanted, "treatment": how, "largest": size}

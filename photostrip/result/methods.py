@@ -19,16 +19,8 @@ PARTS = ("count", "rms", "max", "worst", "rms_um")
 def methods_document(name: str, found: Mapping[str, Document | PhotostripError]) -> Document:
     """Put the results of several adjustments side by side.
 
-    Parameters
-    ----------
-    found : mapping of str to dict or PhotostripError
-        For each adjustment the document of its result, or why there is none.
-
-    Returns
-    -------
-    dict
-        ``methods``: for each adjustment what is left at check and at control points, and its precision; ``best``: the
-        adjustment with the smallest rms at check points in plan and in height, None without check points.
+    `found` has for each adjustment the document of its result, or why there is none. ``methods`` says what is left at
+    check and at control points, ``best`` which adjustment has the smallest rms at check points, None without these.
     """
     rows = [_method(adjustment, each) for adjustment, each in found.items()]
     return {

@@ -27,17 +27,9 @@ DIGITS = re.compile("([0-9]+)")
 
 
 def rounded(values: ArrayLike, decimals: int) -> Plain:
-    """Round to decimals.
+    """Round numbers to decimals: a number or nested lists in the shape of `values`.
 
-    Parameters
-    ----------
-    values : array_like
-        Numbers of any shape.
-
-    Returns
-    -------
-    float, None or nested lists
-        The numbers in the shape of `values`; None where there is none (NaN, infinite). Never -0.
+    None stands where there is no number (NaN, infinite); never -0.
     """
     return plain(np.round(np.asarray(values, float), decimals) + 0.0)
 
@@ -60,7 +52,7 @@ def significant(values: ArrayLike, digits: int = SIGNIFICANT) -> Plain:
 
 
 def micrometres(millimetres: ArrayLike) -> Plain:
-    """Give millimetres of the image as rounded micrometres."""
+    """Return millimetres of the image as rounded micrometres."""
     return rounded(np.asarray(millimetres, float) * 1000.0, MICROMETRES)
 
 
@@ -73,13 +65,7 @@ def natural(name: str) -> tuple[list[str | tuple[int, str]], str]:
 
 
 def natural_rank(names: Sequence[str]) -> NDArray[np.intp]:
-    """Place of each name in natural order.
-
-    Returns
-    -------
-    ndarray of int, shape (n,)
-        Rank of each, from 0.
-    """
+    """Place of each name in natural order, from 0."""
     keys = [natural(name) for name in names]
     rank = np.empty(len(names), np.intp)
     rank[sorted(range(len(names)), key=keys.__getitem__)] = np.arange(len(names))

@@ -141,16 +141,17 @@ def records(block: str, columns: Mapping[str, Any]) -> list[Document]:
     stands in every record.
     """
     size = next(len(column) for column in columns.values() if isinstance(column, list | tuple | np.ndarray))
-    return _rows({key: _cells(table_at(block)[key], column, size) for key, column in columns.items()})
+    return as_records({key: _cells(table_at(block)[key], column, size) for key, column in columns.items()})
 
 
-def _rows(columns: Mapping[str, Sequence[Plain]]) -> list[Document]:
+def as_records(columns: Mapping[str, Sequence[Plain]]) -> list[Document]:
+    """Make records of columns of equal length."""
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
 def _cells(entry: Quantity | Table, column: Any, size: int) -> Sequence[Plain]:  # noqa: ANN401 (any column)
     if isinstance(column, Mapping) and isinstance(entry, dict):
-        return _rows({key: _cells(entry[key], part, size) for key, part in column.items()})
+        return as_records({key: _cells(entry[key], part, size) for key, part in column.items()})
     if not isinstance(column, list | tuple | np.ndarray):
         return [column] * size
     if isinstance(entry, Quantity):
@@ -166,4 +167,4 @@ def grouped(block: str, heads: Mapping[str, Any], columns: Mapping[str, Any], en
     for key, column in columns.items():
         values = _cells(table[key], column, 0)
         cells[key] = [values[start:end] for start, end in pairwise(ends)]
-    return _rows(cells)
+    return as_records(cells)

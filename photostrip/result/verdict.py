@@ -1,6 +1,6 @@
 """The verdict on a result: good, worth a look, or a failed tolerance; and what to look at, worst first.
 
-Everything is judged from the result's own document, with the limits that stand here.
+It is made from the finished document, so that a saved result has the same verdict; its limits stand first.
 """
 
 from __future__ import annotations
@@ -23,29 +23,17 @@ SIGMA0_RATIO = 1.5  # of sigma0 to the stated standard deviation
 PAIR_RATIO = 1.5  # of a pair's sigma0 to that of the project, when chance does not explain it
 PAIR_LEVEL = 0.01  # probability that any sound pair of the project is named
 PHOTO_RATIO = 3.0  # of a photo's image residuals to those of the project
-POOR_CONTROL = (
-    5.0  # rms of the control's residuals in units of their standard deviation; a long strip bends by that much
-)
+# Rms of the control's residuals in units of their standard deviation; a long strip bends by that much.
+POOR_CONTROL = 5.0
 ODD_POINT = 4.0  # difference at a given point against the rms of the others
 ODD_RATIO = 3.0  # and against its standard deviation: a few good points can be better than they should be
 FEW = 4  # given points below which none can stand out
 MANY_REJECTED = 0.05  # share of the points in pairs
-NAMED = 3  # things of one kind that are named
+NAMED = 3  # pairs, photos, findings or notes of one kind that are named
 
 
 def verdict_of(document: Document) -> Document:
-    """Judge a result.
-
-    Parameters
-    ----------
-    document : dict
-        The document of the result with its numbers, without the verdict.
-
-    Returns
-    -------
-    dict
-        ``status``, one of ``good``, ``look`` and ``failed``; ``accuracy``, a sentence; ``look_at``, sentences.
-    """
+    """Return status, accuracy in a sentence and what to look at, from a document that has no verdict yet."""
     failed = [*_tolerances(document), *_findings(document, "error")]
     look_at = [
         *failed,
@@ -184,7 +172,7 @@ def _rejected(document: Document) -> Iterator[str]:
 
 
 def _findings(document: Document, severity: str) -> Iterator[str]:
-    """Tell what the data say against themselves and nobody has accepted."""
+    """Name what the data say against themselves and nobody has accepted."""
     open_ones = [each for each in document["findings"] if each["severity"] == severity and not each["accepted"]]
     for _, group in groupby(open_ones, key=itemgetter("code")):
         kind = list(group)

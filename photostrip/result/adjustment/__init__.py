@@ -1,1 +1,6 @@
-"""Blocks of the document about pairs, strips, models and their adjustment."""
+"""Blocks of the document about adjustments: strips, pairs, links, rejections, the covariance and the bundle.
+
+Each module turns the stages of a ``StripResult`` or of the bundle into records of its blocks: millimetres of the image
+become micrometres, radians degrees, and discrepancies are carried to the ground by the similarity of the strip.
+``deformation_surface`` estimates twist and bending of single models ([003] eq. 10.12).
+"""

@@ -1,6 +1,6 @@
 """The iterations of a strip once more, step by step, for those who want to follow them.
 
-A run keeps what it found, not the way there. Here the same functions start again from the same values and tell each
+A run keeps what it found, not the way there. The same functions start again from the same values and hand over each
 step; that they end where the run ended is tested.
 """
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     Numbers = NDArray[np.intp]
 
 START_DIGITS = 1  # of radians: where a pair starts whose start values do not lead to its solution
-SAME = 1e-6  # rad
+SAME_ELEMENTS = 1e-6  # radians
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,10 +59,7 @@ class SimilarityStep:
 def pair_rounds(result: Result, strip: StripResult) -> list[list[PairRound]]:
     """Repeat the relative orientation of every pair: with all its points, then without those that were rejected.
 
-    Returns
-    -------
-    list of list of PairRound
-        For each pair one round, or two when points of it were rejected.
+    A pair has one round, or two when points of it were rejected.
     """
     final = strip.of_photos.orientation
     given = _with_all_points(result, strip)
@@ -88,7 +85,7 @@ def _starts(pairs: Pairs, wanted: Floats) -> Floats:
     start = start_values(pairs)
     solved = solve_elements(pairs).elements
     reached = iterate_elements(start, pairs).elements
-    turned = np.abs(np.sin((reached - solved) / 2)).max(axis=1) > SAME
+    turned = np.abs(np.sin((reached - solved) / 2)).max(axis=1) > SAME_ELEMENTS
     start[turned] = np.round(np.where(np.isfinite(solved), solved, wanted)[turned], START_DIGITS)
     return start
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from itertools import compress
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.geometry.rotation import alpha_omega_kappa
-from photostrip.result.numbers import rounded, significant
+from photostrip.result.numbers import EXACT, rounded, significant
+from photostrip.result.quantities import as_records
 from photostrip.result.trace.replay import pair_rounds, similarity_steps
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.relative_orientation.solution import ELEMENTS, base_rays
@@ -16,13 +18,13 @@ from photostrip.triangulation.strip_formation.intersection import intersect
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from photostrip.geometry.similarity import Similarity
     from photostrip.pipeline import Result
     from photostrip.pipeline.results import StripResult
+    from photostrip.result.numbers import Document
     from photostrip.result.trace.replay import PairRound, SimilarityStep
 
     Floats = NDArray[np.float64]
-
-Document = dict[str, Any]
 
 SCHEMA = 1
 UNITS = {"deg": 180 / np.pi, "gon": 200 / np.pi, "rad": 1.0}
@@ -48,45 +50,25 @@ SYMBOLS = {
 
 
 def trace_of(result: Result) -> Document:
-    """Return every stage of a run, iteration by iteration.
-
-    Returns
-    -------
-    dict
-        ``symbols``, and for each strip ``pairs``, ``chain``, ``scale_transfer``, ``absolute`` and ``polynomial``;
-        angles in the unit of the output.
-    """
+    """Return every stage of a run, iteration by iteration; angles in the unit of the output."""
     unit = result.settings.angle_unit
     return {
         "photostrip_trace": SCHEMA,
         "name": result.inputs.name,
         "angles": unit,
         "symbols": SYMBOLS,
-        "strips": [
-            _linked(result, strip, UNITS[unit]) if result.model_strips else _strip(result, strip, UNITS[unit])
-            for strip in result.strips
-        ],
-    }
-
-
-def _linked(result: Result, strip: StripResult, factor: float) -> Document:
-    """Return a strip of independent models: its links are in the result, the way to the ground is as for photos."""
-    return {
-        "strip": strip.strip.id,
-        "pairs": [],
-        "chain": [],
-        "scale_transfer": [],
-        "absolute": _absolute(result, strip, factor),
-        "polynomial": _polynomial(result, strip),
+        "strips": [_strip(result, strip, UNITS[unit]) for strip in result.strips],
     }
 
 
 def _strip(result: Result, strip: StripResult, factor: float) -> Document:
+    """Return the stages of a strip; links of independent models are in the result, their way to the ground is here."""
+    of_photos = strip.model_stages is None
     return {
         "strip": strip.strip.id,
-        "pairs": _pairs(result, strip, factor),
-        "chain": _chain(strip, factor),
-        "scale_transfer": _scale_transfer(result, strip),
+        "pairs": _pairs(result, strip, factor) if of_photos else [],
+        "chain": _chain(strip, factor) if of_photos else [],
+        "scale_transfer": _scale_transfer(result, strip) if of_photos else [],
         "absolute": _absolute(result, strip, factor),
         "polynomial": _polynomial(result, strip),
     }
@@ -98,20 +80,18 @@ def _strip(result: Result, strip: StripResult, factor: float) -> Document:
 def _pairs(result: Result, strip: StripResult, factor: float) -> list[Document]:
     """Relative orientation of every pair: rounds of the iteration, rejections, parallaxes and model points."""
     photos, orientation = strip.strip.photos, strip.of_photos.orientation
-    found = []
-    for number, rounds in enumerate(pair_rounds(result, strip)):
-        found.append(
-            {
-                "left": photos[number],
-                "right": photos[number + 1],
-                "rounds": [_round(each, factor) for each in rounds],
-                "rejected": _rejected(result, strip, number),
-                "sigma0_um": rounded(orientation.sigma0[number] * 1000, 2),
-                "elements": _named(orientation.elements[number] * factor, ANGLE),
-                "points": _points(result, strip, number),
-            }
-        )
-    return found
+    return [
+        {
+            "left": photos[number],
+            "right": photos[number + 1],
+            "rounds": [_round(each, factor) for each in rounds],
+            "rejected": _rejected(result, strip, number),
+            "sigma0_um": rounded(orientation.sigma0[number] * 1000, 2),
+            "elements": _named(orientation.elements[number] * factor, ANGLE),
+            "points": _points(result, strip, number),
+        }
+        for number, rounds in enumerate(pair_rounds(result, strip))
+    ]
 
 
 def _named(values: Floats, decimals: int) -> Document:
@@ -154,18 +134,16 @@ def _points(result: Result, strip: StripResult, number: int) -> list[Document]:
     pairs = orientation.pairs.take(np.array([number]))
     left, right = base_rays(orientation.elements[[number]], pairs)
     model = intersect(np.array([1.0, 0.0, 0.0]), left, right, pairs.focal)
-    columns = (
-        rounded(np.column_stack([pairs.left, pairs.right]), MILLIMETRES),
-        rounded(orientation.parallax[rows], MILLIMETRES),
-        rounded(model.ray_factor, MODEL),
-        rounded(strip.of_photos.formed.model_xyz[rows], MODEL),
-        (pairs.weight > 0).tolist(),
-    )
-    found = []
-    for row, image, q, factor, xyz, used in zip(rows.tolist(), *columns, strict=True):
-        point = {"point": ids[orientation.point[row]], **dict(zip(("x1", "y1", "x2", "y2"), image, strict=True))}
-        found.append(point | {"q": q, "N": factor, **dict(zip("XYZ", xyz, strict=True)), "used": used})
-    return found
+    image = rounded(np.column_stack([pairs.left, pairs.right]).T, MILLIMETRES)
+    columns = {
+        "point": [ids[point] for point in orientation.point[rows]],
+        **dict(zip(("x1", "y1", "x2", "y2"), image, strict=True)),
+        "q": rounded(orientation.parallax[rows], MILLIMETRES),
+        "N": rounded(model.ray_factor, MODEL),
+        **dict(zip("XYZ", rounded(strip.of_photos.formed.model_xyz[rows].T, MODEL), strict=True)),
+        "used": (pairs.weight > 0).tolist(),
+    }
+    return as_records(columns)
 
 
 # ---------------------------------------------------------------------------------------------- chain and scales
@@ -191,38 +169,34 @@ def _chain(strip: StripResult, factor: float) -> list[Document]:
 
 
 def _angles(rotation: Floats, factor: float) -> list[float]:
-    """Give alpha, omega, kappa of a rotation in the unit of the output."""
+    """Return alpha, omega, kappa of a rotation in the unit of the output."""
     values: list[float] = rounded(np.array(alpha_omega_kappa(rotation)).ravel() * factor, ANGLE)
     return values
 
 
 def _scale_transfer(result: Result, strip: StripResult) -> list[Document]:
-    """Pass points of every joint: distances, ratios, the factor."""
+    """Pass points of every junction: distances, ratios, the factor."""
     formed, ids = strip.of_photos.formed, result.refined.observations.point_ids
-    joints, photos = formed.junctions, strip.strip.photos
-    found = []
-    for joint, factor in enumerate(joints.factor.tolist()):
-        rows = np.flatnonzero(joints.junction == joint)
-        center = formed.centers[joint + 1]
-        before = np.linalg.norm(formed.model_xyz[joints.before[rows]] - center, axis=1)
-        after = np.linalg.norm(formed.model_xyz[joints.after[rows]] - center, axis=1) / formed.scale[joint + 1]
-        points = [
-            {
-                "point": ids[joints.point[row]],
-                "D": rounded(d, MODEL),
-                "D'": rounded(d_model, MODEL),
-                "k_t": rounded(joints.ratio[row] * formed.scale[joint], MODEL),
-                "used": bool(joints.used[row]),
-            }
-            for row, d, d_model in zip(rows.tolist(), before, after, strict=True)
-        ]
+    joined, found = formed.junctions, []
+    for number, factor in enumerate(joined.factor.tolist()):
+        rows = np.flatnonzero(joined.junction == number)
+        center = formed.centers[number + 1]
+        before = np.linalg.norm(formed.model_xyz[joined.before[rows]] - center, axis=1)
+        after = np.linalg.norm(formed.model_xyz[joined.after[rows]] - center, axis=1) / formed.scale[number + 1]
+        points = {
+            "point": [ids[point] for point in joined.point[rows]],
+            "D": rounded(before, MODEL),
+            "D'": rounded(after, MODEL),
+            "k_t": rounded(joined.ratio[rows] * formed.scale[number], MODEL),
+            "used": joined.used[rows].tolist(),
+        }
         found.append(
             {
-                "photo": photos[joint + 1],
+                "photo": strip.strip.photos[number + 1],
                 "form": result.settings.formation.scale_transfer,
-                "points": points,
-                "k": rounded(factor * formed.scale[joint], MODEL),
-                "sd_of_one": rounded(joints.spread[joint] * factor * formed.scale[joint], MODEL),
+                "points": as_records(points),
+                "k": rounded(factor * formed.scale[number], MODEL),
+                "sd_of_one": rounded(joined.spread[number] * factor * formed.scale[number], MODEL),
             }
         )
     return found
@@ -233,33 +207,27 @@ def _scale_transfer(result: Result, strip: StripResult) -> list[Document]:
 
 def _absolute(result: Result, strip: StripResult, factor: float) -> Document:
     """Absolute orientation: the frame, the control in it, the steps, the similarity."""
-    steps = similarity_steps(result, strip)
     similarity, frame = strip.absolute.similarity, strip.intermediate
     points = strip.formed.xyz[strip.control_rows]
     moved = similarity(points)
     given = absolute_orientation.Targets(strip.control, result.frames, frame).of(moved)
-    columns = (strip.control.ids, strip.control.use, rounded(points, MODEL), rounded(moved, METRES),
-               rounded(given, METRES))  # fmt: skip
-    control = [
-        {
-            "point": name,
-            "use": "".join(axis for axis, counts in zip("xyz", use.tolist(), strict=True) if counts),
-            "strip": strip_xyz,
-            "oriented": oriented,
-            "given": target,
-        }
-        for name, use, strip_xyz, oriented, target in zip(*columns, strict=True)
-    ]
+    control = {
+        "point": strip.control.ids,
+        "use": ["".join(compress("xyz", use)) for use in strip.control.use.tolist()],
+        "strip": rounded(points, MODEL),
+        "oriented": rounded(moved, METRES),
+        "given": rounded(given, METRES),
+    }
     return {
         "A0": rounded(frame.azimuth * factor, ANGLE),
         "origin": rounded(frame.origin, METRES),
         "M": rounded(frame.axes.ravel(), COSINE),
-        "steps": [_similarity_step(number, step, factor) for number, step in enumerate(steps, 1)],
-        "s": significant(similarity.scale, 12),
-        **dict(zip(("xi", "eta", "theta"), _angles(similarity.rotation, factor), strict=True)),
-        "shift": rounded(similarity.shift, METRES),
+        "steps": [
+            _similarity_step(number, step, factor) for number, step in enumerate(similarity_steps(result, strip), 1)
+        ],
+        **_similarity(similarity, factor),
         "sigma0": significant(strip.absolute.sigma0),
-        "control": control,
+        "control": as_records(control),
     }
 
 
@@ -267,12 +235,18 @@ def _similarity_step(number: int, step: SimilarityStep, factor: float) -> Docume
     return {
         "iteration": number,
         "[wvv]": significant(step.squares, SQUARES),
-        "s": significant(step.similarity.scale, 12),
-        **dict(zip(("xi", "eta", "theta"), _angles(step.similarity.rotation, factor), strict=True)),
-        "shift": rounded(step.similarity.shift, METRES),
+        **_similarity(step.similarity, factor),
         "d_shift": significant(step.step[:3], STEP),
         "d_rotation": significant(step.step[3:6], STEP),
         "d_scale": significant(step.step[6], STEP),
+    }
+
+
+def _similarity(found: Similarity, factor: float) -> Document:
+    return {
+        "s": significant(found.scale, EXACT),
+        **dict(zip(("xi", "eta", "theta"), _angles(found.rotation, factor), strict=True)),
+        "shift": rounded(found.shift, METRES),
     }
 
 
@@ -283,8 +257,7 @@ def _polynomial(result: Result, strip: StripResult) -> Document | None:
         return None
     xyz = strip.absolute.similarity(strip.formed.xyz[strip.control_rows])
     corrected = found(xyz)
-    targets = absolute_orientation.Targets(strip.control, result.frames, strip.intermediate)
-    free, left = targets.of(corrected) - xyz, corrected - targets.of(corrected)
+    given = absolute_orientation.Targets(strip.control, result.frames, strip.intermediate).of(corrected)
     axes = {
         name: {
             "terms": list(axis.terms),
@@ -294,11 +267,13 @@ def _polynomial(result: Result, strip: StripResult) -> Document | None:
         }
         for name, axis in zip("XYZ", found.axes, strict=True)
     }
-    columns = (rounded(xyz[:, :2], METRES), rounded(free, METRES), rounded(left, METRES))
-    control = [
-        {"point": name, "X": place[0], "Y": place[1], "l": terms, "v": residual}
-        for name, place, terms, residual in zip(strip.control.ids, *columns, strict=True)
-    ]
+    control = {
+        "point": strip.control.ids,
+        "X": rounded(xyz[:, 0], METRES),
+        "Y": rounded(xyz[:, 1], METRES),
+        "l": rounded(given - xyz, METRES),
+        "v": rounded(corrected - given, METRES),
+    }
     evidence = [
         {
             "group": each.group,
@@ -311,4 +286,4 @@ def _polynomial(result: Result, strip: StripResult) -> Document | None:
         }
         for each in found.evidence
     ]
-    return {"degree": found.degree, "evidence": evidence, "axes": axes, "control": control}
+    return {"degree": found.degree, "evidence": evidence, "axes": axes, "control": as_records(control)}
