@@ -189,16 +189,16 @@ pipeline = import_module("photostrip.pipeline.run")  # the module; the package g
 # functions imported by name are timed where they are called
 of_strips = import_module("photostrip.pipeline.strips.photos")
 common = import_module("photostrip.pipeline.common_points")
-settling = import_module("photostrip.triangulation.gross_errors.rays.screened_formation")
+screened_formation = import_module("photostrip.triangulation.gross_errors.rays.screened_formation")
 STAGES = (
     ("image coordinates", corrections, "refine"),
     ("collecting pairs", of_strips, "collect_pairs"),
     ("relative orientation", of_strips, "orient_unchecked"),
-    ("screening of pairs", screening, "examine"),
+    ("screening of pairs", screening, "screen_pairs"),
     ("strip formation", of_strips, "form_from_pairs"),
-    ("strip formation", settling, "form_from_pairs"),
-    ("screening of the strip", strip_screening, "examine"),
-    ("screening of control", control_screening, "screen"),
+    ("strip formation", screened_formation, "form_from_pairs"),
+    ("screening of the strip", strip_screening, "screen_rays"),
+    ("screening of control", control_screening, "screen_control"),
     ("absolute orientation", absolute_orientation, "orient"),
     ("polynomial", correction, "fit"),
     ("resection", of_strips, "resect"),

@@ -18,6 +18,12 @@ def printed(program: str, *options: str) -> str:
     return subprocess.run(command, capture_output=True, text=True, check=True, cwd=ROOT.parent).stdout
 
 
+def test_every_stage_that_the_strip_benchmark_times_exists() -> None:
+    from benchmarks.strip import STAGES  # limits the threads of the process
+
+    assert [f"{module.__name__}.{name}" for _, module, name in STAGES if not hasattr(module, name)] == []
+
+
 @pytest.mark.slow
 def test_accuracy_prints_limits_and_what_was_measured() -> None:
     out = printed("accuracy.py", "--seeds", "2", "--cases", "b", "long", "--workers", "1")
