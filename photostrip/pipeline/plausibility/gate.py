@@ -13,6 +13,7 @@ import numpy as np
 
 from photostrip.errors import GeometryError, InputError
 from photostrip.geodesy.tying import tie_frames
+from photostrip.pipeline.image_coordinates import PhotoCoordinates
 from photostrip.pipeline.plausibility import evidence, given_cameras, given_control
 from photostrip.pipeline.plausibility.given_control import GivenControl
 from photostrip.pipeline.plausibility.image_evidence import of_images
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.notes import Finding
     from photostrip.pipeline.inputs import Inputs, MeasuredModels, Settings, Strip
     from photostrip.pipeline.plausibility.evidence import EvidenceStrip
@@ -41,7 +43,7 @@ def of_inputs(inputs: Inputs, settings: Settings, directory: Path | None = None)
     findings = [*images.findings, *_of_ids(images.strips, images)]
     findings += given_cameras.centers(inputs, images.observations, images.strips, directory)
     unformed = [None] * len(images.strips)
-    findings += _of_control(inputs, images, images.strips, unformed, directory, trials=False)
+    findings += _of_control(_given_control(inputs, directory), images, images.strips, unformed, trials=False)
     return accepted(findings, settings.accept)
 
 
@@ -51,13 +53,15 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     if inputs.models is not None:
         return accepted(_of_models(inputs, inputs.models, settings, directory), settings.accept)
     points = result.refined.observations
-    images = replace(of_images(inputs, settings), observations=points)
+    photo = PhotoCoordinates(result.measured, result.interior)
+    images = replace(of_images(inputs, settings, photo), observations=points)
+    control = _given_control(inputs, directory, _plain_frames(result))
     stages = result.strips if result.bundle is None else result.bundle.start.strips  # as they were formed
     formed = [
         evidence.EvidenceStrip(each.strip, each.orientation, each.formed) for each in (s.of_photos for s in stages)
     ]
     strips = tuple(each.strip for each in formed)  # a photo that is a strip of its own forms nothing
-    findings = [*images.findings, *_of_control(inputs, images, strips, formed, directory)]
+    findings = [*images.findings, *_of_control(control, images, strips, formed)]
     for each in formed:
         findings += _of_formed(each, points)
     findings += given_cameras.centers(inputs, points, images.strips, directory)
@@ -79,7 +83,8 @@ def of_failure(inputs: Inputs, settings: Settings, directory: Path | None = None
         images = of_images(inputs, settings)
         points = evidence.ideal(images.observations, images.cameras, settings)
         formed = [evidence.form(strip, points, settings) for strip in images.strips]
-        findings = [*images.findings, *_of_control(inputs, images, images.strips, formed, directory)]
+        control = _given_control(inputs, directory)
+        findings = [*images.findings, *_of_control(control, images, images.strips, formed)]
         whole = [each for each in formed if each is not None]
         for each in whole:
             findings += _of_formed(each, points)
@@ -94,26 +99,35 @@ def of_failure(inputs: Inputs, settings: Settings, directory: Path | None = None
         return ()  # the failure itself is what must be reported
 
 
-def _given_control(inputs: Inputs, directory: Path | None) -> GivenControl | None:
-    """Given points in their frames; None where the frames contradict each other, which stops the run itself."""
+def _given_control(inputs: Inputs, directory: Path | None, frames: Sequence[GroundFrame] = ()) -> GivenControl | None:
+    """Given points in their frames; None where the frames contradict each other, which stops the run itself.
+
+    Parameters
+    ----------
+    frames : sequence of GroundFrame, optional
+        The frames, where a run has tied them already.
+    """
     try:
-        frames, _ = tie_frames(inputs.frames, inputs.output, directory=directory)
+        tied = frames or tie_frames(inputs.frames, inputs.output, directory=directory)[0]
     except InputError:
         return None
-    return GivenControl.placed(inputs, frames, directory)
+    return GivenControl.placed(inputs, tied, directory)
+
+
+def _plain_frames(result: Result) -> Sequence[GroundFrame]:
+    """Ground frames of a run; none where they carry a curvature that the given coordinates do not."""
+    return () if result.settings.absolute.earth_curvature == "model" else result.frames
 
 
 def _of_control(
-    inputs: Inputs,
+    control: GivenControl | None,
     images: ImageEvidence,
     strips: Sequence[Strip],
     formed: Sequence[EvidenceStrip | None],
-    directory: Path | None,
     *,
     trials: bool = True,
 ) -> list[Finding]:
     """Look at given coordinates: where they lie, how they go with each strip, how they hold it."""
-    control = _given_control(inputs, directory)
     if control is None:
         return []
     findings = [*control.findings, *given_control.by_strip(control, images, strips, formed, trials=trials)]

@@ -15,8 +15,10 @@ from photostrip.triangulation.plausibility.photos import flight_order, units
 if TYPE_CHECKING:
     from photostrip.camera import Camera
     from photostrip.notes import Finding
+    from photostrip.pipeline.image_coordinates import PhotoCoordinates
     from photostrip.pipeline.inputs import Inputs, Settings, Strip
     from photostrip.points import PhotoPoints
+    from photostrip.triangulation.image_coordinates.mark_fit import InteriorOrientation
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,10 +33,16 @@ class ImageEvidence:
     settings: Settings
 
 
-def of_images(inputs: Inputs, settings: Settings) -> ImageEvidence:
-    """Look at image coordinates as far as that goes without adjusting anything."""
+def of_images(inputs: Inputs, settings: Settings, photo: PhotoCoordinates | None = None) -> ImageEvidence:
+    """Look at image coordinates as far as that goes without adjusting anything.
+
+    Parameters
+    ----------
+    photo : PhotoCoordinates, optional
+        Image points in the system of the photo, where a run has them already.
+    """
     cameras = {photo: strip.camera for strip in inputs.strips for photo in strip.photos}
-    observations, findings = _photo_coordinates(inputs, cameras, settings)
+    observations, findings = _photo_coordinates(inputs, cameras, settings, photo)
     of_units, of_camera = units.find_wrong_units(observations, cameras)
     findings += of_units
     factor = {name: of_camera[cameras[name].name] for name in observations.photo_ids}
@@ -64,9 +72,11 @@ def of_images(inputs: Inputs, settings: Settings) -> ImageEvidence:
 
 
 def _photo_coordinates(
-    inputs: Inputs, cameras: dict[str, Camera], settings: Settings
+    inputs: Inputs, cameras: dict[str, Camera], settings: Settings, photo: PhotoCoordinates | None
 ) -> tuple[PhotoPoints, list[Finding]]:
     """Image points in the system of the photo, and what the fiducial marks say."""
+    if photo is not None:
+        return photo.observations, [] if photo.interior is None else _of_marks(photo.interior)
     measured = _on_listed_photos(inputs.observations, cameras)
     if inputs.fiducials is None:
         return measured, []
@@ -75,7 +85,11 @@ def _photo_coordinates(
         observations = interior.transform(measured, oriented)
     except (GeometryError, InputError):
         return measured, []  # what is wrong with the marks stops the run
-    return observations, units.find_wrong_mark_units(oriented.scale_x, oriented.photo_ids)
+    return observations, _of_marks(oriented)
+
+
+def _of_marks(oriented: InteriorOrientation) -> list[Finding]:
+    return list(units.find_wrong_mark_units(oriented.scale_x, oriented.photo_ids))
 
 
 def _on_listed_photos(measured: PhotoPoints, cameras: dict[str, Camera]) -> PhotoPoints:
