@@ -15,7 +15,7 @@ Source: data snooping after a robust start; derived, see docs/sources.md.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -87,19 +87,27 @@ class StripAtControl:
     breadth: float
     # covariance of all misclosures; without it polynomials stand for the strip's deformation
     joint: control_significance.ControlCovariance | None = None
+    # similarities found so far, by the coordinates that count
+    found: dict[bytes, absolute_orientation.AbsoluteOrientation] = field(default_factory=dict, repr=False)
+
+    def oriented(self, kept: ControlPoints) -> absolute_orientation.AbsoluteOrientation:
+        """Return the similarity on what is kept, all coordinates with the same weight; each choice is fitted once."""
+        key = kept.use.tobytes()
+        if key not in self.found:
+            targets = Targets(kept, self.frames, self.intermediate)
+            self.found[key] = absolute_orientation.orient(self.strip, targets, kept.use.astype(float))
+        return self.found[key]
 
     def problem(self, control: ControlPoints) -> correction.FitProblem:
         """Fit the similarity, and give what is left to a polynomial."""
         targets = Targets(control, self.frames, self.intermediate)
-        first = absolute_orientation.orient(self.strip, targets, control.use.astype(float))
-        weight = absolute_orientation.weights(targets.turned(first.similarity(self.strip)), self.precision)
+        weight = absolute_orientation.weights(targets.turned(self.placed(control)), self.precision)
         orientation = absolute_orientation.orient(self.strip, targets, weight)
         return correction.FitProblem(orientation.similarity(self.strip), targets, weight, self.spacing, self.breadth)
 
     def placed(self, kept: ControlPoints) -> Floats:
         """Return all control points after a similarity on what is kept, intermediate frame, metres."""
-        targets = Targets(kept, self.frames, self.intermediate)
-        return absolute_orientation.orient(self.strip, targets, kept.use.astype(float)).similarity(self.strip)
+        return self.oriented(kept).similarity(self.strip)
 
     def misclosures(self, kept: ControlPoints, control: ControlPoints | None = None) -> Floats:
         """Misclosures of all control after a similarity on what is kept, metres along the ground axes."""
@@ -150,7 +158,7 @@ def _gross(control: ControlPoints, setting: StripAtControl) -> Flags:
     nothing = np.zeros(control.use.shape, bool)
     targets = Targets(control, setting.frames, setting.intermediate)
     weight = control.use.astype(float)
-    result = absolute_orientation.orient(setting.strip, targets, weight)
+    result = setting.oriented(control)
     size = np.abs(result.misclosures)
     if size[control.use].max() < CONSPICUOUS * np.median(size[control.use]):
         return nothing
