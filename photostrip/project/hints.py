@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -71,7 +72,7 @@ def _of_models(models: ModelTables, control: Sequence[ControlTable | None], proj
         rows = np.flatnonzero(np.isin(each.models, [number[name] for name in strangers]))
         number_of = counted(len(strangers), "model")
         message = f"{counted(len(rows), what)} of {number_of} in no strip not used: {listed(strangers)}"
-        yield Note("model-in-no-strip", message, file=each.table.file, line=int(each.table.lines[rows[0]]), key="model")
+        yield each.table.note(rows[0], "model-in-no-strip", message, key="model")
     centers = set(models.center_rows(photos).tolist())
     inside = np.array([name in used for name in read.model_ids], bool)[read.models]
     count: dict[str, int] = {}
@@ -112,9 +113,9 @@ def _cameras_not_used(
     others = [name for name in read.ids if name not in photos]
     if others:
         message = f"{counted(len(others), 'row')} of {counted(len(others), 'photo')} in no strip not used"
-        file, line = read.table.file, int(read.table.lines[read.ids.index(others[0])])
         message = f"{message}: {listed(others)}{_twins(alike(others, photos))}"
-        yield Note("photo-in-no-strip", message, "note", photos=tuple(others), file=file, line=line, key="photo")
+        note = read.table.note(read.ids.index(others[0]), "photo-in-no-strip", message, "note", key="photo")
+        yield replace(note, photos=tuple(others))
 
 
 def _unused_cameras(project: ProjectFile, root: Node) -> Iterator[Note]:
@@ -123,9 +124,9 @@ def _unused_cameras(project: ProjectFile, root: Node) -> Iterator[Note]:
     if unused:
         verb = "belongs" if len(unused) == 1 else "belong"
         number = counted(len(unused), "camera")
-        place, key = root.entries["cameras"].keys[unused[0]], key_path(("cameras", unused[0]))
         message = f"{number} {verb} to no strip: {listed(unused)}"
-        yield Note("unused-camera", message, "note", file=place.file, line=place.line, column=place.column, key=key)
+        key = key_path(("cameras", unused[0]))
+        yield root.entries["cameras"].keys[unused[0]].note("unused-camera", message, key=key)
 
 
 def _solved_marks(name: str, camera: Camera, solved: Certificate, root: Node) -> Note:
@@ -141,10 +142,7 @@ def _solved_marks(name: str, camera: Camera, solved: Certificate, root: Node) ->
     else:
         message += ": none is left over to check them"
     severity = "note" if solved.redundancy and largest <= POOR_FIT else "warning"
-    place = root.place_of(path)
-    return Note(
-        "certificate", message, severity, file=place.file, line=place.line, column=place.column, key=key_path(path)
-    )
+    return root.place_of(path).note("certificate", message, severity, key=key_path(path))
 
 
 def _photos_in_no_strip(read: Measurements, photos: set[str]) -> Iterator[Note]:
@@ -154,13 +152,9 @@ def _photos_in_no_strip(read: Measurements, photos: set[str]) -> Iterator[Note]:
         return
     number = {name: code for code, name in enumerate(read.photo_ids)}
     rows = np.flatnonzero(np.isin(read.photo, [number[name] for name in others]))
-    near = alike(others, photos)
-    message = (
-        f"{counted(len(rows), 'row')} of {counted(len(others), 'photo')} in no strip not used:"
-        f" {listed(others)}{_twins(near)}"
-    )
-    file, line = read.table.file, int(read.table.lines[rows[0]])
-    yield Note("photo-in-no-strip", message, photos=tuple(others), file=file, line=line, key="photo")
+    message = f"{counted(len(rows), 'row')} of {counted(len(others), 'photo')} in no strip not used"
+    message = f"{message}: {listed(others)}{_twins(alike(others, photos))}"
+    yield replace(read.table.note(rows[0], "photo-in-no-strip", message, key="photo"), photos=tuple(others))
 
 
 def _measured_once(
@@ -175,19 +169,19 @@ def _measured_once(
             f"{counted(len(control), 'control or check point is', 'control or check points are')} measured on one photo"
         )
         message = f"{what} only and cannot be used: {listed(control)}"
-        file, line = read.table.file, _first_line(read, control)
-        yield Note("control-measured-once", message, points=tuple(control), file=file, line=line, key="point")
+        row = _first_row(read, control)
+        yield read.table.note(row, "control-measured-once", message, key="point", points=control)
     if new:
         near = alike(new, given - set(once))
         what = f"{counted(len(new), 'point is', 'points are')} measured on one photo only and cannot be determined"
-        message, file, line = f"{what}: {listed(new)}{_twins(near)}", read.table.file, _first_line(read, new)
-        yield Note("measured-once", message, "note", points=tuple(new), file=file, line=line, key="point")
+        message, row = f"{what}: {listed(new)}{_twins(near)}", _first_row(read, new)
+        yield read.table.note(row, "measured-once", message, "note", key="point", points=new)
 
 
-def _first_line(read: Measurements, points: Sequence[str]) -> int:
-    """Line of the first row of any of some points."""
+def _first_row(read: Measurements, points: Sequence[str]) -> int:
+    """First row of any of some points."""
     number = {name: code for code, name in enumerate(read.target_ids)}
-    return int(read.table.lines[np.flatnonzero(np.isin(read.target, [number[name] for name in points]))[0]])
+    return int(np.flatnonzero(np.isin(read.target, [number[name] for name in points]))[0])
 
 
 def _switched_off(read: ControlTable) -> Iterator[Note]:
@@ -196,8 +190,8 @@ def _switched_off(read: ControlTable) -> Iterator[Note]:
     if off:
         number = counted(len(off), "point is", "points are")
         message = f"{number} switched off (use: off): {listed(off)}"
-        line = int(read.table.lines[np.flatnonzero(~read.used)[0]])
-        yield Note("control-off", message, "note", points=tuple(off), file=read.table.file, line=line, key="use")
+        row = int(np.flatnonzero(~read.used)[0])
+        yield read.table.note(row, "control-off", message, "note", key="use", points=off)
 
 
 def _never_measured(
@@ -211,12 +205,8 @@ def _never_measured(
     verb = "is" if len(missing) == 1 else "are"
     number = counted(len(missing), "control or check point")
     message = f"{number} {verb} not measured {where}: {listed(missing)}{_twins(near)}"
-    file, line, level = (
-        read.table.file,
-        int(read.table.lines[read.ids.index(missing[0])]),
-        "warning" if near else "note",
-    )
-    yield Note("control-not-measured", message, level, points=tuple(missing), file=file, line=line, key="point")
+    row, level = read.ids.index(missing[0]), "warning" if near else "note"
+    yield read.table.note(row, "control-not-measured", message, level, key="point", points=missing)
 
 
 def _twins(near: dict[str, str]) -> str:

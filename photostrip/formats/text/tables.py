@@ -8,7 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.notes import Note
+
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from photostrip.errors import Fault
@@ -76,6 +80,13 @@ class Table:
     def placed_as(self, column: str, where: str) -> Table:
         """Return the table with the faults of a column that it does not have placed at one that it has."""
         return replace(self, _source=self._source.placed_as(column, where))
+
+    def note(
+        self, row: int, code: str, message: str, severity: str = "warning", *, key: str, points: Sequence[str] = ()
+    ) -> Note:
+        """Make a note with the line of a row."""
+        line = int(self.lines[row])
+        return Note(code, message, severity, points=tuple(points), file=self.file, line=line, key=key)
 
     def fault(self, row: int, column: str, message: str, code: str, *, expected: str = "", fix: str = "") -> Fault:
         """Make a fault with the place of a cell."""

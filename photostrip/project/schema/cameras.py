@@ -6,18 +6,7 @@ from typing import Annotated, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from photostrip.project.schema.values import (
-    Id,
-    Number,
-    Pair,
-    Positive,
-    Section,
-    choice,
-    if_empty,
-    key,
-    quoted,
-    wrong,
-)
+from photostrip.project.schema.values import Id, Number, Pair, Positive, Section, choice, if_empty, key, quoted, wrong
 from photostrip.triangulation.bundle.settings import CALIBRATION
 from photostrip.triangulation.image_coordinates.certificate import PLACES
 

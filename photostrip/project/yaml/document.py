@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 
 from photostrip.errors import Fault
 from photostrip.formats.text.numbers import shown
+from photostrip.notes import Note
 
 COMMAND_LINE = "--set"  # the place of values that stand in no file
 _STEP = re.compile(r'(?:^|\.)(?:"([^"]*)"|([^."\[\]]+))|\[([0-9]{1,6})\]')
@@ -28,6 +29,14 @@ class Place:
     file: str
     line: int = 0
     column: int = 0
+
+    def fault(self, message: str, code: str, *, key: str = "", expected: str = "", fix: str = "") -> Fault:
+        """Make a fault that stands here."""
+        return Fault(message, code, self.file, self.line, self.column, key, expected, fix)
+
+    def note(self, code: str, message: str, severity: str = "note", *, key: str = "") -> Note:
+        """Make a note that stands here."""
+        return Note(code, message, severity, file=self.file, line=self.line, column=self.column, key=key)
 
 
 @dataclass(slots=True, eq=False)

@@ -46,8 +46,7 @@ def read_document(file: str, findings: Findings) -> Node | None:
         return None
     if not isinstance(root.value, dict):
         message = f"the file holds {type_names[type(root.value)]}"
-        place = root.place
-        findings.add(Fault(message, "type", file, place.line, place.column, expected=type_names[dict]))
+        findings.add(root.place.fault(message, "type", expected=type_names[dict]))
         return None
     return root
 
@@ -117,15 +116,13 @@ class _Builder:
             self.key.pop()
 
     def _refuse(self, place: Place, message: str, code: str, fix: str = "", expected: str = "") -> None:
-        self.findings.add(Fault(message, code, place.file, place.line, place.column, expected=expected, fix=fix))
+        self.findings.add(place.fault(message, code, expected=expected, fix=fix))
 
     def _document(self, place: Place) -> None:
         self.documents += 1
         if self.documents > 1:
             message = "a second document (`---`) begins"
-            raise _TooMuchError(
-                Fault(message, "yaml", place.file, place.line, place.column, expected="one project in one file")
-            )
+            raise _TooMuchError(place.fault(message, "yaml", expected="one project in one file"))
 
     def _properties(self, event: Any, place: Place) -> None:  # noqa: ANN401 (three kinds of event, without a type)
         """Refuse anchors and tags: a value is what is typed, where it is typed."""
@@ -140,8 +137,7 @@ class _Builder:
         stripped = text.strip()
         if stripped != text and event.style in {"'", '"'}:
             message = f"blanks around `{shown(text)}` taken off"
-            note = Note("stray-blanks", message, "note", file=place.file, line=place.line, column=place.column)
-            self.findings.notes.append(note)
+            self.findings.notes.append(place.note("stray-blanks", message))
         return stripped
 
     def _open(self, node: Node) -> None:
@@ -149,9 +145,8 @@ class _Builder:
         self.open.append(node)
         self.key.append(None)
         if len(self.open) > DEEPEST:
-            place = node.place
             message = f"values are nested more than {DEEPEST} deep"
-            raise _TooMuchError(Fault(message, "yaml", place.file, place.line, place.column, expected="a project"))
+            raise _TooMuchError(node.place.fault(message, "yaml", expected="a project"))
 
     def _put(self, node: Node) -> None:
         """Return a new value its place in the tree."""
@@ -189,16 +184,8 @@ class _Builder:
         first = parent.keys.get(key)
         if first is not None:
             where = f"line {first.line}" if first.line != place.line else f"column {first.column}"
-            fault = Fault(
-                f"the key `{shown(key)}` stands here for the second time, first in {where}",
-                "duplicate-key",
-                place.file,
-                place.line,
-                place.column,
-                shown(key),
-                fix="keep one of them",
-            )
-            self.findings.add(fault)
+            message = f"the key `{shown(key)}` stands here for the second time, first in {where}"
+            self.findings.add(place.fault(message, "duplicate-key", key=shown(key), fix="keep one of them"))
             return
         parent.entries[key] = node
         parent.keys[key] = place

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from photostrip.errors import Fault
 from photostrip.formats.text.findings import counted, suggestion
 from photostrip.formats.text.numbers import shown
 from photostrip.project.schema.values import Section
 from photostrip.project.yaml.document import Node, fault_at, key_path, type_names
 
 if TYPE_CHECKING:
+    from photostrip.errors import Fault
     from photostrip.formats.text.findings import Findings
     from photostrip.project.yaml.document import Path
 
@@ -84,7 +84,7 @@ def _unknown(schema: Model, root: Node, path: Path) -> Fault:
         fix = f"`{name}` belongs into `{homes(schema)[name]}`"
     message = f"the key `{shown(name)}` is not known"
     expected = "" if fix else f"one of {', '.join(known)}"
-    return Fault(message, "unknown-key", place.file, place.line, place.column, key_path(path), expected, fix)
+    return place.fault(message, "unknown-key", key=key_path(path), expected=expected, fix=fix)
 
 
 def _wrong_type(root: Node, path: Path, expected: str) -> Fault:
