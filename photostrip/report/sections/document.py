@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 
 def sections_of(document: Document, *, everything: bool = False) -> tuple[Section, ...]:
     """Return the sections of the accuracy report."""
+    several = len(document["strips"]) > 1
     return (
         verdict_section(document, everything=everything),
         *findings_sections(document),
@@ -48,7 +49,7 @@ def sections_of(document: Document, *, everything: bool = False) -> tuple[Sectio
         counts_section(document),
         *_of_the_strips(document, everything=everything),
         *_of_the_accuracy(document, everything=everything),
-        *_of_the_points(document, everything=everything),
+        *_of_the_points(document, several=several, everything=everything),
         Section("", (Words(headline(document), document["status"]), accuracy(document))),
     )
 
@@ -79,11 +80,11 @@ def _of_the_accuracy(document: Document, *, everything: bool) -> Iterator[Sectio
         yield deformation_section(document)
 
 
-def _of_the_points(document: Document, *, everything: bool) -> Iterator[Section]:
+def _of_the_points(document: Document, *, several: bool, everything: bool) -> Iterator[Section]:
     """Return what is left at points and photos, what was rejected, what is not determined."""
     yield control_section(document, everything=everything)
     yield check_section(document, everything=everything)
-    if len(document["strips"]) > 1 and "bundle" not in document:
+    if several and "bundle" not in document:
         yield ties_section(document, everything=everything)
     if not of_models(document):
         yield image_section(document)
