@@ -105,3 +105,12 @@ def test_independent_models_prints_three_tables() -> None:
         len(re.findall(r"^\| [38] \| (?:similarity|degree [12]) \|(?: \d\.\d+ \(.*?\) \|){2}$", out, re.MULTILINE)) == 6
     )
     assert re.search(r"^\| 1000 \| 100 % \| 100 % \|", out, re.MULTILINE)
+
+
+@pytest.mark.slow
+def test_mutations_prints_changes_and_who_notices_them() -> None:
+    out = printed("mutations.py", "--count", "2", "--seed", "1", "--room", "geometry", "--near")
+    rows = re.findall(r"^\| `geometry/\w+\.py:\d+` \| `.+` to `.+` in `.+` \| (.+) \|$", out, re.MULTILINE)
+    assert len(rows) == 2
+    assert any(row.startswith("`geometry/test_") for row in rows)
+    assert re.search(rf"^\| all \| 2 \| {sum(row != 'NOT noticed' for row in rows)} \|$", out, re.MULTILINE)

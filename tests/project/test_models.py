@@ -123,6 +123,8 @@ def test_other_names_of_columns_and_rows_of_their_own(tmp_path: Path) -> None:
     found = sample(tmp_path, {**FILES, P: text, M: "\n".join(own) + "\n"}).load().inputs.models
     assert found is not None
     assert found.points.sigma[3].tolist() == [0.01, 0.02, 0.03]
+    told = check_project(tmp_path / P).document["model_sigma"]
+    assert (told["rows_with_own"], told["rows_with_default"]) == (len(lines) - 1, 0)
 
 
 def blocks() -> str:

@@ -72,6 +72,18 @@ def test_from_photo_and_to_photo_are_inverse(tmp_path: Path, capsys: pytest.Capt
     np.testing.assert_allclose(np.array(back), np.array([[80.0, 60.0], [-70.5, 12.25], [0.0, 0.0]]), atol=1e-5)
 
 
+@pytest.mark.parametrize("way", ["from-photo", "to-photo"])
+def test_a_camera_is_level_and_unturned_unless_said_otherwise(
+    way: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    table = tmp_path / "points.csv"
+    table.write_text({"from-photo": "point,x,z\nA,80,60\n", "to-photo": "point,lambda,beta\nA,20,10\n"}[way])
+    asked = ("directions", way, table, *PHOTHEO, "--angles", "deg", "--format", "csv")
+    plain, said = call(capsys, *asked), call(capsys, *asked, "--alpha", 0, "--omega", 0, "--kappa", 0)
+    assert plain[0] == 0
+    assert plain == said
+
+
 def test_from_photo_gives_the_numbers_of_the_source(capsys: pytest.CaptureFixture[str]) -> None:
     found = answer(capsys, "directions", "from-photo", *PHOTHEO, "--at", "80,60", "--sigma-um", 5)
     (point,) = found["points"]

@@ -145,6 +145,14 @@ def test_where_control_lies() -> None:
     assert laid_out([0, 3, 7], [0.4, -0.5, 0.4]) == []
 
 
+def test_findings_on_the_layout_count_photos_from_one() -> None:
+    plan = np.array([[100.0, -120.0], [100.0, 0.0], [100.0, 120.0], [300.0, -120.0], [300.0, 0.0], [300.0, 120.0]])
+    names, photos = ["a", "b", "c", "d", "e", "f"], [f"{number}" for number in range(8)]
+    place = np.array([1.0, 1.0, 1.0, 3.0, 3.0, 3.0])
+    (found,) = layout.find_weak_control(place, plan, 150.0, photos, "A", names)
+    assert found.evidence == {"first_control_at_photo": 2.0, "last_control_at_photo": 4.0, "photos": 8}
+
+
 # --------------------------------------------------------------------------------------------------------- angles
 
 

@@ -310,6 +310,12 @@ def test_the_f_test_is_that_of_two_sums_of_squares() -> None:
         assert evidence.p == pytest.approx(f_distribution.sf(ratio, gained, left), rel=1e-6, abs=1e-12)
 
 
+def test_no_degree_beyond_the_third_is_tried() -> None:
+    xyz = layout(np.linspace(-9000, 9000, 15))
+    found = fit(noisy(1, bent(xyz, 30.0, 4), xyz), PolynomialSettings())  # what only a fourth degree would take up
+    assert {evidence.degree for evidence in found.evidence} == {0, 1, 2, 3}
+
+
 def left_out_by_refitting(
     one: FitProblem, terms: Sequence[str], axes: Sequence[int], groups: Sequence[ArrayLike]
 ) -> float:
