@@ -42,22 +42,7 @@ def plan_and_height(frame: Document, now: Floats, before: Floats) -> tuple[Float
 
 
 def difference_in_plan_and_height(frame: Document, delta: Floats, at: Floats) -> tuple[Floats, Floats]:
-    """Return the parts of differences that are in metres already.
-
-    Parameters
-    ----------
-    frame : dict
-        The block ``frame`` of a result.
-    delta : ndarray, shape (n, 3)
-        Differences in metres, in the order of the frame's axes.
-    at : ndarray, shape (n, 3)
-        Coordinates of the points.
-
-    Returns
-    -------
-    plan, height : ndarray, shape (n,)
-        Length in plan and size of the difference in height, metres.
-    """
+    """Return the same of differences that are in metres already, at points `at`; both in the order of the axes."""
     if frame["kind"] == "geocentric":
         parts = _turned(frame, delta, at)
     else:

@@ -14,18 +14,7 @@ Member = tuple[str, str, str]  # block, id, what it is
 
 
 def members_of(document: Document, kind: str) -> set[Member]:
-    """Return the members of one set of a result.
-
-    Parameters
-    ----------
-    kind : str
-        ``ids``, ``choices``, ``rejected`` or ``findings``.
-
-    Returns
-    -------
-    set of tuple of str
-        Block of the result, id, and in words what it is.
-    """
+    """Return the members of one set of a result: ``ids``, ``choices``, ``rejected`` or ``findings``."""
     return set(MEMBERS[kind](document))
 
 
@@ -73,7 +62,7 @@ def _rejected(document: Document) -> Iterator[Member]:
 
 
 def _findings(document: Document) -> Iterator[Member]:
-    """Give notes by their code and what they are about; their words hold numbers that are compared elsewhere."""
+    """Return notes by their code and what they are about; their words hold numbers that are compared elsewhere."""
     for note in document["notes"]:
         about = [f"strip {note['strip']}"] if note["strip"] else []
         about += [f"photo {photo}" for photo in note["photos"]] + [f"point {point}" for point in note["points"]]

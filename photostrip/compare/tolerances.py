@@ -70,11 +70,8 @@ class Tolerances:
     def allowed(self, kind: str, unit: str, before: float) -> float:
         """Return the largest difference that is allowed for a number.
 
-        Parameters
-        ----------
-        unit : str
-            Its unit. The absolute part of a tolerance holds for numbers in the unit of their kind only: a statistic
-            without a unit has the relative part alone.
+        The absolute part of a tolerance holds for numbers in the unit of their kind only: a statistic without a unit
+        has the relative part alone.
         """
         tolerance = self.of(kind)
         absolute = tolerance.absolute if unit == UNITS[kind] else tolerance.absolute_um if unit == "um" else 0.0

@@ -22,15 +22,7 @@ COLUMNS = (
 
 
 def summary_json(outcomes: Sequence[Document], exit_code: int, *, ascii_only: bool = False) -> str:
-    """Return the summary as JSON.
-
-    Parameters
-    ----------
-    outcomes : sequence of dict
-        The line of each project, in the order in which the user named them.
-    ascii_only : bool
-        Whether letters beyond ASCII are to be written as escapes.
-    """
+    """Return the summary as JSON, a line for each project in the order in which the user named them."""
     counts: dict[str, int] = {}
     for each in outcomes:
         counts[each["status"]] = counts.get(each["status"], 0) + 1
@@ -67,13 +59,7 @@ def record_text(record: Document) -> str:
 
 
 def parsed_record(data: bytes) -> Document | None:
-    """Read the record of a result.
-
-    Returns
-    -------
-    dict or None
-        The record; None when it is none, or of another version.
-    """
+    """Read the record of a result; None when it is none, or of another version."""
     try:
         record = json.loads(data)
     except (ValueError, RecursionError):

@@ -28,13 +28,9 @@ ANGLE_SYSTEM = "alpha-omega-kappa"
 
 
 def truth_text(simulation: Simulation, output: GroundFrame) -> str:
-    """Write the truth.
+    """Write the truth: frame, photos and points in the form of a result, gross errors, seed and specification.
 
-    Returns
-    -------
-    str
-        JSON: frame, photos and points in the form of a result, gross errors, seed and specification; one line for
-        each photo, point and error.
+    Each photo, point and error stands on a line of its own.
     """
     blocks = {
         "photos": [on_one_line(each) for each in _photos(simulation, output)],

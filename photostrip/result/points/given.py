@@ -31,7 +31,7 @@ class Differences:
 
     axes: Floats  # (c, 3): metres in the order of the result's axes; NaN where it does not count or is not known
     parts: Floats  # (c, 3): metres to the east, to the north and up at the point
-    # (c, 3): standard deviation of each difference along the point's own axes in the fit, metres: of the given
+    # (c, 3): standard deviation of each difference along the axes of the point in the fit, metres: of the given
     # coordinate and of a point of one model together
     sigma: Floats
     normalised: Floats  # (c,): the largest difference of a point in units of that standard deviation

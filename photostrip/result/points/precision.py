@@ -133,7 +133,7 @@ def centre_columns(result: Result, place: Floats, given: Floats | None) -> Docum
 
 
 def _rates(rotations: Floats, system: str) -> Floats:
-    """Give changes of the angles by small rotations about the output's axes; NaN where they cannot be separated."""
+    """Return changes of the angles by small rotations about the output's axes; NaN where they cannot be separated."""
     try:
         return np.asarray(np.linalg.inv(angle_rates(angles(rotations, system), system)), float)
     except GeometryError:  # some photo is the exception
