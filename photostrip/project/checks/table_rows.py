@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
     Numbers = NDArray[np.intp]
     Document = dict[str, Any]
-    Reason = tuple[str, NDArray[np.bool_], NDArray[np.object_]]
 
 IN_NO_STRIP = "its photo belongs to no strip"
 ONCE = "the point is measured on one photo only"
@@ -32,6 +31,14 @@ NO_MODEL = "not measured in any model of the strips"
 OFF = "switched off (use: off)"
 NO_BUNDLE = "only the bundle adjustment uses it"
 NOT_MEASURED = "not measured on any photo of the strips"
+
+
+class Reason(NamedTuple):
+    """Why rows are not used, which of them, and whose they are."""
+
+    why: str
+    rows: NDArray[np.bool_]
+    ids: NDArray[np.object_]
 
 
 def observations_used(inputs: Inputs) -> Numbers:
@@ -101,13 +108,13 @@ def model_rows(tables: Tables, models: MeasuredModels) -> list[Document]:
         if each is not None:
             stranger = np.array([name not in known for name in each.model_ids], bool)[each.models]
             owners = np.array(each.model_ids, object)[each.models]
-            found.append(_block(each.table.file, each.table.lines, [(IN_NO_MODEL, stranger, owners)]))
+            found.append(_block(each.table.file, each.table.lines, [Reason(IN_NO_MODEL, stranger, owners)]))
     points = set(models.points.point_ids)
     for control in tables.control:
         if control is not None:
             names = np.array(control.ids, object)
             missing = np.array([name not in points for name in control.ids], bool)
-            reasons = [(OFF, ~control.used, names), (NO_MODEL, control.used & missing, names)]
+            reasons = [Reason(OFF, ~control.used, names), Reason(NO_MODEL, control.used & missing, names)]
             found.append(_block(control.table.file, control.table.lines, reasons))
     return found
 
@@ -117,7 +124,11 @@ def _cameras(read: PositionTable | OrientationTable, photos: set[str], bundle: b
     stranger = np.array([name not in photos for name in read.ids], bool)
     off = ~read.used if isinstance(read, PositionTable) else np.zeros(len(names), bool)
     idle = ~stranger & ~off & (not bundle)
-    reasons = [(IN_NO_STRIP, stranger, names), (OFF, ~stranger & off, names), (NO_BUNDLE, idle, names)]
+    reasons = [
+        Reason(IN_NO_STRIP, stranger, names),
+        Reason(OFF, ~stranger & off, names),
+        Reason(NO_BUNDLE, idle, names),
+    ]
     return _block(read.table.file, read.table.lines, reasons)
 
 
@@ -130,9 +141,9 @@ def _measured(read: Measurements, photos: set[str], gaps: set[str], whole: set[s
     names = np.array(read.target_ids, object)[read.target]
     owners = np.array(read.photo_ids, object)[read.photo]
     reasons = [
-        (IN_NO_STRIP, stranger, owners),
-        (ONCE, ~stranger & once, names),
-        (NO_NEIGHBOUR, ~stranger & ~once & apart, names),
+        Reason(IN_NO_STRIP, stranger, owners),
+        Reason(ONCE, ~stranger & once, names),
+        Reason(NO_NEIGHBOUR, ~stranger & ~once & apart, names),
     ]
     return _block(read.table.file, read.table.lines, reasons, read.times)
 
@@ -140,7 +151,7 @@ def _measured(read: Measurements, photos: set[str], gaps: set[str], whole: set[s
 def _marks(read: Measurements, photos: set[str]) -> Document:
     stranger = np.array([name not in photos for name in read.photo_ids], bool)[read.photo]
     owners = np.array(read.photo_ids, object)[read.photo]
-    return _block(read.table.file, read.table.lines, [(IN_NO_STRIP, stranger, owners)], read.times)
+    return _block(read.table.file, read.table.lines, [Reason(IN_NO_STRIP, stranger, owners)], read.times)
 
 
 def _given(read: ControlTable, count: dict[str, int], gaps: set[str]) -> Document:
@@ -148,10 +159,10 @@ def _given(read: ControlTable, count: dict[str, int], gaps: set[str]) -> Documen
     apart = np.array([name in gaps for name in read.ids], bool)
     names = np.array(read.ids, object)
     reasons = [
-        (OFF, ~read.used, names),
-        (NOT_MEASURED, read.used & (number == 0), names),
-        (ONCE, read.used & (number == 1), names),
-        (NO_NEIGHBOUR, read.used & (number > 1) & apart, names),
+        Reason(OFF, ~read.used, names),
+        Reason(NOT_MEASURED, read.used & (number == 0), names),
+        Reason(ONCE, read.used & (number == 1), names),
+        Reason(NO_NEIGHBOUR, read.used & (number > 1) & apart, names),
     ]
     return _block(read.table.file, read.table.lines, reasons)
 
@@ -165,8 +176,8 @@ def _block(file: str, lines: Numbers, reasons: list[Reason], times: Numbers | No
 
 
 def _unused(lines: Numbers, reasons: list[Reason], times: Numbers) -> Iterator[Document]:
-    for why, which, names in reasons:
-        rows = np.flatnonzero(which)
+    for reason in reasons:
+        rows = np.flatnonzero(reason.rows)
         if len(rows):
-            ids = list(dict.fromkeys(names[rows].tolist()))
-            yield {"why": why, "rows": int(times[rows].sum()), "ids": ids, "first_line": int(lines[rows[0]])}
+            ids = list(dict.fromkeys(reason.ids[rows].tolist()))
+            yield {"why": reason.why, "rows": int(times[rows].sum()), "ids": ids, "first_line": int(lines[rows[0]])}

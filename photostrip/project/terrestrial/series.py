@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -81,7 +81,15 @@ def read_series(file: str, table: Table, centre: Floats, wanted: Wanted, finding
     if findings.number(file) or findings.number("") or built is None:
         return None
     times = None if wanted.times is None or len(wanted.times) != len(epochs) else np.array(wanted.times)
-    return Series(read.points, epochs, *built, stable, times)
+    return Series(
+        points=read.points,
+        epochs=epochs,
+        coordinates=built.coordinates,
+        own=built.own,
+        shared=built.shared,
+        stable=stable,
+        times=times,
+    )
 
 
 def _epochs(read: EpochTable, kind: str, wanted: Wanted, findings: Findings) -> tuple[str, ...]:
@@ -130,12 +138,17 @@ def _stable(read: EpochTable, stable: tuple[str, ...], findings: Findings) -> ND
     return np.array([name in set(stable) for name in read.points], bool)
 
 
-Built = tuple["Floats", "Floats", "Floats"]
+class _Measured(NamedTuple):
+    """Coordinates and variances of a ``Series``."""
+
+    coordinates: Floats
+    own: Floats
+    shared: Floats
 
 
 def _from_coordinates(
     read: EpochTable, table: Table, centre: Floats, epochs: tuple[str, ...], findings: Findings
-) -> Built | None:
+) -> _Measured | None:
     """Coordinates of each epoch have errors of their own and share none."""
     sigma = _filled(read, ("sx", "sz"), table.sigma, "sigma", findings)
     if sigma is None:
@@ -151,12 +164,12 @@ def _from_coordinates(
     coordinates[where] = read.table.columns("x", "z")[rows] * scale * flip - centre[read.side[rows]]
     own[where] = (sigma[rows] * scale) ** 2
     flat = (*shape[:2], 4)
-    return coordinates.reshape(flat), own.reshape(flat), np.zeros(flat[1:])
+    return _Measured(coordinates.reshape(flat), own.reshape(flat), np.zeros(flat[1:]))
 
 
 def _from_pseudo_parallaxes(
     read: EpochTable, table: Table, centre: Floats, epochs: tuple[str, ...], findings: Findings
-) -> Built | None:
+) -> _Measured | None:
     """Pseudo-parallaxes have errors of their own; those of the reference photos all epochs share."""
     sigma = _filled(read, ("sigma",), table.sigma, "sigma", findings)
     usual = table.sigma if table.sigma_d is None else table.sigma_d
@@ -180,7 +193,7 @@ def _from_pseudo_parallaxes(
     own[number[rows], read.point[rows]] = (sigma_d[rows] * MILLIMETRES[table.unit]) ** 2
     shared = np.zeros((len(read.points), 4))
     shared[read.point[::-1]] = (sigma[::-1] * MILLIMETRES[table.unit]) ** 2  # the first row of a point counts
-    return coordinates, own, shared
+    return _Measured(coordinates, own, shared)
 
 
 def _filled(
