@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -37,30 +37,40 @@ def level(control: ControlPoints, frames: Sequence[GroundFrame], *, as_written: 
         return None
     written = np.where(control.use, control.enu, np.nan)
     filled = _filled(written, control.frame)
-    by_frame = None if as_written else _decoded(filled, control, frames, plan)
-    if by_frame is None:
-        unit = np.array([[frame.plan_factor, frame.plan_factor, frame.height_factor] for frame in frames])
-        unit = np.where(unit > 0, unit, 1.0)[control.frame]
-        xyz = (filled - np.mean(filled[plan], axis=0)) * unit
-        axes = np.broadcast_to(np.eye(3), (len(control), 3, 3))
-    else:
-        xyz, unit, axes = by_frame
+    decoded = None if as_written else _decoded(filled, control, frames, plan)
+    points = decoded or _plain(filled, control, frames, plan)
     known = np.column_stack([plan, plan, height])
     sigma = np.where(known & (control.sigma > 0), control.sigma, np.nan)
     usual = [
         float(np.nanmedian(part)) if np.isfinite(part).any() else USUAL_SIGMA for part in (sigma[:, :2], sigma[:, 2])
     ]
     return GivenPoints(
-        control.ids,
-        np.where(known, xyz, np.nan),
-        known,
-        control.check,
-        control.frame,
-        written,
-        unit,
-        np.array(axes),
-        (usual[0], usual[1]),
+        ids=control.ids,
+        xyz=np.where(known, points.xyz, np.nan),
+        use=known,
+        check=control.check,
+        group=control.frame,
+        written=written,
+        unit=points.unit,
+        axes=points.axes,
+        sigma=(usual[0], usual[1]),
     )
+
+
+class _LevelPoints(NamedTuple):
+    """Given points in one level frame, with what their written coordinates mean there."""
+
+    xyz: Floats  # (n, 3)
+    unit: Floats  # (n, 3): metres in a unit of the written coordinates
+    axes: Floats  # (n, 3, 3): directions of the written axes, as rows
+
+
+def _plain(filled: Floats, control: ControlPoints, frames: Sequence[GroundFrame], plan: Flags) -> _LevelPoints:
+    """Take the numbers as they are written, in the units of their frames as far as these have one."""
+    unit = np.array([[frame.plan_factor, frame.plan_factor, frame.height_factor] for frame in frames])
+    unit = np.where(unit > 0, unit, 1.0)[control.frame]
+    axes = np.tile(np.eye(3), (len(control), 1, 1))
+    return _LevelPoints((filled - np.mean(filled[plan], axis=0)) * unit, unit, axes)
 
 
 def _filled(written: Floats, lists: NDArray[np.intp]) -> Floats:
@@ -78,10 +88,8 @@ def _filled(written: Floats, lists: NDArray[np.intp]) -> Floats:
     return filled
 
 
-def _decoded(
-    filled: Floats, control: ControlPoints, frames: Sequence[GroundFrame], plan: Flags
-) -> tuple[Floats, Floats, Floats] | None:
-    """Level coordinates, metres in a unit, and directions of the written axes; None where the frames refuse."""
+def _decoded(filled: Floats, control: ControlPoints, frames: Sequence[GroundFrame], plan: Flags) -> _LevelPoints | None:
+    """Bring the points through their frames; None where the frames refuse."""
     cartesian, axes, unit = np.empty_like(filled), np.empty((len(filled), 3, 3)), np.ones_like(filled)
     try:
         for number in np.unique(control.frame).tolist():
@@ -100,7 +108,7 @@ def _decoded(
     geocentric = np.array([frames[number].kind == "geocentric" for number in control.frame.tolist()])
     if geocentric.any():  # their coordinates are no plan and no height
         unit = np.where(geocentric[:, None], 1.0, unit)
-    return xyz, unit, axes @ turn.T
+    return _LevelPoints(xyz, unit, axes @ turn.T)
 
 
 def _metres(frame: GroundFrame, enu: Floats) -> Floats:
