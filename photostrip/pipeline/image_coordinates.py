@@ -78,7 +78,8 @@ def heights_of(observations: PhotoPoints, inputs: Inputs, settings: Settings, gr
     control = measured_control(inputs.control, observations)
     formed = form_photos(inputs, observations, settings)
     if settings.adjustment == "bundle":
-        from photostrip.pipeline.block.start import known_of, start  # a strip needs none of its libraries
+        from photostrip.pipeline.block.datum import known_of  # a strip needs none of its libraries
+        from photostrip.pipeline.block.start import start
 
         begin = start(inputs, settings, formed, observations, known_of(inputs, control, ground))
         centers, points = begin.centers, begin.points[np.isfinite(begin.points[:, 0])]

@@ -1,1 +1,8 @@
-"""The bundle adjustment of a run: start values, problem, adjustment."""
+"""All strips of a project in one bundle adjustment.
+
+What comes in are ideal image coordinates, control, camera positions and given orientations; what goes out is a
+``results.AdjustedStrips`` with orientations, points, covariances and calibration. ``datum`` and ``start`` bring all
+strips to the ground, ``problem`` collects the observations, ``adjust`` solves and searches for gross errors,
+``block_result`` puts the solution where the pipeline goes on. The equations are those of ``triangulation/bundle``, see
+docs/bundle.md.
+"""

@@ -11,6 +11,7 @@ from photostrip.errors import GeometryError
 from photostrip.pipeline.block import block_result
 from photostrip.pipeline.block import problem as block_problem
 from photostrip.pipeline.block import start as block_start
+from photostrip.pipeline.block.datum import known_of
 from photostrip.pipeline.results import Bundle, SinglePhoto
 from photostrip.pipeline.strips.forming import form_photos
 from photostrip.triangulation.bundle import snooping
@@ -63,7 +64,7 @@ def adjust_block(
     GeometryError
         When a strip, a photo or the datum cannot be determined, by name.
     """
-    known = block_start.known_of(inputs, control, ground)
+    known = known_of(inputs, control, ground)
     formed = form_photos(inputs, observations, settings)
     start = block_start.start(inputs, settings, formed, observations, known)
     block = block_problem.build(inputs, settings, observations, control, ground, start)

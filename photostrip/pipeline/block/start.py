@@ -8,19 +8,25 @@ strip gives frame and scale. Single photos are resected on what is known by then
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.errors import GeometryError
-from photostrip.geometry.rotation import from_angles
-from photostrip.geometry.similarity import Similarity, collinearity
+from photostrip.geometry.similarity import collinearity
+from photostrip.pipeline.block.datum import (
+    LEAST_TIES,
+    ON_A_LINE,
+    JoinedStrips,
+    Known,
+    cartesian_of,
+    datum,
+    join_waiting,
+)
 from photostrip.pipeline.results import BlockStart
-from photostrip.pipeline.strips.absolute import middle_frame
 from photostrip.pipeline.strips.adjusting import adjust_formed
 from photostrip.points import ControlPoints
-from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.resection.closed_form import approximate
 from photostrip.triangulation.resection.collinearity import KnownPhotos
 from photostrip.triangulation.resection.ray_intersection import intersect_points
@@ -31,8 +37,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.pipeline.frames import GroundFrames
     from photostrip.pipeline.inputs import Inputs, Settings
     from photostrip.pipeline.results import StripResult
     from photostrip.pipeline.strips.photos import FormedPhotos
@@ -42,47 +46,7 @@ if TYPE_CHECKING:
     Numbers = NDArray[np.intp]
     Flags = NDArray[np.bool_]
 
-LEAST_TIES = 3
-ON_A_LINE = 1e-6  # ratio of the squared spreads of points that hardly say how a strip is rolled about their line
 MOST_TIES = 60  # points that hand the frame of a block to one of its strips
-FREE_BASE = 1000.0  # metres: mean length of the bases where nothing gives a scale
-ROLL_WEIGHT = 1e-4  # of the assumption that cameras look down, where nothing else fixes the roll
-
-
-@dataclass(frozen=True, eq=False)
-class Known:
-    """What is known on the ground, all in the project's Cartesian frame."""
-
-    control: ControlPoints
-    frames: tuple[GroundFrame, ...]
-    output: GroundFrame  # frame of the result
-    centers: dict[str, Floats]  # known positions of antennas or perspective centres, by photo
-    rotations: dict[str, Floats]  # known rotations, photo to Cartesian frame, by photo
-    # (3,): antenna from the perspective centre along the image axes, metres, for photos without a known rotation
-    lever: Floats
-
-
-def known_of(inputs: Inputs, control: ControlPoints, ground: GroundFrames) -> Known:
-    """Collect what is known on the ground: control, orientations, camera positions with all three coordinates."""
-    centers: dict[str, Floats] = {}
-    rotations: dict[str, Floats] = {}
-    lever = np.zeros(3)
-    positions, orientations = inputs.positions, inputs.orientations
-    if positions is not None and ground.positions is not None:
-        whole = np.asarray(positions.use.all(axis=1), bool)
-        names = [photo for photo, yes in zip(positions.photos, whole, strict=True) if yes]
-        found = ground.positions.cartesian_from_ground(positions.enu[whole], ids=[f"of photo {name}" for name in names])
-        centers = dict(zip(names, found, strict=True))
-        lever = np.array(positions.lever_arm)
-    if orientations is not None and ground.orientations is not None:
-        ids = [f"of photo {name}" for name in orientations.photos]
-        found = ground.orientations.cartesian_from_ground(orientations.enu, ids=ids)
-        turned = ground.orientations.axes_at(found).transpose(0, 2, 1) @ from_angles(
-            orientations.angles, orientations.system
-        )
-        rotations = dict(zip(orientations.photos, turned, strict=True))
-        centers |= dict(zip(orientations.photos, found, strict=True))
-    return Known(control, ground.control, ground.output, centers, rotations, lever)
 
 
 def start(
@@ -105,7 +69,7 @@ def start(
     waiting = block.tie(stages, waiting)
     free = False
     while waiting:
-        group = _joined(stages, waiting, len(observations.point_ids))
+        group = join_waiting(stages, waiting, len(observations.point_ids))
         free = block.place(stages, group) or free
         waiting = block.tie(stages, [number for number in waiting if number not in group.members])
     strips = tuple(block.done[number] for number in range(len(stages)))
@@ -188,174 +152,15 @@ class _Block:
         )
         return adjust_formed(stage, control, (*known.frames, known.output), self.tied)
 
-    def place(self, stages: Sequence[FormedPhotos], group: _Group) -> bool:
+    def place(self, stages: Sequence[FormedPhotos], group: JoinedStrips) -> bool:
         """Bring a block of strips to the ground; True when nothing was known and its own frame was taken."""
-        similarity, free = _datum(stages, group, self.observations, self.known, alone=not self.done)
+        similarity, free = datum(stages, group, self.observations, self.known, alone=not self.done)
         for number in group.members:
             stage = stages[number]
             cartesian = similarity(group.joined[number](stage.formed.xyz))
             good = np.isfinite(cartesian).all(axis=1)
             self.done[number] = self._on(stage, stage.formed.point[good], cartesian[good])
         return free
-
-
-@dataclass(frozen=True, eq=False)
-class _Group:
-    """Strips joined by their common points, in the frame of the first of them."""
-
-    members: tuple[int, ...]
-    joined: dict[int, Similarity]
-    points: Floats
-
-
-def _joined(stages: Sequence[FormedPhotos], waiting: Sequence[int], count: int) -> _Group:
-    """Join the strip with the most points to all that share points with it, and so on."""
-    first = max(waiting, key=lambda number: (len(stages[number].formed.point), -number))
-    identity = Similarity(1.0, np.eye(3), np.zeros(3))
-    joined = {first: identity}
-    points = np.full((count, 3), np.nan)
-    points[stages[first].formed.point] = stages[first].formed.xyz
-    while True:
-        shared = {
-            number: stages[number].formed.point[np.isfinite(points[stages[number].formed.point, 0])]
-            for number in waiting
-            if number not in joined
-        }
-        for number in sorted(shared, key=lambda each: -len(shared[each])):
-            formed = stages[number].formed
-            if len(shared[number]) < LEAST_TIES or collinearity(points[shared[number]]) < ON_A_LINE:
-                continue
-            rows = np.searchsorted(formed.point, shared[number])
-            joined[number] = Similarity.from_points(formed.xyz[rows], points[shared[number]])
-            new = formed.point[~np.isfinite(points[formed.point, 0])]
-            points[new] = joined[number](formed.xyz[np.searchsorted(formed.point, new)])
-            break
-        else:
-            return _Group(tuple(joined), joined, points)
-
-
-# ------------------------------------------------------------------------------------- a block to the ground
-
-
-def _datum(
-    stages: Sequence[FormedPhotos], group: _Group, observations: PhotoPoints, known: Known, *, alone: bool
-) -> tuple[Similarity, bool]:
-    """Similarity from the frame of a block to the Cartesian frame; True with it when nothing gave it."""
-    names = tuple(photo for number in group.members for photo in stages[number].strip.photos)
-    number_of = {name: number for number, name in enumerate(observations.point_ids)}
-    rows = np.array([number_of.get(name, -1) for name in known.control.ids], np.intp)
-    here = (rows >= 0) & np.isfinite(group.points[rows, 0]) if len(rows) else np.zeros(0, bool)
-    control = known.control.take(here)
-    cameras = [name for name in names if name in known.centers]
-    refusal: GeometryError | None = None
-    if len(control):
-        try:
-            return _by_control(group.points[rows[here]], group.points, control, known), False
-        except GeometryError as error:
-            refusal = error
-    if len(cameras) >= 2:
-        return _by_cameras(stages, group, (control, rows[here]), known), False
-    if refusal is not None or not alone or known.centers:
-        what = (
-            f"strip {stages[group.members[0]].strip.id}" if len(group.members) == 1 else f"{len(group.members)} strips"
-        )
-        message = f"{what}: neither control nor camera positions nor tie points bring it to the ground"
-        if refusal is not None:
-            message += f" ({refusal})"
-        raise GeometryError(message, photos=names, code="strip-not-tied") from refusal
-    return _of_its_own(stages, group), True
-
-
-def _by_control(xyz: Floats, every: Floats, control: ControlPoints, known: Known) -> Similarity:
-    """Similarity of a block to its control, plan and height points included."""
-    frame = middle_frame(control, known.frames)
-    targets = absolute_orientation.Targets(control, known.frames, frame)
-    found = absolute_orientation.orient(xyz, targets, control.use.astype(float), every[np.isfinite(every[:, 0])])
-    inner = found.similarity
-    return Similarity(inner.scale, frame.axes @ inner.rotation, frame.cartesian_from_intermediate(inner.shift))
-
-
-def _oriented(stages: Sequence[FormedPhotos], group: _Group) -> tuple[tuple[str, ...], Floats, Floats]:
-    """Photos of a block with their orientations in its frame."""
-    names: list[str] = []
-    centers, rotations = [], []
-    for number in group.members:
-        names += stages[number].strip.photos
-        centers.append(group.joined[number](stages[number].formed.centers))
-        rotations.append(group.joined[number].rotation @ stages[number].formed.rotations)
-    return tuple(names), np.concatenate(centers), np.concatenate(rotations)
-
-
-def _by_cameras(
-    stages: Sequence[FormedPhotos], group: _Group, given: tuple[ControlPoints, Numbers], known: Known
-) -> Similarity:
-    """Similarity of a block to known positions and orientations of its cameras, and to full control points.
-
-    Where all of them lie on one line, cameras are taken to look down: that is a start, the adjustment decides.
-    """
-    names, centers, rotations = _oriented(stages, group)
-    rows = np.array([row for row, name in enumerate(names) if name in known.centers], np.intp)
-    source, target = centers[rows], np.array([known.centers[names[row]] for row in rows])
-    control, numbers = given
-    full = np.asarray(control.use.all(axis=1), bool)
-    source = np.concatenate([source, group.points[numbers[full]]])
-    target = np.concatenate([target, _cartesian_of(control.take(full), known)])
-    weight = np.ones(len(source))
-    scale = np.linalg.norm(target - target.mean(axis=0)) / np.linalg.norm(source - source.mean(axis=0))
-    arm = _depth(stages, group)
-    turned = [(row, known.rotations[names[row]]) for row in rows if names[row] in known.rotations]
-    for axis in range(3):
-        if turned:
-            index = np.array([row for row, _ in turned], np.intp)
-            ends = np.array([known.centers[names[row]] + scale * arm * turn[:, axis] for row, turn in turned])
-            source = np.concatenate([source, centers[index] + arm * rotations[index][:, :, axis]])
-            target = np.concatenate([target, ends])
-            weight = np.concatenate([weight, np.ones(len(index))])
-    if collinearity(target, weight) < ON_A_LINE or len(target) < LEAST_TIES:
-        up = known.output.level_axes_at(target[: len(rows)])[:, 2]
-        source = np.concatenate([source, centers[rows] - arm * rotations[rows][:, :, 2]])
-        target = np.concatenate([target, target[: len(rows)] - scale * arm * up])
-        weight = np.concatenate([weight, np.full(len(rows), ROLL_WEIGHT)])
-    found = Similarity.from_points(source, target, weight)
-    if known.lever.any():  # the rotations are known now: from antennas to perspective centres
-        antenna = np.array([names[row] not in known.rotations for row in rows])
-        target[: len(rows)] -= np.where(antenna[:, None], (found.rotation @ rotations[rows]) @ known.lever, 0.0)
-        found = Similarity.from_points(source, target, weight)
-    return found
-
-
-def _cartesian_of(control: ControlPoints, known: Known) -> Floats:
-    """Cartesian coordinates of full control points."""
-    found = np.empty((len(control), 3))
-    for number, frame in enumerate(known.frames):
-        rows = control.frame == number
-        if rows.any():
-            found[rows] = frame.cartesian_from_ground(control.enu[rows])
-    return found
-
-
-def _depth(stages: Sequence[FormedPhotos], group: _Group) -> float:
-    """Distance from a camera to the ground, in the unit of the block."""
-    formed = stages[group.members[0]].formed
-    return float(np.median(np.linalg.norm(formed.xyz - formed.xyz.mean(axis=0), axis=1)))
-
-
-def _of_its_own(stages: Sequence[FormedPhotos], group: _Group) -> Similarity:
-    """Frame and scale of a block that nothing ties to the ground: X along the first strip, Z against the view."""
-    _, centers, rotations = _oriented(stages, group)
-    first = stages[group.members[0]].formed.centers
-    base = np.linalg.norm(np.diff(first, axis=0), axis=1).mean()
-    up = rotations[:, :, 2].mean(axis=0)
-    up /= np.linalg.norm(up)
-    along = first[-1] - first[0]
-    along -= (along @ up) * up
-    along /= np.linalg.norm(along)
-    rotation = np.stack([along, np.cross(up, along), up])
-    scale = FREE_BASE / float(base)
-    return Similarity(scale, rotation, -scale * rotation @ centers.mean(axis=0))
-
-
-# ------------------------------------------------------------------------------------------- all photos and points
 
 
 def _together(
@@ -401,7 +206,7 @@ def _with_control(points: Floats, observations: PhotoPoints, known: Known) -> Fl
     rows = np.array([number[name] for name in full.ids], np.intp)
     missing = np.isnan(found[rows, 0]) if len(rows) else np.zeros(0, bool)
     if missing.any():
-        found[rows[missing]] = _cartesian_of(full.take(missing), known)
+        found[rows[missing]] = cartesian_of(full.take(missing), known)
     return found
 
 

@@ -1,1 +1,7 @@
-"""Covariances of every strip of a run, and the test of its check points."""
+"""Covariances of every strip of a run, and the test of its check points.
+
+What comes in are adjusted strips and the same strips as they lay on their control, with their derivatives; what goes
+out is a ``results.Precision`` in the project's Cartesian frame. Each strip is differentiated by itself
+(``photo_precision``, ``model_precision``); points of several strips share the errors of common control
+(``strip_precision``). The equations are derived in docs/precision.md.
+"""
