@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from photostrip.triangulation.bundle.snooping import ScreenedBundle
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
     from photostrip.triangulation.error_propagation.covariances import CheckTest
-    from photostrip.triangulation.gross_errors.control import control_screening, control_significance
+    from photostrip.triangulation.gross_errors.control import control_significance
+    from photostrip.triangulation.gross_errors.control.control_rejections import ControlRejection
     from photostrip.triangulation.gross_errors.pairs import screening
     from photostrip.triangulation.gross_errors.rays import strip_screening
     from photostrip.triangulation.image_coordinates import corrections
@@ -119,7 +120,7 @@ class StripResult:
     depth: float  # mean distance of the points from the cameras along the viewing direction, metres; NaN if unknown
     notes: tuple[Note, ...]  # what this strip's numbers say beside themselves
     # control coordinates that were not used; ``control`` says so in its ``use``
-    wrong_control: tuple[control_screening.ControlRejection, ...]
+    wrong_control: tuple[ControlRejection, ...]
     # what the covariance of the strip says of each coordinate of ``control``; None without
     judged_control: control_significance.ControlTests | None = None
     photo_stages: PhotoStages | None = None  # None for independent models

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.geometry.rotation import angle_rates
 from photostrip.pipeline import overruling
 from photostrip.pipeline.results import BlockProblem
@@ -21,7 +22,6 @@ from photostrip.triangulation.bundle.observations.problem import (
 )
 from photostrip.triangulation.bundle.quality.self_calibration import sigmas
 from photostrip.triangulation.bundle.selection import Selection
-from photostrip.triangulation.gross_errors.control import control_screening
 from photostrip.triangulation.resection.collinearity import project
 
 if TYPE_CHECKING:
@@ -293,7 +293,7 @@ def _begin(
     far = max(LEAST_FAR, FAR * float(np.median(known)) if len(known) else 0.0)
     whole = Selection.everything(problem)
     given = whole.control.copy()
-    axes = list(control_screening.AXES)
+    axes = list(GROUND_AXES)
     wrong = {
         each.id: [axes.index(axis) for axis in each.axes] for strip in start.strips for each in strip.wrong_control
     }

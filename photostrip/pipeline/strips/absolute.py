@@ -15,6 +15,7 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.geodesy.local_frame import IntermediateFrame, mean_position, strip_azimuth
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.gross_errors.control import control_screening
+from photostrip.triangulation.gross_errors.control.strip_at_control import StripAtControl
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from photostrip.points import ControlPoints
     from photostrip.triangulation.error_propagation.control_errors import Misclosures
     from photostrip.triangulation.gross_errors.control import control_significance
+    from photostrip.triangulation.gross_errors.control.control_rejections import ControlRejection
     from photostrip.triangulation.polynomial.correction import Polynomial
 
     Floats = NDArray[np.float64]
@@ -135,7 +137,7 @@ class ScreenedStrip(Generic[Errors]):
     """A strip on the control that is not contradicted by the strip and the other control."""
 
     oriented: OrientedStrip[Errors]
-    wrong_control: tuple[control_screening.ControlRejection, ...] = ()
+    wrong_control: tuple[ControlRejection, ...] = ()
     # what the covariance of the strip says of each coordinate of the control; None without
     judged_control: control_significance.ControlTests | None = None
 
@@ -170,7 +172,7 @@ def reject_wrong_control(oriented: OrientedStrip[Errors], settings: Settings) ->
     stage, control = oriented.stage, oriented.control
     if not stage.screens_control(settings):
         return ScreenedStrip(oriented)
-    place = control_screening.StripAtControl(
+    place = StripAtControl(
         stage.formed.xyz[oriented.control_rows],
         oriented.frames,
         oriented.intermediate,
@@ -179,7 +181,7 @@ def reject_wrong_control(oriented: OrientedStrip[Errors], settings: Settings) ->
         stage.misclosure_covariance(oriented),
     )
     kept, wrong = control_screening.screen_control(control, place)
-    judged = place.judged(control, kept)
+    judged = place.tests_by_covariance(control, kept)
     if wrong:
         oriented = to_ground(stage, kept, oriented.control_rows, oriented.frames)
     return ScreenedStrip(oriented, wrong, judged)

@@ -9,7 +9,6 @@ import numpy as np
 from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.notes import Note
 from photostrip.triangulation.absolute_orientation import WEAK_LIMIT
-from photostrip.triangulation.gross_errors.control.control_screening import AXES
 from photostrip.triangulation.relative_orientation.orientation import CONDITION_WARNING
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
     from photostrip.points import ControlPoints
     from photostrip.triangulation.absolute_orientation import AbsoluteOrientation
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
-    from photostrip.triangulation.gross_errors.control.control_screening import ControlRejection
+    from photostrip.triangulation.gross_errors.control.control_rejections import ControlRejection
     from photostrip.triangulation.gross_errors.pairs.screening import ScreenedPairs
     from photostrip.triangulation.polynomial.correction import Polynomial
     from photostrip.triangulation.relative_orientation.orientation import Orientation
@@ -79,7 +78,7 @@ def wrong_control_notes(strip: Strip | ModelStrip, wrong: Sequence[ControlReject
     """Name control that was not used, and what seems to be wrong with it."""
     notes = []
     for each in wrong:
-        sizes = dict(zip(AXES, each.size, strict=True))
+        sizes = dict(zip(GROUND_AXES, each.size, strict=True))
         parts = ", ".join(f"{axis} by about {sizes[axis]:+.2f} m" for axis in each.axes)
         text = (
             f"control point {each.id} contradicts the strip and the other control: {parts} (test value "

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.result.adjustment.bundle import KINDS, names_of_observation
 from photostrip.result.adjustment.junctions import PPM
 from photostrip.result.adjustment.links import AXES, names_of
 from photostrip.result.numbers import natural, rounded
 from photostrip.result.quantities import DECIMALS_BY_UNIT, record
-from photostrip.triangulation.gross_errors.control import control_screening
 from photostrip.triangulation.gross_errors.rays.strip_screening import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY
 from photostrip.triangulation.strip_formation.scale_ratios import depths
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from photostrip.points import PhotoPoints
     from photostrip.result.numbers import Document
     from photostrip.triangulation.bundle.snooping import BundleRejection
-    from photostrip.triangulation.gross_errors.control.control_screening import ControlRejection
+    from photostrip.triangulation.gross_errors.control.control_rejections import ControlRejection
     from photostrip.triangulation.gross_errors.pairs.screening import PairRejection
 
     Flags = NDArray[np.bool_]
@@ -209,7 +209,7 @@ def rejected_by_strip(strip: StripResult) -> Flags:
 
 
 def _from_control(strip: StripResult, wrong: ControlRejection) -> Document:
-    sizes = dict(zip(control_screening.AXES, wrong.size, strict=True))
+    sizes = dict(zip(GROUND_AXES, wrong.size, strict=True))
     reason = "; ".join(f"{axis} by about {sizes[axis]:+.2f} m" for axis in wrong.axes)
     if wrong.exchanged_with:
         reason += f"; fits when exchanged with {wrong.exchanged_with}"
