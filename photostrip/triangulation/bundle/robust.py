@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-ROUNDS = 6
+REWEIGHTINGS = 6
 TUNING = 3.0  # standardised residuals up to which a ray keeps its weight
 NORMAL_MEDIAN = 1.1774  # median of the length of two standard normal residuals
 NO_WEIGHT = 1e-3  # weight below which a ray is out
@@ -37,7 +37,7 @@ def adjust_robustly(problem: BundleProblem) -> tuple[BundleSolution, Floats]:
     """
     weight = np.ones(len(problem.images))
     sigma = problem.images.sigma
-    for _ in range(ROUNDS):
+    for _ in range(REWEIGHTINGS):
         spread = sigma / np.sqrt(np.maximum(weight, SMALLEST))[:, None]
         solution = solve(replace(problem, images=replace(problem.images, sigma=spread)))
         problem = restarted(problem, solution)

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     Numbers = NDArray[np.intp]
     Flags = NDArray[np.bool_]
 
-ROUNDS = 200  # of testing and taking out; each takes out one error of every neighbourhood
+SEARCH_ROUNDS = 200  # of testing and taking out; each takes out one error of every neighbourhood
 READMISSIONS = 3
 NEAR = 0.5  # test value of what may go in the same round, in units of the worst of all
 
@@ -136,7 +136,7 @@ class _Search:
         chosen = selected(self.problem, selection)
         solution, weight = robust.adjust_robustly(chosen)
         self.problem = restarted(self.problem, solution)
-        self.rounds += robust.ROUNDS
+        self.rounds += robust.REWEIGHTINGS
         rows = np.flatnonzero(selection.images)[weight < robust.NO_WEIGHT]
         images = selection.images.copy()
         for row in rows[~self.kept[rows]].tolist():
@@ -148,7 +148,7 @@ class _Search:
 
     def clean(self, selection: Selection) -> _Adjusted:
         """Test and take out until nothing is beyond the limit."""
-        for _ in range(ROUNDS):
+        for _ in range(SEARCH_ROUNDS):
             done = self.adjust(selection)
             worst = list(self._worst(done))
             if not worst:

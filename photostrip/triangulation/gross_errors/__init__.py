@@ -1,1 +1,5 @@
-"""The search for gross errors: in pairs, along the strip, at the control."""
+"""Gross errors: found in ``pairs`` by y parallaxes, in ``rays`` by the whole strip, in the ``control`` by the strip.
+
+In come oriented pairs, a formed strip, its control; out come the same without what contradicts the rest, and a list of
+what was rejected with test value, limit and estimated error. Source: [004a] for single pairs; derived, docs/sources.md.
+"""

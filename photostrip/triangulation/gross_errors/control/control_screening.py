@@ -47,29 +47,16 @@ if TYPE_CHECKING:
 LARGEST_SHARE = 0.45  # of the control coordinates of plan or height that may be far off
 LARGEST_TESTED = 0.34  # of the others that single tests may reject
 CONSPICUOUS = 6.0  # largest over median misclosure that asks for a robust start
-GROSS = 12.0  # standard deviations from the median, in the robust start
+FAR_OFF_SIGMAS = 12.0  # standard deviations from the median, in the robust start
 ROBUST_STEPS = 20
-SETTLED = 0.1  # of the median misclosure: the robust start is to find large errors, not digits
+ROBUST_CHANGE = 0.1  # of the median misclosure: the robust start is to find large errors, not digits
 ROUGH = 5.0  # standard deviations left by a polynomial beyond which there is more than a bend
 ALIKE = 0.1  # spread of misclosures of a band over their mean, below which they are one bend
 PLAN = slice(0, 2)
 
 
 def screen_control(control: ControlPoints, strip: StripAtControl) -> tuple[ControlPoints, tuple[ControlRejection, ...]]:
-    """Take wrong coordinates out of the control.
-
-    Parameters
-    ----------
-    control : ControlPoints
-        Control of a strip, no check points.
-
-    Returns
-    -------
-    ControlPoints
-        The same points with ``use`` false where a coordinate was rejected.
-    tuple of ControlRejection
-        What was rejected, in order of the control.
-    """
+    """Take wrong coordinates out of the control of a strip: ``use`` becomes false where a coordinate was rejected."""
     try:
         start = _without(control, _gross(control, strip))
         strip, kept = _snooped(control, start, strip)
@@ -99,12 +86,12 @@ def _gross(control: ControlPoints, strip: StripAtControl) -> Flags:
         floor = max(float(np.median(size[control.use])), 1e-6)
         result = absolute_orientation.orient(strip.xyz, targets, weight / np.maximum(size / floor, 1.0) * control.use)
         before, size = size, np.abs(result.misclosures)
-        if np.abs(size - before).max() < SETTLED * floor:
+        if np.abs(size - before).max() < ROBUST_CHANGE * floor:
             break
     scatter = SIGMA_FROM_MEDIAN * np.array(
         [np.median(size[:, axes][control.use[:, axes]]) for axes in ([0, 1], [0, 1], [2])]
     )
-    far = np.array(control.use & (size > GROSS * scatter), bool)
+    far = np.array(control.use & (size > FAR_OFF_SIGMAS * scatter), bool)
     far[:, PLAN] = far[:, PLAN].any(axis=1, keepdims=True) & control.use[:, PLAN]
     far &= _witnessed(result.similarity(strip.xyz)[:, 0], strip.spacing, control.use & ~far)
     return far if _enough(control, far) else nothing

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 LARGEST = 400  # control coordinates whose covariance is formed as a whole
 LONGEST = 300  # photos of a strip for which it is formed; for more it takes longer than all the rest
 LEAST_REDUNDANCY = 3
-SEEN = 1e-3  # share of a coordinate's variance below which nothing checks it
+LEAST_CHECKED_SHARE = 1e-3  # share of a coordinate's variance below which nothing checks it
 POWER = 0.84  # normal quantile: an error is called detectable when it is found in 80 % of cases
 BENT = 2.5  # standard deviation of unit weight beyond which the strip is bent by more than its random errors
 
@@ -56,16 +56,18 @@ class ControlTests:
 
 
 def predict_control(joint: ControlCovariance, misclosures: Floats, used: Flags, alpha: float) -> ControlTests:
-    """Judge every control coordinate by what the others predict.
+    """Test every control coordinate against what the others predict, with their covariances.
+
+    With the projector P = W - W A (A^T W A)^-1 A^T W of those that take part and the misclosures w, the coordinate i
+    has the error -(P w)_i / P_ii and the test value |(P w)_i| / sqrt(P_ii); one that takes no part is tested by those
+    that do.
 
     Parameters
     ----------
-    joint : ControlCovariance
-        Covariance and design of all coordinates.
     misclosures : ndarray, shape (n, 3)
         Strip minus given along the ground axes, metres, after any similarity near the truth.
     used : ndarray of bool, shape (n, 3)
-        Coordinates that take part; the others are judged by them.
+        Coordinates that take part.
     alpha : float
         Level of rejecting anything in a strip without wrong control.
     """
@@ -87,7 +89,7 @@ def predict_control(joint: ControlCovariance, misclosures: Floats, used: Flags, 
         place = joint.point[number], joint.axis[number]
         weight, pull, rest = _of_one(joint, w, inside, number, (projector, pulled, total))
         share = weight * joint.covariance[number, number]
-        if share < SEEN:
+        if share < LEAST_CHECKED_SHARE:
             continue
         # a covariance is never believed to be too large: what is not modelled makes misclosures larger
         spread = max(1.0, float(np.sqrt(max(rest, 0.0) / (freedom - 1))))

@@ -34,37 +34,22 @@ PLAN_POINTS, HEIGHT_POINTS = 2, 3  # of a set
 SETS = 2000  # all sets of up to 63 points in plan and 23 heights
 DETERMINED = 1e-4  # smallest determinant of a set, columns of unit length over all points
 AGREE = 3.0  # standard deviations from the better half
-FAR = 12.0  # standard deviations; what is nearer is left to the tests of single coordinates
-ROUNDS = 8
+FAR_SIGMAS = 12.0  # standard deviations; what is nearer is left to the tests of single coordinates
+SUBSET_ROUNDS = 8
 
 
 def far(strip: Floats, targets: Targets, weight: Floats, start: Similarity) -> tuple[Flags, Floats]:
-    """Find coordinates far from a similarity that suits the better half of the control.
+    """Find coordinates far from a similarity that suits the better half of the control, in plan both of a point.
 
-    Parameters
-    ----------
-    strip : ndarray, shape (n, 3)
-        Strip coordinates of the control points.
-    weight : ndarray, shape (n, 3)
-        Weights of their coordinates, metres^-2; nothing is far that is within twelve of these standard deviations.
-
-    Returns
-    -------
-    far : ndarray of bool, shape (n, 3)
-        Coordinates that do not agree, in plan both of a point.
-    misclosures : ndarray, shape (n, 3)
-        Misclosures of all after a similarity on those that agree, metres along the ground axes.
-
-    Raises
-    ------
-    GeometryError
-        When what agrees does not determine a similarity.
+    Nothing is far that is within twelve standard deviations by its weight (n, 3), metres^-2. Also gives the misclosures
+    of all after a similarity on those that agree, along the ground axes; a GeometryError when what agrees does not
+    determine one.
     """
     use = targets.control.use
     expected = 1 / np.sqrt(np.where(weight > 0, weight, np.inf)).max(axis=0, initial=0.0)
     similarity, good = start, np.zeros(use.shape, bool)
     size = np.zeros(use.shape)
-    for _ in range(ROUNDS):
+    for _ in range(SUBSET_ROUNDS):
         before = good
         good = _agreeing(similarity(strip), targets, expected)
         if (good == before).all():
@@ -73,7 +58,7 @@ def far(strip: Floats, targets: Targets, weight: Floats, start: Similarity) -> t
         similarity, size = result.similarity, _sizes(result.misclosures)
     scatter = [max(SIGMA_FROM_MEDIAN * float(np.median(size[good[:, k], k])), float(expected[k])) for k in (0, 1, 2)]
     scatter[0] = scatter[1] = max(scatter[:2])
-    return np.asarray(use & (size > FAR * np.array(scatter)), bool), result.misclosures
+    return np.asarray(use & (size > FAR_SIGMAS * np.array(scatter)), bool), result.misclosures
 
 
 def _sizes(misclosures: Floats) -> Floats:

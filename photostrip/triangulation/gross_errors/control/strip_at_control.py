@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 ALPHA = 0.01  # of rejecting anything in a strip without wrong control
 LEAST_REDUNDANCY = 3  # of plan and of height, for a test
-SEEN = 0.05  # redundancy number below which a coordinate cannot be tested
+LEAST_REDUNDANCY_NUMBER = 0.05  # redundancy number below which a coordinate cannot be tested
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +101,7 @@ def tests_by_polynomial(problem: correction.FitProblem, fit: correction.Polynomi
     rest = np.column_stack([1 - axis.leverage for axis in fit.axes])
     residual = np.column_stack([axis.residuals for axis in fit.axes])
     with np.errstate(divide="ignore", invalid="ignore"):
-        predicted = np.where(rest > SEEN, residual / rest, 0.0)
+        predicted = np.where(rest > LEAST_REDUNDANCY_NUMBER, residual / rest, 0.0)
     expected = 1 / np.sqrt(np.where(problem.by_axis > 0, problem.by_axis, np.inf))
     groups = ((0, 1), (0, 1), (2,))
     spread, freedom = np.empty_like(residual), np.empty(3)
@@ -109,10 +109,12 @@ def tests_by_polynomial(problem: correction.FitProblem, fit: correction.Polynomi
         counted = problem.by_axis[:, group] > 0
         total = sum(fit.axes[k].redundancy for k in group)
         squares = (residual[:, group] ** 2).sum()
-        point_squares = (residual[:, group] ** 2 / np.maximum(rest[:, group], SEEN) * counted).sum(axis=1)
+        point_squares = (residual[:, group] ** 2 / np.maximum(rest[:, group], LEAST_REDUNDANCY_NUMBER) * counted).sum(
+            axis=1
+        )
         freedom[axis] = max(total - len(group), 1)
         spread[:, axis] = np.sqrt(np.maximum(squares - point_squares, 0.0) / freedom[axis])
-    deviation = np.maximum(spread, expected) / np.sqrt(np.maximum(rest, SEEN))
+    deviation = np.maximum(spread, expected) / np.sqrt(np.maximum(rest, LEAST_REDUNDANCY_NUMBER))
     axes = problem.targets.axes(problem.xyz)
     size = -np.einsum("nij,nj->ni", axes, predicted)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -120,7 +122,7 @@ def tests_by_polynomial(problem: correction.FitProblem, fit: correction.Polynomi
     redundancy = np.einsum("nij,nj->ni", axes**2, np.clip(rest, 0.0, 1.0))
     tail = ALPHA / (2 * int(use.sum()))
     limit = np.array([t_quantile(1 - tail, dof) for dof in freedom])
-    tested = use & (redundancy > SEEN) & np.isfinite(value)
+    tested = use & (redundancy > LEAST_REDUNDANCY_NUMBER) & np.isfinite(value)
     return ControlTests(
         value=np.where(tested, value, 0.0),
         limit=np.broadcast_to(limit, value.shape),

@@ -30,23 +30,14 @@ DETERMINED = 1e-6  # determinant of M_KK below which a set cannot be told from a
 
 @lru_cache(maxsize=256)
 def subsets(n: int, k: int) -> Numbers:
-    """All sets of k of n numbers.
-
-    Parameters
-    ----------
-    n, k : int
-        How many numbers there are and how many make a set.
-
-    Returns
-    -------
-    ndarray of int, shape (C(n, k), k)
-        The sets, ascending.
-    """
+    """All sets of k of n numbers, shape (C(n, k), k)."""
     return np.array(list(combinations(range(n), k)), np.intp).reshape(-1, k)
 
 
 def gains(residuals: Floats, matrix: Floats, sets: Numbers) -> Floats:
-    """Return what the sum of squares loses when sets of points are taken out.
+    """Compute what the sum of squares loses when sets of points are taken out: v_K^T (M_KK)^-1 v_K, shape (g, s).
+
+    -inf for a set whose errors cannot be told from a change of the elements.
 
     Parameters
     ----------
@@ -56,11 +47,6 @@ def gains(residuals: Floats, matrix: Floats, sets: Numbers) -> Floats:
         The matrices M of residuals from errors.
     sets : ndarray of int, shape (s, k) or (g, s, k)
         Sets of k = 1, 2 or 3 points, the same for all adjustments or different ones.
-
-    Returns
-    -------
-    ndarray, shape (g, s)
-        v_K^T (M_KK)^-1 v_K; -inf for a set whose errors cannot be told from a change of the elements.
     """
     number = np.arange(len(residuals))[:, None]
     place = np.broadcast_to(sets, (len(residuals), *sets.shape[-2:]))
@@ -91,21 +77,8 @@ def _form(v: list[Floats], m: dict[tuple[int, int], Floats]) -> tuple[Floats, Fl
 def search(residuals: Floats, matrix: Floats, target: Floats, forbidden: Flags | None = None) -> list[Numbers]:
     """Find for each adjustment the smallest set whose removal brings the sum of squares below its target.
 
-    Parameters
-    ----------
-    residuals : ndarray, shape (g, n)
-        Residuals in units of their a-priori standard deviation.
-    matrix : ndarray, shape (g, n, n)
-        The matrices M.
-    target : ndarray, shape (g, 3)
-        Largest sum of squares allowed after one, two and three points are gone; -inf where so many may not go.
-    forbidden : ndarray of bool, shape (g, n), optional
-        Points that may not go.
-
-    Returns
-    -------
-    list of ndarray of int
-        For each adjustment the points to take out; empty when no set of up to three does it.
+    Empty when no set of up to three does it. ``target`` (g, 3) is the largest sum allowed after one, two and three
+    points are gone, -inf where so many may not go; points ``forbidden`` (g, n) stay.
     """
     total = (residuals**2).sum(axis=1)
     found = [np.zeros(0, np.intp) for _ in range(len(residuals))]

@@ -28,30 +28,13 @@ NO_REDUNDANCY = 1e-6  # residuals with less are rounding
 
 
 def squares(orientation: Orientation, sigma: Floats) -> Floats:
-    """Sum of squared parallaxes of each pair in units of their variance.
-
-    Parameters
-    ----------
-    sigma : ndarray, shape (p,)
-        Standard deviation of a y parallax of weight one, mm.
-
-    Returns
-    -------
-    ndarray, shape (p,)
-        Values of the global test.
-    """
+    """Value of the global test of each pair: v^T W v / sigma^2, ``sigma`` (p,) of a y parallax of weight one, mm."""
     total: Floats = orientation.pairs.sums(orientation.pairs.weight * orientation.parallax**2) / sigma**2
     return total
 
 
 def global_limits(count: Numbers) -> Floats:
-    """Critical values of the global test.
-
-    Returns
-    -------
-    ndarray
-        Chi-square with count - 5 degrees of freedom; infinite without redundancy.
-    """
+    """Critical values of the global test: chi-square with count - 5 degrees; infinite without redundancy."""
     return _by_number(
         count,
         lambda n: chi2_quantile(CONFIDENCE, n - MINIMUM_POINTS) if n > MINIMUM_POINTS else np.inf,
@@ -59,17 +42,9 @@ def global_limits(count: Numbers) -> Floats:
 
 
 def standardised(orientation: Orientation, sigma: Floats) -> Floats:
-    """Give parallaxes in units of their standard deviation: residuals of points used, predictions of the others.
+    """Parallaxes in units of their standard deviation, (m,): residuals of points used, predictions of the others.
 
-    Parameters
-    ----------
-    sigma : ndarray, shape (p,)
-        Standard deviation of a y parallax of weight one, mm.
-
-    Returns
-    -------
-    ndarray, shape (m,)
-        Values without unit; 0 where a residual has no redundancy.
+    0 where a residual has no redundancy.
     """
     pairs, used = orientation.pairs, orientation.used
     size = np.abs(orientation.parallax) / sigma[pairs.pair] * np.sqrt(np.where(used, pairs.weight, 1.0))
@@ -80,18 +55,7 @@ def standardised(orientation: Orientation, sigma: Floats) -> Floats:
 
 
 def failing(orientation: Orientation, sigma: Floats) -> Flags:
-    """Pairs whose residuals do not belong to the scatter.
-
-    Parameters
-    ----------
-    sigma : ndarray, shape (p,)
-        Standard deviation of a y parallax of weight one, mm.
-
-    Returns
-    -------
-    ndarray of bool, shape (p,)
-        True where the sum of squares or the largest residual exceeds its limit.
-    """
+    """Pairs whose sum of squares or largest residual exceeds its limit."""
     count = orientation.points_used
     largest = np.maximum.reduceat(
         np.where(orientation.used, standardised(orientation, sigma), 0.0), orientation.pairs.starts

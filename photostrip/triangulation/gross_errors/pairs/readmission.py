@@ -29,19 +29,9 @@ READMIT = 3.0  # standard deviations of the predicted residual
 
 
 def readmit(orientation: Orientation, rows: Numbers, given: Floats, sigma: Floats) -> tuple[Orientation, Numbers]:
-    """Take points back that the final elements predict well, the best of each pair first.
+    """Take points back that the final elements predict well, the best of each pair first; also which rows came back.
 
-    Parameters
-    ----------
-    given : ndarray, shape (m,)
-        Weights of all points before any was taken out.
-    sigma : ndarray, shape (p,)
-        Standard deviation of a y parallax of weight one, mm.
-
-    Returns
-    -------
-    Orientation
-        Pairs oriented with the points taken back.
+    ``given`` (m,) are the weights before any was taken out.
     """
     if not len(rows):
         return orientation, np.zeros(0, np.intp)

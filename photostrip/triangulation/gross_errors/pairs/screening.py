@@ -33,6 +33,7 @@ from photostrip.triangulation.relative_orientation.solution import base_rays, in
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from photostrip.triangulation.gross_errors.pairs.parallax_scatter import ParallaxScatter
     from photostrip.triangulation.relative_orientation.orientation import Orientation
 
     Floats = NDArray[np.float64]
@@ -72,7 +73,7 @@ class ScreenedPairs:
 
     orientation: Orientation  # pairs oriented without the rejected points
     rejections: tuple[PairRejection, ...]  # what was rejected, in order; re-admitted points are marked
-    scatter: screening_search.ParallaxScatter  # standard deviations of a y parallax of weight one
+    scatter: ParallaxScatter  # standard deviations of a y parallax of weight one
     # (p,): pairs that fail the global test with nothing left to reject: errors that hide each other are suspected
     masked: NDArray[np.bool_]
     converged: NDArray[np.bool_]  # (p,): whether the orientation of each pair converged
@@ -100,61 +101,13 @@ class ScreenedPairs:
         return np.where(self.orientation.used, size, np.nan)
 
 
-def screen(
-    orientation: Orientation, settings: RelativeSettings, sigma: float
-) -> tuple[Orientation, tuple[PairRejection, ...]]:
-    """Reject points with gross errors from all pairs and orient those pairs again.
-
-    Parameters
-    ----------
-    orientation : Orientation
-        All pairs, oriented with all points.
-    settings : RelativeSettings
-        Method, significance and limit.
-    sigma : float
-        A-priori standard deviation of an image coordinate in mm.
-
-    Returns
-    -------
-    Orientation
-        Pairs oriented without the rejected points.
-    tuple of PairRejection
-        What was rejected, in order.
-
-    Raises
-    ------
-    InputError
-        For a method that does not exist.
-    """
-    result = screen_pairs(orientation, settings, sigma)
-    return result.orientation, result.rejections
-
-
 def screen_pairs(
     orientation: Orientation, settings: RelativeSettings, sigma: float, converged: NDArray[np.bool_] | None = None
 ) -> ScreenedPairs:
     """Reject points with gross errors, and say what can and what cannot be seen in each pair.
 
-    Parameters
-    ----------
-    orientation : Orientation
-        All pairs, oriented with all points; with ``auto`` and ``robust`` they need not make sense yet.
-    settings : RelativeSettings
-        Method, significance and limit.
-    sigma : float
-        A-priori standard deviation of an image coordinate in mm.
-    converged : ndarray of bool, shape (p,), optional
-        Whether the orientation of each pair converged; all by default.
-
-    Returns
-    -------
-    ScreenedPairs
-        Oriented pairs, log, zones, scatter and pairs with suspected errors.
-
-    Raises
-    ------
-    InputError
-        For a method that does not exist.
+    With ``auto`` and ``robust`` the pairs need not make sense yet; ``converged`` (p,) says whose orientation converged,
+    all by default. ``sigma`` is that of an image coordinate, mm.
     """
     if settings.screening not in METHODS:
         msg = f"screening method {settings.screening!r} is not available; choose one of {', '.join(METHODS)}"
@@ -181,7 +134,7 @@ def screen_pairs(
 
 def _readmitted(
     orientation: Orientation,
-    scatter: screening_search.ParallaxScatter,
+    scatter: ParallaxScatter,
     found: screening_search.DeletedPoints,
     behind: Flags,
 ) -> tuple[Orientation, list[PairRejection]]:
@@ -212,30 +165,6 @@ def _sequential(
         result, found = _stage(result, test, float(bound))
         log += found
     return result, log
-
-
-def spared(orientation: Orientation, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Choose the rows that can all go without leaving a pair or a zone without support.
-
-    Parameters
-    ----------
-    rows : ndarray of bool, shape (m,)
-        Rows that should go.
-
-    Returns
-    -------
-    ndarray of bool, shape (m,)
-        Those that may, one after the other in the order of the table.
-    """
-    result = np.zeros(len(rows), bool)
-    support = Support.of(orientation)
-    counts = support.counts.copy()
-    for row in np.flatnonzero(rows & orientation.used).tolist():
-        pair = orientation.pairs.pair[[row]]
-        if Support(support.zone[[row]], counts).spare(pair)[0]:
-            counts[pair[0], support.zone[row] - 1] -= 1
-            result[row] = True
-    return result
 
 
 def _completed(log: list[PairRejection], result: Orientation) -> tuple[PairRejection, ...]:

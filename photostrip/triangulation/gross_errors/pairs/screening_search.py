@@ -22,6 +22,12 @@ from photostrip.triangulation.gross_errors.pairs.pair_global_test import (
     largest_limits,
     standardised,
 )
+from photostrip.triangulation.gross_errors.pairs.parallax_scatter import (
+    ParallaxScatter,
+    ParallaxSizes,
+    revised_scatter,
+    sizes_left,
+)
 from photostrip.triangulation.gross_errors.pairs.zones import EMPTY_ZONES, MINIMUM_LEFT, ZONES, Support
 from photostrip.triangulation.relative_orientation import robust
 from photostrip.triangulation.relative_orientation.orientation import assess_pairs, orient_again
@@ -42,28 +48,10 @@ if TYPE_CHECKING:
     Numbers = NDArray[np.intp]
     Flags = NDArray[np.bool_]
 
-SMALLEST_REDUNDANCY = 0.05  # a residual with less says little about the scatter
-MEDIAN_SCATTER = 1.17  # sd of a standard deviation from the median of n residuals, times sqrt(n)
-PROOF = 3.0  # of those, by which a scatter must exceed the one in force
-CONTRADICTION = 1.25  # ratio of the scatter found to the one stated that is worth a change
-UNCHANGED = 1.05  # ratio of scatters that makes no difference
-FEW = 0.35  # share of a pair's points that may go before what is left says nothing about the scatter
-ENOUGH = 5.0  # redundancy below which one error cannot be told from a larger scatter
-SMALLEST_SIGMA = 1e-9  # mm
-GROSS = 4.0  # standard deviations; residuals from the robust start beyond it are wrong points
+GROSS_SIGMAS = 4.0  # standard deviations; residuals from the robust start beyond it are wrong points
 PAIRS_AT_ONCE = 64
 HALF = 0.5
 MILD = 10.0  # root of the sum of squares in units of its variance
-
-
-@dataclass(frozen=True, eq=False)
-class ParallaxScatter:
-    """Standard deviations of a y parallax of weight one that the tests are made with."""
-
-    stated: float  # from the stated standard deviation of image coordinates, mm
-    # from the residuals of all pairs of the strip, robust, mm; NaN when they did not contradict the stated one
-    found: float
-    by_pair: Floats  # (p,): those in force, mm
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,28 +69,14 @@ class DeletedPoints:
 
 
 def robust_start(orientation: Orientation, todo: Numbers, sigma: Floats) -> tuple[Floats, Floats]:
-    """Orient some pairs with falling weights.
+    """Orient some pairs with falling weights, from the median parallax or, where that fails, as they are.
 
-    They start from the median parallax and, where that fails, from their present elements.
-
-    Parameters
-    ----------
-    todo : ndarray of int
-        Pairs to orient, ascending.
-    sigma : ndarray, shape (p,)
-        Standard deviation of a y parallax of weight one, mm.
-
-    Returns
-    -------
-    elements : ndarray, shape (t, 5)
-        Elements in radians.
-    scale : ndarray, shape (t,)
-        Scatter of the residuals, mm; see ``robust.solve``.
+    Gives elements (t, 5) and the scatter of the residuals (t,), mm; see ``robust``.
     """
     part = orientation.pairs.take(todo)
     elements, scale = robust.solve(robust.start_values(part), part, sigma[todo])
     share = _share(elements, part, scale)
-    again = np.flatnonzero((share <= HALF) | (scale > GROSS * sigma[todo]))
+    again = np.flatnonzero((share <= HALF) | (scale > GROSS_SIGMAS * sigma[todo]))
     if len(again):
         rest = part.take(again)
         present = np.nan_to_num(orientation.elements[todo[again]])
@@ -116,7 +90,7 @@ def robust_start(orientation: Orientation, todo: Numbers, sigma: Floats) -> tupl
 def _share(elements: Floats, pairs: Pairs, scale: Floats) -> Floats:
     """Share of the points that lie in front and belong to the scatter."""
     with np.errstate(all="ignore"):
-        fits = np.abs(y_parallaxes(elements, pairs)) * np.sqrt(pairs.weight) < GROSS * scale[pairs.pair]
+        fits = np.abs(y_parallaxes(elements, pairs)) * np.sqrt(pairs.weight) < GROSS_SIGMAS * scale[pairs.pair]
         good = fits & in_front_of_cameras(elements, pairs) & (pairs.weight > 0)
     share: Floats = pairs.sums(good.astype(float)) / np.maximum(pairs.sums((pairs.weight > 0).astype(float)), 1.0)
     return share
@@ -145,28 +119,22 @@ def search(
         go, worst first.
     doubtful : ndarray of bool, shape (p,), optional
         Pairs whose elements cannot be used as they are; they are searched whatever the test says.
-
-    Returns
-    -------
-    ParallaxScatter
-        Scatter of the parallaxes that the search was made with.
-    DeletedPoints
-        Pairs oriented without the wrong points, and what was taken out.
     """
-    stated = max(float(np.sqrt(2.0)) * sigma, SMALLEST_SIGMA)
-    scatter = ParallaxScatter(stated, float("nan"), np.full(orientation.pairs.size, stated))
+    scatter = ParallaxScatter.of(sigma, orientation.pairs.size)
     lost = np.zeros(orientation.pairs.size, bool) if doubtful is None else doubtful
     todo = np.flatnonzero(failing(orientation, scatter.by_pair) | lost)
     if not len(todo):
         return scatter, _Log([], [], [], []).closed(orientation)
     part, rows = orientation.take(todo), orientation.pairs.rows_of(todo)
-    passed = _Sizes.of(orientation)
+    passed = ParallaxSizes.of(orientation)
     every = np.arange(len(todo))
     if sets and not lost.any():
         found = _mildly(part, scatter.by_pair[todo])
         if found is not None:
-            sizes = passed.with_part(rows, _left(part, found, found.orientation, scatter.by_pair[todo]))
-            if (_revised(scatter, orientation.pairs, sizes).by_pair <= UNCHANGED * scatter.by_pair).all():
+            sizes = passed.with_part(
+                rows, sizes_left(part, found.orientation, found.orientation, scatter.by_pair[todo])
+            )
+            if not scatter.contradicted(revised_scatter(scatter, orientation.pairs, sizes)):
                 return scatter, _whole(orientation, todo, rows, found)
     elements, scale = robust_start(part, every, scatter.by_pair[todo])
     seen = _seen_from(part, elements, every)
@@ -175,9 +143,9 @@ def search(
         sigma_now = scatter.by_pair[todo]
         failed = np.flatnonzero(failing(part, sigma_now) | lost[todo])
         found = _search_once(part, seen if start else part, failed, sigma_now, sets=sets, start=start)
-        sizes = passed.with_part(rows, _left(part, found, cleaned, sigma_now))
-        revised = _revised(scatter, orientation.pairs, sizes)
-        if (revised.by_pair <= UNCHANGED * scatter.by_pair).all():
+        sizes = passed.with_part(rows, sizes_left(part, found.orientation, cleaned, sigma_now))
+        revised = revised_scatter(scatter, orientation.pairs, sizes)
+        if not scatter.contradicted(revised):
             return scatter, _whole(orientation, todo, rows, found)
         scatter = revised
 
@@ -199,75 +167,16 @@ def _whole(orientation: Orientation, todo: Numbers, rows: Numbers, found: Delete
     return replace(found, orientation=orientation.with_pairs(todo, found.orientation), rows=rows[found.rows])
 
 
-@dataclass(frozen=True, eq=False)
-class _Sizes:
-    """What the parallaxes of all rows say about the scatter: sizes as ``_normalised``, redundancy numbers."""
-
-    size: Floats
-    redundancy: Floats
-
-    @classmethod
-    def of(cls, orientation: Orientation) -> _Sizes:
-        return cls(_normalised(orientation), orientation.redundancy)
-
-    def with_part(self, rows: Numbers, part: _Sizes) -> _Sizes:
-        size, redundancy = self.size.copy(), self.redundancy.copy()
-        size[rows], redundancy[rows] = part.size, part.redundancy
-        return _Sizes(size, redundancy)
-
-
 def _cleaned(seen: Orientation, todo: Numbers, scale: Floats) -> Orientation:
     """Orient some pairs on what their robust start leaves of their points."""
     pairs = seen.pairs
     limit = np.full(pairs.size, np.inf)
-    limit[todo] = GROSS * scale
+    limit[todo] = GROSS_SIGMAS * scale
     with np.errstate(invalid="ignore"):
         inside = np.abs(seen.parallax) * np.sqrt(pairs.weight) <= limit[pairs.pair]
     enough = pairs.sums((inside & seen.used).astype(float)) > MINIMUM_POINTS
     weight = np.where(inside | ~enough[pairs.pair], pairs.weight, 0.0)
     return orient_again(seen, weight, todo)
-
-
-def _left(given: Orientation, found: DeletedPoints, cleaned: Orientation, sigma: Floats) -> _Sizes:
-    """Return what a search leaves of the pairs that failed.
-
-    Pairs from which too many points went, or that still fail, do not speak by what the search chose to leave but by
-    what a robust start leaves.
-    """
-    total, left = given.points_used, found.orientation.points_used
-    few = total - left <= np.maximum(deletion.LARGEST, FEW * total)
-    trusted = (few & ~failing(found.orientation, sigma))[given.pairs.pair]
-    chosen, robustly = _Sizes.of(found.orientation), _Sizes.of(cleaned)
-    return _Sizes(
-        np.where(trusted, chosen.size, robustly.size), np.where(trusted, chosen.redundancy, robustly.redundancy)
-    )
-
-
-def _revised(scatter: ParallaxScatter, pairs: Pairs, left: _Sizes) -> ParallaxScatter:
-    """Raise the scatter where the residuals left by a search contradict it."""
-    sizes = left.size
-    tested = np.isfinite(sizes)
-    freedom = pairs.sums(np.where(tested, left.redundancy, 0.0))
-    if freedom.sum() < ENOUGH:
-        return scatter
-    pooled = SIGMA_FROM_MEDIAN * float(np.median(sizes[tested]))
-    proof = 1 + PROOF * MEDIAN_SCATTER / np.sqrt(max(float(freedom.sum()), 1.0))
-    first = np.isnan(scatter.found)
-    level, factor = (scatter.stated, max(CONTRADICTION, proof)) if first else (scatter.found, UNCHANGED)
-    found_now = pooled if pooled > factor * level else scatter.found
-    level = max(level, np.nan_to_num(found_now))
-    own = SIGMA_FROM_MEDIAN * np.nan_to_num(robust.median_by_pair(sizes, pairs, tested))
-    proven = np.where(freedom < ENOUGH, 0.0, own / (1 + PROOF * MEDIAN_SCATTER / np.sqrt(np.maximum(freedom, 1.0))))
-    return ParallaxScatter(scatter.stated, found_now, np.maximum(level, np.maximum(proven, scatter.by_pair)))
-
-
-def _normalised(orientation: Orientation) -> Floats:
-    """Sizes of the parallaxes over sqrt(redundancy / weight), mm; NaN where they say little."""
-    share = np.nan_to_num(orientation.redundancy)
-    speaks = orientation.used & (share > SMALLEST_REDUNDANCY)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        size = np.abs(orientation.parallax) * np.sqrt(orientation.pairs.weight / share)
-    return np.where(speaks, size, np.nan)
 
 
 def _search_once(
@@ -412,7 +321,7 @@ def _delete_beyond(orientation: Orientation, sigma: Floats, todo: Numbers, log: 
     size = np.where(np.isfinite(size), size, np.inf)
     scale = SIGMA_FROM_MEDIAN * robust.median_by_pair(size, pairs, orientation.used)
     limit = np.full(pairs.size, np.inf)
-    limit[todo] = GROSS * np.maximum(scale, sigma)[todo]
+    limit[todo] = GROSS_SIGMAS * np.maximum(scale, sigma)[todo]
     rows = np.flatnonzero(orientation.used & (size > limit[pairs.pair]))
     support = Support.of(orientation)
     counts = support.counts.copy()

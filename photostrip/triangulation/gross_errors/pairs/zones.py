@@ -37,20 +37,7 @@ RMS_OF_ROWS = np.sqrt(2 / 3)  # root mean square of y over rows at -a, 0, a, in 
 
 
 def zones(elements: Floats, pairs: Pairs) -> Numbers:
-    """Zone of every point.
-
-    Parameters
-    ----------
-    elements : ndarray, shape (p, 5)
-        Elements of the pairs in radians.
-    pairs : Pairs
-        Measurements; points of weight 0 get a zone and do not shape it.
-
-    Returns
-    -------
-    ndarray of int, shape (m,)
-        Numbers 1 to 6 of the nearest standard positions.
-    """
+    """Zone of every point, 1 to 6; points of weight 0 get a zone and do not shape it."""
     left, right = base_rays(elements, pairs)
     x, y = -pairs.focal * left[:2] / left[2]
     parallax = x + pairs.focal * right[0] / right[2]
@@ -73,15 +60,7 @@ class Support:
 
     @classmethod
     def of(cls, orientation: Orientation, zone: Numbers | None = None) -> Support:
-        """Count the points of oriented pairs.
-
-        Parameters
-        ----------
-        orientation : Orientation
-            The pairs with the weights in force.
-        zone : ndarray of int, shape (m,), optional
-            Zones of the rows, when they are known already.
-        """
+        """Count the points of oriented pairs, whose zones (m,) may be known already."""
         number = zones(orientation.elements, orientation.pairs) if zone is None else zone
         pairs, used = orientation.pairs, orientation.used
         place = ZONES * pairs.pair[used] + number[used] - 1
@@ -95,18 +74,7 @@ class Support:
         return number
 
     def spare(self, pair: Numbers) -> Flags:
-        """Rows that can go without leaving a pair or a zone without support.
-
-        Parameters
-        ----------
-        pair : ndarray of int, shape (m,)
-            Pair of every row.
-
-        Returns
-        -------
-        ndarray of bool, shape (m,)
-            True when six points stay, and no zone loses its last point while another one is empty already.
-        """
+        """Rows that can go: six points stay, and no zone loses its last point while another one is empty already."""
         enough = self.counts.sum(axis=1) > MINIMUM_LEFT
         last = self.counts[pair, self.zone - 1] <= 1
         flags: Flags = enough[pair] & (~last | (self.empty[pair] < EMPTY_ZONES))

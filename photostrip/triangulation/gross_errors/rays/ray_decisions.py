@@ -88,14 +88,10 @@ class _Doubted:
 
 
 def decide(group: Group, expected: tuple[Floats, Floats], number: Numbers) -> RayDecisions:
-    """Judge points by photos that were oriented without them.
+    """Say of each point which of its rays are wrong, by photos that were oriented without it.
 
-    Parameters
-    ----------
-    expected : tuple of ndarray, shapes (k, 2r - 3), (k, 2r - 3, 2r - 3)
-        What those photos leave of the conditions of each point, and its variances.
-    number : ndarray of int, shape (w,)
-        Points of each window, among which one in a hundred windows may lose a good one.
+    ``expected`` is what those photos leave of the conditions of each point (k, 2r - 3), and its variances; ``number``
+    (w,) the points of each window, among which one in a hundred windows may lose a good one.
     """
     k, r = group.ray.shape
     gap, variance = expected

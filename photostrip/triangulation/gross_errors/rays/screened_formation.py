@@ -38,8 +38,8 @@ if TYPE_CHECKING:
     Numbers = NDArray[np.intp]
     Flags = NDArray[np.bool_]
 
-PASSES = 4  # most of the strips settle in the second
-STILL = 5e-4  # rad, and relative: the second order of such a change is 0.04 µm on a photo of 150 mm
+MOST_FORMATIONS = 4  # most of the strips settle in the second
+NOTICEABLE_CHANGE = 5e-4  # rad, and relative: the second order of such a change is 0.04 µm on a photo of 150 mm
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,24 +59,8 @@ def form_screened(
 ) -> tuple[Orientation, FormedStrip, RayRejections]:
     """Form a strip, leave out what its points contradict, take back what they confirm, and form it again.
 
-    Parameters
-    ----------
-    oriented : Orientation
-        Pairs as their own search for gross errors leaves them.
-    readmit : bool
-        Whether points that a pair rejected may be taken back.
-
-    Returns
-    -------
-    Orientation
-        The pairs with what the strip decided.
-    FormedStrip
-        The strip; points without a ray left are gone.
-
-    Raises
-    ------
-    GeometryError
-        When a joint is broken.
+    ``readmit``: whether points that a pair rejected may be taken back. Gives the pairs with what the strip decided, the
+    strip without the points that have no ray left, and the rays; a GeometryError when a junction is broken.
     """
     of_pairs = oriented
     layout = StripRays.of(oriented, measured.observations, measured.photos)
@@ -85,7 +69,7 @@ def form_screened(
     aside = np.zeros(len(oriented.point), bool)
     moved: Flags | None = None
     formed = form_from_pairs(oriented, settings, measured.photos, measured.sigma)
-    for _ in range(PASSES):
+    for _ in range(MOST_FORMATIONS):
         scene = MeasuredStrip(oriented, formed, measured.observations, layout, measured.sigma, measured.stated)
         suspected = np.union1d(suspected, strip_screening.suspects(scene)).astype(np.intp)
         verdict = strip_screening.screen_rays(scene, suspected, measured.kept, verdict, moved)
@@ -125,8 +109,8 @@ def _formed_again(
 def _moved(before: tuple[Orientation, FormedStrip], after: tuple[Orientation, FormedStrip]) -> Flags:
     """Find the models that have been turned or stretched noticeably."""
     (old, formed), (new, again) = before, after
-    turned: Flags = np.asarray(np.abs(new.elements - old.elements).max(axis=1) > STILL, bool)
-    stretched = np.abs(again.junctions.factor / formed.junctions.factor - 1) > STILL
+    turned: Flags = np.asarray(np.abs(new.elements - old.elements).max(axis=1) > NOTICEABLE_CHANGE, bool)
+    stretched = np.abs(again.junctions.factor / formed.junctions.factor - 1) > NOTICEABLE_CHANGE
     return np.asarray(turned | np.append(stretched, False) | np.append(False, stretched), bool)
 
 
@@ -175,16 +159,5 @@ def _supported(of_pairs: Orientation, used: Flags) -> Flags:
 
 
 def taken_back(rejections: Sequence[PairRejection], used: Flags) -> tuple[PairRejection, ...]:
-    """Mark the rejections of pairs that the strip took back.
-
-    Parameters
-    ----------
-    used : ndarray of bool, shape (m,)
-        Rows of the pairs' table that are used in the end.
-
-    Returns
-    -------
-    tuple of PairRejection
-        The same, re-admitted ones marked.
-    """
+    """Mark the rejections of pairs that the strip took back; ``used`` (m,) are the rows used in the end."""
     return tuple(replace(each, readmitted=bool(used[each.row])) for each in rejections)

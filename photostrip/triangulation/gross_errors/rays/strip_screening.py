@@ -41,9 +41,9 @@ LONGEST_REACH = 8  # photos; windows do not grow for points that reach over more
 BATCH = 48  # windows solved together
 ABSOLUTE_STEPS, WELSCH_STEPS = 15, 8
 WELSCH = 3.0  # standard deviations
-STILL = 0.3  # standard deviations; the robust start is to find wrong points, not digits
+ROBUST_CHANGE = 0.3  # standard deviations; the robust start is to find wrong points, not digits
 LEAST_WEIGHT = 1e-9  # keeps a photo in its window
-ROUNDS = 12
+DECISION_ROUNDS = 12
 WRONG_RAY, TWO_RAYS, SEVERAL_RAYS = "ray", "pair", "rays"
 """What was found at a point: its wrong ray; two rays that contradict each other; several of which any may be wrong."""
 KINDS = {GOOD: SEVERAL_RAYS, RAY: WRONG_RAY, PAIR: TWO_RAYS, RAYS: SEVERAL_RAYS, NONE: SEVERAL_RAYS}
@@ -135,17 +135,9 @@ def suspects(scene: MeasuredStrip) -> Numbers:
 
 
 def collect(scene: MeasuredStrip, wanted: Flags | None = None) -> WindowRays:
-    """Collect and linearise the rays of the points that have a place in the strip.
+    """Collect and linearise the rays of the points that have a place in the strip, on wanted photos or on all.
 
-    Parameters
-    ----------
-    wanted : ndarray of bool, shape (photos,), optional
-        Photos whose rays are wanted; all by default.
-
-    Returns
-    -------
-    WindowRays
-        Ordered by point and photo; points with one ray are left out.
+    Ordered by point and photo; points with one ray are left out.
     """
     o, layout = scene.observations, scene.layout
     inside = layout.paired if wanted is None else layout.paired & np.append(wanted, False)[layout.position]
@@ -195,24 +187,17 @@ def screen_rays(
     earlier: RayRejections | None = None,
     moved: Flags | None = None,
 ) -> RayRejections:
-    """Judge all points near some suspected ones.
+    """Test all points near some suspected ones, and say which rays must not be used.
 
     Parameters
     ----------
-    points : ndarray of int
-        Points that are suspected.
     kept : ndarray of int
-        Rows of the observations that the user keeps: their points are not judged.
+        Rows of the observations that the user keeps: their points are not tested.
     earlier : RayRejections, optional
-        What was said of the same strip before its last small change.
+        What was found in the same strip before its last small change.
     moved : ndarray of bool, shape (p,), optional
         Models that this change has turned or stretched by more than the adjustment of a window is linear for; what was
-        said where there is none stands. All by default.
-
-    Returns
-    -------
-    RayRejections
-        What must not be used, and which points were judged at all.
+        found where there is none stands. All by default.
     """
     if not len(points):
         return RayRejections()
@@ -276,7 +261,7 @@ def _adjusted(groups: list[Group], count: int, length: int, start: list[Floats] 
         if all((each.weight == weight).all() for each, weight in zip(found, start, strict=True)):
             return found  # those that were left out before are left out again
     state = [_State(each, each.weight, *(np.zeros(each.weight.shape, bool) for _ in range(2))) for each in found]
-    for _ in range(ROUNDS):
+    for _ in range(DECISION_ROUNDS):
         judged = _judged(groups, [each.weight for each in state], number, length)
         worst = np.zeros(count)
         for old, new in zip(state, judged, strict=True):
@@ -347,7 +332,7 @@ def _robust(groups: list[Group], count: int, length: int) -> AdjustedWindows:
         going, part = np.arange(count), conditions
         for _ in range(steps):
             now = part.left(part.estimate(weights(left[going])))
-            moving = np.abs(now - left[going]).max(axis=1) >= STILL
+            moving = np.abs(now - left[going]).max(axis=1) >= ROBUST_CHANGE
             left[going] = now
             going, part = going[moving], part.take(moving)
             if not len(going):

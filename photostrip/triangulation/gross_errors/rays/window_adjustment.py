@@ -91,14 +91,9 @@ class WindowConditions:
 
 
 def stacked(parts: list[tuple[Group, Floats, Floats]], count: int, length: int) -> WindowConditions:
-    """Put conditions of groups into their windows.
+    """Put conditions of groups into ``count`` windows of ``length`` photos.
 
-    Parameters
-    ----------
-    parts : list of tuple
-        Groups with the derivatives (k, c, 6r) of their conditions by the photos, and the misclosures (k, c).
-    count, length : int
-        Number of windows and photos in each.
+    Of each group: derivatives (k, c, 6r) of its conditions by the photos, and misclosures (k, c).
     """
     window = np.concatenate([np.zeros(0, np.intp), *(np.repeat(g.window, closing.shape[1]) for g, _, closing in parts)])
     order = np.argsort(window, kind="stable")
@@ -117,30 +112,16 @@ def stacked(parts: list[tuple[Group, Floats, Floats]], count: int, length: int) 
 
 
 def projected(group: Group, weight: Floats) -> tuple[Floats, Floats]:
-    """Conditions of the rays that count, each as precise as a coordinate and none correlated with another.
+    """Conditions of the rays that count (``weight`` 1, not 0), each as precise as a coordinate, none correlated.
 
-    Parameters
-    ----------
-    weight : ndarray, shape (k, r)
-        1 for a ray that counts, 0 for one that does not.
-
-    Returns
-    -------
-    tuple of ndarray, shapes (k, 2r, 6r), (k, 2r)
-        Derivatives by the photos, and misclosures.
+    Derivatives by the photos (k, 2r, 6r), and misclosures (k, 2r).
     """
     matrix = projectors(group, weight)
     return matrix @ group.by_photo, (matrix @ group.misfit[:, :, None])[:, :, 0]
 
 
 def expected(group: Group, solved: AdjustedWindows) -> tuple[Floats, Floats]:
-    """Return what an adjustment that is taken not to know the points leaves of their conditions.
-
-    Returns
-    -------
-    tuple of ndarray, shapes (k, 2r - 3), (k, 2r - 3, 2r - 3)
-        Misclosures and their variances.
-    """
+    """Misclosures (k, 2r - 3), and variances, that an adjustment leaves which does not know the points."""
     gap, spread = _predicted(group, solved)
     return gap, group.gram + spread
 
@@ -153,17 +134,9 @@ def _predicted(group: Group, solved: AdjustedWindows) -> tuple[Floats, Floats]:
 
 
 def without(group: Group, weight: Floats, solved: AdjustedWindows) -> tuple[Floats, Floats]:
-    """Return what an adjustment of all other points leaves of the conditions of each point.
+    """Misclosures (k, 2r - 3) that an adjustment of all other points leaves of each point's conditions, and variances.
 
-    Parameters
-    ----------
-    weight : ndarray, shape (k, r)
-        Rays that took part, 1 or 0.
-
-    Returns
-    -------
-    tuple of ndarray, shapes (k, 2r - 3), (k, 2r - 3, 2r - 3)
-        Misclosures and their variances.
+    With G the cofactors of the conditions and S those of their prediction: G (G - S)^-1 times the misclosures.
     """
     gap, spread = _predicted(group, solved)
     variance = group.gram + spread

@@ -96,19 +96,9 @@ class Group:
 
 
 def groups(rays: WindowRays, first: Numbers, length: int) -> list[Group]:
-    """Sort the rays of some windows by point, and the points by their number of rays.
+    """Sort the rays of some windows by point, and the points by their number of rays: two, three and so on.
 
-    Parameters
-    ----------
-    rays : WindowRays
-        Rays of the strip, ordered by point and photo.
-    first : ndarray of int, shape (w,)
-        First photo of each window.
-
-    Returns
-    -------
-    list of Group
-        Points with two rays, with three and so on; points with one ray in a window are left out.
+    ``rays`` are ordered by point and photo; points with one ray in a window are left out.
     """
     inside = (rays.photo >= first[:, None]) & (rays.photo < first[:, None] + length)
     window, ray = np.nonzero(inside)
@@ -136,17 +126,9 @@ def groups(rays: WindowRays, first: Numbers, length: int) -> list[Group]:
 
 
 def projectors(group: Group, weight: Floats) -> Floats:
-    """Matrices that take the point out of its weighted rays.
+    """Projections P (k, 2r, 2r) that take the point out of its weighted rays: P A = 0, A the derivatives by the point.
 
-    Parameters
-    ----------
-    weight : ndarray, shape (k, r)
-        1 for a ray that counts, 0 for one that does not; a point needs two.
-
-    Returns
-    -------
-    ndarray, shape (k, 2r, 2r)
-        Projections P with P A = 0, A the derivatives by the point; zero for a point with fewer than two rays.
+    ``weight`` is 1 for a ray that counts, 0 for one that does not; zero for a point with fewer than two rays.
     """
     root = np.repeat(weight, 2, axis=1)[:, :, None]
     design = group.by_point * root
@@ -160,14 +142,10 @@ def projectors(group: Group, weight: Floats) -> Floats:
 
 
 def coplanarities(group: Group) -> Floats:
-    """Conditions of rays of neighbouring photos, then what more the rays of a point demand.
+    """Conditions of rays of neighbouring photos, then what more the rays of a point demand: unit rows (k, 2r - 3, 2r).
 
-    An error along the base leaves the first r - 1 alone, which are y parallaxes.
-
-    Returns
-    -------
-    ndarray, shape (k, 2r - 3, 2r)
-        Rows of unit length: r - 1 coplanarities, then r - 2 rows across them and each other.
+    An error along the base leaves the first r - 1 alone, which are y parallaxes; the r - 2 others are at right angles
+    to them and to each other.
     """
     k, coordinates = group.misfit.shape
     r = coordinates // 2

@@ -62,24 +62,7 @@ def linearise(
     photos: tuple[Floats, Floats],
     xyz: Floats,
 ) -> WindowRays:
-    """Linearise the collinearity equations of rays.
-
-    Parameters
-    ----------
-    place : tuple of ndarray of int, shape (n,)
-        Row, photo and point of each ray.
-    image : tuple
-        Image coordinates (n, 2) in mm, their standard deviations (n, 2) in mm, principal distance in mm.
-    photos : tuple of ndarray
-        Perspective centres (m, 3) and rotations (m, 3, 3), photo to strip.
-    xyz : ndarray, shape (n, 3)
-        Approximate position of the point of each ray, strip coordinates.
-
-    Returns
-    -------
-    WindowRays
-        The rays; not finite where a point lies behind its camera.
-    """
+    """Linearise the collinearity equations of rays at approximate points (n, 3); not finite behind a camera."""
     row, photo, point = place
     xy, sigma, focal = image
     centers, rotations = photos

@@ -32,6 +32,12 @@ SIGMA = 5 * MICROMETRE
 ZONES = (2, 2, 3, 3, 3, 3)  # points of the six zones in the published experiment
 
 
+def screened(orientation: Orientation, settings: RelativeSettings, sigma: float) -> tuple[Orientation, Log]:
+    """Reject points and give the pairs without them, and the log."""
+    found = screening.screen_pairs(orientation, settings, sigma)
+    return found.orientation, found.rejections
+
+
 def clean(seed: int = 0, pairs: int = 1, points: tuple[int, ...] = ZONES, sigma: float = SIGMA) -> TruePairs:
     return true_pairs(np.random.default_rng(seed), pairs, counts=points, tilt_deg=3.0, kappa_deg=0.0, sigma=sigma)
 
@@ -95,7 +101,7 @@ def test_the_logs_of_the_formula_book(example: Vector, second: str) -> None:
 def test_screening_as_a_project_asks_for_it(example: Vector) -> None:
     oriented, names = of_example(example)
     settings = RelativeSettings("parallax+grubbs", example.input["alpha"], example.input["T_mm"])
-    found, log = screening.screen(oriented, settings, example.input["sigma_q_apriori_mm"])
+    found, log = screened(oriented, settings, example.input["sigma_q_apriori_mm"])
     compare(found, log, names, example.expected["parallax_then_grubbs"], example.tol)
 
 
@@ -138,7 +144,7 @@ def experiment(seed: int, models: int, *, errors: bool = True) -> tuple[Orientat
 )
 def test_the_shares_of_the_published_experiment(limit: float, published: dict[str, float]) -> None:
     oriented, error = experiment(1, 34 * 60)
-    _, log = screening.screen(oriented, RelativeSettings("parallax+grubbs", 0.05, limit), 0.01)
+    _, log = screened(oriented, RelativeSettings("parallax+grubbs", 0.05, limit), 0.01)
     wrong = int(np.count_nonzero(error))
     assert wrong == 44 * 60
     by_test = {test: {e.row for e in log if e.test == test and error[e.row] != 0} for test in ("parallax", "grubbs")}
@@ -165,7 +171,7 @@ def test_false_alarms_of_clean_models(method: str, share: float) -> None:
 def test_one_large_error_is_found_alone(method: str) -> None:
     truth = clean(3, 5)
     oriented = spoiled(truth, {20: 1.0})
-    found, log = screening.screen(oriented, RelativeSettings(method), SIGMA)
+    found, log = screened(oriented, RelativeSettings(method), SIGMA)
     assert rows_of(log) == [20]
     entry = log[0]
     assert entry.value > entry.limit > 0
@@ -177,33 +183,33 @@ def test_one_large_error_is_found_alone(method: str) -> None:
 
 def test_the_automatic_limit_is_four_sigma_of_a_parallax() -> None:
     oriented = spoiled(clean(3), {5: 0.4})
-    _, log = screening.screen(oriented, RelativeSettings("parallax+grubbs"), SIGMA)
+    _, log = screened(oriented, RelativeSettings("parallax+grubbs"), SIGMA)
     assert log[0].test == "parallax"
     assert log[0].limit == pytest.approx(4 * np.sqrt(2) * SIGMA)
-    _, log = screening.screen(oriented, RelativeSettings("parallax+grubbs", parallax_limit=0.015), SIGMA)
+    _, log = screened(oriented, RelativeSettings("parallax+grubbs", parallax_limit=0.015), SIGMA)
     assert log[0].limit == 0.015
-    _, log = screening.screen(oriented, RelativeSettings("parallax+grubbs", parallax_limit=10.0), SIGMA)
+    _, log = screened(oriented, RelativeSettings("parallax+grubbs", parallax_limit=10.0), SIGMA)
     assert log[0].test == "grubbs"
     assert log[0].limit == pytest.approx(grubbs_limit(16, 0.05))
 
 
 def test_a_smaller_alpha_rejects_less() -> None:
     oriented, _ = experiment(5, 200, errors=False)
-    counts = [len(screening.screen(oriented, RelativeSettings("tau", alpha), 0.01)[1]) for alpha in (0.2, 0.05, 0.001)]
+    counts = [len(screened(oriented, RelativeSettings("tau", alpha), 0.01)[1]) for alpha in (0.2, 0.05, 0.001)]
     assert counts[0] > counts[1] > counts[2]
 
 
 def test_without_errors_nothing_is_rejected() -> None:
     exact = clean(4, 3, sigma=0.0).orient()
     for method in ("parallax+grubbs", "tau", "none"):
-        found, log = screening.screen(exact, RelativeSettings(method, 0.2, 1e-6), SIGMA)
+        found, log = screened(exact, RelativeSettings(method, 0.2, 1e-6), SIGMA)
         assert log == ()
         assert found.used.all()
 
 
 def test_none_rejects_nothing() -> None:
     oriented = spoiled(clean(4), {3: 2.0})
-    found, log = screening.screen(oriented, RelativeSettings("none"), SIGMA)
+    found, log = screened(oriented, RelativeSettings("none"), SIGMA)
     assert log == ()
     assert found is oriented
 
@@ -211,7 +217,7 @@ def test_none_rejects_nothing() -> None:
 def test_the_worst_goes_first_and_one_at_a_time() -> None:
     truth = clean(6, 2, points=(4,) * 6)
     oriented = spoiled(truth, {2: 2.0, 13: -0.5, 24 + 7: 1.0})
-    _, log = screening.screen(oriented, RelativeSettings("parallax+grubbs", parallax_limit=0.1), SIGMA)
+    _, log = screened(oriented, RelativeSettings("parallax+grubbs", parallax_limit=0.1), SIGMA)
     assert rows_of(log) == [2, 31, 13]  # the first round takes the worst of each pair, the next what is left
     neighbours = np.flatnonzero(np.abs(oriented.parallax) > 0.1)
     assert len(neighbours) > 3  # good points that a bad one had pulled; they stay
@@ -219,7 +225,7 @@ def test_the_worst_goes_first_and_one_at_a_time() -> None:
 
 def test_a_rejected_pair_is_what_it_is_without_the_point() -> None:
     truth = clean(7, 3)
-    found, log = screening.screen(spoiled(truth, {16 + 4: 0.8}), RelativeSettings("parallax+grubbs"), SIGMA)
+    found, log = screened(spoiled(truth, {16 + 4: 0.8}), RelativeSettings("parallax+grubbs"), SIGMA)
     assert rows_of(log) == [20]
     left, right = (np.delete(side[16:32], 4, axis=0)[None] for side in (truth.pairs.left, truth.pairs.right))
     alone = TruePairs(batch(left, right, truth.pairs.focal), truth.base[1:2], truth.rotation[1:2]).orient()
@@ -231,7 +237,7 @@ def test_other_pairs_keep_every_digit() -> None:
     truth = clean(8, 3)
     before, (after, log) = (
         truth.orient(),
-        screening.screen(spoiled(truth, {20: 0.8}), RelativeSettings("parallax+grubbs"), SIGMA),
+        screened(spoiled(truth, {20: 0.8}), RelativeSettings("parallax+grubbs"), SIGMA),
     )
     assert rows_of(log) == [20]
     for number in (0, 2):
@@ -246,7 +252,7 @@ def test_points_behind_the_cameras_go_first() -> None:
     left, right = truth.pairs.left.copy(), truth.pairs.right
     left[3] = right[3] - [20.0, 0.0]  # rays that spread: they meet above the cameras
     oriented = TruePairs(batch(left[None], right[None], truth.pairs.focal), truth.base, truth.rotation).orient()
-    found, log = screening.screen(oriented, RelativeSettings("none"), SIGMA)
+    found, log = screened(oriented, RelativeSettings("none"), SIGMA)
     assert [(entry.row, entry.test) for entry in log] == [(3, "in front")]
     assert not found.used[3]
     assert truth.errors(found.elements)[0] < 1e-3
@@ -259,11 +265,11 @@ def test_points_behind_the_cameras_go_first() -> None:
 def test_a_pair_keeps_six_points(method: str) -> None:
     truth = clean(10, points=(2, 1, 2, 1, 1, 1))
     errors = {row: 3.0 * (-1) ** row for row in range(0, 8, 2)}
-    found, log = screening.screen(spoiled(truth, errors), RelativeSettings(method, 0.2, 0.001), SIGMA)
+    found, log = screened(spoiled(truth, errors), RelativeSettings(method, 0.2, 0.001), SIGMA)
     assert found.points_used[0] >= 6
     assert len(log) <= 2
     six = spoiled(clean(10, points=(1,) * 6), {0: 3.0})
-    found, log = screening.screen(six, RelativeSettings(method, 0.2, 0.001), SIGMA)
+    found, log = screened(six, RelativeSettings(method, 0.2, 0.001), SIGMA)
     assert log == ()
 
 
@@ -284,7 +290,7 @@ def test_tau_needs_a_redundancy_of_three() -> None:
 @pytest.mark.parametrize("method", ["ransac", "Tau", ""])
 def test_a_method_that_does_not_exist_is_refused_by_name(method: str) -> None:
     with pytest.raises(InputError) as caught:
-        screening.screen(clean().orient(), RelativeSettings(method), SIGMA)
+        screened(clean().orient(), RelativeSettings(method), SIGMA)
     assert caught.value.exit_code == EXIT_INPUT
     assert f"screening method '{method}' is not available" in str(caught.value)
     assert "parallax+grubbs" in str(caught.value)
