@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple, Self
 import numpy as np
 
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO, by_point
+from photostrip.triangulation.bundle.structure import triangle
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -195,3 +196,26 @@ def _large_squares(run: tuple[Floats, Floats], to: tuple[Floats, Floats], count:
     three = joint @ joint[..., :-1, :].swapaxes(-1, -2)
     three[0] += three[1]
     np.add(three[0], three[2], out=to[1])
+
+
+class BatchBlocks(NamedTuple):
+    """What a batch contributes to the normal equations."""
+
+    pairs: Floats  # (k (k + 1) / 2 * groups, 6, 6): pairs of photos
+    border: Floats  # (k * groups, 6, more + 1): photos with common parameters and right-hand side
+    corner: Floats  # (more + 1, more + 1): common parameters and right-hand side among themselves
+
+
+def blocks_of(products: GroupSquares, rays: int) -> BatchBlocks:
+    """Cut the products of a batch into what goes to pairs, to the border of photos and to the corner: B'B - T T'."""
+    added, subtracted = products
+    n = PHOTO * rays
+    groups = len(subtracted)
+    row, column = triangle(rays)
+    squares = subtracted[:, :n, :n].reshape(groups, rays, PHOTO, rays, PHOTO)
+    pairs = squares.transpose(1, 3, 0, 2, 4)[row, column]
+    np.negative(pairs, out=pairs)
+    pairs[row == column] += added[:, :, :PHOTO, :PHOTO]
+    border = added[:, :, :PHOTO, PHOTO:] - subtracted[:, :n, n:].reshape(groups, rays, PHOTO, -1).transpose(1, 0, 2, 3)
+    corner = added[:, :, PHOTO:, PHOTO:].sum(axis=(0, 1)) - subtracted[:, n:, n:].sum(axis=0)
+    return BatchBlocks(pairs.reshape(-1, PHOTO, PHOTO), border.reshape(rays * groups, PHOTO, -1), corner)

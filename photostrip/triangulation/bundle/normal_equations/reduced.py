@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.triangulation.bundle.normal_equations.band import Band
-from photostrip.triangulation.bundle.normal_equations.point_elimination import eliminate, squares
+from photostrip.triangulation.bundle.normal_equations.point_elimination import blocks_of, eliminate, squares
 from photostrip.triangulation.bundle.normal_equations.sparse import Sparse
-from photostrip.triangulation.bundle.normal_equations.structure import blocks_of
 from photostrip.triangulation.bundle.observations import given_orientations
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO, by_photo
 

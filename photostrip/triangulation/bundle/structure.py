@@ -8,13 +8,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from photostrip.triangulation.bundle.observations.collinearity import PHOTO
 from photostrip.triangulation.bundle.observations.ray_batches import Batch, SortedRays, arrange, sort_rays
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.bundle.normal_equations.point_elimination import GroupSquares
     from photostrip.triangulation.bundle.observations.problem import BundleProblem, ControlObservations
 
     Floats = NDArray[np.float64]
@@ -186,26 +184,3 @@ def control_normals(control: ControlObservations, points: int) -> ControlNormals
     np.add.at(normal, row, normals)
     np.add.at(right, row, np.einsum("nij,nj->ni", normals, control.xyz))
     return ControlNormals(normal, right, where)
-
-
-class BatchBlocks(NamedTuple):
-    """What a batch contributes to the normal equations."""
-
-    pairs: Floats  # (k (k + 1) / 2 * groups, 6, 6): pairs of photos
-    border: Floats  # (k * groups, 6, more + 1): photos with common parameters and right-hand side
-    corner: Floats  # (more + 1, more + 1): common parameters and right-hand side among themselves
-
-
-def blocks_of(products: GroupSquares, rays: int) -> BatchBlocks:
-    """Cut the products of a batch into what goes to pairs, to the border of photos and to the corner: B'B - T T'."""
-    added, subtracted = products
-    n = PHOTO * rays
-    groups = len(subtracted)
-    row, column = triangle(rays)
-    squares = subtracted[:, :n, :n].reshape(groups, rays, PHOTO, rays, PHOTO)
-    pairs = squares.transpose(1, 3, 0, 2, 4)[row, column]
-    np.negative(pairs, out=pairs)
-    pairs[row == column] += added[:, :, :PHOTO, :PHOTO]
-    border = added[:, :, :PHOTO, PHOTO:] - subtracted[:, :n, n:].reshape(groups, rays, PHOTO, -1).transpose(1, 0, 2, 3)
-    corner = added[:, :, PHOTO:, PHOTO:].sum(axis=(0, 1)) - subtracted[:, n:, n:].sum(axis=0)
-    return BatchBlocks(pairs.reshape(-1, PHOTO, PHOTO), border.reshape(rays * groups, PHOTO, -1), corner)
