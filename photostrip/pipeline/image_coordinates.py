@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.pipeline.given_points import measured_control
-from photostrip.pipeline.strips.absolute import orient_on_control, reject_wrong_control
+from photostrip.pipeline.strips.adjusting import adjust_formed
 from photostrip.pipeline.strips.forming import form_photos
 from photostrip.triangulation.image_coordinates import corrections, interior
 
@@ -70,35 +70,21 @@ def correct(photo: PhotoCoordinates, inputs: Inputs, settings: Settings, ground:
 
 
 def heights_of(observations: PhotoPoints, inputs: Inputs, settings: Settings, ground: GroundFrames) -> Heights:
-    """Mean heights of cameras and ground from the strips as they lie on their control.
-
-    Neither a correction of the strips' deformation nor a bundle adjustment changes these means by what matters to
-    refraction.
-    """
+    """Mean heights of cameras and ground from the strips, adjusted as they will be, in the frames of the run."""
     control = measured_control(inputs.control, observations)
-    formed = form_photos(inputs, observations, settings)
     if settings.adjustment == "bundle":
-        from photostrip.pipeline.block.datum import known_of  # a strip needs none of its libraries
-        from photostrip.pipeline.block.start import start
+        from photostrip.pipeline.block.adjust import adjust_block  # a strip needs none of its libraries
 
-        begin = start(inputs, settings, formed, observations, known_of(inputs, control, ground))
-        centers, points = begin.centers, begin.points[np.isfinite(begin.points[:, 0])]
+        adjusted = adjust_block(inputs, settings, observations, control, ground)
+        strips, points = adjusted.strips, adjusted.points.cartesian
     else:
-        screened = [
-            reject_wrong_control(orient_on_control(stage, control, ground.control), settings) for stage in formed
-        ]
-        oriented = [each.oriented for each in screened]
-        cartesian = [each.intermediate.cartesian_from_intermediate for each in oriented]
-        centers = np.concatenate(
-            [
-                placed(each.absolute.similarity(each.stage.formed.centers))
-                for placed, each in zip(cartesian, oriented, strict=True)
-            ]
-        )
+        formed = form_photos(inputs, observations, settings)
+        strips = tuple(adjust_formed(stage, control, ground.control, settings) for stage in formed)
         points = _means(
-            np.concatenate([each.stage.formed.point for each in oriented]),
-            np.concatenate([placed(each.xyz) for placed, each in zip(cartesian, oriented, strict=True)]),
+            np.concatenate([strip.formed.point for strip in strips]),
+            np.concatenate([strip.cartesian for strip in strips]),
         )
+    centers = np.concatenate([strip.intermediate.cartesian_from_intermediate(strip.centers) for strip in strips])
     frame = ground.control[0] if ground.control else ground.output
     return Heights(float(_heights(centers, frame).mean()), float(_heights(points, frame).mean()))
 
