@@ -45,7 +45,8 @@ def by_strip(inputs: Inputs, wanted: Settings) -> list[Floats]:
     return found
 
 
-@pytest.mark.parametrize("adjustment", [pytest.param("polynomial", marks=pytest.mark.slow), "covariance"])
+@pytest.mark.slow
+@pytest.mark.parametrize("adjustment", ["polynomial", "covariance"])
 def test_common_control_makes_common_errors(adjustment: str) -> None:
     """Mean of two strips: a quarter of both covariances, and twice what their shared control does to both."""
     inputs = two_strips()

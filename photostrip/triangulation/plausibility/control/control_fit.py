@@ -89,7 +89,7 @@ def fit_similarity(w: Complex, plan: Complex, *, mirrored: bool = False) -> Plan
     PlanSimilarity or None
         None for fewer than three points, or when all stand at one place.
 
-    Source: least median of squares (Rousseeuw 1984).
+    Source: derived; least median of squares (Rousseeuw 1984).
     """
     if len(w) < LEAST_POINTS:
         return None
