@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
     from numpy.typing import ArrayLike, NDArray
 
+    from photostrip.arrays import Flags, Floats, Numbers
+
 T = TypeVar("T", bound="DataclassInstance")
 
 
@@ -42,13 +44,10 @@ def frozen(values: ArrayLike, dtype: type = float, shape: tuple[int, ...] | None
     return array
 
 
-def take_rows(table: T, rows: Sequence[int] | NDArray[np.intp] | NDArray[np.bool_], columns: Iterable[str]) -> T:
+def take_rows(table: T, rows: Sequence[int] | Numbers | Flags, columns: Iterable[str]) -> T:
     """Select rows of a frozen table of columns, by number or by flag.
 
-    Parameters
-    ----------
-    columns : iterable of str
-        Fields that hold a column, an array or a tuple; the others stay.
+    columns: fields that hold a column, an array or a tuple; the others stay.
     """
     chosen: dict[str, Any] = {}
     for name in columns:
@@ -63,7 +62,7 @@ class PointTable:
     """Coordinates of points in one named frame."""
 
     ids: tuple[str, ...]  # point ids, unique
-    xyz: NDArray[np.float64]  # (n, 3): coordinates in the unit of the frame
+    xyz: Floats  # (n, 3): coordinates in the unit of the frame
     frame: Frame  # the frame in which they exist
 
     def __post_init__(self) -> None:
@@ -79,7 +78,7 @@ class PointTable:
         """Return the number of points."""
         return len(self.ids)
 
-    def shared(self, other: PointTable) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    def shared(self, other: PointTable) -> tuple[Numbers, Numbers]:
         """Rows, in either table, of the points that both hold, in this table's order."""
         if self.frame is not other.frame:
             msg = f"points in the {self.frame} frame cannot be joined with points in the {other.frame} frame"
@@ -98,10 +97,10 @@ class PhotoPoints:
     photo_ids: tuple[str, ...]
     point_ids: tuple[str, ...]
     # photo, point: (n,): numbers of the photo and of the point of each row
-    photo: NDArray[np.intp]
-    point: NDArray[np.intp]
-    xy: NDArray[np.float64]  # (n, 2): image coordinates in mm; x to the right, y up
-    sigma: NDArray[np.float64]  # (n, 2): their standard deviations in mm
+    photo: Numbers
+    point: Numbers
+    xy: Floats  # (n, 2): image coordinates in mm; x to the right, y up
+    sigma: Floats  # (n, 2): their standard deviations in mm
 
     def __post_init__(self) -> None:
         """Freeze the columns."""
@@ -123,12 +122,12 @@ class ControlPoints:
     ids: tuple[str, ...]  # point ids, unique
     # (n, 3): given coordinates in the units of each point's own ground frame, in the internal order east, north, up
     # (geocentric: X, Y, Z). A coordinate that is not given is NaN
-    enu: NDArray[np.float64]
-    use: NDArray[np.bool_]  # (n, 3): which coordinates count, in the same order
-    check: NDArray[np.bool_]  # (n,): true for check points, which never influence a result
-    sigma: NDArray[np.float64]  # (n, 3): standard deviations in metres, in the same order
+    enu: Floats
+    use: Flags  # (n, 3): which coordinates count, in the same order
+    check: Flags  # (n,): true for check points, which never influence a result
+    sigma: Floats  # (n, 3): standard deviations in metres, in the same order
     # (n,): number of each point's ground frame in the project's list of frames
-    frame: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, np.intp))
+    frame: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))
 
     def __post_init__(self) -> None:
         """Freeze the columns."""
@@ -144,7 +143,7 @@ class ControlPoints:
         """Return the number of points."""
         return len(self.ids)
 
-    def take(self, rows: Sequence[int] | NDArray[np.intp] | NDArray[np.bool_]) -> ControlPoints:
+    def take(self, rows: Sequence[int] | Numbers | Flags) -> ControlPoints:
         """Points of some rows, by number or by flag, in their order."""
         return take_rows(self, rows, [column.name for column in fields(self)])
 
@@ -162,11 +161,11 @@ class ModelPoints:
     point_ids: tuple[str, ...]
     photo_ids: tuple[str, ...]
     # model, node: (n,): number of the model, and of the point or centre, of each row
-    model: NDArray[np.intp]
-    node: NDArray[np.intp]
+    model: Numbers
+    node: Numbers
     # (n, 3): model coordinates in mm, right-handed; every model has a scale, a rotation and an origin of its own
-    xyz: NDArray[np.float64]
-    sigma: NDArray[np.float64]  # (n, 3): their standard deviations in mm
+    xyz: Floats
+    sigma: Floats  # (n, 3): their standard deviations in mm
 
     def __post_init__(self) -> None:
         """Freeze the columns."""

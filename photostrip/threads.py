@@ -25,10 +25,7 @@ THREAD_VARIABLES = (
 def limit_threads(environment: MutableMapping[str, str] = os.environ) -> None:
     """Ask for one thread wherever the user has not asked for another number.
 
-    Parameters
-    ----------
-    environment : mutable mapping of str to str
-        The variables to complete; those already set stay as they are.
+    environment: the variables to complete; those already set stay as they are.
     """
     for variable in THREAD_VARIABLES:
         environment.setdefault(variable, "1")

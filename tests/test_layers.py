@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 # Bottom to top. A room is a module or a folder directly below photostrip/.
 LAYERS = (
-    {"errors", "notes", "threads", "distributions"},
+    {"arrays", "errors", "notes", "threads", "distributions"},
     {"points", "camera", "statistics", "geometry", "geodesy"},
     {"triangulation", "terrestrial"},
     {"simulate"},

@@ -17,9 +17,8 @@ from photostrip.errors import Fault, InputError
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from numpy.typing import NDArray
+    from photostrip.arrays import Floats
 
-    Floats = NDArray[np.float64]
 
 Document = dict[str, Any]
 
@@ -52,17 +51,10 @@ def compare_results(
 
     The baseline may be a short one.
 
-    Returns
-    -------
-    dict
-        ``status`` (``same``, ``different``); ``kinds``: for each kind of quantity how many were compared and how many
-        differ by more than allowed, and the worst; ``differences``: all of these, worst first; ``sets``: what is
+    Returns ``status`` (``same``, ``different``); ``kinds``: for each kind of quantity how many were compared and how
+        many differ by more than allowed, and the worst; ``differences``: all of these, worst first; ``sets``: what is
         missing and new in each set.
-
-    Raises
-    ------
-    InputError
-        When they cannot be compared: other frames, nothing in common, a document that is not whole.
+    Raises InputError when they cannot be compared: other frames, nothing in common, a document that is not whole.
     """
     _require_comparable(document, baseline, files)
     tolerances = tolerances or Tolerances()

@@ -10,9 +10,8 @@ from photostrip.geodesy.curvature import meridian_radius, prime_vertical_radius
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from photostrip.arrays import Floats
 
-    Floats = NDArray[np.float64]
 
 Document = dict[str, Any]
 
@@ -20,18 +19,10 @@ Document = dict[str, Any]
 def plan_and_height(frame: Document, now: Floats, before: Floats) -> tuple[Floats, Floats]:
     """Return the distance of points from where they were, in plan and in height.
 
-    Parameters
-    ----------
-    frame : dict
-        The block ``frame`` of a result.
-    now, before : ndarray, shape (n, 3)
-        Coordinates in the order and the units of the frame.
-
-    Returns
-    -------
-    plan, height : ndarray, shape (n,)
-        Length in plan and size of the difference in height, metres. In a geocentric frame up is the normal of the
-        ellipsoid.
+    frame: the block ``frame`` of a result.
+    now, before: (n, 3), coordinates in the order and the units of the frame.
+    Returns plan, height: (n,), length in plan and size of the difference in height, metres. In a geocentric frame up is
+        the normal of the ellipsoid.
     """
     if frame["kind"] == "geocentric":
         parts = _turned(frame, now - before, before)

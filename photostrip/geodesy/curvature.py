@@ -16,7 +16,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
+
+    from photostrip.arrays import Floats
 
 Ellipsoid = tuple[float, float]
 """Semi-major and semi-minor axis (a, b) of an ellipsoid of revolution, metres."""
@@ -28,21 +30,21 @@ def eccentricity_squared(ellipsoid: Ellipsoid) -> float:
     return (a - b) * (a + b) / (a * a)
 
 
-def meridian_radius(lat: ArrayLike, ellipsoid: Ellipsoid) -> NDArray[np.float64]:
+def meridian_radius(lat: ArrayLike, ellipsoid: Ellipsoid) -> Floats:
     """Radius of curvature of the meridian, M = a (1 - e^2) / W^3 with W = sqrt(1 - e^2 sin^2 B)."""
     e2 = eccentricity_squared(ellipsoid)
     w2 = 1.0 - e2 * np.sin(np.asarray(lat, dtype=np.float64)) ** 2
     return np.asarray(ellipsoid[0] * (1.0 - e2) / (w2 * np.sqrt(w2)))
 
 
-def prime_vertical_radius(lat: ArrayLike, ellipsoid: Ellipsoid) -> NDArray[np.float64]:
+def prime_vertical_radius(lat: ArrayLike, ellipsoid: Ellipsoid) -> Floats:
     """Radius of curvature across the meridian, N = a / W with W = sqrt(1 - e^2 sin^2 B)."""
     e2 = eccentricity_squared(ellipsoid)
     w2 = 1.0 - e2 * np.sin(np.asarray(lat, dtype=np.float64)) ** 2
     return np.asarray(ellipsoid[0] / np.sqrt(w2))
 
 
-def curvature_correction(distance: ArrayLike, radius: ArrayLike) -> NDArray[np.float64]:
+def curvature_correction(distance: ArrayLike, radius: ArrayLike) -> Floats:
     """How far the level surface has fallen below the tangent plane, D^2 / (2 R), at a distance D in that plane.
 
     Added to a coordinate above the tangent plane it gives a height; subtracted from a height it gives the coordinate.
@@ -52,11 +54,11 @@ def curvature_correction(distance: ArrayLike, radius: ArrayLike) -> NDArray[np.f
     return np.asarray(np.square(np.asarray(distance, dtype=np.float64)) / (2.0 * np.asarray(radius)))
 
 
-def height_from_tangent(z: ArrayLike, distance: ArrayLike, radius: ArrayLike) -> NDArray[np.float64]:
+def height_from_tangent(z: ArrayLike, distance: ArrayLike, radius: ArrayLike) -> Floats:
     """Height above the level surface from the coordinate above the tangent plane: results, after the orientation."""
     return np.asarray(z, dtype=np.float64) + curvature_correction(distance, radius)  # eq. 153
 
 
-def tangent_from_height(height: ArrayLike, distance: ArrayLike, radius: ArrayLike) -> NDArray[np.float64]:
+def tangent_from_height(height: ArrayLike, distance: ArrayLike, radius: ArrayLike) -> Floats:
     """Coordinate above the tangent plane from the height above the level surface: control, before the orientation."""
     return np.asarray(height, dtype=np.float64) - curvature_correction(distance, radius)  # eq. 153

@@ -7,10 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+    from photostrip.arrays import Floats
 
 
 class Operation(Protocol):
@@ -28,7 +25,7 @@ class Operation(Protocol):
     def grids(self) -> tuple[str, ...]:
         """Paths of the grid files that are read."""
 
-    def apply(self, columns: Array, *, inverse: bool = False) -> Array:
+    def apply(self, columns: Floats, *, inverse: bool = False) -> Floats:
         """Transform rows of coordinates; what lies outside the domain becomes infinite."""
 
 
@@ -40,18 +37,18 @@ class DatumShift:
     source_unit: float  # radians per unit of the geographic CRS
     target_unit: float
 
-    def _apply(self, geodetic: Array, *, inverse: bool) -> Array:
+    def _apply(self, geodetic: Floats, *, inverse: bool) -> Floats:
         """Run the operation in the units of the two CRSs."""
         units = (self.source_unit, self.target_unit)
         given, wanted = units[::-1] if inverse else units
         moved = self.operation.apply(geodetic / (given, given, 1.0), inverse=inverse)
         return moved * (wanted, wanted, 1.0)
 
-    def forward(self, geodetic: Array) -> Array:
+    def forward(self, geodetic: Floats) -> Floats:
         """From the frame's own datum to that of the Cartesian frame."""
         return geodetic if self.operation.idle else self._apply(geodetic, inverse=False)
 
-    def inverse(self, geodetic: Array) -> Array:
+    def inverse(self, geodetic: Floats) -> Floats:
         """Undo ``forward``.
 
         PROJ inverts a seven-parameter shift to first order in its angles, 0.1 mm for one arc second and centimetres
@@ -65,6 +62,6 @@ class DatumShift:
         return first + miss
 
 
-def wrapped_longitude(angle: Array) -> Array:
+def wrapped_longitude(angle: Floats) -> Floats:
     """Bring differences of longitude into [-pi, pi)."""
     return (angle + math.pi) % (2.0 * math.pi) - math.pi

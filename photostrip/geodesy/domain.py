@@ -11,15 +11,13 @@ from photostrip.errors import Fault, GeometryError, InputError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
+    from photostrip.arrays import Flags, Floats
 
-    Array = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
 
 _ROWS_NAMED = 8
 
 
-def finite_rows(rows: Array) -> Flags:
+def finite_rows(rows: Floats) -> Flags:
     """Rows without an infinite number: PROJ marks what it cannot transform by infinity."""
     return np.asarray(np.isfinite(rows).all(axis=1))
 

@@ -11,14 +11,13 @@ from photostrip.errors import GeometryError
 from photostrip.geodesy.domain import named_rows
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from photostrip.arrays import Floats
 
-    Array = NDArray[np.float64]
 
 _POLE = 1e-9  # radians: nearer to a pole, east and north are not defined
 
 
-def true_axes(geodetic: Array) -> Array:
+def true_axes(geodetic: Floats) -> Floats:
     """East, north and the ellipsoid's normal at longitude, latitude (radians), in the geocentric frame."""
     lon, lat = geodetic[:, 0], geodetic[:, 1]
     pole = np.abs(lat) > math.pi / 2.0 - _POLE
@@ -31,7 +30,7 @@ def true_axes(geodetic: Array) -> Array:
     return np.stack([east, north, up], axis=1)
 
 
-def axes_between(east: Array, north: Array) -> Array:
+def axes_between(east: Floats, north: Floats) -> Floats:
     """Right angles, shared evenly between two directions; nothing moves where they cross at right angles."""
     east, north = _unit(east), _unit(north)
     up = _unit(np.cross(east, north))
@@ -39,13 +38,13 @@ def axes_between(east: Array, north: Array) -> Array:
     return np.stack([east, np.cross(up, east), up], axis=1)
 
 
-def axes_along_north(east: Array, north: Array) -> Array:
+def axes_along_north(east: Floats, north: Floats) -> Floats:
     """Right angles, the second axis along a direction in the plane of two."""
     up = _unit(np.cross(east, north))
     north = _unit(north - np.einsum("nc,nc->n", north, up)[:, None] * up)
     return np.stack([np.cross(north, up), north, up], axis=1)
 
 
-def _unit(vectors: Array) -> Array:
+def _unit(vectors: Floats) -> Floats:
     """Bring vectors to unit length."""
     return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))

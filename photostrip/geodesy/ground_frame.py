@@ -31,11 +31,11 @@ from photostrip.geodesy.local_frame import geocentric_from_geodetic, geodetic_fr
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
+    from photostrip.arrays import Floats
     from photostrip.geodesy.curvature import Ellipsoid
 
-    Array = NDArray[np.float64]
 
 WGS84: Ellipsoid = (6378137.0, 6356752.314245179)
 """Semi-axes of WGS 84, metres: by definition a = 6378137 m, 1/f = 298.257223563 (NIMA TR8350.2)."""
@@ -85,11 +85,11 @@ class GroundFrame:
         first, second, third = (names.index(axis) for axis in self.axes)
         return first, second, third
 
-    def internal_from_user(self, columns: ArrayLike) -> Array:
+    def internal_from_user(self, columns: ArrayLike) -> Floats:
         """Bring columns (coordinates or sigmas) in the order of ``axes`` into the internal order."""
         return np.asarray(columns, dtype=np.float64)[..., np.argsort(self.order)]
 
-    def user_from_internal(self, columns: ArrayLike) -> Array:
+    def user_from_internal(self, columns: ArrayLike) -> Floats:
         """Bring columns (coordinates or sigmas) in the internal order into the order of ``axes``."""
         return np.asarray(columns, dtype=np.float64)[..., list(self.order)]
 
@@ -105,23 +105,14 @@ class GroundFrame:
 
     # ---------------------------------------------------------------- points
 
-    def cartesian_from_ground(self, enu: ArrayLike, *, ids: Sequence[str] | None = None) -> Array:
+    def cartesian_from_ground(self, enu: ArrayLike, *, ids: Sequence[str] | None = None) -> Floats:
         """Cartesian coordinates (n, 3), metres, of ground points (n, 3) in the CRS's own units.
 
         They are geocentric; in a local world they are east, north, up in metres above the tangent plane.
 
-        Parameters
-        ----------
-        ids : sequence of str, optional
-            Ids of the points, for messages; without them rows are named, counted from 0.
+        ids: ids of the points, for messages; without them rows are named, counted from 0.
+        Raises InputError if a coordinate is not a number, lies outside the domain of the projection or outside a grid.
 
-        Raises
-        ------
-        InputError
-            If a coordinate is not a number, lies outside the domain of the projection or outside a grid.
-
-        Notes
-        -----
         Source: [001] eq. 153 for a local frame with a radius.
         """
         points = np.array(enu, dtype=np.float64).reshape(-1, 3)
@@ -137,23 +128,14 @@ class GroundFrame:
         height = self._ellipsoidal(points, ids)
         return self._cartesian_from_geodetic(np.column_stack([plan, height]), ids)
 
-    def ground_from_cartesian(self, xyz: ArrayLike, *, ids: Sequence[str] | None = None) -> Array:
+    def ground_from_cartesian(self, xyz: ArrayLike, *, ids: Sequence[str] | None = None) -> Floats:
         """Ground coordinates (n, 3), in the CRS's own units, of points (n, 3) in the Cartesian frame, metres.
 
         Longitudes are in (-180, 180] degrees.
 
-        Parameters
-        ----------
-        ids : sequence of str, optional
-            Ids of the points, for messages; without them rows are named, counted from 0.
+        ids: ids of the points, for messages; without them rows are named, counted from 0.
+        Raises GeometryError if a point lies where the projection or a grid does not reach.
 
-        Raises
-        ------
-        GeometryError
-            If a point lies where the projection or a grid does not reach.
-
-        Notes
-        -----
         Source: [001] eq. 152, 153.
         """
         points = np.array(xyz, dtype=np.float64).reshape(-1, 3)
@@ -170,15 +152,12 @@ class GroundFrame:
         require_reached(finite_rows(plan), f"outside the domain of {self.spec.name}", ids)
         return np.column_stack([plan, self._from_ellipsoidal(plan, geodetic[:, 2], ids)])
 
-    def geodetic(self, xyz: ArrayLike) -> Array:
+    def geodetic(self, xyz: ArrayLike) -> Floats:
         """Longitude, latitude (radians) and ellipsoidal height of Cartesian points, on the frame's own datum.
 
         Longitudes are in (-pi, pi] from the datum's zero meridian, and 0 at a pole.
 
-        Raises
-        ------
-        GeometryError
-            For a local frame, and for points near the centre of the body.
+        Raises GeometryError for a local frame, and for points near the centre of the body.
         """
         if self.kind == "local":
             raise GeometryError("a local frame has no longitude and latitude", code="local-geodetic")
@@ -197,7 +176,7 @@ class GroundFrame:
 
     # ------------------------------------------------------------ directions
 
-    def axes_at(self, xyz: ArrayLike) -> Array:
+    def axes_at(self, xyz: ArrayLike) -> Floats:
         """Directions (n, 3, 3) of the ground axes at Cartesian points; rows are unit vectors in the Cartesian frame.
 
         They are orthogonal and right-handed: grid east, grid north and the ellipsoid's normal of a projected frame;
@@ -205,10 +184,8 @@ class GroundFrame:
         lines of a grid do not cross at right angles (a projection that is not conformal), the right angle lies evenly
         between them.
 
-        Raises
-        ------
-        GeometryError
-            For a geographic frame at a pole, where there is no east, and outside the domain of a projection.
+        Raises GeometryError for a geographic frame at a pole, where there is no east, and outside the domain of a
+            projection.
         """
         points = np.asarray(xyz, dtype=np.float64).reshape(-1, 3)
         if self.kind in {"geocentric", "local"}:
@@ -217,19 +194,16 @@ class GroundFrame:
         axes = true_axes(geodetic) if self.kind == "geographic" else self._grid_axes(geodetic)
         return axes if self._shift is None else self._shifted_axes(geodetic, axes)
 
-    def level_axes_at(self, xyz: ArrayLike) -> Array:
+    def level_axes_at(self, xyz: ArrayLike) -> Floats:
         """Directions as ``axes_at`` gives them, but true east, north and the normal for ``geocentric``."""
         return true_axes(self.geodetic(xyz)) if self.kind == "geocentric" else self.axes_at(xyz)
 
-    def convergence(self, xyz: ArrayLike) -> Array:
+    def convergence(self, xyz: ArrayLike) -> Floats:
         """Meridian convergence at Cartesian points: the azimuth of grid north, radians in (-pi, pi], shape (n,).
 
         In the northern hemisphere it is positive east of the central meridian. 0 for frames without a grid.
 
-        Raises
-        ------
-        GeometryError
-            At a pole, where there is no true north, and outside the domain of the projection.
+        Raises GeometryError at a pole, where there is no true north, and outside the domain of the projection.
         """
         points = np.asarray(xyz, dtype=np.float64).reshape(-1, 3)
         if self.kind != "projected":
@@ -239,7 +213,7 @@ class GroundFrame:
         east, north = np.einsum("nij,nj->in", true[:, :2], grid_north)
         return np.asarray(np.arctan2(east, north))
 
-    def difference(self, enu_a: ArrayLike, enu_b: ArrayLike) -> Array:
+    def difference(self, enu_a: ArrayLike, enu_b: ArrayLike) -> Floats:
         """Difference of ground coordinates (n, 3), a minus b, in metres along east, north, up (X, Y, Z).
 
         For a projected frame it is the difference of coordinates times the unit; for a geographic one metres on the
@@ -294,7 +268,7 @@ class GroundFrame:
 
     # ------------------------------------------------------------- the steps
 
-    def _bent(self, points: Array, formula: Callable[[Array, Array, float], Array]) -> Array:
+    def _bent(self, points: Floats, formula: Callable[[Floats, Floats, float], Floats]) -> Floats:
         """Heights of a local frame to or from the tangent plane, where a radius is given."""
         radius = self.spec.curvature_radius
         if radius is None:
@@ -305,7 +279,7 @@ class GroundFrame:
         points[:, 2] = formula(points[:, 2], distance, radius)  # eq. 153
         return points
 
-    def _lonlat(self, plan: Array, ids: Sequence[str] | None) -> Array:
+    def _lonlat(self, plan: Floats, ids: Sequence[str] | None) -> Floats:
         """Longitude and latitude, radians, of plan coordinates."""
         if self._plane is not None:
             lonlat = self._plane.apply(plan)
@@ -323,7 +297,7 @@ class GroundFrame:
         require_rows(inside, "no such longitude and latitude (are the axes in the right order?)", ids)
         return lonlat
 
-    def _ellipsoidal(self, points: Array, ids: Sequence[str] | None) -> Array:
+    def _ellipsoidal(self, points: Floats, ids: Sequence[str] | None) -> Floats:
         """Heights above the frame's own ellipsoid, metres."""
         if self._vertical is None:
             return points[:, 2] * self.height_factor + (self.spec.geoid_undulation or 0.0)
@@ -331,7 +305,7 @@ class GroundFrame:
         require_rows(np.isfinite(height), f"outside the geoid grid of {self.spec.name}", ids)
         return height
 
-    def _from_ellipsoidal(self, plan: Array, ellipsoidal: Array, ids: Sequence[str] | None) -> Array:
+    def _from_ellipsoidal(self, plan: Floats, ellipsoidal: Floats, ids: Sequence[str] | None) -> Floats:
         """Heights in the user's sense and unit from heights above the frame's own ellipsoid."""
         if self._vertical is None:
             return (ellipsoidal - (self.spec.geoid_undulation or 0.0)) / self.height_factor
@@ -341,22 +315,22 @@ class GroundFrame:
         again = self._vertical.apply(np.column_stack([plan, first]))[:, 2]
         return first + (ellipsoidal - again) / self.height_factor
 
-    def _cartesian_from_geodetic(self, geodetic: Array, ids: Sequence[str] | None) -> Array:
+    def _cartesian_from_geodetic(self, geodetic: Floats, ids: Sequence[str] | None) -> Floats:
         """Cartesian coordinates from longitude, latitude (radians) and height of the frame's own datum."""
         if self._shift is not None:
             geodetic = self._shift.forward(geodetic)
             require_rows(finite_rows(geodetic), f"no datum shift from {self.spec.name} is known there", ids)
         return geocentric_from_geodetic(geodetic, self._cartesian)
 
-    def _own_geocentric(self, geodetic: Array) -> Array:
+    def _own_geocentric(self, geodetic: Floats) -> Floats:
         """Geocentric coordinates on the frame's own datum."""
         return geocentric_from_geodetic(geodetic, self.ellipsoid or WGS84)
 
-    def _own_geodetic_from_geocentric(self, xyz: Array) -> Array:
+    def _own_geodetic_from_geocentric(self, xyz: Floats) -> Floats:
         """Longitude, latitude, height on the frame's own datum."""
         return geodetic_from_geocentric(xyz, self.ellipsoid or WGS84)
 
-    def _grid_axes(self, geodetic: Array) -> Array:
+    def _grid_axes(self, geodetic: Floats) -> Floats:
         """Rows grid east, grid north, normal in the geocentric frame of the own datum.
 
         Where one gets when the grid coordinate grows, by central differences of fourth order: that needs nothing of
@@ -376,7 +350,7 @@ class GroundFrame:
         weights = np.array([-1.0, 8.0, -8.0, 1.0])
         return axes_between(*np.einsum("k,aknc->anc", weights, xyz))
 
-    def _shifted_axes(self, geodetic: Array, axes: Array) -> Array:
+    def _shifted_axes(self, geodetic: Floats, axes: Floats) -> Floats:
         """Axes of the own datum, carried into the Cartesian frame through the datum shift."""
         step = _DERIVATIVE_STEP * (self.ellipsoid or WGS84)[0]
         centre = self._own_geocentric(geodetic)

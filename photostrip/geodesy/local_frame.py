@@ -19,15 +19,16 @@ from photostrip.errors import GeometryError
 from photostrip.geodesy.curvature import eccentricity_squared, prime_vertical_radius
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
+    from photostrip.arrays import Floats
     from photostrip.geodesy.curvature import Ellipsoid
 
 _ITERATIONS = 10  # the Earth stops after 2 or 3, a body as flat as Saturn after a few more
 _CONVERGED = 1e-15  # radians, 6 nanometres on the Earth
 
 
-def geocentric_from_geodetic(geodetic: ArrayLike, ellipsoid: Ellipsoid) -> NDArray[np.float64]:
+def geocentric_from_geodetic(geodetic: ArrayLike, ellipsoid: Ellipsoid) -> Floats:
     """Geocentric coordinates (n, 3) of points given by longitude, latitude (radians) and height above the ellipsoid.
 
     X runs towards the zero meridian, Z towards the north pole: X = (N + H) cos B cos L, Y = (N + H) cos B sin L,
@@ -40,7 +41,7 @@ def geocentric_from_geodetic(geodetic: ArrayLike, ellipsoid: Ellipsoid) -> NDArr
     return np.stack([across * np.cos(lon), across * np.sin(lon), along], axis=-1)
 
 
-def geodetic_from_geocentric(xyz: ArrayLike, ellipsoid: Ellipsoid) -> NDArray[np.float64]:
+def geodetic_from_geocentric(xyz: ArrayLike, ellipsoid: Ellipsoid) -> Floats:
     """Longitude in (-pi, pi], latitude (radians) and height above the ellipsoid, (n, 3), of geocentric coordinates.
 
     On the axis of rotation the longitude is 0. Made for points near the surface; towards the centre of the body, nearer
@@ -66,7 +67,7 @@ def geodetic_from_geocentric(xyz: ArrayLike, ellipsoid: Ellipsoid) -> NDArray[np
     return np.stack([np.arctan2(y, x), lat, height], axis=-1)
 
 
-def axes_matrix(lat: float, lon: float, azimuth: float) -> NDArray[np.float64]:
+def axes_matrix(lat: float, lon: float, azimuth: float) -> Floats:
     """Direction cosines M = Rz(L0) Ry(90 deg - B0) Rz(180 deg - A0) of the axes of an intermediate frame.
 
     Its columns are X (in azimuth A0, clockwise from north), Y (90 degrees to the left of X) and Z (the normal, up), in
@@ -86,7 +87,7 @@ def axes_matrix(lat: float, lon: float, azimuth: float) -> NDArray[np.float64]:
     )
 
 
-def local_axes_matrix(azimuth: float) -> NDArray[np.float64]:
+def local_axes_matrix(azimuth: float) -> Floats:
     """Direction cosines of the axes of an intermediate frame in a flat world, in east, north, up components.
 
     A rotation about the vertical: columns as in ``axes_matrix``.
@@ -113,15 +114,8 @@ def mean_position(lat: ArrayLike, lon: ArrayLike, height: ArrayLike) -> tuple[fl
 def strip_azimuth(first: ArrayLike, last: ArrayLike) -> float:
     """Azimuth A0 = atan2(-DY, DX), clockwise from north in (-pi, pi], of the strip from its end centres.
 
-    Parameters
-    ----------
-    first, last : array_like, shape (3,)
-        The two perspective centres in the intermediate frame of azimuth 0 (X north, Y west, Z up).
-
-    Raises
-    ------
-    GeometryError
-        If the two centres lie above each other: then the strip has no direction.
+    first, last: (3,), the two perspective centres in the intermediate frame of azimuth 0 (X north, Y west, Z up).
+    Raises GeometryError if the two centres lie above each other: then the strip has no direction.
     """
     dx, dy, _ = np.asarray(last, dtype=np.float64) - np.asarray(first, dtype=np.float64)
     if not np.hypot(dx, dy) > 0.0:
@@ -139,8 +133,8 @@ class IntermediateFrame:
     Source: [001] eq. 142-144, 152. Way there and way back use the same origin and axes by construction.
     """
 
-    origin: NDArray[np.float64]  # (3,): origin, in the project's Cartesian frame, metres
-    axes: NDArray[np.float64]  # (3, 3): M: columns are the axes X, Y, Z in the project's Cartesian frame
+    origin: Floats  # (3,): origin, in the project's Cartesian frame, metres
+    axes: Floats  # (3, 3): M: columns are the axes X, Y, Z in the project's Cartesian frame
     azimuth: float = 0.0  # azimuth A0 of the X axis, clockwise from north, radians
 
     def __post_init__(self) -> None:
@@ -176,26 +170,26 @@ class IntermediateFrame:
         about_z = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
         return type(self)(self.origin, self.axes @ about_z, azimuth)
 
-    def intermediate_from_cartesian(self, xyz: ArrayLike) -> NDArray[np.float64]:
+    def intermediate_from_cartesian(self, xyz: ArrayLike) -> Floats:
         """Points (..., 3) from the project's Cartesian frame into this frame. Source: [001] eq. 144."""
         return np.asarray((np.asarray(xyz, dtype=np.float64) - self.origin) @ self.axes)  # eq. 144
 
-    def cartesian_from_intermediate(self, points: ArrayLike) -> NDArray[np.float64]:
+    def cartesian_from_intermediate(self, points: ArrayLike) -> Floats:
         """Points (..., 3) from this frame back into the Cartesian frame. Source: [001] eq. 152."""
         return np.asarray(self.origin + np.asarray(points, dtype=np.float64) @ self.axes.T)  # eq. 152
 
-    def intermediate_vectors(self, vectors: ArrayLike) -> NDArray[np.float64]:
+    def intermediate_vectors(self, vectors: ArrayLike) -> Floats:
         """Directions or differences from the Cartesian frame into this frame: turned, not shifted."""
         return np.asarray(np.asarray(vectors, dtype=np.float64) @ self.axes)
 
-    def cartesian_vectors(self, vectors: ArrayLike) -> NDArray[np.float64]:
+    def cartesian_vectors(self, vectors: ArrayLike) -> Floats:
         """Directions or differences from this frame into the Cartesian frame: turned, not shifted."""
         return np.asarray(np.asarray(vectors, dtype=np.float64) @ self.axes.T)
 
-    def intermediate_rotations(self, rotations: ArrayLike) -> NDArray[np.float64]:
+    def intermediate_rotations(self, rotations: ArrayLike) -> Floats:
         """Rotations (..., 3, 3) from image axes to Cartesian axes, turned to lead to the axes of this frame."""
         return np.asarray(self.axes.T @ np.asarray(rotations, dtype=np.float64))
 
-    def cartesian_rotations(self, rotations: ArrayLike) -> NDArray[np.float64]:
+    def cartesian_rotations(self, rotations: ArrayLike) -> Floats:
         """Rotations (..., 3, 3) from image axes to the axes of this frame, turned to lead to Cartesian axes."""
         return np.asarray(self.axes @ np.asarray(rotations, dtype=np.float64))

@@ -15,10 +15,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
     from pyproj import CRS, Transformer
 
-    Array = NDArray[np.float64]
+    from photostrip.arrays import Floats
 
 
 @cache
@@ -42,7 +41,7 @@ class ProjOperation:
 
     def __init__(self, source: CRS, target: CRS) -> None:
         self._ends = (source, target)
-        self._decided_by: tuple[Array, bool] | None = None  # the point, and whether it went the inverse way
+        self._decided_by: tuple[Floats, bool] | None = None  # the point, and whether it went the inverse way
 
     def __getstate__(self) -> dict[str, Any]:
         """Keep what the operation is made from: PROJ's own object cannot be sent to another process."""
@@ -62,7 +61,7 @@ class ProjOperation:
         """Whether coordinates pass unchanged, as between ETRS89 and WGS 84."""
         return self.transformer.definition.startswith("proj=noop")
 
-    def apply(self, columns: Array, *, inverse: bool = False) -> Array:
+    def apply(self, columns: Floats, *, inverse: bool = False) -> Floats:
         """Transform rows of coordinates; what lies outside the domain becomes infinite."""
         if self._decided_by is None and len(columns):
             self._decided_by = columns[len(columns) // 2], inverse
@@ -95,13 +94,13 @@ class ProjOperation:
         )
 
 
-def _run(transformer: Transformer, columns: Array, *, inverse: bool) -> Any:  # noqa: ANN401 (arrays or numbers)
+def _run(transformer: Transformer, columns: Floats, *, inverse: bool) -> Any:  # noqa: ANN401 (arrays or numbers)
     """Hand columns to PROJ and get columns back."""
     transform: Any = transformer.transform
     return transform(*columns, direction="INVERSE" if inverse else "FORWARD", errcheck=False)
 
 
-def _used(transformer: Transformer, point: Array, *, inverse: bool) -> Transformer:
+def _used(transformer: Transformer, point: Floats, *, inverse: bool) -> Transformer:
     """Single out the operation that PROJ uses for one point."""
     _run(transformer, point, inverse=inverse)
     try:

@@ -37,28 +37,14 @@ def tie_frames(
 ) -> tuple[list[GroundFrame], GroundFrame]:
     """Tie the frames of all control lists and of the output to one Cartesian frame.
 
-    Parameters
-    ----------
-    specs : sequence of FrameSpec
-        Frame of each control list.
-    output : FrameSpec or None
-        Frame of the results; None: that of the first control list.
-    directory : Path, optional
-        Where grid files named in PROJ strings are looked for first: the project file's directory.
-    keys : sequence of str, optional
-        Key of each frame in the project file; without it they are those of the control lists.
-
-    Returns
-    -------
-    tuple
-        The control lists' frames, in their order, and the output's. The Cartesian frame is the geocentric one of the
-        output's datum, or the local frame.
-
-    Raises
-    ------
-    InputError
-        With every fault of every frame: unknown or unsuitable CRS, contradictory heights, missing geoid grid, no
-        sound operation between two datums, local and geodetic frames in one project.
+    specs: frame of each control list.
+    output: frame of the results; None: that of the first control list.
+    directory: where grid files named in PROJ strings are looked for first: the project file's directory.
+    keys: key of each frame in the project file; without it they are those of the control lists.
+    Returns the control lists' frames, in their order, and the output's. The Cartesian frame is the geocentric one of
+        the output's datum, or the local frame.
+    Raises InputError with every fault of every frame: unknown or unsuitable CRS, contradictory heights, missing geoid
+        grid, no sound operation between two datums, local and geodetic frames in one project.
     """
     wanted = list(zip(keys or [f"control[{i}]" for i in range(len(specs))], specs, strict=True))
     if output is not None:

@@ -25,9 +25,10 @@ from photostrip.points import frozen
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
-    Floats = NDArray[np.float64]
+    from photostrip.arrays import Floats
+
 
 SINGULAR = 1e-9  # smallest over largest singular value: below, rounding decides
 ITERATIONS = 50
@@ -88,10 +89,7 @@ class PlaneInverse:
     def __call__(self, points: ArrayLike) -> Floats:
         """Transform points (..., n, 2) back to those on the side of the origin.
 
-        Raises
-        ------
-        GeometryError
-            When there is no such point: the transformation folds the plane before it.
+        Raises GeometryError when there is no such point: the transformation folds the plane before it.
         """
         target = np.asarray(points, float)
         found = PlaneTransform(_from_matrix(_inverse(self.inverse.coefficients[..., LINEAR])))(target)
@@ -157,11 +155,8 @@ def projective_from_points(source: ArrayLike, target: ArrayLike, weights: ArrayL
     The equations multiplied by the denominator give the start, Gauss-Newton steps then reduce the residuals themselves.
     Needs four points of which no three are on one line.
 
-    Raises
-    ------
-    GeometryError
-        When the points do not determine all coefficients, lie on both sides of the line that goes to infinity, or when
-        the iteration does not converge.
+    Raises GeometryError when the points do not determine all coefficients, lie on both sides of the line that goes to
+        infinity, or when the iteration does not converge.
     """
     a, b, w = _arrays(source, target, weights)
     local_a, substitution = _local(a, w)

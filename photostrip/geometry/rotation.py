@@ -13,28 +13,30 @@ import numpy as np
 from photostrip.errors import GeometryError
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
+
+    from photostrip.arrays import Floats
 
 SYSTEMS = ("alpha-omega-kappa", "omega-phi-kappa", "phi-omega-kappa")
 GIMBAL_LIMIT = 1e-12  # 1 - |sine of the middle angle| below which the other two are not separable
 
 
-def rotation_x(angle: ArrayLike) -> NDArray[np.float64]:
+def rotation_x(angle: ArrayLike) -> Floats:
     """Rotation about the x axis by angles (...), right-hand rule."""
     return _elementary(angle, 1, 2)
 
 
-def rotation_y(angle: ArrayLike) -> NDArray[np.float64]:
+def rotation_y(angle: ArrayLike) -> Floats:
     """Rotation about the y axis, right-hand rule; see ``rotation_x``."""
     return _elementary(angle, 2, 0)
 
 
-def rotation_z(angle: ArrayLike) -> NDArray[np.float64]:
+def rotation_z(angle: ArrayLike) -> Floats:
     """Rotation about the z axis, right-hand rule; see ``rotation_x``."""
     return _elementary(angle, 0, 1)
 
 
-def _elementary(angle: ArrayLike, first: int, second: int) -> NDArray[np.float64]:
+def _elementary(angle: ArrayLike, first: int, second: int) -> Floats:
     t = np.asarray(angle, float)
     matrix = np.zeros((*t.shape, 3, 3))
     matrix[..., range(3), range(3)] = 1.0
@@ -44,7 +46,7 @@ def _elementary(angle: ArrayLike, first: int, second: int) -> NDArray[np.float64
     return matrix
 
 
-def from_alpha_omega_kappa(alpha: ArrayLike, omega: ArrayLike, kappa: ArrayLike) -> NDArray[np.float64]:
+def from_alpha_omega_kappa(alpha: ArrayLike, omega: ArrayLike, kappa: ArrayLike) -> Floats:
     """Rotations ``A = Ry(-alpha) Rx(omega) Rz(kappa)``, photo to object, (..., 3, 3), of angles in radians.
 
     Alpha positive looks forward (+X), omega positive looks left (+Y), kappa positive turns the x axis counter-clockwise
@@ -67,16 +69,11 @@ def from_alpha_omega_kappa(alpha: ArrayLike, omega: ArrayLike, kappa: ArrayLike)
     return matrix
 
 
-def alpha_omega_kappa(matrix: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def alpha_omega_kappa(matrix: ArrayLike) -> tuple[Floats, Floats, Floats]:
     """Angles alpha, omega, kappa, shape (...), of rotations (..., 3, 3), photo to object.
 
-    Raises
-    ------
-    GeometryError
-        When omega is +-90 degrees: alpha and kappa cannot be separated.
+    Raises GeometryError when omega is +-90 degrees: alpha and kappa cannot be separated.
 
-    Notes
-    -----
     Source: [001] eq. 129 and 135, there misprinted as sin(omega) = -b3/c3; it is -b3.
     """
     a = np.asarray(matrix, float)
@@ -88,21 +85,17 @@ def alpha_omega_kappa(matrix: ArrayLike) -> tuple[NDArray[np.float64], NDArray[n
     )
 
 
-def _refuse_gimbal(sine: NDArray[np.float64], middle: str, first: str) -> None:
+def _refuse_gimbal(sine: Floats, middle: str, first: str) -> None:
     if np.any(1 - np.abs(sine) < GIMBAL_LIMIT):
         msg = f"{middle} is 90 degrees: {first} and kappa cannot be separated; choose another system of angles"
         raise GeometryError(msg, code="gimbal")
 
 
-def angles(matrix: ArrayLike, system: str) -> NDArray[np.float64]:
+def angles(matrix: ArrayLike, system: str) -> Floats:
     """Angles (..., 3) of rotations, photo to object, in a system of ``SYSTEMS`` and in the order of its name.
 
-    Raises
-    ------
-    GeometryError
-        When the middle angle is +-90 degrees.
-    ValueError
-        When the system is not known.
+    Raises GeometryError when the middle angle is +-90 degrees.
+    Raises ValueError when the system is not known.
     """
     a = np.asarray(matrix, float)
     if system == "omega-phi-kappa":
@@ -117,7 +110,7 @@ def angles(matrix: ArrayLike, system: str) -> NDArray[np.float64]:
     return np.stack([-alpha if system == "phi-omega-kappa" else alpha, omega, kappa], axis=-1)
 
 
-def from_angles(values: ArrayLike, system: str) -> NDArray[np.float64]:
+def from_angles(values: ArrayLike, system: str) -> Floats:
     """Rotations from angles (..., 3) in a system of ``SYSTEMS``; the inverse of ``angles``."""
     first, second, kappa = np.moveaxis(np.asarray(values, float), -1, 0)
     if system == "omega-phi-kappa":
@@ -128,7 +121,7 @@ def from_angles(values: ArrayLike, system: str) -> NDArray[np.float64]:
     return from_alpha_omega_kappa(-first if system == "phi-omega-kappa" else first, second, kappa)
 
 
-def angle_rates(values: ArrayLike, system: str) -> NDArray[np.float64]:
+def angle_rates(values: ArrayLike, system: str) -> Floats:
     """Small rotations that small changes of the angles make: D (..., 3, 3) with ``theta = D d(angles)``.
 
     ``exp([theta]) R`` is the rotation of the changed angles; theta refers to the axes of the object. D is singular
@@ -151,7 +144,7 @@ def angle_rates(values: ArrayLike, system: str) -> NDArray[np.float64]:
     return np.stack(columns, axis=-1)
 
 
-def from_vector(vector: ArrayLike) -> NDArray[np.float64]:
+def from_vector(vector: ArrayLike) -> Floats:
     """Rotation about a vector (..., 3) by its length in radians (Rodrigues' formula)."""
     v = np.asarray(vector, float)
     angle = np.linalg.norm(v, axis=-1)[..., None, None]
@@ -159,11 +152,11 @@ def from_vector(vector: ArrayLike) -> NDArray[np.float64]:
     safe = np.where(angle < 1e-9, 1.0, angle)  # noqa: PLR2004  below it the series' first terms are exact
     first = np.where(angle < 1e-9, 1.0, np.sin(safe) / safe)  # noqa: PLR2004
     second = np.where(angle < 1e-9, 0.5, (1 - np.cos(safe)) / safe**2)  # noqa: PLR2004
-    matrix: NDArray[np.float64] = np.eye(3) + first * k + second * (k @ k)
+    matrix: Floats = np.eye(3) + first * k + second * (k @ k)
     return matrix
 
 
-def cross_matrix(vector: ArrayLike) -> NDArray[np.float64]:
+def cross_matrix(vector: ArrayLike) -> Floats:
     """Matrix [v] with ``[v] w = v x w``."""
     v = np.asarray(vector, float)
     matrix = np.zeros((*v.shape[:-1], 3, 3))
@@ -176,15 +169,15 @@ def cross_matrix(vector: ArrayLike) -> NDArray[np.float64]:
     return matrix
 
 
-def angle_between(first: ArrayLike, second: ArrayLike) -> NDArray[np.float64]:
+def angle_between(first: ArrayLike, second: ArrayLike) -> Floats:
     """Angle, 0 to pi, of the rotation from one attitude to another, exact also when it is tiny."""
     a, b = np.asarray(first, float), np.asarray(second, float)
     chord = np.linalg.norm(a - b, axis=(-2, -1)) / np.sqrt(8.0)
-    angle: NDArray[np.float64] = 2 * np.arcsin(np.clip(chord, 0, 1))
+    angle: Floats = 2 * np.arcsin(np.clip(chord, 0, 1))
     return angle
 
 
-def to_vector(matrix: ArrayLike) -> NDArray[np.float64]:
+def to_vector(matrix: ArrayLike) -> Floats:
     """Vector (..., 3) of a rotation by less than 180 degrees; the inverse of ``from_vector``."""
     a = np.asarray(matrix, float)
     sine = 0.5 * np.stack(
@@ -194,5 +187,5 @@ def to_vector(matrix: ArrayLike) -> NDArray[np.float64]:
     angle = np.arctan2(length, 0.5 * (np.trace(a, axis1=-2, axis2=-1) - 1.0))
     small = length < 1e-9  # noqa: PLR2004  there the vector and its sines are the same
     factor = np.where(small, 1.0, angle / np.where(small, 1.0, length))
-    vector: NDArray[np.float64] = sine * factor[..., None]
+    vector: Floats = sine * factor[..., None]
     return vector

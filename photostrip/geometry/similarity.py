@@ -11,9 +11,10 @@ from photostrip.geometry.rotation import cross_matrix
 from photostrip.points import frozen
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
-    Floats = NDArray[np.float64]
+    from photostrip.arrays import Floats
+
 
 SIMILARITY_PARAMETERS = 7  # shift, rotation, logarithm of the scale
 
@@ -85,10 +86,7 @@ def collinearity(points: ArrayLike, weights: ArrayLike | None = None) -> float:
 def similarity_derivatives(xyz: Floats, origin: Floats) -> Floats:
     """Displacements by an infinitesimal similarity about an origin: dX = t + theta x (X - O) + lambda (X - O).
 
-    Returns
-    -------
-    ndarray, shape (n, 3, 7)
-        Derivatives by shift t, rotation theta (radians) and logarithm of the scale lambda.
+    Returns (n, 3, 7), derivatives by shift t, rotation theta (radians) and logarithm of the scale lambda.
     """
     arm = xyz - origin
     derivatives = np.zeros((len(arm), 3, SIMILARITY_PARAMETERS))

@@ -12,16 +12,12 @@ from photostrip.pipeline.results import Adjusted, AdjustedStrips, Ties
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.inputs import Settings
     from photostrip.pipeline.results import StripResult
     from photostrip.pipeline.strips.absolute import ScreenedStrip
     from photostrip.points import ControlPoints, PhotoPoints
-
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 
 def join_strips(
@@ -34,12 +30,8 @@ def join_strips(
 ) -> AdjustedStrips:
     """Join strips that were adjusted each by itself.
 
-    Parameters
-    ----------
-    screened : sequence of ScreenedStrip
-        The same strips before their deformation was corrected.
-    given : ControlPoints
-        All given points, check points too.
+    screened: the same strips before their deformation was corrected.
+    given: all given points, check points too.
     """
     points, ties = _joined(strips, observations.point_ids, output)
     precision = None

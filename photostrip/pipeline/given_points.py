@@ -10,14 +10,10 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.results import Adjusted
     from photostrip.points import ControlPoints, PhotoPoints
-
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 
 def measured_control(control: ControlPoints, observations: PhotoPoints) -> ControlPoints:

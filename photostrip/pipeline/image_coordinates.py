@@ -16,16 +16,12 @@ from photostrip.pipeline.strips.forming import form_photos
 from photostrip.triangulation.image_coordinates import corrections, interior
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.frames import GroundFrames
     from photostrip.pipeline.inputs import Inputs, Settings
     from photostrip.points import PhotoPoints
     from photostrip.triangulation.image_coordinates.mark_fit import InteriorOrientation
-
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)

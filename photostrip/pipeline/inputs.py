@@ -18,15 +18,11 @@ from photostrip.triangulation.relative_orientation.orientation import RelativeSe
 from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.camera import Camera
     from photostrip.geodesy.frame_spec import FrameSpec
     from photostrip.points import ControlPoints, ModelPoints, PhotoPoints
 
-    Floats = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
-    Numbers = NDArray[np.intp]
 
 ADJUSTMENTS = ("similarity", "polynomial", "covariance", "bundle")
 

@@ -14,14 +14,11 @@ from photostrip.triangulation.relative_orientation.orientation import RelativeSe
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.points import ModelPoints, PhotoPoints
     from photostrip.triangulation.gross_errors.pairs.screening import ScreenedPairs
     from photostrip.triangulation.independent_models.link_screening import LinkSettings
 
-    Numbers = NDArray[np.intp]
-    Flags = NDArray[np.bool_]
 
 CENTER = "center of photo "  # before the name of a perspective centre in model coordinates
 
@@ -29,10 +26,7 @@ CENTER = "center of photo "  # before the name of a perspective centre in model 
 def require(settings: RelativeSettings, observations: PhotoPoints) -> None:
     """Refuse entries that name no measurement, and those that are to be kept and dropped.
 
-    Raises
-    ------
-    InputError
-        With a fault for each such entry.
+    Raises InputError with a fault for each such entry.
     """
     faults = []
     for key in ("keep", "drop"):
@@ -59,10 +53,7 @@ def require(settings: RelativeSettings, observations: PhotoPoints) -> None:
 def require_named(settings: LinkSettings, measured: ModelPoints) -> None:
     """Refuse entries of ``keep`` and ``drop`` that name nothing, and those in both.
 
-    Raises
-    ------
-    InputError
-        With a fault for each such entry.
+    Raises InputError with a fault for each such entry.
     """
     if not (settings.keep or settings.drop):
         return
@@ -91,15 +82,8 @@ def require_named(settings: LinkSettings, measured: ModelPoints) -> None:
 def rows_of(entries: Sequence[str], observations: PhotoPoints) -> dict[str, int]:
     """Find the rows of the measurements of a list.
 
-    Parameters
-    ----------
-    entries : sequence of str
-        Measurements, photo/point.
-
-    Returns
-    -------
-    dict of str to int
-        Row of each; -1 for none.
+    entries: measurements, photo/point.
+    Returns row of each; -1 for none.
     """
     if not entries:
         return {}
@@ -115,15 +99,8 @@ def rows_of(entries: Sequence[str], observations: PhotoPoints) -> dict[str, int]
 def rows(entries: Sequence[str], observations: PhotoPoints) -> Numbers:
     """Return the rows of the measurements of a list.
 
-    Parameters
-    ----------
-    entries : sequence of str
-        Measurements, photo/point.
-
-    Returns
-    -------
-    ndarray of int
-        Their rows, ascending.
+    entries: measurements, photo/point.
+    Returns their rows, ascending.
     """
     return np.array(sorted(rows_of(entries, observations).values()), np.intp)
 
@@ -131,37 +108,21 @@ def rows(entries: Sequence[str], observations: PhotoPoints) -> Numbers:
 def touched(entries: Sequence[str], observations: PhotoPoints, rows: Numbers) -> Flags:
     """Find the rows of a pairs' table that use a measurement of a list.
 
-    Parameters
-    ----------
-    entries : sequence of str
-        Measurements, photo/point.
-    rows : ndarray of int, shape (m, 2)
-        Rows of the two measurements in the observations.
-
-    Returns
-    -------
-    ndarray of bool, shape (m,)
-        True for those.
+    entries: measurements, photo/point.
+    rows: (m, 2), rows of the two measurements in the observations.
+    Returns (m,), true for those.
     """
     hits = np.isin(rows, list(rows_of(entries, observations).values()))
     found: Flags = hits[:, 0] | hits[:, 1]
     return found
 
 
-def restored(screened: ScreenedPairs, weight: NDArray[np.float64], kept: Flags) -> ScreenedPairs:
+def restored(screened: ScreenedPairs, weight: Floats, kept: Flags) -> ScreenedPairs:
     """Take rejected measurements back that the user keeps.
 
-    Parameters
-    ----------
-    weight : ndarray, shape (m,)
-        Weights before the search.
-    kept : ndarray of bool, shape (m,)
-        Rows that are kept.
-
-    Returns
-    -------
-    ScreenedPairs
-        The search with those rows in use; their rejections are marked as re-admitted.
+    weight: (m,), weights before the search.
+    kept: (m,), rows that are kept.
+    Returns the search with those rows in use; their rejections are marked as re-admitted.
     """
     oriented = screened.orientation
     back = kept & ~oriented.used
@@ -176,10 +137,7 @@ def restored(screened: ScreenedPairs, weight: NDArray[np.float64], kept: Flags) 
 def notes(settings: RelativeSettings, strip: str, photos: Sequence[str]) -> list[Note]:
     """Say what the user has decided.
 
-    Returns
-    -------
-    list of Note
-        One for each list that touches the strip.
+    Returns one for each list that touches the strip.
     """
     kept, dropped = (
         ", ".join(entry for entry in entries if any(entry.startswith(f"{photo}/") for photo in photos))

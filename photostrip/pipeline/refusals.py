@@ -21,10 +21,7 @@ OF_MODELS = ("polynomial", "similarity")  # adjustments that need no image coord
 def require_runnable(inputs: Inputs, settings: Settings) -> None:
     """Refuse an adjustment that does not exist, and measurements on photos whose camera nobody knows.
 
-    Raises
-    ------
-    InputError
-        By the key in the project file.
+    Raises InputError by the key in the project file.
     """
     if settings.adjustment not in ADJUSTMENTS:
         fault = Fault(
@@ -44,10 +41,7 @@ def require_runnable(inputs: Inputs, settings: Settings) -> None:
 def require_whole(inputs: Inputs, frames: Sequence[GroundFrame]) -> None:
     """Refuse geocentric points of which only some coordinates count: X, Y, Z are neither plan nor height.
 
-    Raises
-    ------
-    InputError
-        With a fault for each such point.
+    Raises InputError with a fault for each such point.
     """
     control = inputs.control
     if not frames:
@@ -84,10 +78,7 @@ def refuse_curvature_twice(inputs: Inputs, settings: Settings) -> None:
 def require_adjustment_of_models(settings: Settings) -> None:
     """Refuse adjustments that need image coordinates where models were measured.
 
-    Raises
-    ------
-    InputError
-        By the key in the project file.
+    Raises InputError by the key in the project file.
     """
     if settings.adjustment not in OF_MODELS:
         fault = Fault(

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.geodesy.local_frame import IntermediateFrame
     from photostrip.notes import Finding, Note
@@ -35,9 +34,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.resection import resection as exterior
     from photostrip.triangulation.strip_formation.strip import FormedStrip
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
-    Flags = NDArray[np.bool_]
 
 NEW, CONTROL, CHECK = "new", "control", "check"
 

@@ -29,20 +29,10 @@ if TYPE_CHECKING:
 def triangulate(inputs: Inputs, settings: Settings, *, directory: Path | None = None) -> Result:
     """Take a project through the whole strip method.
 
-    Parameters
-    ----------
-    directory : Path, optional
-        The project file's directory, where grids named by the frames are looked for first.
+    directory: the project file's directory, where grids named by the frames are looked for first.
+    Raises InputError when the settings or frames contradict each other or the control is left-handed.
+    Raises GeometryError when a pair, a junction or the absolute orientation cannot be determined.
 
-    Raises
-    ------
-    InputError
-        When the settings or frames contradict each other or the control is left-handed.
-    GeometryError
-        When a pair, a junction or the absolute orientation cannot be determined.
-
-    Notes
-    -----
     Either error carries in ``findings`` what the data say against themselves.
     """
     try:

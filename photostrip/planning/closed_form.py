@@ -12,14 +12,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
-    Array = NDArray[np.float64]
+    from photostrip.arrays import Floats
+
 
 ORDER = ("dbz", "dkappa", "dalpha", "domega")
 
 
-def control_sums(control: ArrayLike) -> Array:
+def control_sums(control: ArrayLike) -> Floats:
     """Add up c1 to c15 over the control points (n, 2): m(u, v) = sum of u v less the product of the sums over n."""
     x, y = np.asarray(control, float).T
     pairs = (
@@ -29,26 +30,18 @@ def control_sums(control: ArrayLike) -> Array:
     return np.array([u @ v - u.sum() * v.sum() / len(x) for u, v in pairs])
 
 
-def coefficients(points: ArrayLike, control: ArrayLike, base: float, depth: float) -> Array:
+def coefficients(points: ArrayLike, control: ArrayLike, base: float, depth: float) -> Floats:
     """Errors of points of the oriented model per error of each element.
 
-    Parameters
-    ----------
-    points, control : array_like, shape (q, 2), (n, 2)
-        x and y from the left nadir; all control is given in plan and height.
-    base, depth : float
-        b and the depth Z of all points.
-
-    Returns
-    -------
-    ndarray, shape (q, 3, 4)
-        Coefficients of x, y, height in the order of `ORDER`; dby drops out.
+    points, control: (q, 2), (n, 2), x and y from the left nadir; all control is given in plan and height.
+    base, depth: b and the depth Z of all points.
+    Returns (q, 3, 4), coefficients of x, y, height in the order of `ORDER`; dby drops out.
     """
     along, across = _plan(points, control, base, depth)
     return np.stack([along, across, _height(points, control, base)], axis=1)
 
 
-def _reduced(points: ArrayLike, control: ArrayLike) -> dict[str, Array]:
+def _reduced(points: ArrayLike, control: ArrayLike) -> dict[str, Floats]:
     """Return the differences [g] = g of the point less the mean of g over the control."""
     found = {}
     (x, y), (u, v) = np.asarray(points, float).T, np.asarray(control, float).T
@@ -67,7 +60,7 @@ def _reduced(points: ArrayLike, control: ArrayLike) -> dict[str, Array]:
     return found
 
 
-def _plan(points: ArrayLike, control: ArrayLike, base: float, depth: float) -> tuple[Array, Array]:
+def _plan(points: ArrayLike, control: ArrayLike, base: float, depth: float) -> tuple[Floats, Floats]:
     """Rows of x (eq. 9) and y (eq. 10)."""
     c1, c2, c3, c4, c5, c6, c7, c8, c9, c10, c11, c12, c13, c14, c15 = control_sums(control)
     b, z = base, depth
@@ -101,7 +94,7 @@ def _plan(points: ArrayLike, control: ArrayLike, base: float, depth: float) -> t
     return np.stack(along, axis=-1), np.stack(across, axis=-1)
 
 
-def _height(points: ArrayLike, control: ArrayLike, base: float) -> Array:
+def _height(points: ArrayLike, control: ArrayLike, base: float) -> Floats:
     """Rows of the height (eq. 11); dbz and dkappa do not deform heights."""
     c1, c2, c3, c4, _, c6, _, c8, c9, *_ = control_sums(control)
     g = _reduced(points, control)

@@ -47,10 +47,7 @@ class ControlLayout:
 def spots_of(layout: ControlLayout, photos: int, rows: int) -> tuple[Spot, ...]:
     """Control points of a layout by photo and row, none twice; a spot named one by one wins over one of a band.
 
-    Raises
-    ------
-    InputError
-        When a spot lies outside the strip, or a band has more points than there are rows.
+    Raises InputError when a spot lies outside the strip, or a band has more points than there are rows.
     """
     last = photos - 1
     if layout.kind == "points":

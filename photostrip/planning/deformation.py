@@ -18,9 +18,10 @@ from photostrip.statistics import normal_quantile, t_quantile
 from photostrip.triangulation.relative_orientation import six_points
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
-    Array = NDArray[np.float64]
+    from photostrip.arrays import Floats
+
 
 TERMS = ("E0", "A", "B", "C", "D")
 LEAST_POINTS = 5
@@ -28,24 +29,19 @@ LEAST_REDUNDANCY = 3  # below it a standard deviation from the residuals is most
 RANK_TOLERANCE = 5e-3  # of the singular values of the scaled columns: below it x² is as good as a multiple of x
 
 
-def parallax_error(xy: ArrayLike, elements: ArrayLike, focal: float, base: float, measured: ArrayLike = 0.0) -> Array:
+def parallax_error(xy: ArrayLike, elements: ArrayLike, focal: float, base: float, measured: ArrayLike = 0.0) -> Floats:
     """Return the quantity c, mm, that all errors of a point go through (eq. 10.8).
 
-    Parameters
-    ----------
-    xy : array_like, shape (n, 2)
-        x and y.
-    elements : array_like, shape (..., 5)
-        Errors of the elements, radians. A constant f (dalpha2' - dalpha1') is left out of c, which is scale and height
-        datum only.
-    measured : array_like
-        Error dp of the x parallax, mm.
+    xy: (n, 2), x and y.
+    elements: (..., 5), errors of the elements, radians. A constant f (dalpha2' - dalpha1') is left out of c, which is
+        scale and height datum only.
+    measured: error dp of the x parallax, mm.
     """
     x, y = np.moveaxis(np.asarray(xy, float), -1, 0)
     al1, ka1, al2, om2, ka2 = np.moveaxis(np.asarray(elements, float), -1, 0)
     right = x - base
     turned = (right**2 * al2 - x**2 * al1 + right * y * om2) / focal
-    found: Array = turned - y * (ka2 - ka1) - np.asarray(measured, float)
+    found: Floats = turned - y * (ka2 - ka1) - np.asarray(measured, float)
     return found
 
 
@@ -65,14 +61,14 @@ SIDE, CENTRAL = "side", "central"
 PRINTED = {SIDE: Constants(3.5, 2.3), CENTRAL: Constants(2.1, 1.6)}
 
 
-def rigorous_factors(xy: ArrayLike, focal: float, width: float, base: float) -> Array:
+def rigorous_factors(xy: ArrayLike, focal: float, width: float, base: float) -> Floats:
     """Variance of c in units of the variance of a y parallax, with the cofactors of six standard points, shape (n,).
 
     `width` is the distance a of the side points from the middle ones, mm; the measured parallax counts 2.
     """
     place = np.asarray(xy, float)
     rows = np.stack([parallax_error(place, unit, focal, base) for unit in np.eye(5)], axis=-1)
-    found: Array = np.einsum("...i,ij,...j->...", rows, six_points.cofactors(focal, width, base), rows) + 2
+    found: Floats = np.einsum("...i,ij,...j->...", rows, six_points.cofactors(focal, width, base), rows) + 2
     return found
 
 
@@ -87,14 +83,11 @@ def rigorous_constants(xy: ArrayLike, focal: float, width: float, base: float) -
 # ---------------------------------------------------------------------------------------------------- paraboloid
 
 
-def paraboloid(elements: ArrayLike, scale: float, focal: float, base: float) -> Array:
+def paraboloid(elements: ArrayLike, scale: float, focal: float, base: float) -> Floats:
     """Return the surface into which errors of the elements bend the heights of a model.
 
-    Returns
-    -------
-    ndarray, shape (5,)
-        E0, A, B, C, D of dZ = E0 + A x + B y + C x y + D x²; dZ in ground mm for x, y in mm. E0, A and B go into the
-        absolute orientation; C is twist, D is bending along the base.
+    Returns (5,), E0, A, B, C, D of dZ = E0 + A x + B y + C x y + D x²; dZ in ground mm for x, y in mm. E0, A and B go
+        into the absolute orientation; C is twist, D is bending along the base.
     """
     al1, ka1, al2, om2, ka2 = np.asarray(elements, float)
     m, b = scale, base
@@ -107,14 +100,14 @@ def paraboloid(elements: ArrayLike, scale: float, focal: float, base: float) -> 
 class Paraboloid:
     """A deformation paraboloid fitted to height residuals."""
 
-    coefficients: Array  # (5,): E0, A, B, C, D, in the unit of the residuals for x, y in their unit
+    coefficients: Floats  # (5,): E0, A, B, C, D, in the unit of the residuals for x, y in their unit
     # (5,): standard deviations: from the residuals with a `redundancy` of three or more, else from the stated ones
-    sigmas: Array
+    sigmas: Floats
     redundancy: int
     sigma0: float  # standard deviation of unit weight from the residuals; NaN without redundancy
 
     @property
-    def t_values(self) -> Array:
+    def t_values(self) -> Floats:
         """C and D over their standard deviations, shape (2,)."""
         with np.errstate(divide="ignore", invalid="ignore"):  # parallaxes without any error
             return np.asarray(self.coefficients[3:] / self.sigmas[3:], float)
@@ -131,7 +124,7 @@ class Paraboloid:
         return -float(twist) * base / scale, -float(bend) * base / scale
 
 
-def paraboloid_rows(xy: ArrayLike) -> Array:
+def paraboloid_rows(xy: ArrayLike) -> Floats:
     """Rows 1, x, y, x y, x² of the surface, shape (n, 5)."""
     x, y = np.moveaxis(np.asarray(xy, float), -1, 0)
     return np.stack([np.ones_like(x), x, y, x * y, x**2], axis=-1)
@@ -156,19 +149,10 @@ def determines_paraboloid(xy: ArrayLike) -> bool:
 def fit_paraboloid(xy: ArrayLike, residuals: ArrayLike, sigmas: ArrayLike) -> Paraboloid:
     """Fit the deformation paraboloid to height residuals.
 
-    Parameters
-    ----------
-    xy : array_like, shape (n, 2)
-        x and y, in one unit.
-    residuals : array_like, shape (n,)
-        Heights of the model minus given heights.
-    sigmas : array_like, shape (n,)
-        Standard deviations of the residuals, in their unit.
-
-    Raises
-    ------
-    GeometryError
-        When the points do not determine the surface.
+    xy: (n, 2), x and y, in one unit.
+    residuals: (n,), heights of the model minus given heights.
+    sigmas: (n,), standard deviations of the residuals, in their unit.
+    Raises GeometryError when the points do not determine the surface.
 
     Source: [003], after eq. 10.12.
     """

@@ -15,15 +15,16 @@ from photostrip.errors import GeometryError
 from photostrip.triangulation.relative_orientation import six_points
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
-    Array = NDArray[np.float64]
+    from photostrip.arrays import Floats
+
 
 ELEMENTS = ("dby", "dbz", "dkappa", "dalpha", "domega")
 FREE = ("dkappa", "dbz", "dalpha2", "domega")  # dalpha2: the turn against the base, dalpha - dbz / b
 
 
-def influence(points: ArrayLike, base: float) -> Array:
+def influence(points: ArrayLike, base: float) -> Floats:
     """Errors of model points (x, y, depth Z > 0) per error of each element of relative orientation, shape (n, 3, 5).
 
     The right ray meets the level of the point ``px`` and ``py`` away from it. Intersection with the fixed left ray
@@ -39,7 +40,7 @@ def influence(points: ArrayLike, base: float) -> Array:
     return np.stack([along, across + py / 2, up], axis=-2)
 
 
-def free_influence(points: ArrayLike, base: float) -> Array:
+def free_influence(points: ArrayLike, base: float) -> Floats:
     """Return the same for the elements `FREE`, which are independent with six standard points, shape (n, 3, 4).
 
     dby is left out: it shifts all points alike, which the control takes back. dalpha and dbz are correlated;
@@ -52,28 +53,21 @@ def free_influence(points: ArrayLike, base: float) -> Array:
     return np.stack([kappa, shift + alpha / base, alpha, omega], axis=-1)
 
 
-def free_covariance(dependent: ArrayLike, base: float) -> Array:
+def free_covariance(dependent: ArrayLike, base: float) -> Floats:
     """Covariance (4, 4) of the elements `FREE` from that (5, 5) of `ELEMENTS`."""
     take = np.zeros((4, 5))
     take[0, 2] = take[1, 1] = take[2, 3] = take[3, 4] = 1.0
     take[2, 1] = -1.0 / base
-    found: Array = take @ np.asarray(dependent, float) @ take.T
+    found: Floats = take @ np.asarray(dependent, float) @ take.T
     return found
 
 
-def element_covariance(points: ArrayLike, base: float, sigma: float) -> Array:
+def element_covariance(points: ArrayLike, base: float, sigma: float) -> Floats:
     """Covariance (5, 5) of `ELEMENTS` from any points (x, y, depth) that orient the pair.
 
-    Parameters
-    ----------
-    sigma : float
-        Standard deviation of one y parallax at the depth at which the unit of the model is that of the photo: with
+    sigma: standard deviation of one y parallax at the depth at which the unit of the model is that of the photo: with
         depths Z and the principal distance f = mean depth, that of a y parallax in the photo.
-
-    Raises
-    ------
-    GeometryError
-        When the points do not determine the orientation.
+    Raises GeometryError when the points do not determine the orientation.
 
     Source: rows of the linear condition at zero elements, and Q_dep = T Q T^T; derived.
     """
@@ -93,15 +87,11 @@ def element_covariance(points: ArrayLike, base: float, sigma: float) -> Array:
     return sigma**2 * turn @ inverse @ turn.T
 
 
-def measured_covariance(points: ArrayLike, base: float, focal: float, sigma: float) -> Array:
+def measured_covariance(points: ArrayLike, base: float, focal: float, sigma: float) -> Floats:
     """Covariance (n, 3, 3) of model coordinates from the measurement of the points (x, y, depth) themselves.
 
-    Parameters
-    ----------
-    focal : float
-        Principal distance in the unit of `sigma`.
-    sigma : float
-        Standard deviation of an image coordinate; x1, y1, x2, y2 are independent of each other.
+    focal: principal distance in the unit of `sigma`.
+    sigma: standard deviation of an image coordinate; x1, y1, x2, y2 are independent of each other.
     """
     x, y, z = np.moveaxis(np.asarray(points, float), -1, 0)
     one, zero = np.ones_like(x), np.zeros_like(x)
@@ -114,5 +104,5 @@ def measured_covariance(points: ArrayLike, base: float, focal: float, sigma: flo
         axis=-2,
     )
     rows *= (z / focal * sigma)[:, None, None]
-    found: Array = rows @ np.swapaxes(rows, -1, -2)
+    found: Floats = rows @ np.swapaxes(rows, -1, -2)
     return found

@@ -21,15 +21,12 @@ from photostrip.triangulation.strip_formation.scale_transfer import StripFormati
 from photostrip.triangulation.strip_formation.strip import form_from_pairs
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.camera import Camera
     from photostrip.simulate import Simulation
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.strip import FormedStrip
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 SAME = 1e-6  # of a base: a point this near to the nadir of a photo belongs to its column
 LEAST_PHOTOS = 3

@@ -18,10 +18,9 @@ from photostrip.planning.element_errors import free_influence
 from photostrip.planning.single_model import PARAMETERS, ModelControl, parameter_rows
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
-    Array = NDArray[np.float64]
-    Rows = NDArray[np.intp]
+    from photostrip.arrays import Floats, Numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,24 +29,24 @@ class AdjustedModel:
 
     control: ModelControl
     base: float
-    parameters: Array  # (7,): absolute orientation, in the order of `PARAMETERS`
-    elements: Array  # (4,): estimated errors of the relative orientation: dkappa, dbz, dalpha2, domega
-    cofactors: Array  # (11, 11): covariance of both
+    parameters: Floats  # (7,): absolute orientation, in the order of `PARAMETERS`
+    elements: Floats  # (4,): estimated errors of the relative orientation: dkappa, dbz, dalpha2, domega
+    cofactors: Floats  # (11, 11): covariance of both
     # (n, 3, 3): inverse covariances of the misclosures without the elements; zero where a coordinate is not given
-    weights: Array
+    weights: Floats
 
-    def correction(self, points: ArrayLike) -> Array:
+    def correction(self, points: ArrayLike) -> Floats:
         """Return what is to be subtracted from model points (q, 3): absolute orientation and deformation together."""
-        found: Array = self._rows(points) @ np.concatenate([self.parameters, self.elements])
+        found: Floats = self._rows(points) @ np.concatenate([self.parameters, self.elements])
         return found
 
-    def covariance(self, points: ArrayLike, measured: ArrayLike, row: Rows | None = None) -> Array:
+    def covariance(self, points: ArrayLike, measured: ArrayLike, row: Numbers | None = None) -> Floats:
         """Covariance (q, 3, 3) of corrected points; the arguments are those of ``single_model.expected_errors``."""
         rows, measuring = self._rows(points), np.array(measured, float)
         if row is not None:
             known = np.flatnonzero(row >= 0)
             measuring[known] = self.control.measured[row[known]]
-        found: Array = measuring + rows @ self.cofactors @ np.swapaxes(rows, 1, 2)
+        found: Floats = measuring + rows @ self.cofactors @ np.swapaxes(rows, 1, 2)
         if row is not None:
             # the measurement of a control point is part of the estimate
             estimated = rows[known] @ self.cofactors @ np.swapaxes(rows[known], 1, 2)
@@ -55,19 +54,15 @@ class AdjustedModel:
             found[known] -= shared + np.swapaxes(shared, 1, 2)
         return found
 
-    def _rows(self, points: ArrayLike) -> Array:
+    def _rows(self, points: ArrayLike) -> Floats:
         return np.concatenate([parameter_rows(points, self.control), free_influence(points, self.base)], axis=2)
 
 
 def adjust_model(control: ModelControl, misclosures: ArrayLike, base: float, elements: ArrayLike) -> AdjustedModel:
     """Orient a model with the errors of its relative orientation as further unknowns.
 
-    Parameters
-    ----------
-    misclosures : array_like, shape (n, 3)
-        W: model minus given; coordinates that are not given do not count.
-    elements : array_like, shape (4, 4)
-        A-priori covariance of dkappa, dbz, dalpha2, domega.
+    misclosures: (n, 3), W: model minus given; coordinates that are not given do not count.
+    elements: (4, 4), a-priori covariance of dkappa, dbz, dalpha2, domega.
     """
     rows = np.concatenate([parameter_rows(control.points, control), free_influence(control.points, base)], axis=2)
     counts = np.stack([control.plan, control.plan, control.height], axis=1)

@@ -13,9 +13,10 @@ from photostrip.planning.model_adjustment import adjust_model
 from photostrip.planning.single_model import ExpectedErrors, ModelControl, expected_errors
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
-    Array = NDArray[np.float64]
+    from photostrip.arrays import Floats
+
 
 Place = tuple[float, float]
 LAYOUTS = ("corners", "corners+centre", "six")
@@ -76,23 +77,23 @@ class Forecast:
     """Expected errors of one model."""
 
     spec: ModelSpec
-    places: Array  # (q, 2): points of the grid, mm at photo scale, rows across the flight after each other
+    places: Floats  # (q, 2): points of the grid, mm at photo scale, rows across the flight after each other
     expected: ExpectedErrors  # their errors after the plain absolute orientation, mm at photo scale
-    adjusted: Array  # (q, 3, 3): their covariance when the elements are unknowns of the orientation
-    at_control: Array  # (n, 3): standard deviations of the adjusted control points, metres
-    elements: Array  # (4,): standard deviations of `FREE`: radians, dbz in mm at photo scale
+    adjusted: Floats  # (q, 3, 3): their covariance when the elements are unknowns of the orientation
+    at_control: Floats  # (n, 3): standard deviations of the adjusted control points, metres
+    elements: Floats  # (4,): standard deviations of `FREE`: radians, dbz in mm at photo scale
 
     @property
-    def sigmas(self) -> Array:
+    def sigmas(self) -> Floats:
         """Standard deviations along, across and in height, metres, shape (q, 3)."""
         return self.expected.sigmas * self.spec.ground_unit
 
     @property
-    def adjusted_sigmas(self) -> Array:
+    def adjusted_sigmas(self) -> Floats:
         """The same with the elements as unknowns of the orientation."""
         return _sigmas(self.adjusted) * self.spec.ground_unit
 
-    def shares(self) -> dict[str, Array]:
+    def shares(self) -> dict[str, Floats]:
         """Return the standard deviations (q, 3), metres, that each source alone would cause.
 
         The measurement of the point, each element, the relative orientation as a whole, control as measured and as
@@ -123,10 +124,7 @@ class SimpleAccuracy:
 def plan_model(spec: ModelSpec) -> Forecast:
     """Compute the expected errors of a model over its area and at its control.
 
-    Raises
-    ------
-    GeometryError
-        When the points of orientation or the control determine too little.
+    Raises GeometryError when the points of orientation or the control determine too little.
     """
     along = np.linspace(0.0, spec.base, spec.grid[0])
     across = np.linspace(spec.width, -spec.width, spec.grid[1])
@@ -168,17 +166,17 @@ def simple_accuracy(spec: ModelSpec) -> list[SimpleAccuracy]:
     return found
 
 
-def _sigmas(covariance: Array) -> Array:
+def _sigmas(covariance: Floats) -> Floats:
     return np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
 
 
-def _level(places: ArrayLike, focal: float) -> Array:
+def _level(places: ArrayLike, focal: float) -> Floats:
     """Give places of level ground their depth."""
     flat = np.asarray(places, float)
     return np.column_stack([flat, np.full(len(flat), focal)])
 
 
-def _measured(points: Array, spec: ModelSpec) -> Array:
+def _measured(points: Floats, spec: ModelSpec) -> Floats:
     return measured_covariance(points, spec.base, spec.focal, spec.image_sigma)
 
 
@@ -194,7 +192,7 @@ def _control(spec: ModelSpec) -> ModelControl:
     )
 
 
-def _elements(spec: ModelSpec) -> Array:
+def _elements(spec: ModelSpec) -> Floats:
     """Covariance of the elements from the standard zones, or from the points that are named."""
     places = spec.orientation_points or standard_zones(spec.base, spec.width)
     density = 1 if spec.orientation_points else spec.zone_points

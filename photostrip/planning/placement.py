@@ -115,12 +115,8 @@ def best_places(strip: IdealStrip, layout: ControlLayout, placement: Placement, 
     not far away where it helps most, until no move helps. It may miss the very best layout; it never ends behind equal
     spacing.
 
-    Parameters
-    ----------
-    layout : ControlLayout
-        The control that is there in any case.
-    required : Required
-        Weighs plan against height; without it both count alike, relative to what equal spacing gives.
+    layout: the control that is there in any case.
+    required: weighs plan against height; without it both count alike, relative to what equal spacing gives.
     """
     photos, rows = strip.geometry.photos, strip.geometry.points.rows
     fixed = spots_of(layout, photos, rows)

@@ -25,11 +25,10 @@ from photostrip.errors import GeometryError
 from photostrip.planning.element_errors import free_influence
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
-    Array = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
-    Rows = NDArray[np.intp]
+    from photostrip.arrays import Flags, Floats, Numbers
+
 
 PARAMETERS = ("dX0", "dY0", "dZ0", "dlambda", "dtheta", "deta", "dxi")
 FLATTEST = 1e-6  # of control in height: A against c1 c2; below that it lies on a line
@@ -40,29 +39,29 @@ CLOSEST = 1e-12  # of control in plan: B against the square of the size of its c
 class ModelControl:
     """Control points of a model."""
 
-    points: Array  # (n, 3): x, y and depth
+    points: Floats  # (n, 3): x, y and depth
     # plan, height: (n,): whether the point is given in plan, in height
     plan: Flags
     height: Flags
-    measured: Array  # (n, 3, 3): covariance of the measured model coordinates
-    given: Array  # (n, 3, 3): covariance of the given coordinates
+    measured: Floats  # (n, 3, 3): covariance of the measured model coordinates
+    given: Floats  # (n, 3, 3): covariance of the given coordinates
 
 
 @dataclass(frozen=True, eq=False)
 class ExpectedErrors:
     """Expected errors of points."""
 
-    covariance: Array  # (q, 3, 3): covariance of x, y and height
+    covariance: Floats  # (q, 3, 3): covariance of x, y and height
     # (q, 3, 3): what each source contributes: ``measuring`` of the point itself (for a control point with what its own
     # measurement does through the orientation), ``orientation`` relative, ``control measured``, ``control given``. They
     # add up to the covariance
-    sources: dict[str, Array]
+    sources: dict[str, Floats]
     # (q, 3, 4): standard deviations from each of `FREE` alone. Their squares add up to the variances of ``orientation``
     # where the four are not correlated, as with six standard points
-    elements: Array
+    elements: Floats
 
     @property
-    def sigmas(self) -> Array:
+    def sigmas(self) -> Floats:
         """Standard deviations of x, y and height, shape (q, 3)."""
         return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
 
@@ -70,19 +69,12 @@ class ExpectedErrors:
 # ------------------------------------------------------------------------------------------ absolute orientation
 
 
-def orientation_operator(points: ArrayLike, control: ModelControl) -> Array:
+def orientation_operator(points: ArrayLike, control: ModelControl) -> Floats:
     """Return what the absolute orientation gives to points, per misclosure at the control.
 
-    Returns
-    -------
-    ndarray, shape (q, 3, n, 3)
-        H: the part dx3 of point j is the sum over control i of ``H[j, :, i, :] @ W[i]``, with W = model minus given.
-        It is subtracted from the model.
-
-    Raises
-    ------
-    GeometryError
-        When the control does not determine the seven parameters.
+    Returns (q, 3, n, 3), H: the part dx3 of point j is the sum over control i of ``H[j, :, i, :] @ W[i]``, with W =
+        model minus given. It is subtracted from the model.
+    Raises GeometryError when the control does not determine the seven parameters.
 
     Source: [000] eq. 3-7 in operator form.
     """
@@ -97,7 +89,7 @@ def orientation_operator(points: ArrayLike, control: ModelControl) -> Array:
     return operator
 
 
-def _plan_operator(where: Array, control: ModelControl) -> tuple[Array, Array]:
+def _plan_operator(where: Floats, control: ModelControl) -> tuple[Floats, Floats]:
     """Parts of Hx = Hy' along and across a misclosure, shape (q, control points in plan) each."""
     xy = control.points[control.plan, :2]
     if len(xy) < 2:
@@ -112,7 +104,7 @@ def _plan_operator(where: Array, control: ModelControl) -> tuple[Array, Array]:
     return np.asarray(1 / len(xy) + point_xy @ control_xy.T / size), np.asarray(point_xy @ turned.T / size)
 
 
-def _height_operator(where: Array, control: ModelControl) -> Array:
+def _height_operator(where: Floats, control: ModelControl) -> Floats:
     """Hz, shape (q, control points in height)."""
     xy = control.points[control.height, :2]
     if len(xy) < 3:
@@ -128,7 +120,7 @@ def _height_operator(where: Array, control: ModelControl) -> Array:
     return np.asarray(1 / len(xy) + point_xy @ np.linalg.solve(moments, control_xy.T))
 
 
-def parameter_rows(points: ArrayLike, control: ModelControl) -> Array:
+def parameter_rows(points: ArrayLike, control: ModelControl) -> Floats:
     """Rows F, shape (q, 3, 7), that give the part dx3 of points from the seven `PARAMETERS`.
 
     The centres of the control are the origins: that of the plan control for plan, that of the heights for heights.
@@ -144,7 +136,7 @@ def parameter_rows(points: ArrayLike, control: ModelControl) -> Array:
     return rows
 
 
-def deformation(points: ArrayLike, control: ModelControl, base: float) -> Array:
+def deformation(points: ArrayLike, control: ModelControl, base: float) -> Floats:
     """Influence of the elements `FREE` on points of the oriented model, less what control takes back, (q, 3, 4)."""
     operator, of_control = orientation_operator(points, control), free_influence(control.points, base)
     return np.asarray(free_influence(points, base) - np.einsum("qanb,nbk->qak", operator, of_control))
@@ -159,25 +151,17 @@ def expected_errors(
     control: ModelControl,
     base: float,
     elements: ArrayLike,
-    row: Rows | None = None,
+    row: Numbers | None = None,
 ) -> ExpectedErrors:
     """Covariance of points of the oriented model before anything is measured.
 
     Errors of the elements and of the measured coordinates of the same image points count as independent, as in the
     source.
 
-    Parameters
-    ----------
-    points : array_like, shape (q, 3)
-        x, y, depth.
-    measured : array_like, shape (q, 3, 3)
-        Covariance of their measured model coordinates.
-    elements : array_like, shape (4, 4)
-        Covariance of `FREE`.
-    row : ndarray of int, shape (q,), optional
-        The control point that a point is, -1 for none; default: none of them is control.
-
-    Source: [000], last paragraphs.
+    points: (q, 3), x, y, depth.
+    measured: (q, 3, 3), covariance of their measured model coordinates.
+    elements: (4, 4), covariance of `FREE`.
+    row: (q,), optional, the control point that a point is, -1 for none; default: none of them is control.
     """
     operator = orientation_operator(points, control)
     shape = deformation(points, control, base)
@@ -200,7 +184,7 @@ def expected_errors(
     )
 
 
-def _through(operator: Array, covariance: Array) -> Array:
+def _through(operator: Floats, covariance: Floats) -> Floats:
     """Carry independent covariances of the control through the operator."""
-    found: Array = np.einsum("qanb,nbc,qdnc->qad", operator, covariance, operator, optimize=True)
+    found: Floats = np.einsum("qanb,nbc,qdnc->qad", operator, covariance, operator, optimize=True)
     return found

@@ -16,11 +16,9 @@ from photostrip.planning.strip_methods import BUNDLE, METHODS, Accuracy, accurac
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.errors import Fault
 
-    Floats = NDArray[np.float64]
 
 ANYTHING = Required()
 
@@ -73,10 +71,7 @@ class DesignReport:
 def plan_strip(design: Design) -> DesignReport:
     """Work out a design: expected precision of every layout and method, bands needed and best places.
 
-    Raises
-    ------
-    InputError, GeometryError
-        When there can be no such strip, or a layout does not fit it.
+    Raises InputError, GeometryError when there can be no such strip, or a layout does not fit it.
     """
     strip = ideal_strip(design.geometry)
     _require_places(design)

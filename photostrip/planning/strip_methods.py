@@ -27,12 +27,9 @@ from photostrip.triangulation.polynomial import correction
 from photostrip.triangulation.polynomial import terms as polynomial_terms
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.planning.ideal_strip import IdealStrip
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 SIMILARITY, COVARIANCE, BUNDLE = "similarity", "covariance", "bundle"
 DEGREES = {"degree 1": "1", "degree 2": "2", "degree 3": "3"}
@@ -83,10 +80,7 @@ def accuracy(strip: IdealStrip, layout: ControlLayout, spots: tuple[Spot, ...], 
 
     The layout gives the precision of the control and of measured perspective centres, which only the bundle uses.
 
-    Raises
-    ------
-    GeometryError
-        When the control does not determine the strip.
+    Raises GeometryError when the control does not determine the strip.
     """
     control = control_of(strip, spots, layout.sigma)
     if method == BUNDLE:

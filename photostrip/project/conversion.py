@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from photostrip.arrays import Floats, Numbers
     from photostrip.formats.measured.control import ControlTable
     from photostrip.formats.measured.exterior import OrientationTable, PositionTable
     from photostrip.formats.measured.measurements import Measurements
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     from photostrip.project.schema.project_file import ProjectFile
     from photostrip.triangulation.image_coordinates.certificate import Certificate
 
-    Floats = NDArray[np.float64]
 
 PER_MILLIMETRE = {"mm": 1.0, "um": 1e3, "0.1um": 1e4}
 RADIANS = {"deg": np.pi / 180, "gon": np.pi / 200, "rad": 1.0}  # in a unit of angles
@@ -55,10 +55,7 @@ def cameras(project: ProjectFile) -> dict[str, camera.Camera]:
 def certificate_of(given: Camera) -> Certificate | None:
     """Solve the distances between the fiducial marks of a camera; None when no distances are given.
 
-    Raises
-    ------
-    InputError
-        When the distances give no figure; keys begin at the camera.
+    Raises InputError when the distances give no figure; keys begin at the camera.
     """
     if not given.fiducial_distances:
         return None
@@ -146,7 +143,7 @@ def _corner(owner: camera.Camera | None, *, half_pixel: bool) -> tuple[float, fl
     return -owner.format[0] / 2 + shift, owner.format[1] / 2 - shift
 
 
-def _per_photo(values: Sequence[tuple[float, float]], read: Measurements, rows: NDArray[np.intp]) -> Floats:
+def _per_photo(values: Sequence[tuple[float, float]], read: Measurements, rows: Numbers) -> Floats:
     return np.array(values, float).reshape(-1, 2)[read.photo[rows]]
 
 
@@ -154,7 +151,7 @@ def _scaled(values: Floats, scale: Floats) -> Floats:
     return np.asarray(values * scale[:, :1] / scale[:, 1:])
 
 
-def _renumbered(ids: Sequence[str], codes: NDArray[np.intp]) -> tuple[tuple[str, ...], NDArray[np.intp]]:
+def _renumbered(ids: Sequence[str], codes: Numbers) -> tuple[tuple[str, ...], Numbers]:
     """Return the ids that are left new numbers, in order of first appearance."""
     kept, first, inverse = np.unique(codes, return_index=True, return_inverse=True)
     order = np.argsort(first)

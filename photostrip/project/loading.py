@@ -116,10 +116,7 @@ class Project:
 def load_project(path: Path, overrides: Sequence[str] = ()) -> Project:
     """Read a project and all its tables.
 
-    Raises
-    ------
-    InputError
-        With every fault of every file.
+    Raises InputError with every fault of every file.
     """
     reading = Reading.of(str(path), overrides)
     root, findings = reading.root, reading.findings

@@ -18,16 +18,13 @@ from photostrip.project.yaml.references import listed_photos
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.errors import Fault
     from photostrip.formats.measured.models import ModelTable
     from photostrip.formats.text.findings import Findings
     from photostrip.project.schema.measurements import Models
     from photostrip.project.yaml.document import Node
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 MILLIMETRES = {"mm": 1.0, "um": 1e-3, "m": 1e3}  # in a unit
 

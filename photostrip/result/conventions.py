@@ -11,13 +11,10 @@ from photostrip.result.numbers import rms
 from photostrip.result.quantities import record
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from photostrip.camera import Camera
     from photostrip.pipeline import Result
     from photostrip.result.numbers import Document
 
-    Floats = NDArray[np.float64]
 
 ROTATION = {
     "projected": "grid east, grid north and the ellipsoid's normal at the perspective center",

@@ -23,15 +23,8 @@ SCHEMA = 1
 def document_of(result: Result, notes: Iterable[Note] = ()) -> Document:
     """Turn a result into the content of result.json.
 
-    Parameters
-    ----------
-    notes : iterable of Note
-        What was noticed before the run, while the project was read; they come first.
-
-    Returns
-    -------
-    dict
-        Text, numbers, None, lists and dictionaries only; the same for the same inputs, without times and paths.
+    notes: what was noticed before the run, while the project was read; they come first.
+    Returns text, numbers, None, lists and dictionaries only; the same for the same inputs, without times and paths.
         Numbers are rounded to decimals that lie well below what they are good for.
     """
     rank = natural_rank(result.refined.observations.point_ids)

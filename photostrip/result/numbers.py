@@ -10,7 +10,9 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
+
+    from photostrip.arrays import Floats, Numbers
 
 Plain = Any  # a number, None or nested lists of them
 Document = dict[str, Any]
@@ -34,7 +36,7 @@ def rounded(values: ArrayLike, decimals: int) -> Plain:
     return plain(np.round(np.asarray(values, float), decimals) + 0.0)
 
 
-def plain(values: NDArray[np.float64]) -> Plain:
+def plain(values: Floats) -> Plain:
     """Return an array as plain lists, None where a number is not finite."""
     finite = np.isfinite(values)
     if finite.all():
@@ -64,7 +66,7 @@ def natural(name: str) -> tuple[list[str | tuple[int, str]], str]:
     return parts, name
 
 
-def natural_rank(names: Sequence[str]) -> NDArray[np.intp]:
+def natural_rank(names: Sequence[str]) -> Numbers:
     """Place of each name in natural order, from 0."""
     keys = [natural(name) for name in names]
     rank = np.empty(len(names), np.intp)
@@ -72,7 +74,7 @@ def natural_rank(names: Sequence[str]) -> NDArray[np.intp]:
     return rank
 
 
-def rms(values: NDArray[np.float64]) -> float:
+def rms(values: Floats) -> float:
     """Root mean square of what is not NaN; NaN when there is nothing."""
     known = values[~np.isnan(values)]
     return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")

@@ -17,14 +17,11 @@ from photostrip.result.quantities import record
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats
     from photostrip.pipeline import Result
     from photostrip.result.numbers import Document, Plain
     from photostrip.result.points.given import Differences
 
-    Floats = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
 
 # Name of a tolerance in the project file: where its value stands in the summary, and its unit.
 TOLERANCES: dict[str, tuple[tuple[str, ...], str]] = {

@@ -12,15 +12,11 @@ from photostrip.points import ControlPoints
 from photostrip.simulate.draws import Draws, Purpose
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.points import PointTable
     from photostrip.simulate.placement import Placed
     from photostrip.simulate.spec import Spec
-
-    Array = NDArray[np.float64]
-    Rows = NDArray[np.intp]
 
 
 CHECK_POINTS = 10  # when the specification does not say how many
@@ -30,21 +26,18 @@ CHECK_POINTS = 10  # when the specification does not say how many
 class Roles:
     """Numbers of the points that are given."""
 
-    control: Rows  # (c,): control points, by strip, along it, then from left to right
-    use: NDArray[np.bool_]  # (c, 3): which of their coordinates are given: east, north, up (X, Y, Z)
-    check: Rows  # (k,): check points, by number
+    control: Numbers  # (c,): control points, by strip, along it, then from left to right
+    use: Flags  # (c, 3): which of their coordinates are given: east, north, up (X, Y, Z)
+    check: Numbers  # (k,): check points, by number
 
 
-def roles(spec: Spec, placed: Placed, rays: Rows) -> Roles:
+def roles(spec: Spec, placed: Placed, rays: Numbers) -> Roles:
     """Choose control and check points; `rays` says on how many photos of its own strip each point lies.
 
     Draws (`Purpose.ROLES`): an order of all points for the layout ``random``; an order of the control points for the
     shares of ``use``; an order of all points for the check points.
 
-    Raises
-    ------
-    InputError
-        When there are not enough points on two photos.
+    Raises InputError when there are not enough points on two photos.
     """
     draws = Draws(spec.seed, Purpose.ROLES)
     order = draws.order(len(rays))
@@ -73,7 +66,7 @@ def band_photos(spec: Spec) -> list[int]:
     return [(2 * k * last + bands - 1) // (2 * (bands - 1)) for k in range(bands)]
 
 
-def _designed(spec: Spec, placed: Placed, rays: Rows, order: Rows) -> Rows:  # noqa: ARG001 (one form with _random)
+def _designed(spec: Spec, placed: Placed, rays: Numbers, order: Numbers) -> Numbers:  # noqa: ARG001 (one form with _random)
     """Gruber points at the places of the layout, in every strip."""
     n, rows = spec.flight.photos, spec.points.rows
     if spec.control.layout == "bands":
@@ -95,7 +88,7 @@ def _designed(spec: Spec, placed: Placed, rays: Rows, order: Rows) -> Rows:  # n
     return control
 
 
-def _random(spec: Spec, placed: Placed, rays: Rows, order: Rows) -> Rows:
+def _random(spec: Spec, placed: Placed, rays: Numbers, order: Numbers) -> Numbers:
     """Points anywhere, in every strip."""
     chosen = []
     for j in range(spec.flight.strips):
@@ -107,7 +100,7 @@ def _random(spec: Spec, placed: Placed, rays: Rows, order: Rows) -> Rows:
     return np.concatenate(chosen)
 
 
-def _shares(use: dict[str, float], order: Rows) -> NDArray[np.bool_]:
+def _shares(use: dict[str, float], order: Numbers) -> Flags:
     """Deal the shares of given coordinates out to the points, the largest remainders rounded up."""
     count, total = len(order), sum(use.values())
     exact = np.array([share / total * count for share in use.values()])
@@ -120,19 +113,15 @@ def _shares(use: dict[str, float], order: Rows) -> NDArray[np.bool_]:
 
 
 def given_coordinates(
-    spec: Spec, chosen: Roles, points: PointTable, offset: Array, frames: list[GroundFrame]
+    spec: Spec, chosen: Roles, points: PointTable, offset: Floats, frames: list[GroundFrame]
 ) -> ControlPoints:
     """Make the control list: true coordinates with errors, each in its frame.
 
     Control points, then check points; coordinates that are not given are NaN. Draws (`Purpose.CONTROL`): for each
     control point, then for each check point east, north, up.
 
-    Parameters
-    ----------
-    offset : ndarray, shape (c, 3)
-        Gross errors of the control points east, north, up (X, Y, Z), metres.
-    frames : list of GroundFrame
-        The frame of the first list and, if there is one, of the second.
+    offset: (c, 3), gross errors of the control points east, north, up (X, Y, Z), metres.
+    frames: the frame of the first list and, if there is one, of the second.
     """
     rows = np.concatenate([chosen.control, chosen.check])
     n, given = len(rows), len(chosen.control)
@@ -156,7 +145,7 @@ def given_coordinates(
     )
 
 
-def _frame_numbers(spec: Spec, xyz: Array, frames: list[GroundFrame]) -> Rows:
+def _frame_numbers(spec: Spec, xyz: Floats, frames: list[GroundFrame]) -> Numbers:
     """Which of the frames each point is given in: the second east of the boundary."""
     if len(frames) == 1:
         return np.zeros(len(xyz), dtype=np.intp)

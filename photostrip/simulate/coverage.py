@@ -10,27 +10,22 @@ from photostrip.simulate.flight import CUT_SIGMAS, position_sigma
 from photostrip.simulate.imaging import sees
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Numbers
     from photostrip.simulate.flight import Photos
     from photostrip.simulate.placement import Placed
     from photostrip.simulate.spec import Spec
 
-    Rows = NDArray[np.intp]
 
 FLATTEST_RAY = np.radians(75.0)  # a ray flatter than this is not looked for
 
 
-def shown(spec: Spec, photos: Photos, placed: Placed) -> tuple[Rows, Rows]:
+def shown(spec: Spec, photos: Photos, placed: Placed) -> tuple[Numbers, Numbers]:
     """All image points: which photo shows which point.
 
     Points are sought only around the place of each photo in its strip, so that the time grows with the photos, not with
     their square.
 
-    Returns
-    -------
-    photo, point : ndarray of int, shape (n,)
-        Numbers of photo and point of each image point, by photo, then by point.
+    Returns photo, point: (n,), numbers of photo and point of each image point, by photo, then by point.
     """
     n = spec.flight.photos
     reach = _reach(spec, placed)

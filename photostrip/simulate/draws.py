@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from photostrip.arrays import Floats, Numbers
 
 
 class Purpose(IntEnum):
@@ -41,16 +41,16 @@ class Draws:
     def __init__(self, seed: int, purpose: Purpose, number: int = 0) -> None:
         self._bits = np.random.PCG64(np.random.SeedSequence(seed, spawn_key=(int(purpose), number)))
 
-    def uniform(self, *shape: int) -> NDArray[np.float64]:
+    def uniform(self, *shape: int) -> Floats:
         """Draw the next uniform numbers of the stream in [0, 1), in rows."""
         words = np.asarray(self._bits.random_raw(int(np.prod(shape))), dtype=np.uint64)
         return np.asarray((words >> np.uint64(11)) * 2.0**-53).reshape(shape)
 
-    def between(self, *shape: int) -> NDArray[np.float64]:
+    def between(self, *shape: int) -> Floats:
         """Draw uniform numbers in [-1, 1); see ``uniform``."""
         return 2.0 * self.uniform(*shape) - 1.0
 
-    def normal(self, *shape: int) -> NDArray[np.float64]:
+    def normal(self, *shape: int) -> Floats:
         """Draw normal numbers with mean 0 and standard deviation 1.
 
         Two uniform numbers each give one of them (the cosine of Box and Muller): number i of the stream does not depend
@@ -60,6 +60,6 @@ class Draws:
         radius = np.sqrt(-2.0 * np.log1p(-pairs[:, 0]))
         return np.asarray(radius * np.cos(2.0 * np.pi * pairs[:, 1])).reshape(shape)
 
-    def order(self, count: int) -> NDArray[np.intp]:
+    def order(self, count: int) -> Numbers:
         """Draw the numbers 0 to count - 1 in random order: that in which `count` uniform numbers are sorted."""
         return np.argsort(self.uniform(count), kind="stable")

@@ -11,12 +11,9 @@ from photostrip.geometry.rotation import rotation_z
 from photostrip.simulate.draws import Draws, Purpose
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.simulate.spec import Spec
 
-    Array = NDArray[np.float64]
-    Rows = NDArray[np.intp]
 
 LENGTHS = (1.0, 0.7, 0.5)  # wavelengths of the irregular deformation, parts of the larger side of the photo
 
@@ -25,13 +22,13 @@ LENGTHS = (1.0, 0.7, 0.5)  # wavelengths of the irregular deformation, parts of 
 class Sheets:
     """What happens to the film of each photo."""
 
-    matrix: Array  # (m, 2, 2): affine part: comparator axes from photo axes, with the turn of the film
-    offset: Array  # (m, 2): place of the photo's origin in the comparator, mm
-    wave: Array  # (m, 2, w, 2): wave numbers of the irregular part of each coordinate, radians per mm
-    phase: Array  # (m, 2, w): their phases, radians
+    matrix: Floats  # (m, 2, 2): affine part: comparator axes from photo axes, with the turn of the film
+    offset: Floats  # (m, 2): place of the photo's origin in the comparator, mm
+    wave: Floats  # (m, 2, w, 2): wave numbers of the irregular part of each coordinate, radians per mm
+    phase: Floats  # (m, 2, w): their phases, radians
     amplitude: float  # their amplitude, mm
 
-    def comparator_from_photo(self, photo: Rows, xy: Array) -> Array:
+    def comparator_from_photo(self, photo: Numbers, xy: Floats) -> Floats:
         """Give comparator coordinates of points (n, 2) in the system of the fiducial marks, mm."""
         angle = np.einsum("ncwk,nk->ncw", self.wave[photo], xy) + self.phase[photo]
         moved = xy + self.amplitude * np.sin(angle).sum(axis=2)

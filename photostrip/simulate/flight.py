@@ -11,12 +11,10 @@ from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.simulate.draws import Draws, Purpose
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.simulate.ground import World
     from photostrip.simulate.spec import Spec
 
-    Array = NDArray[np.float64]
 
 CUT_SIGMAS = 3.0  # standard deviations beyond which no photo is displaced or tilted: a pilot would fly again
 BASE_SCATTER = (0.02, 0.02, 0.01)  # of the base: along, across, height
@@ -30,12 +28,12 @@ class Photos:
     strips: tuple[tuple[str, tuple[str, ...]], ...]  # each strip's id and its photos in flight order
     # along, across, height: (n,): places of the perspective centres from the middle of the strips and heights above the
     # ellipsoid, metres
-    along: Array
-    across: Array
-    height: Array
-    centers: Array  # (n, 3): perspective centres in the Cartesian frame, metres
-    rotations: Array  # (n, 3, 3): rotations that take image axes to the Cartesian frame
-    up: Array  # (n, 3): the vertical at the perspective centres, in the Cartesian frame
+    along: Floats
+    across: Floats
+    height: Floats
+    centers: Floats  # (n, 3): perspective centres in the Cartesian frame, metres
+    rotations: Floats  # (n, 3, 3): rotations that take image axes to the Cartesian frame
+    up: Floats  # (n, 3): the vertical at the perspective centres, in the Cartesian frame
 
 
 def strip_id(number: int) -> str:

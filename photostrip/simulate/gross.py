@@ -11,8 +11,7 @@ from photostrip.errors import Fault, InputError
 from photostrip.simulate.draws import Draws, Purpose
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.points import PhotoPoints
     from photostrip.simulate.spec import GrossError, Spec
 
@@ -34,24 +33,16 @@ class InjectedError:
     other: str = ""  # the point it was exchanged with
 
 
-def spoil_control(
-    spec: Spec, ids: tuple[str, ...], use: NDArray[np.bool_]
-) -> tuple[NDArray[np.float64], tuple[InjectedError, ...]]:
+def spoil_control(spec: Spec, ids: tuple[str, ...], use: Flags) -> tuple[Floats, tuple[InjectedError, ...]]:
     """Choose gross errors of given coordinates: what is added to them (n, 3), metres, and the list of errors.
 
     Draws (`Purpose.GROSS`, a stream for each entry of the list): an order of all control points, then for each error a
     number for the axis and one for the sign. An error whose point is named has the sign of its size. No point gets two
     errors.
 
-    Parameters
-    ----------
-    use : ndarray of bool, shape (n, 3)
-        Which coordinates of the control points are given.
-
-    Raises
-    ------
-    InputError
-        When a point named is not a control point, or more errors are asked for than there are control points.
+    use: (n, 3), which coordinates of the control points are given.
+    Raises InputError when a point named is not a control point, or more errors are asked for than there are control
+        points.
     """
     offset = np.zeros((len(ids), 3))
     free = np.ones(len(ids), dtype=bool)
@@ -81,10 +72,8 @@ def spoil_images(spec: Spec, observations: PhotoPoints) -> tuple[PhotoPoints, tu
     number for the axis, one for the sign and one for the partner of a swap. An error whose photo and point are both
     named has the sign of its size. No image point gets two errors.
 
-    Raises
-    ------
-    InputError
-        When a photo does not show the point named, or more errors are asked for than there are image points.
+    Raises InputError when a photo does not show the point named, or more errors are asked for than there are image
+        points.
     """
     xy = np.array(observations.xy)
     photo = np.array(observations.photo_ids)[observations.photo]
@@ -121,7 +110,7 @@ def _entries(spec: Spec, kinds: set[str]) -> list[tuple[int, GrossError]]:
     return [(number, entry) for number, entry in enumerate(spec.gross_errors) if entry.kind in kinds]
 
 
-def _take(rows: NDArray[np.intp], number: int, entry: GrossError) -> list[int]:
+def _take(rows: Numbers, number: int, entry: GrossError) -> list[int]:
     """Return the first rows, as many as are asked for."""
     if len(rows) < entry.count:
         raise _too_many(number, entry)

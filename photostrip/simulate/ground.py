@@ -19,11 +19,9 @@ from photostrip.geodesy.local_frame import geocentric_from_geodetic
 from photostrip.simulate.draws import Draws, Purpose
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.simulate.spec import Spec
 
-    Array = NDArray[np.float64]
 
 WAVES = 5  # sine waves that make up the relief
 
@@ -34,12 +32,12 @@ class World:
 
     # (3, 3): rows: the direction of flight, its left and the vertical in the middle of the strips, in the Cartesian
     # frame
-    axes: Array
+    axes: Floats
     # semi-axes (a, b), metres; None: the world is flat and the middle is the origin
     ellipsoid: tuple[float, float] | None = None
     radius: float = np.inf  # mean radius of the surface in the middle, metres
 
-    def cartesian(self, along: Array, across: Array, height: Array) -> Array:
+    def cartesian(self, along: Floats, across: Floats, height: Floats) -> Floats:
         """Geocentric X, Y, Z of points, or east, north, up in a flat world, shape (n, 3), metres."""
         if self.ellipsoid is None:
             return np.asarray(np.stack([along, across, height], axis=-1) @ self.axes)
@@ -48,7 +46,7 @@ class World:
         lon, lat = np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))
         return geocentric_from_geodetic(np.stack([lon, lat, height], axis=-1), self.ellipsoid)
 
-    def frames(self, along: Array, across: Array) -> Array:
+    def frames(self, along: Floats, across: Floats) -> Floats:
         """Direction of flight, left and vertical at places: columns of (n, 3, 3) in the Cartesian frame.
 
         The vertical is the ellipsoid's normal.
@@ -83,11 +81,11 @@ class Surface:
 
     height: float  # mean height, metres
     slope: tuple[float, float]  # rise along and across, metres per metre
-    amplitude: Array  # (m,): amplitudes of the waves, metres
-    wave: Array  # (m, 2): wave numbers along and across, radians per metre
-    phase: Array  # (m,): phases, radians
+    amplitude: Floats  # (m,): amplitudes of the waves, metres
+    wave: Floats  # (m, 2): wave numbers along and across, radians per metre
+    phase: Floats  # (m,): phases, radians
 
-    def __call__(self, along: Array, across: Array) -> Array:
+    def __call__(self, along: Floats, across: Floats) -> Floats:
         """Return the heights at places."""
         plane = self.height + self.slope[0] * along + self.slope[1] * across
         angle = np.multiply.outer(along, self.wave[:, 0]) + np.multiply.outer(across, self.wave[:, 1]) + self.phase

@@ -13,29 +13,20 @@ from photostrip.triangulation.image_coordinates import lens_distortion
 from photostrip.triangulation.image_coordinates.refraction import refraction_constant
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.simulate.flight import Photos
     from photostrip.simulate.spec import Spec
 
-    Array = NDArray[np.float64]
-    Rows = NDArray[np.intp]
 
 USABLE = 0.97  # part of the width and height of the photo that is measured in
 BENDING_STEPS = 6  # each gains four digits
 
 
-def project(photos: Photos, photo: Rows, ray: Array, principal_distance: float) -> tuple[Array, Array]:
+def project(photos: Photos, photo: Numbers, ray: Floats, principal_distance: float) -> tuple[Floats, Floats]:
     """Central projection of rays (of any length) into photos, one for each row.
 
-    Returns
-    -------
-    xy : ndarray, shape (n, 2)
-        Ideal image coordinates from the principal point, mm.
-    depth : ndarray, shape (n,)
-        Part of the ray along the camera's axis; negative for what lies behind the camera.
-
-    Source: derived, collinearity of (x, y, -f) with A^T (X - X0).
+    Returns xy: (n, 2), ideal image coordinates from the principal point, mm.
+    Returns depth: (n,), part of the ray along the camera's axis; negative for what lies behind the camera.
     """
     turned = np.einsum("ni,nij->nj", ray, photos.rotations[photo])
     depth = -turned[:, 2]
@@ -43,7 +34,7 @@ def project(photos: Photos, photo: Rows, ray: Array, principal_distance: float) 
     return principal_distance * turned[:, :2] / safe[:, None], depth
 
 
-def bent(photos: Photos, photo: Rows, ray: Array, ground_height: float) -> Array:
+def bent(photos: Photos, photo: Numbers, ray: Floats, ground_height: float) -> Floats:
     """Directions in which the cameras see the ends of rays, metres, through the standard atmosphere.
 
     `ground_height` is the mean height of the terrain above sea level.
@@ -62,7 +53,7 @@ def bent(photos: Photos, photo: Rows, ray: Array, ground_height: float) -> Array
     return np.asarray(aside * stretch[:, None] - down[:, None] * up)
 
 
-def sees(spec: Spec, photos: Photos, photo: Rows, xyz: Array) -> NDArray[np.bool_]:
+def sees(spec: Spec, photos: Photos, photo: Numbers, xyz: Floats) -> Flags:
     """Whether a photo shows a point (n, 3), Cartesian frame, well within its format, one point for each row."""
     xy, depth = project(photos, photo, xyz - photos.centers[photo], spec.camera.principal_distance)
     inside = (np.abs(xy + spec.camera.principal_point) <= USABLE / 2.0 * np.asarray(spec.format)).all(axis=1)

@@ -13,14 +13,11 @@ from photostrip.simulate.imaging import sees
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.simulate.flight import Photos
     from photostrip.simulate.ground import Surface, World
     from photostrip.simulate.spec import Spec
 
-    Array = NDArray[np.float64]
-    Rows = NDArray[np.intp]
 
 # Where a point is tried when its photos do not all show it at first: shift along, in half widths of the zone on three
 # photos, and part of the distance from the flight line.
@@ -37,25 +34,25 @@ class Placed:
     # point ids: the photo and a number. The Gruber points of a photo have the numbers from 1 on, from left to right;
     # further points of the model that begins with it have the next numbers
     ids: tuple[str, ...]
-    home: Rows  # (n,): number of that photo
-    row: Rows  # (n,): number of the row of a Gruber point, -1 for other points
+    home: Numbers  # (n,): number of that photo
+    row: Numbers  # (n,): number of the row of a Gruber point, -1 for other points
     # along, across, height: (n,): places from the middle of the strips and heights above the ellipsoid, metres
-    along: Array
-    across: Array
-    height: Array
-    xyz: Array  # (n, 3): points in the Cartesian frame, metres
+    along: Floats
+    across: Floats
+    height: Floats
+    xyz: Floats  # (n, 3): points in the Cartesian frame, metres
 
 
 @dataclass(frozen=True, eq=False)
 class _Slots:
     """Points to be placed, all in the same manner: where they may lie and which photos must show them."""
 
-    photos: Rows  # (n, m), -1 where there is none
-    along: Array  # (n,) middle
-    across: Array  # (n,) flight line
-    drawn: Array  # (n, 2) scatter, metres, left out where a point is tried again
-    shift: Array  # (n,) metres along for a shift of 1
-    aside: Array  # (n,) metres from the flight line
+    photos: Numbers  # (n, m), -1 where there is none
+    along: Floats  # (n,) middle
+    across: Floats  # (n,) flight line
+    drawn: Floats  # (n, 2) scatter, metres, left out where a point is tried again
+    shift: Floats  # (n,) metres along for a shift of 1
+    aside: Floats  # (n,) metres from the flight line
 
 
 def place(spec: Spec, space: World, terrain: Surface, photos: Photos) -> Placed:
@@ -91,7 +88,7 @@ def place(spec: Spec, space: World, terrain: Surface, photos: Photos) -> Placed:
     )
 
 
-def _gruber_slots(spec: Spec, photos: Photos, home: Rows, drawn: Array) -> _Slots:
+def _gruber_slots(spec: Spec, photos: Photos, home: Numbers, drawn: Floats) -> _Slots:
     n, rows = spec.flight.photos, spec.points.rows
     length, width = spec.footprint
     zone = min(max(length / 2.0 - spec.base, 0.0), spec.base / 2.0)  # half the width of what lies on three photos
@@ -108,7 +105,7 @@ def _gruber_slots(spec: Spec, photos: Photos, home: Rows, drawn: Array) -> _Slot
     )
 
 
-def _extra_slots(spec: Spec, photos: Photos, home: Rows, drawn: Array) -> _Slots:
+def _extra_slots(spec: Spec, photos: Photos, home: Numbers, drawn: Floats) -> _Slots:
     half = np.stack([photos.along[home + 1] - photos.along[home], photos.across[home + 1] - photos.across[home]]) / 2.0
     return _Slots(
         photos=np.stack([home, home + 1], axis=1),
@@ -120,7 +117,7 @@ def _extra_slots(spec: Spec, photos: Photos, home: Rows, drawn: Array) -> _Slots
     )
 
 
-def _leftwards(photos: Photos, n: int) -> Array:
+def _leftwards(photos: Photos, n: int) -> Floats:
     """1 for photos of strips flown forwards, -1 for those flown back: the sign of the left-hand side."""
     ends = photos.along.reshape(-1, n)
     return np.repeat(np.where(ends[:, -1] < ends[:, 0], -1.0, 1.0), n)
@@ -128,7 +125,7 @@ def _leftwards(photos: Photos, n: int) -> Array:
 
 def _moved_inwards(
     spec: Spec, space: World, terrain: Surface, photos: Photos, slots: _Slots, tries: Iterable[tuple[float, float]]
-) -> tuple[Array, Array]:
+) -> tuple[Floats, Floats]:
     """Try places until the photos meant for a point show it; keep the first try where they never do."""
     along, across = np.empty_like(slots.along), np.empty_like(slots.across)
     open_ = np.arange(len(along))

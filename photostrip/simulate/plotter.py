@@ -17,13 +17,10 @@ from photostrip.points import ModelPoints
 from photostrip.simulate.draws import Draws, Purpose
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.points import PhotoPoints
     from photostrip.simulate.spec import Models, Spec
 
-    Array = NDArray[np.float64]
-    Rows = NDArray[np.intp]
 
 TILT_SIGMA = np.radians(2.0)  # scatter of the axes of a level model
 LOG_SCALE_SIGMA = 0.2  # scatter of the logarithm of the model scales
@@ -36,9 +33,9 @@ class TruePlaces:
     """True places of points and photos, in the Cartesian frame."""
 
     photo_ids: tuple[str, ...]
-    points: Array  # (n, 3): points, in the order of the observations' points, metres
-    centers: Array  # (m, 3): perspective centres, metres
-    rotations: Array  # (m, 3, 3): image axes to the frame
+    points: Floats  # (n, 3): points, in the order of the observations' points, metres
+    centers: Floats  # (m, 3): perspective centres, metres
+    rotations: Floats  # (m, 3, 3): image axes to the frame
 
 
 def plotted(
@@ -82,8 +79,8 @@ def plotted(
 
 
 def _system(
-    wanted: Models, photo_scale: float, truth: TruePlaces, pair: tuple[int, int], drawn: Array
-) -> tuple[Array, float]:
+    wanted: Models, photo_scale: float, truth: TruePlaces, pair: tuple[int, int], drawn: Floats
+) -> tuple[Floats, float]:
     """Rotation from the ground to the axes of a model, and its scale in mm per metre."""
     scale = 1000.0 / (wanted.scale or photo_scale) * float(np.exp(LOG_SCALE_SIGMA * drawn[0]))
     if wanted.axes == "any":

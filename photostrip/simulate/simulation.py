@@ -26,8 +26,7 @@ from photostrip.simulate.validation import LARGEST_ARC, faults_of
 from photostrip.triangulation.image_coordinates.corrections import distort
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.camera import Camera
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.points import ControlPoints, ModelPoints
@@ -39,8 +38,6 @@ if TYPE_CHECKING:
     from photostrip.simulate.placement import Placed
     from photostrip.simulate.spec import Spec
 
-    Array = NDArray[np.float64]
-    Rows = NDArray[np.intp]
 
 STATED_SIGMA = 0.001  # mm: what is stated of image coordinates that have no errors
 MOST_ROUND_TRIP = 1e-4  # metres
@@ -55,13 +52,13 @@ class Truth:
     points: PointTable
     ground: PointTable  # the same east, north, up in the output frame, in its units
     photo_ids: tuple[str, ...]  # photos, in the order of the observations' photos
-    centers: Array  # (m, 3): perspective centres in the Cartesian frame, metres
-    centers_ground: Array  # (m, 3): the same east, north, up in the output frame, in its units
-    rotations: Array  # (m, 3, 3): rotations that take image axes to the Cartesian frame
+    centers: Floats  # (m, 3): perspective centres in the Cartesian frame, metres
+    centers_ground: Floats  # (m, 3): the same east, north, up in the output frame, in its units
+    rotations: Floats  # (m, 3, 3): rotations that take image axes to the Cartesian frame
     # (m, 3, 3): rotations that take image axes to the output frame's east, north, up at the perspective centre
-    rotations_local: Array
+    rotations_local: Floats
     # (n, 2): what would be measured without any error of measurement, in the system and order of the observations, mm
-    image: Array
+    image: Floats
     errors: tuple[InjectedError, ...]
 
 
@@ -78,7 +75,9 @@ class Simulation:
     control: ControlPoints  # control and check points; ``frame`` counts in `frames`
     frames: tuple[FrameSpec, ...]  # frame of each control list; the first is that of the output
     fiducials: PhotoPoints | None  # measured fiducial marks, mm
-    gnss: Array | None  # (m, 3), or None: measured perspective centres east, north, up in the first frame, in its units
+    gnss: (
+        Floats | None
+    )  # (m, 3), or None: measured perspective centres east, north, up in the first frame, in its units
     truth: Truth
     # measured models, when they stand in place of image coordinates; the observations then only say what is seen
     models: ModelPoints | None = None
@@ -90,10 +89,8 @@ def simulate(spec: Spec) -> Simulation:
     Random numbers are drawn as ``draws`` says; each function below names its draws. Image noise (`Purpose.IMAGE`): for
     each row of the observations, by photo and point, x, y.
 
-    Raises
-    ------
-    InputError
-        With everything that cannot be simulated; also when neighbouring photos turn out to share too few points.
+    Raises InputError with everything that cannot be simulated; also when neighbouring photos turn out to share too few
+        points.
     """
     if faults := faults_of(spec):
         raise InputError(faults)
@@ -182,7 +179,7 @@ def _check_extent(spec: Spec, space: World) -> None:
         raise InputError(Fault(message, code="simulation-extent", key="flight.photos", fix="fewer photos"))
 
 
-def _check_overlap(spec: Spec, photos: Photos, photo: Rows, point: Rows) -> None:
+def _check_overlap(spec: Spec, photos: Photos, photo: Numbers, point: Numbers) -> None:
     """Refuse a strip that could not be formed, naming the photos."""
     n = spec.flight.photos
     starts = np.searchsorted(photo, np.arange(len(photos.ids) + 1))
@@ -202,7 +199,7 @@ def _check_overlap(spec: Spec, photos: Photos, photo: Rows, point: Rows) -> None
         raise InputError([Fault(text, code="simulation-overlap", key="flight", fix=fix) for text in faults])
 
 
-def _rays(spec: Spec, placed: Placed, photo: Rows, point: Rows) -> Rows:
+def _rays(spec: Spec, placed: Placed, photo: Numbers, point: Numbers) -> Numbers:
     """On how many photos of its own strip each point lies."""
     n = spec.flight.photos
     own = photo // n == placed.home[point] // n
@@ -226,7 +223,7 @@ def _with_final_names(spec: Spec, placed: Placed, names: tuple[str, ...]) -> Spe
     return replace(spec, gross_errors=entries)
 
 
-def _image(spec: Spec, photos: Photos, placed: Placed, film: Sheets | None, photo: Rows, point: Rows) -> Array:
+def _image(spec: Spec, photos: Photos, placed: Placed, film: Sheets | None, photo: Numbers, point: Numbers) -> Floats:
     """Image coordinates without errors of measurement, mm."""
     camera = spec.camera
     ray = placed.xyz[point] - photos.centers[photo]
@@ -237,8 +234,8 @@ def _image(spec: Spec, photos: Photos, placed: Placed, film: Sheets | None, phot
 
 
 def _observations(
-    spec: Spec, photos: Photos, names: tuple[str, ...], photo: Rows, point: Rows, image: Array
-) -> tuple[PhotoPoints, Rows]:
+    spec: Spec, photos: Photos, names: tuple[str, ...], photo: Numbers, point: Numbers, image: Floats
+) -> tuple[PhotoPoints, Numbers]:
     """Measure: add the noise. Gives also the numbers of the points that are measured at all."""
     _, first, inverse = np.unique(point, return_index=True, return_inverse=True)
     rank = np.argsort(np.argsort(first))  # points are numbered as they appear
@@ -273,7 +270,7 @@ def _fiducials(spec: Spec, photos: Photos, film: Sheets | None) -> PhotoPoints |
     )
 
 
-def _gnss(spec: Spec, photos: Photos, output: GroundFrame) -> Array | None:
+def _gnss(spec: Spec, photos: Photos, output: GroundFrame) -> Floats | None:
     """Measure the perspective centres.
 
     Draws (`Purpose.GNSS`): for each photo east, north, up.
@@ -286,7 +283,7 @@ def _gnss(spec: Spec, photos: Photos, output: GroundFrame) -> Array | None:
 
 
 def _truth(
-    output: GroundFrame, points: PointTable, photos: Photos, image: Array, errors: tuple[InjectedError, ...]
+    output: GroundFrame, points: PointTable, photos: Photos, image: Floats, errors: tuple[InjectedError, ...]
 ) -> Truth:
     return Truth(
         points=points,

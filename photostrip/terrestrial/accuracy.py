@@ -17,9 +17,10 @@ from photostrip.terrestrial.directions import partials
 from photostrip.terrestrial.frame import ARCSECONDS, ground_from_photo
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
-    Floats = NDArray[np.float64]
+    from photostrip.arrays import Floats
+
 
 LEVEL = 1e-12  # difference of a rotation from that of a level camera
 
@@ -95,12 +96,8 @@ def rounds_for(sigma: float, wanted: float) -> int:
 def grid(photo_format: tuple[float, float], step: float, *, level: bool = True) -> tuple[Floats, Floats]:
     """Coordinates x and z over the photo, mm, at which accuracy is tabulated: multiples of the step, and the edge.
 
-    Parameters
-    ----------
-    photo_format : tuple of float
-        Width and height of the photo in mm.
-    level : bool
-        Whether one quarter of the photo stands for the others.
+    photo_format: width and height of the photo in mm.
+    level: whether one quarter of the photo stands for the others.
     """
     axes = []
     for size in photo_format:

@@ -17,10 +17,8 @@ from photostrip.statistics import chi2_quantile
 from photostrip.terrestrial.frame import rays, small_turn
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from photostrip.arrays import Flags, Floats
 
-    Floats = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
 
 ANGLES = 3  # a turn to the right, up, and about the optical axis
 MOST_ITERATIONS = 20

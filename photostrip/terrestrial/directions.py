@@ -14,9 +14,10 @@ import numpy as np
 from photostrip.terrestrial.frame import direction_gradient, directions_of, rays, vectors_of
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
-    Floats = NDArray[np.float64]
+    from photostrip.arrays import Floats
+
 
 BEHIND = 1e-6  # cosine of the angle to the optical axis below which a direction cannot be on the photo
 

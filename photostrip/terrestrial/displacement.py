@@ -12,9 +12,10 @@ import numpy as np
 from photostrip.statistics import chi2_quantile
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
-    Floats = NDArray[np.float64]
+    from photostrip.arrays import Floats
+
 
 SPACE = 3  # components of a displacement
 SINGULAR = 1e-12  # reciprocal condition of a covariance matrix below which there is no test
@@ -25,12 +26,7 @@ def displacements(first: Floats, second: Floats, principal_distance: float, base
 
     Exactly the difference of the intersected points, without its loss of digits.
 
-    Parameters
-    ----------
-    first, second : ndarray, shape (n, 4)
-        x, z of the left and x, z of the right photo in mm in two epochs.
-
-    Source: [004c] eq. 2, completed: x' and z' are coordinates of the second epoch, dp is left minus right.
+    first, second: (n, 4), x, z of the left and x, z of the right photo in mm in two epochs.
     """
     f = principal_distance
     change = second - first
@@ -46,14 +42,8 @@ def displacements(first: Floats, second: Floats, principal_distance: float, base
 def standard_errors(second: Floats, sigma: float, principal_distance: float, base: float) -> Floats:
     """Give m_dX, m_dY, m_dZ, metres, for pseudo-parallaxes of equal accuracy, z of the right photo not measured.
 
-    Parameters
-    ----------
-    second : ndarray, shape (n, 4)
-        Coordinates of the second epoch in mm.
-    sigma : float
-        Standard deviation of each pseudo-parallax in mm.
-
-    Source: derived from the completed [004c] eq. 2.
+    second: (n, 4), coordinates of the second epoch in mm.
+    sigma: standard deviation of each pseudo-parallax in mm.
     """
     x, z, p = second[:, 0], second[:, 1], second[:, 0] - second[:, 2]
     depth = base * principal_distance / p
@@ -98,12 +88,8 @@ class Ellipses(NamedTuple):
 def ellipses(covariance: ArrayLike, probability: float) -> Ellipses:
     """Confidence ellipses in plan.
 
-    Parameters
-    ----------
-    covariance : array_like, shape (..., 2, 2)
-        Covariance of the first two components (to the right and ahead, or east and north), m^2.
-    probability : float
-        Probability that the ellipse around the estimate covers the truth.
+    covariance: (..., 2, 2), covariance of the first two components (to the right and ahead, or east and north), m^2.
+    probability: probability that the ellipse around the estimate covers the truth.
     """
     c = np.asarray(covariance, float)
     half_sum = (c[..., 0, 0] + c[..., 1, 1]) / 2

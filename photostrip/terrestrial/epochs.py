@@ -33,10 +33,8 @@ from photostrip.terrestrial.normal_case import SIDES, Normal, StereoPair, inters
 from photostrip.terrestrial.remarks import remarks
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from photostrip.arrays import Flags, Floats, Numbers
 
-    Floats = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
 
 COLUMNS = (slice(0, 2), slice(2, 4))  # of the left and of the right photo
 TURNS = (slice(0, 3), slice(3, 6))
@@ -82,10 +80,7 @@ class _Epoch:
 def monitor(series: Series, pair: StereoPair, settings: MonitoringSettings | None = None) -> Monitoring:
     """Compute the displacements of all points in all epochs; the first epoch is the reference.
 
-    Raises
-    ------
-    GeometryError
-        When there is no base, or the cameras look along it.
+    Raises GeometryError when there is no base, or the cameras look along it.
     """
     chosen = settings or MonitoringSettings()
     ground = pair.ground_from_normal()
@@ -213,7 +208,7 @@ def _epoch(series: Series, pair: StereoPair, number: int, turns: _Turns) -> _Epo
     return _Epoch(normal, xyz, on_ground @ normal.by_measured, on_ground @ normal.by_turn, turns)
 
 
-def _reasons(series: Series, epochs: list[_Epoch]) -> NDArray[np.intp]:
+def _reasons(series: Series, epochs: list[_Epoch]) -> Numbers:
     """Say why points have no coordinates."""
     found = np.full((len(epochs), len(series.points)), MEASURED)
     for number, each in enumerate(epochs):

@@ -19,9 +19,10 @@ import numpy as np
 from photostrip.geometry.rotation import alpha_omega_kappa, from_alpha_omega_kappa
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
-    Floats = NDArray[np.float64]
+    from photostrip.arrays import Floats
+
 
 ARCSECONDS = 180.0 * 3600.0 / np.pi  # in a radian
 GROUND_FROM_HOUSE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])

@@ -15,14 +15,11 @@ import numpy as np
 from photostrip.terrestrial.displacement import SPACE, limit, statistic
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.notes import Note
     from photostrip.terrestrial.camera_motion import Motion, Turn
     from photostrip.terrestrial.normal_case import StereoPair
 
-    Floats = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
 
 MOVED_CAMERA = ("always", "auto", "never")
 MEASURED, ABSENT, NO_REFERENCE, SMALL_PARALLAX, OUTSIDE = range(5)
@@ -98,7 +95,7 @@ class Rates:
     step: Step  # velocities, metres per unit of time
     # (n,): weighted sum of squares of what the uniform motion leaves; NaN where there are fewer than three epochs
     misfit: Floats
-    dof: NDArray[np.intp]  # (n,): its degrees of freedom
+    dof: Numbers  # (n,): its degrees of freedom
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +110,7 @@ class Monitoring:
     since_first: tuple[Step, ...]
     since_previous: tuple[Step, ...]
     rates: Rates | None  # uniform motion, when the epochs have times
-    reason: NDArray[np.intp]  # (e, n): why a point has no coordinates in an epoch: a key of ``REASONS``; 0 where it has
+    reason: Numbers  # (e, n): why a point has no coordinates in an epoch: a key of ``REASONS``; 0 where it has
     # parallax, parallax_sigma: (e, n): vertical parallaxes in mm with their standard deviations; NaN where z was not
     # measured on the right photo
     parallax: Floats

@@ -16,9 +16,8 @@ from photostrip.errors import GeometryError
 from photostrip.terrestrial.frame import GROUND_FROM_HOUSE, TURN_AXES, rays
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from photostrip.arrays import Floats
 
-    Floats = NDArray[np.float64]
 
 LEFT, RIGHT = 0, 1
 SIDES = ("left", "right")
@@ -44,10 +43,7 @@ class StereoPair:
     def ground_from_normal(self) -> Floats:
         """Rotation from the axes of the normal case to the ground; its columns are X, Y, Z.
 
-        Raises
-        ------
-        GeometryError
-            When there is no base, or the cameras look along it.
+        Raises GeometryError when there is no base, or the cameras look along it.
         """
         if self.base == 0:
             msg = "the left and the right station are at the same place: there is no base"
@@ -88,18 +84,11 @@ class Normal:
 def to_normal(measured: Floats, variances: Floats, pair: StereoPair, rotations: Floats) -> Normal:
     """Bring measured image coordinates to the normal case, with z_left = z_right.
 
-    Parameters
-    ----------
-    measured : ndarray, shape (n, 4)
-        x, z of the left and x, z of the right photo in mm, reduced to the principal points. Where the last is NaN, it
-        is what makes the rays meet.
-    variances : ndarray, shape (n, 4)
-        Variances of the measured coordinates, in any unit: they say which coordinates give way when the rays do not
-        meet.
-    rotations : ndarray, shape (n, 2, 3, 3)
-        Photo to ground, for each point and camera.
-
-    Source: derived. [004c] takes transformed coordinates as given and does not use z of the right photo.
+    measured: (n, 4), x, z of the left and x, z of the right photo in mm, reduced to the principal points. Where the
+        last is NaN, it is what makes the rays meet.
+    variances: (n, 4), variances of the measured coordinates, in any unit: they say which coordinates give way when the
+        rays do not meet.
+    rotations: (n, 2, 3, 3), photo to ground, for each point and camera.
     """
     turn = np.einsum("ki,nskj->nsij", pair.ground_from_normal(), rotations)
     focal = pair.principal_distances
@@ -168,14 +157,8 @@ def _blocks(parts: Floats) -> Floats:
 def intersect(coordinates: Floats, principal_distance: float, base: float) -> tuple[Floats, Floats]:
     """Points of the normal case.
 
-    Returns
-    -------
-    xyz : ndarray, shape (n, 3)
-        Coordinates from the left station, metres; NaN where the parallax is too small.
-    by_coordinates : ndarray, shape (n, 3, 4)
-        Their derivatives by x, z of the left and of the right photo, m/mm.
-
-    Source: [004c] eq. 1.
+    Returns xyz: (n, 3), coordinates from the left station, metres; NaN where the parallax is too small.
+    Returns by_coordinates: (n, 3, 4), their derivatives by x, z of the left and of the right photo, m/mm.
     """
     x, z, x_right = coordinates[:, 0], coordinates[:, 1], coordinates[:, 2]
     p = x - x_right

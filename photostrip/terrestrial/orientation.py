@@ -27,10 +27,8 @@ from photostrip.terrestrial.frame import (
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
+    from photostrip.arrays import Flags, Floats, Numbers
 
-    Floats = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
 
 ANGLES = ("alpha", "omega", "kappa")
 FREE = {"principal-distance": ("f",), "principal-point": ("x0", "z0")}  # what may be determined besides
@@ -147,17 +145,9 @@ def orient(
 ) -> PhotoOrientation:
     """Orient a photo by the directions of its points.
 
-    Parameters
-    ----------
-    principal_distance : float
-        f in mm; the start value when it is free.
-    principal_point : tuple of float
-        x0, z0 in mm; the start values when they are free.
-
-    Raises
-    ------
-    GeometryError
-        When the points do not determine what is asked for, or the solution does not converge.
+    principal_distance: f in mm; the start value when it is free.
+    principal_point: x0, z0 in mm; the start values when they are free.
+    Raises GeometryError when the points do not determine what is asked for, or the solution does not converge.
 
     Source: the condition is [002] eq. 1; its least-squares solution is derived.
     """
@@ -228,7 +218,7 @@ def _start(sightings: Sightings, used: Flags, interior: Floats) -> Floats:
     return np.array([np.arctan2(np.sin(turned).mean(), np.cos(turned).mean()), 0.0, 0.0])
 
 
-def _linearised(sightings: Sightings, values: Floats, active: NDArray[np.intp]) -> _System:
+def _linearised(sightings: Sightings, values: Floats, active: Numbers) -> _System:
     """Directions of all points under the present orientation, and their derivatives."""
     alpha, omega, kappa, f = values[:4]
     turn = ground_from_photo(alpha, omega, kappa)
@@ -299,7 +289,7 @@ def _result(
     used: Flags,
     names: tuple[str, ...],
     values: Floats,
-    active: NDArray[np.intp],
+    active: Numbers,
     condition: float,
 ) -> PhotoOrientation:
     system = _linearised(sightings, values, active)
@@ -362,7 +352,7 @@ def _worst(solution: PhotoOrientation, sightings: Sightings, settings: Orientati
     return PointRejection(int(rows[worst]), "deletion", float(p_values[worst]), level, (np.nan, np.nan))
 
 
-def _drops(solution: PhotoOrientation, sightings: Sightings, rows: NDArray[np.intp]) -> tuple[Floats, NDArray[np.intp]]:
+def _drops(solution: PhotoOrientation, sightings: Sightings, rows: Numbers) -> tuple[Floats, Numbers]:
     """By how much the sum of squares falls without each point, and with how many degrees of freedom."""
     values = np.array([*solution.values[:3], solution.principal_distance, *solution.principal_point])
     active = np.flatnonzero([name in solution.names for name in (*ANGLES, "f", "x0", "z0")])

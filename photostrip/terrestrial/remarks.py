@@ -14,11 +14,8 @@ from photostrip.terrestrial.monitoring import MEASURED, REASONS
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from numpy.typing import NDArray
-
     from photostrip.terrestrial.monitoring import CameraState, Monitoring
 
-    Floats = NDArray[np.float64]
 
 SURE = 0.99  # probability below which a misfit may be chance
 NAMED = 8  # ids named in one message

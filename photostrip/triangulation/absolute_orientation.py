@@ -22,13 +22,11 @@ from photostrip.geometry.similarity import Similarity, collinearity
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.geodesy.local_frame import IntermediateFrame
     from photostrip.points import ControlPoints
 
-    Floats = NDArray[np.float64]
 
 LARGEST_SCALE_STEP = 5.0  # of the logarithm of the scale, in one iteration
 ITERATIONS = 50
@@ -141,28 +139,16 @@ def orient(
 ) -> AbsoluteOrientation:
     """Similarity of the strip on its control.
 
-    Parameters
-    ----------
-    strip : ndarray, shape (n, 3)
-        Strip coordinates of the control points.
-    weight : ndarray, shape (n, 3)
-        Weights of their coordinates, metres^-2.
-    reach : ndarray, shape (q, 3), optional
-        All points of the strip, strip coordinates. What the control must determine is their position: control far along
-        a narrow strip is enough when it spans the strip's width. Without them a square of the control's length counts.
-    watch : callable, optional
-        Called at every step with the similarity before it, and shifts, rotations and scale of the step, metres at the
-        end of the strip.
+    strip: (n, 3), strip coordinates of the control points.
+    weight: (n, 3), weights of their coordinates, metres^-2.
+    reach: (q, 3), optional, all points of the strip, strip coordinates. What the control must determine is their
+        position: control far along a narrow strip is enough when it spans the strip's width. Without them a square of
+        the control's length counts.
+    watch: called at every step with the similarity before it, and shifts, rotations and scale of the step, metres at
+        the end of the strip.
+    Raises GeometryError when the control does not determine seven parameters; the free motion is named.
+    Raises InputError when the strip comes out upside down: the control is left-handed.
 
-    Raises
-    ------
-    GeometryError
-        When the control does not determine seven parameters; the free motion is named.
-    InputError
-        When the strip comes out upside down: the control is left-handed.
-
-    Notes
-    -----
     Source: [001] eq. 145-149; start from the closed form of the full points, or from plan and height apart.
     """
     _refuse_too_few(targets.control)
@@ -314,12 +300,8 @@ def free_motion(direction: Floats, xyz: Floats, control: ControlPoints, half: fl
 
     For example ``"the rotation about the line of control points A1, A4"``.
 
-    Parameters
-    ----------
-    direction : ndarray, shape (7,)
-        Shifts, rotations and scale of the motion, as in the design of the orientation.
-    half : float
-        Half length of the strip in metres.
+    direction: (7,), shifts, rotations and scale of the motion, as in the design of the orientation.
+    half: half length of the strip in metres.
     """
     shift, turn, growth = direction[:3], direction[3:6], direction[6]
     sizes = np.array([np.linalg.norm(shift), np.linalg.norm(turn), abs(growth)])

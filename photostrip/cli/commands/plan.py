@@ -143,12 +143,7 @@ class Delivery:
     def deliver(self, document: Document, files: Sequence[str], fine: Document | None = None) -> None:
         """Print a plan; write it, and the rule for make, when a file is named.
 
-        Parameters
-        ----------
-        files : sequence of str
-            Files that the plan was read from.
-        fine : dict, optional
-            The plan on a fine grid, for a picture.
+        fine: the plan on a fine grid, for a picture.
         """
         from photostrip.formats.output.plans import plan_csv
         from photostrip.report.commands.plans import plan_report

@@ -12,8 +12,7 @@ from photostrip.formats.text.tables import Column, Table
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags
     from photostrip.formats.text.findings import Findings
 
 AXES = ("x", "y", "z")
@@ -35,9 +34,7 @@ def sigmas(*axes: str) -> tuple[Column, ...]:
     )
 
 
-def refuse_without_sigma(
-    table: Table, missing: NDArray[np.bool_], columns: Sequence[str], fix: str, findings: Findings
-) -> None:
+def refuse_without_sigma(table: Table, missing: Flags, columns: Sequence[str], fix: str, findings: Findings) -> None:
     """Ask for the standard deviations that neither rows nor project give; `missing` marks their cells."""
     rows, places = np.nonzero(missing)
     if len(rows):

@@ -15,12 +15,9 @@ from photostrip.formats.text.tables import Column, Table
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats
     from photostrip.formats.text.findings import Findings
 
-    Floats = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
 
 USES = ("xyz", "xy", "z", "off")
 ROLES = ("control", "check")
@@ -63,14 +60,9 @@ def read_control(
 ) -> ControlTable | None:
     """Read a table of given ground coordinates; None when the header is wrong.
 
-    Parameters
-    ----------
-    up : int
-        Which of the columns x, y, z is the height: ``use: xy`` means the two others, ``use: z`` this one.
-    default_sigma : bool
-        Whether the project file has standard deviations for rows without them.
-    columns : mapping of str to str, optional
-        Names in the header of columns that have another name there.
+    up: which of the columns x, y, z is the height: ``use: xy`` means the two others, ``use: z`` this one.
+    default_sigma: whether the project file has standard deviations for rows without them.
+    columns: names in the header of columns that have another name there.
     """
     table = read_table(file, CONTROL, findings, columns=columns)
     if table is None:

@@ -27,12 +27,9 @@ from photostrip.formats.text.tables import Column, Table
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.formats.text.findings import Findings
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 FIX = "set `{}` in the project file, or fill the columns"
 
@@ -91,15 +88,10 @@ def read_orientations(
 ) -> OrientationTable | None:
     """Read a table of given exterior orientations; None when the header is wrong.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Names of the three angles, in the order of their system.
-    unit : str
-        Their unit, ``deg``, ``gon`` or ``rad``; a column may be called ``kappa`` or ``kappa_deg``.
-    needs_sigma : tuple of bool
-        Whether rows must have standard deviations of the position and of the angles: they are observations, and
-        the project file gives none.
+    names: names of the three angles, in the order of their system.
+    unit: their unit, ``deg``, ``gon`` or ``rad``; a column may be called ``kappa`` or ``kappa_deg``.
+    needs_sigma: whether rows must have standard deviations of the position and of the angles: they are observations,
+        and the project file gives none.
     """
     angle = tuple(Column(name, number=True, aliases=(f"{name}_{unit}",)) for name in names)
     sigma_names = [f"s_{name}" for name in names]

@@ -7,13 +7,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.formats.text.tables import Table
-
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)

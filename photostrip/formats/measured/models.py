@@ -17,12 +17,9 @@ from photostrip.formats.text.tables import Column, Table
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.formats.text.findings import Findings
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 MODEL = Column("model", aliases=("model_id", "pair", "stereopair"))
 COORDINATES = (*numbers(*AXES), *sigmas(*AXES))
@@ -57,12 +54,8 @@ def read_models(
 ) -> ModelTable | None:
     """Read a table of model coordinates; None when the header is wrong.
 
-    Parameters
-    ----------
-    has_sigma : bool
-        Whether the project has standard deviations for rows without them.
-    columns : mapping of str to str, optional
-        Names in the header of columns that have another name there.
+    has_sigma: whether the project has standard deviations for rows without them.
+    columns: names in the header of columns that have another name there.
     """
     target = "photo" if centers else "point"
     rewritten = None if centers else rows_of_blocks

@@ -19,12 +19,8 @@ from photostrip.formats.text.tables import Column
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import NDArray
-
     from photostrip.formats.text.findings import Findings
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 MARK = Column("mark", aliases=("mark_id", "fiducial", "fiducial_mark"))
 COORDINATES = (*numbers("x", "y"), *sigmas("x", "y"))

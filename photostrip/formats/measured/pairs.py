@@ -17,12 +17,9 @@ from photostrip.formats.text.tables import Column, Table
 if TYPE_CHECKING:
     from collections.abc import Set as AbstractSet
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.formats.text.findings import Findings
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 PAIR = (Column("pair", aliases=("pair_id", "model", "stereopair")),)
 BOTH = (

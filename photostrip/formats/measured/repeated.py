@@ -11,13 +11,10 @@ from photostrip.formats.text.findings import counted
 from photostrip.notes import Note
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.formats.measured.measurements import Measurements
     from photostrip.formats.text.findings import Findings
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 POLICIES = ("refuse", "average")
 FARTHEST = 10.0  # standard deviations from the mean; beyond, two measurements are not of one point
@@ -47,10 +44,7 @@ def averaged(read: Measurements, target: str, default: float | None, findings: F
     The mean stands where the first measurement stood. Its standard deviation follows from those of the measurements,
     not from their spread, which becomes a note. Measurements too far apart to be of one point are refused.
 
-    Parameters
-    ----------
-    default : float or None
-        Standard deviation of rows without one, in the unit of the table.
+    default: standard deviation of rows without one, in the unit of the table.
     """
     _, first, group, count = np.unique(_key(read), return_index=True, return_inverse=True, return_counts=True)
     if (count == 1).all():

@@ -14,12 +14,9 @@ from photostrip.formats.text.tables import Column, Table
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.formats.text.findings import Findings
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 SIDES = ("left", "right")
 EPOCH = Column("epoch", aliases=("epoch_id",))

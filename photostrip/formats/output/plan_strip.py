@@ -12,14 +12,12 @@ from photostrip.planning.strip_design import along_the_strip
 from photostrip.result.numbers import GROUND, Document, micrometres, rms, rounded, significant
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.planning.control_layout import ControlLayout, Spot
     from photostrip.planning.ideal_strip import IdealStrip
     from photostrip.planning.placement import BestPlaces
     from photostrip.planning.strip_design import DesignReport, Needed, Outcome
 
-    Floats = NDArray[np.float64]
 
 PLACED = 6  # decimals of metres that decide which point is the worst: strips are symmetric
 

@@ -16,12 +16,10 @@ from photostrip.result.numbers import GROUND, Document, micrometres, rms, rounde
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.planning.camera_efficiency import ComparedCamera
     from photostrip.planning.model_plan import Forecast
 
-    Floats = NDArray[np.float64]
 
 ARCSECONDS = 206264.806
 IN_PHOTO = 2  # decimals of mm: places of points

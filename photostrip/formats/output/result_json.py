@@ -45,10 +45,7 @@ def _block(value: Plain, encode: Callable[[Plain], str]) -> str:
 def read_result(file: str) -> Document:
     """Read a result.json.
 
-    Raises
-    ------
-    InputError
-        When the file cannot be read, is not JSON or not a result of photostrip.
+    Raises InputError when the file cannot be read, is not JSON or not a result of photostrip.
     """
     text, _ = decode(file, read_bytes(file, LARGEST_RESULT))
     try:

@@ -15,11 +15,9 @@ BLOCK = re.compile(r'^"(\w+)": ')
 def line_finder(text: str) -> Callable[[str, str], int]:
     """Index the lines of a result.json as photostrip writes it, each record on a line of its own.
 
-    Returns
-    -------
-    callable
-        Gives the line, counted from 1, of a block and the id of one of its records; that of the block when there is no
-        such record, 0 when there is no such block. A file that another program has written anew gives 0 or the block.
+    Returns gives the line, counted from 1, of a block and the id of one of its records; that of the block when there is
+        no such record, 0 when there is no such block. A file that another program has written anew gives 0 or the
+        block.
     """
     places: dict[tuple[str, str], int] = {}
     block = ""

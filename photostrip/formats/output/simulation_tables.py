@@ -15,14 +15,12 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.camera import Camera
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.points import ModelPoints, PhotoPoints
     from photostrip.simulate import Simulation
 
-    Floats = NDArray[np.float64]
 
 IMAGE_STEP, IMAGE_STEP_FREE = 1e-4, 1e-9  # mm to which image coordinates are rounded, with noise and without
 GROUND_STEP, GROUND_STEP_FREE = 1e-4, 1e-7  # metres, likewise

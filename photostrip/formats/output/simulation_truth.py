@@ -14,12 +14,10 @@ from photostrip.result.numbers import ROTATION, rounded
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.simulate import InjectedError, Simulation
 
-    Floats = NDArray[np.float64]
     Document = dict[str, Any]
 
 TRUE_STEP = 1e-7  # metres to which the truth is rounded

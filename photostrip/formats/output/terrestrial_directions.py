@@ -16,12 +16,10 @@ from photostrip.terrestrial.orientation import ANGLES
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.result.numbers import Document
     from photostrip.terrestrial.orientation import OrientationSettings, PhotoOrientation, Sightings
 
-    Floats = NDArray[np.float64]
     Grid = tuple[Floats, Floats]  # x and z of a table over the photo in mm, from the principal point
 
 SCHEMA = 1
@@ -83,12 +81,8 @@ def directions_document(
 ) -> Document:
     """Return the directions of image points.
 
-    Parameters
-    ----------
-    xz : ndarray, shape (n, 2)
-        Image coordinates in mm as measured.
-    sigma : float or None
-        Standard deviation of an image coordinate in mm, for those of the directions.
+    xz: (n, 2), image coordinates in mm as measured.
+    sigma: standard deviation of an image coordinate in mm, for those of the directions.
     """
     reduced = xz - np.array(camera.principal_point)
     directions = directions_from_photo(reduced, camera.principal_distance, attitude.rotation)
@@ -134,10 +128,7 @@ def required_accuracy(
 ) -> Document:
     """Return the accuracy over the photo with which directions must be measured.
 
-    Parameters
-    ----------
-    sigma : float
-        Standard error of image coordinates and principal distance in mm.
+    sigma: standard error of image coordinates and principal distance in mm.
     """
     xz = _grid_points(grid)
     exact = accuracy.required(xz, camera.principal_distance, sigma, attitude.rotation)
@@ -175,10 +166,7 @@ def theodolite_accuracy(
 ) -> Document:
     """Return the image accuracy over the photo that a theodolite can vouch for.
 
-    Parameters
-    ----------
-    sigma : float, optional
-        Image accuracy wanted, mm: the rounds it needs are computed.
+    sigma: image accuracy wanted, mm: the rounds it needs are computed.
     """
     xz = _grid_points(grid)
     horizontal, vertical, rounds = theodolite

@@ -18,14 +18,12 @@ from photostrip.terrestrial.normal_case import SIDES
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.notes import Note
     from photostrip.result.numbers import Document
     from photostrip.terrestrial.directions import Phototheodolite
     from photostrip.terrestrial.monitoring import CameraState, Monitoring, Step
 
-    Floats = NDArray[np.float64]
 
 METRE = 6  # decimals: a micrometre on the ground
 COVARIANCES = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))

@@ -38,10 +38,7 @@ def refuse(file: str, code: str, message: str, *, expected: str = "", fix: str =
 def read_bytes(file: str, limit: int) -> bytes:
     """Read a file that the user named.
 
-    Raises
-    ------
-    InputError
-        When it is missing, a folder, unreadable, too big, empty or changed while it was read.
+    Raises InputError when it is missing, a folder, unreadable, too big, empty or changed while it was read.
     """
     source = current()
     if source is not None and source.given is not None:

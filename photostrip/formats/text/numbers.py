@@ -27,10 +27,7 @@ class NotANumber(ValueError):  # noqa: N818 (the name of what it says)
 def number(text: str) -> float:
     """Read a decimal number of at most 15 digits before the point; blanks around it do not count.
 
-    Raises
-    ------
-    NotANumber
-        For anything else, also for ``nan``, ``1_000``, decimal commas and full-width digits.
+    Raises NotANumber for anything else, also for ``nan``, ``1_000``, decimal commas and full-width digits.
     """
     word = text.strip()
     if NUMBER.fullmatch(word):

@@ -60,10 +60,7 @@ def current() -> Source | None:
 def seen_from(file: str, folder: str | Path) -> str:
     """Return a path relative to a folder, with slashes on every system, as seen from the current source's folder.
 
-    Raises
-    ------
-    ValueError
-        When there is no way, because they stand on different drives.
+    Raises ValueError when there is no way, because they stand on different drives.
     """
     source = current()
     base = source.folder if source is not None else ""

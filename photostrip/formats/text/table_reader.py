@@ -26,13 +26,10 @@ from photostrip.notes import Note
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.formats.text.findings import Findings
     from photostrip.formats.text.tables import Column
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
     Cells = tuple[str, ...]
 
 CHUNK = 16_384  # rows turned into columns at a time, so that a big table never stands in memory cell by cell
@@ -51,14 +48,10 @@ def read_table(
 ) -> Table | None:
     """Read a table; None when not even the header can be read.
 
-    Parameters
-    ----------
-    others : sequence of sequence of Column
-        Other layouts of the same kind of table; that of which the header has most is taken, the first when in doubt.
-    columns : mapping of str to str, optional
-        Names in the header of columns that the user calls otherwise.
-    rewritten : callable, optional
-        Makes a table, line for line, of the text of another layout; gives a table as it is.
+    others: other layouts of the same kind of table; that of which the header has most is taken, the first when in
+        doubt.
+    columns: names in the header of columns that the user calls otherwise.
+    rewritten: makes a table, line for line, of the text of another layout; gives a table as it is.
     """
     findings.meet(file)
     try:

@@ -13,13 +13,10 @@ from photostrip.notes import Note
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.errors import Fault
     from photostrip.formats.text.table_text import TableText
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 CONTROL_CHARACTER = re.compile(r"[\x00-\x1f\x7f]")
 

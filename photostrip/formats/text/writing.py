@@ -33,12 +33,8 @@ def write_files(folder: Path, files: Mapping[str, str | bytes]) -> None:
     All contents are written first and renamed then, in the order given: put the file last that make or another program
     looks at.
 
-    Raises
-    ------
-    InputError
-        When the folder is a file, or one of the files a folder.
-    OSError
-        When the disk is full or the folder must not be written to.
+    Raises InputError when the folder is a file, or one of the files a folder.
+    Raises OSError when the disk is full or the folder must not be written to.
     """
     _make(folder)
     for name in files:

@@ -24,8 +24,6 @@ from photostrip.triangulation.bundle.solve import solve
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.frames import GroundFrames
     from photostrip.pipeline.inputs import Inputs, Settings
@@ -35,8 +33,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.bundle.snooping import ScreenedBundle
     from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 REFILLED = 1e-9  # metres by which targets of plan or height points may still move
 REFILLS = 3
@@ -52,17 +48,8 @@ def adjust_block(
 ) -> AdjustedStrips:
     """Adjust all strips of a project together.
 
-    Parameters
-    ----------
-    observations : PhotoPoints
-        Ideal image coordinates.
-    control : ControlPoints
-        Measured control of the project, no check points.
-
-    Raises
-    ------
-    GeometryError
-        When a strip, a photo or the datum cannot be determined, by name.
+    control: measured control of the project, no check points.
+    Raises GeometryError when a strip, a photo or the datum cannot be determined, by name.
     """
     known = known_of(inputs, control, ground)
     formed = form_photos(inputs, observations, settings)

@@ -13,14 +13,11 @@ from photostrip.triangulation.bundle.quality import self_calibration
 from photostrip.triangulation.resection.resection import with_residuals
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.inputs import Inputs
     from photostrip.pipeline.results import Bundle, StripResult
     from photostrip.points import PhotoPoints
-
-    Numbers = NDArray[np.intp]
 
 
 def adjusted_strips(inputs: Inputs, observations: PhotoPoints, output: GroundFrame, bundle: Bundle) -> AdjustedStrips:

@@ -16,16 +16,13 @@ from photostrip.triangulation import absolute_orientation
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.frames import GroundFrames
     from photostrip.pipeline.inputs import Inputs
     from photostrip.pipeline.strips.photos import FormedPhotos
     from photostrip.points import ControlPoints, PhotoPoints
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 LEAST_TIES = 3
 ON_A_LINE = 1e-6  # ratio of the squared spreads of points that hardly say how a strip is rolled about their line

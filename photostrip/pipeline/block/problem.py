@@ -27,17 +27,13 @@ from photostrip.triangulation.resection.collinearity import project
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.frames import GroundFrames
     from photostrip.pipeline.inputs import CameraPositions, GivenOrientations, Inputs, Settings
     from photostrip.pipeline.results import BlockStart
     from photostrip.points import ControlPoints, PhotoPoints
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
-    Flags = NDArray[np.bool_]
 
 FAR = 10.0  # times the median: a ray of no pair that misses its point by more waits outside at first
 LEAST_FAR = 50.0  # in standard deviations
@@ -116,23 +112,12 @@ def given_positions(
 ) -> tuple[Floats, Floats, Floats]:
     """Given coordinates as observations in the Cartesian frame.
 
-    Parameters
-    ----------
-    enu : ndarray, shape (n, 3)
-        Given coordinates in the frame's own units, internal order.
-    use : ndarray of bool, shape (n, 3)
-        Which count.
-    sigma : ndarray, shape (n, 3)
-        Standard deviations, metres.
-    frame : GroundFrame
-        Their frame.
-    near : ndarray, shape (n, 3)
-        Present positions, Cartesian: they stand in for what does not count.
-
-    Returns
-    -------
-    xyz, axes, sigma : ndarray, shapes (n, 3), (n, 3, 3), (n, 3)
-        As ``problem.Control`` has them.
+    enu: (n, 3), given coordinates in the frame's own units, internal order.
+    use: (n, 3), which count.
+    sigma: (n, 3), standard deviations, metres.
+    frame: their frame.
+    near: (n, 3), present positions, Cartesian: they stand in for what does not count.
+    Returns xyz, axes, sigma: (n, 3), (n, 3, 3), (n, 3), as ``problem.Control`` has them.
     """
     if not use.all():
         enu = np.where(use, enu, frame.ground_from_cartesian(near, ids=ids))
@@ -241,15 +226,8 @@ def refilled(
 
     What stands in for a coordinate that is not given moves the given ones a little on a curved Earth.
 
-    Parameters
-    ----------
-    points : ndarray, shape (q, 3)
-        Present positions of all points, in the frame of the problem.
-
-    Returns
-    -------
-    float
-        The largest change of a given coordinate, metres.
+    points: (q, 3), present positions of all points, in the frame of the problem.
+    Returns the largest change of a given coordinate, metres.
     """
     given = block.problem.control
     xyz = given.xyz.copy()

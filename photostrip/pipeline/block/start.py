@@ -35,16 +35,12 @@ from photostrip.triangulation.resection.resection import resect
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.pipeline.inputs import Inputs, Settings
     from photostrip.pipeline.results import StripResult
     from photostrip.pipeline.strips.photos import FormedPhotos
     from photostrip.points import PhotoPoints
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
-    Flags = NDArray[np.bool_]
 
 MOST_TIES = 60  # points that hand the frame of a block to one of its strips
 
@@ -54,15 +50,9 @@ def start(
 ) -> BlockStart:
     """Bring all strips and photos of a block into the Cartesian frame.
 
-    Parameters
-    ----------
-    stages : sequence of FormedPhotos
-        Strips of two photos or more.
-
-    Raises
-    ------
-    GeometryError
-        When a strip or photo hangs together with nothing, or the block cannot be brought to the ground.
+    stages: strips of two photos or more.
+    Raises GeometryError when a strip or photo hangs together with nothing, or the block cannot be brought to the
+        ground.
     """
     block = _Block(settings, observations, known)
     waiting = [number for number, stage in enumerate(stages) if not block.take(number, stage)]

@@ -33,15 +33,8 @@ def closer_look(
 ) -> Callable[[str, str], tuple[complex, complex] | None]:
     """Return a function that gives the directions in which two photos of a strip lie from each other.
 
-    Parameters
-    ----------
-    cameras : mapping of str to Camera
-        Camera of every photo that was measured.
-
-    Returns
-    -------
-    callable
-        Of two photos, the direction towards the second on the first and towards the first on the second; None where
+    cameras: camera of every photo that was measured.
+    Returns of two photos, the direction towards the second on the first and towards the first on the second; None where
         the pair cannot be oriented well enough to say.
     """
     points: list[PhotoPoints] = []

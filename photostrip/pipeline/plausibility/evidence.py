@@ -23,16 +23,13 @@ from photostrip.triangulation.strip_formation.strip import form_from_pairs, mean
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.camera import Camera
     from photostrip.pipeline.inputs import Settings, Strip
     from photostrip.points import ControlPoints, PhotoPoints
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.strip import FormedStrip
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 MOSAIC_PHOTOS = 10  # of a mosaic that is laid on control: a longer one curls
 LONG_STRIP = 40  # photos: a longer one is looked at in stretches
@@ -114,10 +111,7 @@ def form(strip: Strip, observations: PhotoPoints, settings: Settings) -> Evidenc
 def ideal(observations: PhotoPoints, cameras: Mapping[str, Camera], settings: Settings) -> PhotoPoints:
     """Image points free of distortion, without refraction, whose heights are not known; else as they are.
 
-    Parameters
-    ----------
-    cameras : mapping of str to Camera
-        Camera of every photo that was measured.
+    cameras: camera of every photo that was measured.
     """
     try:
         return corrections.refine(observations, cameras, replace(settings.refinement, refraction=False)).observations
@@ -267,12 +261,9 @@ def places_along_strip(
 ) -> tuple[Numbers, Floats]:
     """Say where along a strip given points lie.
 
-    Returns
-    -------
-    rows : ndarray of int, shape (m,)
-        Rows of the given points that at least two of its photos show.
-    place : ndarray, shape (m,)
-        Where they lie along the strip in bases, from 0 at the first photo; the mean of what its photos say.
+    Returns rows: (m,), rows of the given points that at least two of its photos show.
+    Returns place: (m,), where they lie along the strip in bases, from 0 at the first photo; the mean of what its photos
+        say.
     """
     rows, along = places_in_photos(strip, observations, steps)
     size = len(observations.point_ids)
@@ -287,12 +278,8 @@ def places_along_strip(
 def places_in_photos(strip: Strip, observations: PhotoPoints, steps: Mapping[str, complex]) -> tuple[Numbers, Floats]:
     """Say where each photo of a strip puts its points along the strip.
 
-    Returns
-    -------
-    rows : ndarray of int, shape (m,)
-        Image points of the strip.
-    along : ndarray, shape (m,)
-        Their places in bases, from 0 at the first photo.
+    Returns rows: (m,), image points of the strip.
+    Returns along: (m,), their places in bases, from 0 at the first photo.
     """
     position = _positions(observations, strip.photos)
     rows = np.flatnonzero(position >= 0)

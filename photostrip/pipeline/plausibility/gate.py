@@ -72,10 +72,7 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
 def of_failure(inputs: Inputs, settings: Settings, directory: Path | None = None) -> tuple[Finding, ...]:
     """Find what the data say against themselves, the adjustment having failed.
 
-    Returns
-    -------
-    tuple of Finding
-        By code; empty when the evidence cannot be put together either.
+    Returns by code; empty when the evidence cannot be put together either.
     """
     try:
         if inputs.models is not None:
@@ -102,10 +99,7 @@ def of_failure(inputs: Inputs, settings: Settings, directory: Path | None = None
 def _given_control(inputs: Inputs, directory: Path | None, frames: Sequence[GroundFrame] = ()) -> GivenControl | None:
     """Given points in their frames; None where the frames contradict each other, which stops the run itself.
 
-    Parameters
-    ----------
-    frames : sequence of GroundFrame, optional
-        The frames, where a run has tied them already.
+    frames: the frames, where a run has tied them already.
     """
     try:
         tied = frames or tie_frames(inputs.frames, inputs.output, directory=directory)[0]

@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.geodesy.frame_spec import FrameSpec
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.notes import Finding
@@ -27,8 +26,6 @@ if TYPE_CHECKING:
     from photostrip.pipeline.plausibility.evidence import EvidenceStrip
     from photostrip.points import ControlPoints, PhotoPoints
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 LEAST_POINTS = 3  # points that carry a similarity
 LEAST_BREADTH = 0.05  # second over first extent of control, below which it says nothing of the roll
@@ -69,12 +66,8 @@ def centers(
 ) -> Iterator[Finding]:
     """Look at given perspective centres: below the ground, at another height, with bases that jump.
 
-    Parameters
-    ----------
-    observations : PhotoPoints
-        Image points in the system of the photo, mm.
-    strips : sequence of Strip
-        The strips, their photos as they lie.
+    observations: image points in the system of the photo, mm.
+    strips: the strips, their photos as they lie.
     """
     control = inputs.control.take(inputs.control.use.all(axis=1) & ~inputs.control.check)
     for given in _given_centers(inputs):
@@ -191,10 +184,7 @@ def angles(
 ) -> list[Finding]:
     """Compare given angles with those of strips that are laid on their control, whatever an adjustment made of them.
 
-    Returns
-    -------
-    list of Finding
-        P601, P602.
+    Returns P601, P602.
     """
     given = inputs.orientations
     if given is None:

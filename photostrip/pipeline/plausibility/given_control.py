@@ -22,8 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.notes import Finding
     from photostrip.pipeline.inputs import Inputs, ModelStrip, Strip
@@ -32,9 +31,6 @@ if TYPE_CHECKING:
     from photostrip.pipeline.plausibility.model_evidence import ModelStripEvidence
     from photostrip.points import ControlPoints
     from photostrip.triangulation.plausibility.control.control_strip import GivenPoints, StripPoints
-
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,12 +92,8 @@ def by_strip(
 ) -> list[Finding]:
     """Compare given coordinates with each strip: the formed one, or else the mosaic of its photos.
 
-    Parameters
-    ----------
-    formed : sequence of EvidenceStrip or None
-        The same strips, as far as they could be formed.
-    trials : bool
-        Whether strips may be formed anew with other principal distances.
+    formed: the same strips, as far as they could be formed.
+    trials: whether strips may be formed anew with other principal distances.
     """
     findings: list[Finding] = []
     for strip, each in zip(strips, formed, strict=True):

@@ -36,10 +36,7 @@ class ImageEvidence:
 def of_images(inputs: Inputs, settings: Settings, photo: PhotoCoordinates | None = None) -> ImageEvidence:
     """Look at image coordinates as far as that goes without adjusting anything.
 
-    Parameters
-    ----------
-    photo : PhotoCoordinates, optional
-        Image points in the system of the photo, where a run has them already.
+    photo: image points in the system of the photo, where a run has them already.
     """
     cameras = {photo: strip.camera for strip in inputs.strips for photo in strip.photos}
     observations, findings = _photo_coordinates(inputs, cameras, settings, photo)

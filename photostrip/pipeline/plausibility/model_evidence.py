@@ -14,14 +14,11 @@ from photostrip.triangulation.plausibility.control.control_strip import StripPoi
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.pipeline.inputs import MeasuredModels, ModelStrip, Settings
     from photostrip.points import ControlPoints
     from photostrip.triangulation.independent_models.formation import FormedModels
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 UP = np.array([0.0, 0.0, 1.0])  # of a strip of models with perspective centres
 

@@ -23,16 +23,9 @@ def precision_of(
 ) -> Precision:
     """Covariances of all points and photos, and the test of the check points of each strip.
 
-    Parameters
-    ----------
-    oriented : sequence of OrientedStrip
-        The same strips before their deformation was corrected.
-    observations : PhotoPoints
-        Ideal image coordinates of the project.
-    given : ControlPoints
-        All given points, check points too.
-    points : Adjusted
-        Points of all strips together.
+    oriented: the same strips before their deformation was corrected.
+    observations: ideal image coordinates of the project.
+    given: all given points, check points too.
     """
     each = [_of_strip(*pair, observations, given) for pair in zip(strips, oriented, strict=True)]
     return strip_precision.joined(each, strips, points)

@@ -15,8 +15,7 @@ from photostrip.triangulation.error_propagation.derivatives import ErrorRows
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.precision.propagation import Propagation
     from photostrip.pipeline.results import StripResult
@@ -25,8 +24,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.error_propagation.control_errors import Misclosures
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 LARGEST = 100  # check points of a strip that are tested together, spread over it
 
@@ -36,15 +33,8 @@ def check_points(
 ) -> tuple[ControlPoints, Numbers]:
     """Check points that a strip holds, and their rows in its points.
 
-    Parameters
-    ----------
-    observations : PhotoPoints
-        Image points of the project, which name its points.
-
-    Returns
-    -------
-    rows : ndarray of int, shape (c,)
-        Their rows in ``strip.formed.point``.
+    observations: image points of the project, which name its points.
+    Returns rows: (c,), their rows in ``strip.formed.point``.
     """
     number = {name: n for n, name in enumerate(observations.point_ids)}
     row_of = {int(n): row for row, n in enumerate(strip.formed.point)}
@@ -59,14 +49,9 @@ def check_points(
 def by_fit(found: Propagation, given: Given, rows: Numbers, factor: float) -> covariances.CheckTest:
     """Test the check points of a strip that was fitted to the control.
 
-    Parameters
-    ----------
-    found : Propagation
-        Rows and operators of the strip method.
-    rows : ndarray of int, shape (c,)
-        Their rows in the points of the strip.
-    factor : float
-        Variance factor of the image coordinates.
+    found: rows and operators of the strip method.
+    rows: (c,), their rows in the points of the strip.
+    factor: variance factor of the image coordinates.
     """
     seen = given.seen
     by_parameters = np.einsum("wi,wit->wt", seen.direction, found.influence[rows][seen.point])
@@ -98,12 +83,8 @@ def given_at(
 ) -> Given:
     """Compare a strip with its check points.
 
-    Parameters
-    ----------
-    checks : tuple of ControlPoints and ndarray of int
-        The check points and their rows in the strip.
-    frames : sequence of GroundFrame
-        Ground frames of the given points.
+    checks: the check points and their rows in the strip.
+    frames: ground frames of the given points.
     """
     points, rows = checks
     xyz = strip.xyz[rows]

@@ -19,8 +19,7 @@ from photostrip.triangulation.polynomial.terms import POWERS
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.pipeline.results import StripResult
     from photostrip.pipeline.strips.absolute import OrientedStrip
     from photostrip.points import ControlPoints, PhotoPoints
@@ -28,19 +27,12 @@ if TYPE_CHECKING:
     from photostrip.triangulation.independent_models.formation import FormedModels
     from photostrip.triangulation.independent_models.model_errors import ModelErrors
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
-
 
 def variance_factor(formed: FormedModels) -> tuple[float, str]:
     """Variance factor of the model coordinates: 1 unless the links contradict what is stated.
 
-    Returns
-    -------
-    factor : float
-        Variance found over variance stated, or 1.
-    basis : str
-        ``"a-posteriori"`` or ``"a-priori"``.
+    Returns factor: variance found over variance stated, or 1.
+    Returns basis: ``"a-posteriori"`` or ``"a-priori"``.
     """
     solved = formed.links.solved
     redundancy, squares = int(solved.redundancy.sum()), float(solved.squares.sum())
@@ -55,15 +47,8 @@ def of_models(
 ) -> StripPrecision:
     """Covariances of one strip of independent models.
 
-    Parameters
-    ----------
-    given : ControlPoints
-        All given points; the check points among them are compared with what is found.
-
-    Returns
-    -------
-    StripPrecision
-        Covariances of points and perspective centres, test of the check points. The rotations of the photos are not
+    given: all given points; the check points among them are compared with what is found.
+    Returns covariances of points and perspective centres, test of the check points. The rotations of the photos are not
         known, and neither are their covariances.
     """
     formed, axes = strip.of_models.formed, strip.intermediate.axes

@@ -14,8 +14,7 @@ from photostrip.triangulation.error_propagation import covariances
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.results import StripResult
     from photostrip.pipeline.strips.absolute import OrientedStrip
@@ -23,23 +22,15 @@ if TYPE_CHECKING:
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
-
 
 def of_photos(
     strip: StripResult, oriented: OrientedStrip[StripErrors], observations: PhotoPoints, given: ControlPoints
 ) -> StripPrecision:
     """Covariances of one strip of photos.
 
-    Parameters
-    ----------
-    oriented : OrientedStrip
-        The same strip before its deformation was corrected.
-    observations : PhotoPoints
-        Ideal image coordinates of the project.
-    given : ControlPoints
-        All given points; the check points among them are compared with what is found.
+    oriented: the same strip before its deformation was corrected.
+    observations: ideal image coordinates of the project.
+    given: all given points; the check points among them are compared with what is found.
     """
     frames = oriented.frames
     checks = check_points.check_points(strip, given, observations)

@@ -10,15 +10,11 @@ import numpy as np
 from photostrip.triangulation.error_propagation import control_errors, photo_errors, strip_errors
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.pipeline.results import StripResult
     from photostrip.pipeline.strips.absolute import OrientedStrip
     from photostrip.points import PhotoPoints
     from photostrip.triangulation.error_propagation.derivatives import ErrorRows
-
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,12 +35,8 @@ def propagation(
 ) -> Propagation:
     """Differentiate the strip method for one strip.
 
-    Parameters
-    ----------
-    oriented : OrientedStrip
-        The same strip before its deformation was corrected.
-    observations : PhotoPoints
-        Ideal image coordinates of the project.
+    oriented: the same strip before its deformation was corrected.
+    observations: ideal image coordinates of the project.
     """
     errors, found = oriented.errors, oriented.misclosures
     terms = [axis.terms for axis in strip.polynomial.axes] if strip.polynomial else [(), (), ()]

@@ -13,13 +13,9 @@ from photostrip.pipeline.results import Precision
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.pipeline.results import Adjusted, StripResult
     from photostrip.triangulation.error_propagation import covariances
-
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 
 AT_A_TIME = 100  # control coordinates that two strips share, looked at together
@@ -46,10 +42,7 @@ class StripPrecision:
 def joined(strips: Sequence[StripPrecision], results: Sequence[StripResult], points: Adjusted) -> Precision:
     """Precision of all strips together; a point of several strips is their mean.
 
-    Returns
-    -------
-    Precision
-        Covariances of points and photos. Strips have no image coordinate in common; what their points share are the
+    Returns covariances of points and photos. Strips have no image coordinate in common; what their points share are the
         errors of common control.
     """
     rows = [np.searchsorted(points.number, result.formed.point) for result in results]

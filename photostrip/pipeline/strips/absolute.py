@@ -20,8 +20,7 @@ from photostrip.triangulation.gross_errors.control.strip_at_control import Strip
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.geometry.similarity import Similarity
     from photostrip.pipeline.inputs import ModelStrip, Settings, Strip
@@ -32,8 +31,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.gross_errors.control.control_rejections import ControlRejection
     from photostrip.triangulation.polynomial.correction import Polynomial
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 Errors = TypeVar("Errors")  # derivatives of a placed strip by what was measured
 
@@ -147,16 +144,9 @@ def orient_on_control(
 ) -> OrientedStrip[Errors]:
     """Lay a strip on its control: intermediate frame and absolute orientation.
 
-    Parameters
-    ----------
-    control : ControlPoints
-        Measured control of the project, no check points.
-
-    Raises
-    ------
-    GeometryError, InputError
-        When the control does not determine the similarity, or strip and control are of different hands; the strip is
-        named.
+    control: measured control of the project, no check points.
+    Raises GeometryError, InputError when the control does not determine the similarity, or strip and control are of
+        different hands; the strip is named.
     """
     inside, rows = control_of(stage.formed, control, stage.point_ids)
     try:
@@ -205,17 +195,9 @@ def to_ground(
     A provisional similarity in the frame of azimuth 0 gives the direction of the strip and its scale, hence the
     weights; the final one is made in the frame turned along the strip.
 
-    Parameters
-    ----------
-    control : ControlPoints
-        Control that the strip holds.
-    rows : ndarray of int, shape (n,)
-        Its rows in the points of the strip.
-
-    Raises
-    ------
-    GeometryError
-        When the control does not determine the similarity; the strip is named.
+    control: control that the strip holds.
+    rows: (n,), its rows in the points of the strip.
+    Raises GeometryError when the control does not determine the similarity; the strip is named.
     """
     strip, formed = stage.strip, stage.formed
     if not len(control):
@@ -255,17 +237,9 @@ def to_ground(
 def middle_frame(control: ControlPoints, frames: Sequence[GroundFrame]) -> IntermediateFrame:
     """Return the frame at the control's centre of gravity, X to the north.
 
-    Parameters
-    ----------
-    control : ControlPoints
-        Control; points without plan position do not count, a missing height is taken from the others.
-    frames : sequence of GroundFrame
-        Their ground frames.
-
-    Raises
-    ------
-    GeometryError
-        When no point gives a plan position.
+    control: control; points without plan position do not count, a missing height is taken from the others.
+    frames: their ground frames.
+    Raises GeometryError when no point gives a plan position.
     """
     known = ~np.isnan(control.enu[:, :2]).any(axis=1) & control.use[:, 0]
     chosen = control.take(known)

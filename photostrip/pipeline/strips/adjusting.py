@@ -32,10 +32,7 @@ def adjust_formed(
 ) -> StripResult:
     """Take a formed strip to the ground with its own control.
 
-    Raises
-    ------
-    GeometryError, InputError
-        When the absolute orientation cannot be determined; the strip is named.
+    Raises GeometryError, InputError when the absolute orientation cannot be determined; the strip is named.
     """
     return adjust(reject_wrong_control(orient_on_control(stage, control, frames), settings), settings)
 

@@ -18,15 +18,7 @@ if TYPE_CHECKING:
 def form_strips(inputs: Inputs, observations: PhotoPoints, settings: Settings) -> list[StripStage[Any]]:
     """Form the strips of a project, of photos or of independent models, each by itself.
 
-    Parameters
-    ----------
-    observations : PhotoPoints
-        Ideal image coordinates.
-
-    Raises
-    ------
-    GeometryError, InputError
-        When a pair, a junction or a link cannot be determined; the strip is named.
+    Raises GeometryError, InputError when a pair, a junction or a link cannot be determined; the strip is named.
     """
     if inputs.models is not None:
         return list(_link_strips(inputs.models, settings))

@@ -10,13 +10,11 @@ from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.notes import Note
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.pipeline.inputs import ModelStrip
     from photostrip.points import ModelPoints
     from photostrip.triangulation.independent_models.formation import FormedModels
 
-    Floats = NDArray[np.float64]
 
 ODD_SCALE = 30.0  # ratio of the scale of a model to that of the others
 ANOTHER_UNIT, NOTHING = 100.0, 1e-5  # ratio of residuals to what is stated; below the second there are no errors at all
@@ -26,10 +24,7 @@ WEAK = 12.0  # standard deviations of a coordinate by which a link moves the far
 def link_notes(strip: ModelStrip, measured: ModelPoints, formed: FormedModels) -> list[Note]:
     """Say which links are weak, or contradict themselves, and what seems to stand in another unit.
 
-    Returns
-    -------
-    list of Note
-        In the order of the links.
+    Returns in the order of the links.
     """
     links, shared, models = formed.links, formed.links.shared, formed.models
     notes = _unit_notes(strip, formed)
@@ -98,10 +93,7 @@ def _unit_notes(strip: ModelStrip, formed: FormedModels) -> list[Note]:
 def far_ends(formed: FormedModels) -> Floats:
     """Uncertainty of the far end of the model after each link, in standard deviations of a coordinate.
 
-    Returns
-    -------
-    ndarray, shape (j,)
-        Largest standard deviation of a coordinate over the median one of a coordinate of the model.
+    Returns (j,), largest standard deviation of a coordinate over the median one of a coordinate of the model.
     """
     models, solved = formed.models, formed.links.solved
     rows = np.flatnonzero((models.model > 0) & (models.node < models.points))

@@ -26,8 +26,7 @@ from photostrip.triangulation.independent_models.formation import FormedModels, 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats
     from photostrip.geometry.similarity import Similarity
     from photostrip.pipeline.inputs import ModelStrip, Settings
     from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip
@@ -37,8 +36,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.independent_models.linking import StripModels
     from photostrip.triangulation.polynomial.correction import Polynomial
 
-    Floats = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
     Oriented = OrientedStrip[model_errors.ModelErrors]
     WithControlScreened = ScreenedStrip[model_errors.ModelErrors]
 
@@ -161,10 +158,7 @@ class LinkedModels:
 def link_strip(strip: ModelStrip, measured: ModelPoints, settings: Settings) -> LinkedModels:
     """Link the models of a strip and form it, without any control.
 
-    Parameters
-    ----------
-    measured : ModelPoints
-        Model coordinates of the whole project.
+    measured: model coordinates of the whole project.
     """
     return LinkedModels(strip, measured, form_models(strip, measured, settings))
 
@@ -172,15 +166,8 @@ def link_strip(strip: ModelStrip, measured: ModelPoints, settings: Settings) -> 
 def form_models(strip: ModelStrip, measured: ModelPoints, settings: Settings) -> FormedModels:
     """Link the models of a strip and form it, without any control.
 
-    Parameters
-    ----------
-    measured : ModelPoints
-        Model coordinates of the whole project.
-
-    Raises
-    ------
-    GeometryError, InputError
-        When a link cannot be determined, or models are mirror images of each other.
+    measured: model coordinates of the whole project.
+    Raises GeometryError, InputError when a link cannot be determined, or models are mirror images of each other.
     """
     models = models_of(strip, measured, settings.links)
     shared = linking.common(models)
@@ -200,10 +187,7 @@ def form_models(strip: ModelStrip, measured: ModelPoints, settings: Settings) ->
 def models_of(strip: ModelStrip, measured: ModelPoints, settings: link_screening.LinkSettings) -> StripModels:
     """Take the models of a strip out of those of the project, without what the user drops.
 
-    Returns
-    -------
-    StripModels
-        Rows in the order of the models, then of the points.
+    Returns rows in the order of the models, then of the points.
     """
     number = {name: k for k, name in enumerate(strip.models)}
     place = np.array([number.get(name, -1) for name in measured.model_ids], np.intp)[measured.model]

@@ -15,8 +15,7 @@ from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.pipeline.inputs import ModelStrip, Strip
     from photostrip.points import ControlPoints
     from photostrip.triangulation.absolute_orientation import AbsoluteOrientation
@@ -28,7 +27,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.resection.resection import Resection
     from photostrip.triangulation.strip_formation.strip import FormedStrip
 
-    Floats = NDArray[np.float64]
 
 LONG_STRIP = 25  # models; beyond it polynomials fall far behind a rigorous adjustment
 POLYNOMIAL_MODELS = 15  # models from which on, and
@@ -205,11 +203,8 @@ def covariance_proposal(strip: Strip, correction: Polynomial) -> list[Note]:
 def covariance_notes(strip: Strip, control: ControlPoints, adjusted: CovarianceAdjustment | None) -> list[Note]:
     """Say what the tests of the adjustment with the covariance of the strip found.
 
-    Returns
-    -------
-    list of Note
-        Doubtful control, the worst point only: it raises the test values of its neighbours; and a failed test of the
-        whole.
+    Returns doubtful control, the worst point only: it raises the test values of its neighbours; and a failed test of
+        the whole.
     """
     if adjusted is None:
         return []

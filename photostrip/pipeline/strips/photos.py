@@ -24,8 +24,7 @@ from photostrip.triangulation.resection.resection import Resection, resect, with
 from photostrip.triangulation.strip_formation.strip import FormedStrip, form_from_pairs
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.errors import InputError
     from photostrip.geometry.similarity import Similarity
     from photostrip.pipeline.inputs import Settings, Strip
@@ -33,8 +32,6 @@ if TYPE_CHECKING:
     from photostrip.points import PhotoPoints
     from photostrip.triangulation.polynomial.correction import Polynomial
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
     Oriented = OrientedStrip[strip_errors.StripErrors]
     WithControlScreened = ScreenedStrip[strip_errors.StripErrors]
 
@@ -228,15 +225,8 @@ class _Rays:
 def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> FormedPhotos:
     """Orient the pairs of a strip and form it, without any control.
 
-    Parameters
-    ----------
-    observations : PhotoPoints
-        Ideal image coordinates of the whole project.
-
-    Raises
-    ------
-    GeometryError, InputError
-        When a pair or a junction cannot be determined; the strip is named.
+    observations: ideal image coordinates of the whole project.
+    Raises GeometryError, InputError when a pair or a junction cannot be determined; the strip is named.
     """
     sigma = _sigma(strip, observations)
     pairs = collect_pairs(observations, strip.photos, strip.camera.principal_distance)

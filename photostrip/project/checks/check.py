@@ -36,15 +36,13 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Numbers
     from photostrip.formats.measured.control import ControlTable
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.notes import Finding, Note
     from photostrip.points import PhotoPoints
     from photostrip.project.loading import Project
 
-    Floats = NDArray[np.float64]
     Document = dict[str, Any]
 
 LEAST_PLAN, LEAST_HEIGHT = 2, 3  # control coordinates that seven parameters need
@@ -274,7 +272,7 @@ def _frames(project: Project, faults: list[Fault]) -> list[Document]:
     return found
 
 
-def _decoded(project: Project, frame: GroundFrame, rows: NDArray[np.intp]) -> Document:
+def _decoded(project: Project, frame: GroundFrame, rows: Numbers) -> Document:
     """One point to longitude, latitude, height and back; the size of the convergence over all points."""
     control = project.inputs.control
     if not len(rows):

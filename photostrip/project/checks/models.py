@@ -12,13 +12,11 @@ from photostrip.project.yaml.document import fault_at, key_path
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Numbers
     from photostrip.errors import Fault
     from photostrip.pipeline import Inputs, MeasuredModels
     from photostrip.project.loading import Project
 
-    Numbers = NDArray[np.intp]
     Document = dict[str, Any]
 
 MICROMETRES = 1000.0  # in a millimetre

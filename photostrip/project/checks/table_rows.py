@@ -14,13 +14,13 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from photostrip.arrays import Flags, Numbers
     from photostrip.formats.measured.control import ControlTable
     from photostrip.formats.measured.measurements import Measurements
     from photostrip.pipeline import Inputs, MeasuredModels
     from photostrip.project.loading import Project
     from photostrip.project.tables import Tables
 
-    Numbers = NDArray[np.intp]
     Document = dict[str, Any]
 
 IN_NO_STRIP = "its photo belongs to no strip"
@@ -37,7 +37,7 @@ class Reason(NamedTuple):
     """Why rows are not used, which of them, and whose they are."""
 
     why: str
-    rows: NDArray[np.bool_]
+    rows: Flags
     ids: NDArray[np.object_]
 
 
@@ -56,7 +56,7 @@ def observations_used(inputs: Inputs) -> Numbers:
     key = observations.point * (int(starts[-1]) + 1) + position
     present = np.sort(key)
 
-    def shown(wanted: Numbers) -> NDArray[np.bool_]:
+    def shown(wanted: Numbers) -> Flags:
         at = np.searchsorted(present, wanted)
         return np.asarray(present[np.minimum(at, len(present) - 1)] == wanted)
 

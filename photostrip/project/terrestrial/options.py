@@ -34,13 +34,11 @@ from photostrip.terrestrial.orientation import FREE, Sightings
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.formats.text.tables import Column
     from photostrip.notes import Note
     from photostrip.project.schema.values import Range
 
-    Floats = NDArray[np.float64]
 
 STEEPEST = np.radians(89.9999)
 GIMBAL = 1e-6  # cosine of the elevation of the camera below which azimuth and roll are one

@@ -24,12 +24,9 @@ from photostrip.project.terrestrial.ranges import COORDINATE, IMAGE_SIGMA, MILLI
 from photostrip.terrestrial.monitoring import Series
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats
     from photostrip.formats.text.findings import Findings
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 LAYOUTS = {"coordinates": COORDINATES, "pseudo_parallaxes": PSEUDO_PARALLAXES}
 REFERENCE, SECOND = "first", "second"  # names of epochs that have none
@@ -60,10 +57,7 @@ class Wanted:
 def read_series(file: str, table: Table, centre: Floats, wanted: Wanted, findings: Findings) -> Series | None:
     """Read a table of measurements, in mm, reduced to the principal points, z up; None when there are faults.
 
-    Parameters
-    ----------
-    centre : ndarray, shape (2, 2)
-        Principal points of the left and right camera in mm, z up.
+    centre: (2, 2), principal points of the left and right camera in mm, z up.
     """
     reader = read_coordinates if table.kind == "coordinates" else read_pseudo_parallaxes
     read = reader(file, findings)
@@ -128,7 +122,7 @@ def _epochs(read: EpochTable, kind: str, wanted: Wanted, findings: Findings) -> 
     return epochs
 
 
-def _stable(read: EpochTable, stable: tuple[str, ...], findings: Findings) -> NDArray[np.bool_]:
+def _stable(read: EpochTable, stable: tuple[str, ...], findings: Findings) -> Flags:
     """Mark the points that are taken not to move, and refuse those that are not measured."""
     for number, name in enumerate(stable):
         if name not in read.points:

@@ -27,11 +27,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.notes import Note
 
-    Floats = NDArray[np.float64]
 
 NORMAL_AXES = ("right", "ahead", "up")
 

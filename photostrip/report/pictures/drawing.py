@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
+
+    from photostrip.arrays import Floats
 
 INSTALL = "pip install photostrip[report]"
 
@@ -72,9 +73,7 @@ def as_png(figure: Figure) -> bytes:
     return stream.getvalue()
 
 
-def isolines(
-    axes: Axes, x: NDArray[np.float64], y: NDArray[np.float64], surface: NDArray[np.float64], *, filled: bool
-) -> None:
+def isolines(axes: Axes, x: Floats, y: Floats, surface: Floats, *, filled: bool) -> None:
     """Draw lines of equal value with their numbers; none on a plane.
 
     The surface has a row for each y. Filled areas are dark where the value is small.

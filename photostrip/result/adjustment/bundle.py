@@ -13,8 +13,7 @@ from photostrip.triangulation.bundle.quality import reliability
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.pipeline import Result
     from photostrip.pipeline.results import Bundle
     from photostrip.result.numbers import Document
@@ -22,7 +21,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.bundle.settings import BundleSettings
     from photostrip.triangulation.bundle.solution import BundleSolution
 
-    Floats = NDArray[np.float64]
 
 SHOWN = 10  # observations named as the weakest and as the worst
 MICROMETRES = 1000.0  # in a millimetre

@@ -13,13 +13,10 @@ from photostrip.triangulation.absolute_orientation import Targets
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.results import StripResult
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 MILLIMETRES = 1000.0  # per metre
 
@@ -52,14 +49,9 @@ class ModelDeformation:
 def model_deformations(strip: StripResult, frames: Sequence[GroundFrame]) -> tuple[ModelDeformation, ...]:
     """Estimate twist and bending of every model that has the height control for it.
 
-    Returns
-    -------
-    tuple of ModelDeformation
-        In flight order; models with less than five height control points, or with points at fewer than three
+    Returns in flight order; models with less than five height control points, or with points at fewer than three
         distances along the base, are left out.
 
-    Notes
-    -----
     Each model counts as it was measured, carried to the ground by the similarity of the whole strip: its shift and
     its tilts are estimated too, and a polynomial would bend it. Check points take no part.
 

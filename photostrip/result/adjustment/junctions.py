@@ -12,12 +12,10 @@ from photostrip.triangulation.strip_formation.strip import FormedStrip
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.pipeline import Result, StripResult
     from photostrip.result.numbers import Document
 
-    Floats = NDArray[np.float64]
 
 DIRECTIONS = ("along", "across", "up")
 PPM = 1e6
@@ -26,11 +24,8 @@ PPM = 1e6
 def discrepancies(strip: StripResult) -> Floats:
     """Differences of what neighbouring models have in common, after minus before.
 
-    Returns
-    -------
-    ndarray, shape (t, 3)
-        Metres along the strip, to its left and up, of every pass point of every junction, or of everything common to
-        two independent models; NaN where its rays were left out.
+    Returns (t, 3), metres along the strip, to its left and up, of every pass point of every junction, or of everything
+        common to two independent models; NaN where its rays were left out.
     """
     formed = strip.of_photos.formed if strip.model_stages is None else strip.of_models.formed
     common = formed.junctions if isinstance(formed, FormedStrip) else formed.links.shared

@@ -13,12 +13,10 @@ from photostrip.result.quantities import grouped, record, records
 from photostrip.triangulation.independent_models.link_screening import detectable
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Numbers
     from photostrip.pipeline import Result, StripResult
     from photostrip.result.numbers import Document
 
-    Numbers = NDArray[np.intp]
 
 AXES = ("x", "y", "z")
 

@@ -14,13 +14,9 @@ from photostrip.triangulation.relative_orientation.solution import ELEMENTS
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.pipeline import Result, StripResult
     from photostrip.result.numbers import Document
-
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,8 +16,7 @@ from photostrip.triangulation.gross_errors.rays.strip_screening import SEVERAL_R
 from photostrip.triangulation.strip_formation.scale_ratios import depths
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags
     from photostrip.pipeline import Result, StripResult
     from photostrip.pipeline.results import Bundle
     from photostrip.points import PhotoPoints
@@ -26,7 +25,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.gross_errors.control.control_rejections import ControlRejection
     from photostrip.triangulation.gross_errors.pairs.screening import PairRejection
 
-    Flags = NDArray[np.bool_]
 
 MICROMETRES = 1000.0  # in a millimetre
 ANOTHER_POINT = 0.05  # of the extent of a model: an error as large is one of identity

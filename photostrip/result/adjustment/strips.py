@@ -18,13 +18,11 @@ from photostrip.result.quantities import record
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.pipeline import Result, StripResult
     from photostrip.result.numbers import Document
     from photostrip.triangulation.polynomial.correction import Polynomial
 
-    Floats = NDArray[np.float64]
 
 AXES = ("x", "y", "z")
 

@@ -12,14 +12,11 @@ from photostrip.result.numbers import natural_rank
 from photostrip.result.quantities import records
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline import Result
     from photostrip.result.numbers import Document
 
-    Floats = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
 
 CONTROL = "control"  # kind of observations of a bundle adjustment
 LEAST_SHARE = 0.1  # of its standard deviation that a control point shows of itself at least

@@ -12,14 +12,10 @@ from photostrip.result.points.precision import point_columns
 from photostrip.result.quantities import coordinate_decimals, records
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline import Result
     from photostrip.result.numbers import Document
-
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 
 def coordinates(frame: GroundFrame, enu: Floats) -> Document:
@@ -48,12 +44,8 @@ def frame_of(result: Result) -> Document:
 def points_of(result: Result, image_rms: Floats, rank: Numbers) -> list[Document]:
     """Return the list ``points``, in natural order of their ids.
 
-    Parameters
-    ----------
-    image_rms : ndarray, shape (n,)
-        Root mean square image residual of each point as numbered in the observations, mm.
-    rank : ndarray of int, shape (n,)
-        Place of each of them in natural order.
+    image_rms: (n,), root mean square image residual of each point as numbered in the observations, mm.
+    rank: (n,), place of each of them in natural order.
     """
     points, ids = result.points, result.refined.observations.point_ids
     models = np.zeros(len(ids), np.intp)

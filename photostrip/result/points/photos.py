@@ -18,14 +18,9 @@ from photostrip.triangulation.resection.collinearity import project
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.pipeline import Result, Strip, StripResult
     from photostrip.result.numbers import Document
-
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
-    Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,10 +100,7 @@ def residuals_of(result: Result, images: Sequence[ImageResiduals]) -> list[Docum
 def point_rms(result: Result, images: Sequence[ImageResiduals]) -> Floats:
     """Root mean square image residual of every point over all its photos, mm; NaN where it took no part.
 
-    Returns
-    -------
-    ndarray, shape (n,)
-        By number of the point in the observations.
+    Returns (n,), by number of the point in the observations.
     """
     observations = result.refined.observations
     squares, count = np.zeros(len(observations.point_ids)), np.zeros(len(observations.point_ids))

@@ -13,13 +13,10 @@ from photostrip.result.quantities import record, records
 from photostrip.statistics import chi2_quantile, normal_quantile
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.pipeline import Result, StripResult
     from photostrip.result.numbers import Document
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 UNITS = {"deg": 180 / np.pi, "gon": 200 / np.pi, "rad": 1.0}
 UPPER = np.triu_indices(6)
@@ -34,15 +31,8 @@ def turned(covariances: Floats, axes: Floats) -> Floats:
 def plan_and_height(level: Floats) -> Floats:
     """Return standard deviations in plan (of both coordinates together) and in height.
 
-    Parameters
-    ----------
-    level : ndarray, shape (n, 3, 3)
-        Covariances along east, north and up.
-
-    Returns
-    -------
-    ndarray, shape (n, 2)
-        Square roots of the variances of east plus north, and of up.
+    level: (n, 3, 3), covariances along east, north and up.
+    Returns (n, 2), square roots of the variances of east plus north, and of up.
     """
     with np.errstate(invalid="ignore"):
         return np.sqrt(np.column_stack([level[:, 0, 0] + level[:, 1, 1], level[:, 2, 2]]))
@@ -51,13 +41,9 @@ def plan_and_height(level: Floats) -> Floats:
 def ellipses(level: Floats) -> tuple[Floats, Floats]:
     """Return standard error ellipses in plan, from covariances along east, north and up.
 
-    Returns
-    -------
-    axes : ndarray, shape (n, 2)
-        Semi-axes, the larger one first. The true point lies inside with a probability of 39 %, inside the ellipse
-        of 2.45 times the size with 95 %.
-    azimuth : ndarray, shape (n,)
-        Direction of the larger one, clockwise from north, radians, 0 to pi.
+    Returns axes: (n, 2), semi-axes, the larger one first. The true point lies inside with a probability of 39 %, inside
+        the ellipse of 2.45 times the size with 95 %.
+    Returns azimuth: (n,), direction of the larger one, clockwise from north, radians, 0 to pi.
     """
     east, north, mixed = level[:, 0, 0], level[:, 1, 1], level[:, 0, 1]
     middle, reach = (east + north) / 2, np.hypot((north - east) / 2, mixed)
@@ -98,18 +84,11 @@ def photo_columns(result: Result, place: Floats, rotations: Floats, given: Float
 
     An angle's rows take the small rotation about the axes of the output to the angles of the system.
 
-    Parameters
-    ----------
-    place, rotations : ndarray, shapes (m, 3), (m, 3, 3)
-        Perspective centres in the Cartesian frame; photo to the axes of the output at the centres.
-    given : ndarray, shape (m, 6, 6)
-        Covariances in the axes of the Cartesian frame, as in ``pipeline.Precision``.
-
-    Returns
-    -------
-    dict
-        ``sigma`` with x, y, z in metres and the angles in their exported unit; ``covariance``, the upper triangle, row
-        by row, of the matrix of x, y, z and the three angles.
+    place, rotations: (m, 3), (m, 3, 3), perspective centres in the Cartesian frame; photo to the axes of the output at
+        the centres.
+    given: (m, 6, 6), covariances in the axes of the Cartesian frame, as in ``pipeline.Precision``.
+    Returns ``sigma`` with x, y, z in metres and the angles in their exported unit; ``covariance``, the upper triangle,
+        row by row, of the matrix of x, y, z and the three angles.
     """
     axes = result.output.axes_at(place)
     turn = np.zeros((len(place), 6, 6))

@@ -16,14 +16,11 @@ from photostrip.triangulation.relative_orientation.pairs import collect_pairs
 from photostrip.triangulation.relative_orientation.solution import iterate_elements, solve_elements, start_values
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.geometry.similarity import Similarity
     from photostrip.pipeline.results import Result, StripResult
     from photostrip.triangulation.relative_orientation.pairs import Pairs
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 START_DIGITS = 1  # of radians: where a pair starts whose start values do not lead to its solution
 SAME_ELEMENTS = 1e-6  # radians

@@ -16,15 +16,13 @@ from photostrip.triangulation.relative_orientation.solution import ELEMENTS, bas
 from photostrip.triangulation.strip_formation.intersection import intersect
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.geometry.similarity import Similarity
     from photostrip.pipeline import Result
     from photostrip.pipeline.results import StripResult
     from photostrip.result.numbers import Document
     from photostrip.result.trace.replay import PairRound, SimilarityStep
 
-    Floats = NDArray[np.float64]
 
 SCHEMA = 1
 UNITS = {"deg": 180 / np.pi, "gon": 200 / np.pi, "rad": 1.0}

@@ -12,15 +12,12 @@ from photostrip.triangulation.bundle.observations.collinearity import view
 from photostrip.triangulation.bundle.structure import band_structure
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.triangulation.bundle.observations.calibration import Calibrated
     from photostrip.triangulation.bundle.observations.collinearity import Rays
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.observations.ray_batches import Batch
     from photostrip.triangulation.bundle.structure import BandStructure
-
-    Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

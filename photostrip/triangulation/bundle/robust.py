@@ -15,12 +15,10 @@ from photostrip.triangulation.bundle.selection import restarted
 from photostrip.triangulation.bundle.solve import solve
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.solution import BundleSolution
 
-    Floats = NDArray[np.float64]
 
 REWEIGHTINGS = 6
 TUNING = 3.0  # standardised residuals up to which a ray keeps its weight

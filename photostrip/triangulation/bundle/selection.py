@@ -10,13 +10,9 @@ import numpy as np
 from photostrip.triangulation.bundle.observations.problem import BundleProblem, ImageObservations, StartValues
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags
     from photostrip.triangulation.bundle.solution import BundleSolution
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
-    Flags = NDArray[np.bool_]
 
 LEAST_RAYS = 2
 

@@ -19,15 +19,11 @@ from photostrip.triangulation.resection.ray_intersection import intersect_points
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.settings import BundleSettings
     from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
-    Flags = NDArray[np.bool_]
 
 SEARCH_ROUNDS = 200  # of testing and taking out; each takes out one error of every neighbourhood
 READMISSIONS = 3
@@ -278,14 +274,10 @@ def predicted(
 ) -> tuple[Floats, Floats]:
     """Test rays that take no part against what the others give.
 
-    Returns
-    -------
-    value : ndarray, shape (n,)
-        Larger one of the two standardised differences of each ray outside; infinite where its point has no place, NaN
-        for rays inside. Correlations between photo and point are left out, so that the values are rather too small
-        than too large.
-    size : ndarray, shape (n,)
-        That difference, measured minus predicted, mm; NaN where there is none.
+    Returns value: (n,), larger one of the two standardised differences of each ray outside; infinite where its point
+        has no place, NaN for rays inside. Correlations between photo and point are left out, so that the values are
+        rather too small than too large.
+    Returns size: (n,), that difference, measured minus predicted, mm; NaN where there is none.
     """
     solution, precision = found
     value, size = np.full(len(problem.images), np.nan), np.full(len(problem.images), np.nan)

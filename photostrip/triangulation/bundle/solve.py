@@ -26,15 +26,13 @@ from photostrip.triangulation.bundle.parameters import Parameters, ParameterStep
 from photostrip.triangulation.bundle.solution import BundleSolution, IterationStep
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.triangulation.bundle.normal_equations.point_elimination import Eliminated
     from photostrip.triangulation.bundle.normal_equations.reduced import Reduced
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.observations.ray_batches import Batch
     from photostrip.triangulation.bundle.parameters import PreparedProblem
 
-    Floats = NDArray[np.float64]
 
 FIRST_DAMPING = 1e-4
 MORE, LESS = 10.0, 0.1  # factors of the damping after a refused and after a taken step
@@ -58,11 +56,8 @@ def solve(problem: BundleProblem, settings: IterationSettings | None = None) -> 
     Without control and positions the datum comes from inner constraints on the points: the adjusted points have no
     shift, rotation and change of scale against their start.
 
-    Raises
-    ------
-    GeometryError
-        When points, photos or the datum cannot be determined, by name (``bundle-rays``, ``bundle-rank``), or when
-        the steps do not come to an end (``bundle-diverged``).
+    Raises GeometryError when points, photos or the datum cannot be determined, by name (``bundle-rays``,
+        ``bundle-rank``), or when the steps do not come to an end (``bundle-diverged``).
     """
     settings = settings or IterationSettings()
     defects.refuse_repeated(problem)

@@ -11,12 +11,9 @@ import numpy as np
 from photostrip.triangulation.bundle.observations.ray_batches import Batch, SortedRays, arrange, sort_rays
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.triangulation.bundle.observations.problem import BundleProblem, ControlObservations
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 NARROW = 12  # photos: a band as narrow as this is not worth another order
 TABLE = 3_000  # photos: up to here pairs are marked in a square table, which is faster than sorting them

@@ -18,15 +18,11 @@ from photostrip.triangulation.error_propagation.covariances import image_varianc
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.points import PhotoPoints
     from photostrip.triangulation.absolute_orientation import AbsoluteOrientation, Targets
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.strip import FormedStrip
-
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 
 MOST_PASSES = 10
@@ -54,17 +50,9 @@ class CovarianceAdjustment:
     def by_control(self, points: Numbers, coordinates: Numbers) -> Floats:
         """Return what errors of control coordinates subtract from points.
 
-        Parameters
-        ----------
-        points : ndarray of int, shape (n,)
-            Points of the strip.
-        coordinates : ndarray of int, shape (c,)
-            Rows of ``control``.
-
-        Returns
-        -------
-        ndarray, shape (n, 3, c)
-            Derivatives, intermediate frame.
+        points: (n,), points of the strip.
+        coordinates: (c,), rows of ``control``.
+        Returns (n, 3, c), derivatives, intermediate frame.
         """
         rows = self.system.errors.points.take(points)
         return prediction.influence(self.system, rows, self.system.conditions.of_control(coordinates))
@@ -91,10 +79,7 @@ class StripOnControl:
 def adjust(start: StripOnControl, settings: strip_conditions.CovarianceSettings) -> CovarianceAdjustment:
     """Adjust a strip with its own covariance.
 
-    Parameters
-    ----------
-    settings : strip_conditions.CovarianceSettings
-        Which misclosures are distributed.
+    settings: which misclosures are distributed.
     """
     factor, basis = image_variance(start.orientation, start.sigma)
     run = _Adjustment(start, settings, factor)

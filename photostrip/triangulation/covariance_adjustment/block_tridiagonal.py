@@ -13,9 +13,7 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
+    from photostrip.arrays import Floats
 
 
 class InverseRow(NamedTuple):
@@ -60,17 +58,9 @@ class Factors:
 def eliminate(diagonal: Floats, beside: Floats) -> Factors:
     """Eliminate block after block.
 
-    Parameters
-    ----------
-    diagonal : ndarray, shape (n, b, b)
-        Blocks D on the diagonal, symmetric.
-    beside : ndarray, shape (n, b, b)
-        Blocks B to the right of them; the last does not count.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        When a pivot block is singular.
+    diagonal: (n, b, b), blocks D on the diagonal, symmetric.
+    beside: (n, b, b), blocks B to the right of them; the last does not count.
+    Raises numpy.linalg.LinAlgError when a pivot block is singular.
     """
     inverses, shares = np.empty_like(diagonal), np.zeros_like(beside)
     pivot = diagonal[0]

@@ -21,16 +21,13 @@ from photostrip.triangulation.error_propagation.strip_errors import scale_shares
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.geometry.similarity import Similarity
     from photostrip.triangulation.error_propagation.control_errors import Misclosures
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.strip import FormedStrip
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 JUNCTION, CONTROL, DISTANCE = 0, 1, 2
 
@@ -110,14 +107,9 @@ def conditions(
 ) -> Conditions:
     """Collect all conditions of a strip.
 
-    Parameters
-    ----------
-    control : Misclosures
-        Control coordinates that count.
-    misclosures : ndarray, shape (w,)
-        Strip minus given there, metres.
-    distances : bool
-        Whether distances of pass points from the common centres count.
+    control: control coordinates that count.
+    misclosures: (w,), strip minus given there, metres.
+    distances: whether distances of pass points from the common centres count.
     """
     local = LocalSimilarities.of(errors)
     parts = [_junctions(errors, local), _control(control, misclosures, local)]

@@ -32,13 +32,10 @@ from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, E
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.triangulation.covariance_adjustment.system import System
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 LEVEL = 0.03  # probability that any control coordinate of a sound strip is called doubtful
 CHECKED = 1e-6  # part of a control coordinate's variance that the others must check
@@ -96,12 +93,7 @@ def predict(found: System, tables: Sequence[ErrorRows]) -> tuple[list[Predicted]
     [lambda; y] and Cov = C - b^T K^-1 b. A row has to do with its own block and the two beside it, so that only the
     inverse near the diagonal is needed.
 
-    Returns
-    -------
-    predicted : list of Predicted
-        For each table of rows.
-    cofactors : ndarray, shape (n,)
-        Of the correlates of the conditions.
+    Returns cofactors: (n,), of the correlates of the conditions.
     """
     orders = [np.argsort(rows.first, kind="stable") for rows in tables]
     columns = [_Columns.of(found, rows.take(order)) for rows, order in zip(tables, orders, strict=True)]

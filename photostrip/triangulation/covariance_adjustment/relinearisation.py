@@ -26,8 +26,7 @@ from photostrip.triangulation.strip_formation.strip import model_points, place_m
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.points import PhotoPoints
     from photostrip.triangulation.covariance_adjustment.system import System
     from photostrip.triangulation.error_propagation.derivatives import ErrorRows
@@ -35,8 +34,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.scale_transfer import Junctions
     from photostrip.triangulation.strip_formation.strip import FormedStrip
-
-    Floats = NDArray[np.float64]
 
 
 def image_errors(found: System) -> Floats:

@@ -19,13 +19,9 @@ from photostrip.triangulation.error_propagation.covariances import images_with_c
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, REACH, ErrorRows, ranges
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.triangulation.covariance_adjustment.conditions import Conditions
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
-
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)

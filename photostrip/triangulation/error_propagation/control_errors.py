@@ -20,13 +20,9 @@ from photostrip.triangulation.polynomial.terms import POWERS
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.points import ControlPoints
     from photostrip.triangulation.error_propagation.derivatives import ErrorRows
-
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,14 +70,9 @@ class FitOperator:
 def misclosures(points: ErrorRows, control: ControlPoints, control_rows: Numbers, axes: Floats) -> Misclosures:
     """Rows of derivatives of the misclosures, in the order of the points, each with its coordinates that count.
 
-    Parameters
-    ----------
-    control : ControlPoints
-        The control, with standard deviations along `axes`.
-    control_rows : ndarray of int, shape (c,)
-        Its rows in `points`.
-    axes : ndarray, shape (c, 3, 3)
-        Directions along which it is compared, rows, in the intermediate frame.
+    control: the control, with standard deviations along `axes`.
+    control_rows: (c,), its rows in `points`.
+    axes: (c, 3, 3), directions along which it is compared, rows, in the intermediate frame.
     """
     point, axis = np.nonzero(control.use)
     direction = axes[point, axis]
@@ -99,16 +90,10 @@ def fit_operator(
 ) -> FitOperator:
     """Operator of the similarity and the polynomials, M = [M_s; M_p (I - A M_s)], A the design of the similarity.
 
-    Parameters
-    ----------
-    weight : ndarray, shape (c, 3)
-        Weights of the control coordinates in the fit, as ``absolute_orientation.weights`` gives them.
-    xyz : ndarray, shape (c, 3)
-        Control points after the similarity, intermediate frame, metres.
-    terms : sequence of tuple of str
-        Terms of the polynomials of X, Y, Z; all empty without.
-    origin : ndarray, shape (3,)
-        Origin of the similarities.
+    weight: (c, 3), weights of the control coordinates in the fit, as ``absolute_orientation.weights`` gives them.
+    xyz: (c, 3), control points after the similarity, intermediate frame, metres.
+    terms: terms of the polynomials of X, Y, Z; all empty without.
+    origin: (3,), origin of the similarities.
     """
     design, share = found.rows.by_similarity[:, 0], np.sqrt(weight[found.point, found.axis])
     size = np.abs(design).max(axis=0)

@@ -21,14 +21,11 @@ from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, R
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.triangulation.error_propagation.control_errors import Misclosures
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
     from photostrip.triangulation.relative_orientation.orientation import Orientation
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 A_PRIORI, A_POSTERIORI = "a-priori", "a-posteriori"
 LEVEL = 0.01  # of the test that keeps the stated standard deviation of the image coordinates
@@ -104,12 +101,8 @@ def of_parameters(
 ) -> ParameterCovariances:
     """Covariances of the parameters M w fitted to the control, for a variance factor of 1 of the image coordinates.
 
-    Parameters
-    ----------
-    operator : ndarray, shape (t, w)
-        M, parameters by misclosures.
-    factor : float
-        Variance factor of the image coordinates; that of the control is 1.
+    operator: (t, w), M, parameters by misclosures.
+    factor: variance factor of the image coordinates; that of the control is 1.
     """
     sums = _sums(errors, found.rows, operator)
     with_images = _by_photo(errors, sums.by_component, np.arange(len(errors.images.row)))
@@ -246,10 +239,7 @@ def _formed(errors: StripErrors, rows: ErrorRows, along: SimilarityCovariances) 
 def images_with_components(errors: StripErrors, rows: ErrorRows) -> Floats:
     """Covariances of the image coordinates that enter rows directly with components of models near by.
 
-    Returns
-    -------
-    ndarray, shape (n, s + 2 + 2, d, 6)
-        With the components of the models ``first - 2`` to ``first + s + 1``.
+    Returns (n, s + 2 + 2, d, 6), with the components of the models ``first - 2`` to ``first + s + 1``.
     """
     n, slots, size, _ = rows.by_component.shape
     result = np.zeros((n, slots + 2 * REACH, size, COMPONENTS))

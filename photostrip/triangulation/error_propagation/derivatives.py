@@ -13,14 +13,11 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.triangulation.error_propagation.pair_errors import PairErrors
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.strip import FormedStrip
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 COMPONENTS = 6  # of the error of a model: five elements of its pair, logarithm of the scale that it hands on
 ELEMENTS, SCALE = slice(0, 5), 5

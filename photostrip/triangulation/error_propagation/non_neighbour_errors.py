@@ -14,12 +14,8 @@ from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ErrorRows
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.triangulation.error_propagation.derivatives import PlacedStrip
-
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 
 def with_bridges(points: ErrorRows, strip: PlacedStrip) -> ErrorRows:

@@ -17,12 +17,10 @@ from photostrip.geometry.rotation import angle_rates, from_alpha_omega_kappa
 from photostrip.triangulation.relative_orientation.solution import base_rays, linearised_parallaxes, normal_matrices
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.relative_orientation.pairs import Pairs
 
-    Floats = NDArray[np.float64]
 
 SYSTEM = "alpha-omega-kappa"
 LEFT, RIGHT = slice(0, 2), slice(2, 5)  # elements that turn the left and the right photo

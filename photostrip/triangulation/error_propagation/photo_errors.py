@@ -14,13 +14,9 @@ from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, E
 from photostrip.triangulation.resection.collinearity import partials
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
     from photostrip.triangulation.resection.resection import Resection
-
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +29,7 @@ class Sightings:
     xyz: Floats  # (e, 3): adjusted point, metres
     focal: float  # principal distance, mm
 
-    def take(self, rows: Numbers | NDArray[np.bool_]) -> Sightings:
+    def take(self, rows: Numbers | Flags) -> Sightings:
         """Select some."""
         return Sightings(self.photo[rows], self.point[rows], self.image[rows], self.xyz[rows], self.focal)
 

@@ -36,15 +36,11 @@ from photostrip.triangulation.error_propagation.derivatives import (
 from photostrip.triangulation.error_propagation.non_neighbour_errors import with_bridges
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.geometry.similarity import Similarity
     from photostrip.triangulation.error_propagation.pair_errors import PairErrors
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.strip import FormedStrip
-
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,14 +67,9 @@ def differentiate_strip(
 ) -> StripErrors:
     """Rows of derivatives of a formed strip.
 
-    Parameters
-    ----------
-    similarity : Similarity
-        From the strip to the frame of the ground.
-    position : ndarray of int, shape (k,)
-        Place in the strip of the photo of every image point in the observations.
-    sigma : ndarray, shape (k, 2)
-        Standard deviations of all image points in the observations, mm.
+    similarity: from the strip to the frame of the ground.
+    position: (k,), place in the strip of the photo of every image point in the observations.
+    sigma: (k, 2), standard deviations of all image points in the observations, mm.
     """
     rotations = similarity.rotation @ formed.rotations
     pairs = pair_errors.differentiate_pairs(orientation, rotations[:-1], similarity.scale * formed.scale)
@@ -107,10 +98,8 @@ def scale_shares(orientation: Orientation, formed: FormedStrip, pairs: PairError
     The scale k is the weighted mean of the ratios r = |b| / |a| of the vectors before and after: d ln k = sum p r
     (b . db / |b|^2 - a . da / |a|^2) / sum p r. The shares of ``after`` come without their sign.
 
-    Returns
-    -------
-    before, after : ndarray, shape (t, 3)
-        By the point in the model before and after the junction, 1/metres; 0 for pass points that are not used.
+    Returns before, after: (t, 3), by the point in the model before and after the junction, 1/metres; 0 for pass points
+        that are not used.
     """
     joined = formed.junctions
     shares = np.where(joined.used, joined.weight * joined.ratio, 0.0)

@@ -19,10 +19,8 @@ from photostrip.points import frozen
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
+    from photostrip.arrays import Floats, Numbers
 
-    Floats = NDArray[np.float64]
-    Ends = NDArray[np.intp]
 
 PLACES = {
     f"{vertical}-{horizontal}".strip("-"): (x, y)
@@ -58,23 +56,12 @@ def solve(
 ) -> Certificate:
     """Coordinates of fiducial marks, mm, from measured distances: least squares with all distances of equal weight.
 
-    Parameters
-    ----------
-    distances : sequence of (str, str, float)
-        Two marks and the distance between them, mm.
-    nominal : mapping of str to tuple of float, optional
-        Nominal coordinates of the marks, mm: a start, and the place of the figure.
-    places : mapping of str to str, optional
-        Instead, where on the photo each mark is: a key of ``PLACES``.
+    distances: two marks and the distance between them, mm.
+    nominal: nominal coordinates of the marks, mm: a start, and the place of the figure.
+    places: instead, where on the photo each mark is: a key of ``PLACES``.
+    Raises InputError with a fault for each distance between marks that are not known or not two, and when the distances
+        do not fix the figure, or contradict each other so much that there is none.
 
-    Raises
-    ------
-    InputError
-        With a fault for each distance between marks that are not known or not two, and when the distances do not
-        fix the figure, or contradict each other so much that there is none.
-
-    Notes
-    -----
     Source: derived; trilateration with inner constraints.
     """
     start = {name: PLACES[place] for name, place in (places or {}).items()} if nominal is None else dict(nominal)
@@ -94,7 +81,7 @@ def solve(
     return Certificate(marks, residuals, sigma0, redundancy)
 
 
-def _distances(distances: Sequence[tuple[str, str, float]], names: list[str]) -> tuple[Ends, Floats]:
+def _distances(distances: Sequence[tuple[str, str, float]], names: list[str]) -> tuple[Numbers, Floats]:
     faults = []
     for number, (first, second, _) in enumerate(distances):
         unknown = [name for name in (first, second) if name not in names]
@@ -110,7 +97,7 @@ def _distances(distances: Sequence[tuple[str, str, float]], names: list[str]) ->
     return ends.reshape(-1, 2), np.array([length for *_, length in distances], float)
 
 
-def _lengths(xy: Floats, ends: Ends) -> tuple[Floats, Floats]:
+def _lengths(xy: Floats, ends: Numbers) -> tuple[Floats, Floats]:
     """Distances, and their derivatives by all coordinates, shape (d, 2 n)."""
     arms = xy[ends[:, 1]] - xy[ends[:, 0]]
     lengths = np.linalg.norm(arms, axis=1)
@@ -121,7 +108,7 @@ def _lengths(xy: Floats, ends: Ends) -> tuple[Floats, Floats]:
     return lengths, design.reshape(len(ends), -1)
 
 
-def _adjusted(xy: Floats, ends: Ends, given: Floats) -> Floats:
+def _adjusted(xy: Floats, ends: Numbers, given: Floats) -> Floats:
     """Least squares with inner constraints: the figure moves as little as possible from where it started."""
     unknowns = 2 * len(xy) - 3
     for _ in range(ITERATIONS):

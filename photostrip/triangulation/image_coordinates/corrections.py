@@ -26,12 +26,12 @@ from photostrip.triangulation.image_coordinates.refraction import curvature_cons
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
+    from photostrip.arrays import Floats, Numbers
     from photostrip.camera import Camera, Distortion
     from photostrip.points import PhotoPoints
 
-    Floats = NDArray[np.float64]
 
 MICROMETRE = 1e-3  # mm
 SHOWN = 20  # points beyond the distortion table that are named one by one
@@ -100,24 +100,12 @@ def refine(
 ) -> Refined:
     """Refine photo coordinates of all photos: principal point, distortion, refraction and Earth curvature.
 
-    Parameters
-    ----------
-    observations : PhotoPoints
-        Photo coordinates, mm, in the system in which the principal point of the camera is given.
-    flying_height, ground_height : float, optional
-        Heights above sea level in metres that count where the settings have none.
-
-    Returns
-    -------
-    Refined
-        Ideal coordinates in the same rows with the same standard deviations; the same table when no camera has
+    observations: photo coordinates, mm, in the system in which the principal point of the camera is given.
+    flying_height, ground_height: heights above sea level in metres that count where the settings have none.
+    Returns ideal coordinates in the same rows with the same standard deviations; the same table when no camera has
         anything to correct.
-
-    Raises
-    ------
-    InputError
-        When a distortion has no inverse over the format, or refraction or curvature is asked for without heights, or
-        a point lies beyond the radii of a distortion table: with photo, point and radius.
+    Raises InputError when a distortion has no inverse over the format, or refraction or curvature is asked for without
+        heights, or a point lies beyond the radii of a distortion table: with photo, point and radius.
     """
     cameras = {camera_of_photo[photo].name: camera_of_photo[photo] for photo in observations.photo_ids}
     cameras = {name: settings.seen_by(camera) for name, camera in cameras.items()}
@@ -234,7 +222,7 @@ def _stretched(ideal: Floats, principal_distance: float, constant: float, cubic:
 
 
 def _refuse_distortion(
-    observations: PhotoPoints, cameras: Mapping[str, Camera], rows_of: Mapping[str, NDArray[np.intp]]
+    observations: PhotoPoints, cameras: Mapping[str, Camera], rows_of: Mapping[str, Numbers]
 ) -> None:
     """Refuse distortion that folds the photo, and points beyond a distortion table."""
     faults = []
@@ -249,7 +237,7 @@ def _refuse_distortion(
         raise InputError(faults)
 
 
-def _beyond(observations: PhotoPoints, camera: Camera, rows: NDArray[np.intp], radius: Floats) -> list[Fault]:
+def _beyond(observations: PhotoPoints, camera: Camera, rows: Numbers, radius: Floats) -> list[Fault]:
     """Name the points beyond the last radius of a distortion table, the first ones one by one."""
     if camera.distortion is None:
         return []

@@ -18,13 +18,10 @@ from photostrip.geometry import plane
 from photostrip.points import take_rows
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.camera import Camera
     from photostrip.points import PhotoPoints
 
-    Floats = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
 
 WRONG_PATTERN = 0.05  # largest misfit over radius of the marks: film and paper stay far below, wrong numbers far above
 QUARTER = np.pi / 2
@@ -44,7 +41,7 @@ class Marks:
     weights: Floats  # (p, m): weights, of mean 1 over the marks of each photo
 
     @property
-    def count(self) -> NDArray[np.intp]:
+    def count(self) -> Numbers:
         """Number of marks on each photo."""
         return np.asarray((self.weights > 0).sum(1), np.intp)
 
@@ -125,14 +122,9 @@ def right_pattern(marks: Marks) -> tuple[Marks, Flags, list[Fault]]:
     scanned from the other side its points need no repair, but when two of its marks are exchanged they come out
     mirrored, and the residuals are equally small in both cases.
 
-    Returns
-    -------
-    Marks
-        The marks of the photos in which they lie as calibrated, at least two on each.
-    ndarray of bool, shape (p,)
-        Whether these photos were measured mirrored.
-    list of Fault
-        One for each of the other photos, with the mark that seems wrongly numbered.
+    Returns the marks of the photos in which they lie as calibrated, at least two on each.
+    Returns (p,), whether these photos were measured mirrored.
+    Returns one for each of the other photos, with the mark that seems wrongly numbered.
     """
     if not marks.photos:
         return marks, np.zeros(0, bool), []

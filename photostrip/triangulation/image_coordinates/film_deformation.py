@@ -15,10 +15,8 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import NDArray
+    from photostrip.arrays import Floats, Numbers
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 LEAST_MARKS = 4  # three carry the plane that every transformation has already
 FLAT = 0.01  # ratio of the extents of the marks below which they stand on one line

@@ -49,24 +49,13 @@ class InteriorSettings:
 def orient(fiducials: PhotoPoints, cameras: Mapping[str, Camera], settings: InteriorSettings) -> InteriorOrientation:
     """Interior orientation of all photos.
 
-    Parameters
-    ----------
-    fiducials : PhotoPoints
-        Measured marks; ``point_ids`` are their names. The sigma of a row counts as one weight for both coordinates.
-    cameras : mapping of str to Camera
-        Camera of each photo of the project. Photos of cameras without fiducial marks are left as they are.
-
-    Returns
-    -------
-    InteriorOrientation
-        Transformations in the order of `cameras`. Photos that were scanned turned or, all of one camera alike,
+    fiducials: measured marks; ``point_ids`` are their names. The sigma of a row counts as one weight for both
+        coordinates.
+    cameras: camera of each photo of the project. Photos of cameras without fiducial marks are left as they are.
+    Returns transformations in the order of `cameras`. Photos that were scanned turned or, all of one camera alike,
         mirrored are put right by the transformation, and a note says so.
-
-    Raises
-    ------
-    InputError
-        With one fault for each photo that has no marks, too few, marks that its camera does not have, one mark
-        twice, marks on one line, or marks that do not form the pattern of the camera: then the mark that seems
+    Raises InputError with one fault for each photo that has no marks, too few, marks that its camera does not have, one
+        mark twice, marks on one line, or marks that do not form the pattern of the camera: then the mark that seems
         wrongly numbered is named. One photo mirrored against the others of its camera is such a case.
     """
     faults: list[Fault] = []

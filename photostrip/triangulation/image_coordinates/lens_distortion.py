@@ -19,11 +19,11 @@ import numpy as np
 from photostrip.errors import Fault, GeometryError, InputError
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
+    from photostrip.arrays import Floats
     from photostrip.camera import Camera, Distortion
 
-    Floats = NDArray[np.float64]
 
 CONVERGED = 1e-12  # mm
 ITERATIONS = 30
@@ -42,15 +42,9 @@ class _Radial(NamedTuple):
 def ideal_from_image(xy: ArrayLike, distortion: Distortion) -> Floats:
     """Remove the distortion of image points (n, 2) reduced to the principal point, exact to 1e-9 mm.
 
-    Raises
-    ------
-    InputError
-        When a point lies beyond the last radius of a table.
-    GeometryError
-        When no ideal point has this image.
+    Raises InputError when a point lies beyond the last radius of a table.
+    Raises GeometryError when no ideal point has this image.
 
-    Notes
-    -----
     Source: [Brown 1966] for the polynomials.
     """
     points = np.asarray(xy, float)

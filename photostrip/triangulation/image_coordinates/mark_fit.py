@@ -16,12 +16,11 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.errors import Fault
     from photostrip.notes import Note
     from photostrip.triangulation.image_coordinates.film_deformation import Deformation
 
-    Floats = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
 
 WEAK = 0.01  # strength of a transformation below which marks count as lying on one line
 
@@ -38,7 +37,7 @@ class InteriorOrientation:
     # (m, 2): transformed minus calibrated coordinates of these marks in the photo system, mm
     residuals: tuple[Floats, ...]
     sigma0: Floats  # (p,): standard deviation of a mark's coordinate of mean weight, mm; NaN without redundancy
-    redundancy: NDArray[np.intp]  # (p,): coordinates measured minus unknowns
+    redundancy: Numbers  # (p,): coordinates measured minus unknowns
     # scale_x, scale_y: (p,): scales along the measured axes at the mean of the marks, photo over measured, positive
     scale_x: Floats
     scale_y: Floats
@@ -169,7 +168,7 @@ def joined_cameras(
     marks = [names for part in parts for names in part.marks]
     residuals = [each for part in parts for each in part.residuals]
 
-    def column(arrays: Iterable[NDArray[np.generic]]) -> NDArray[np.float64]:
+    def column(arrays: Iterable[NDArray[np.generic]]) -> Floats:
         return np.concatenate([np.zeros(0), *arrays])[rows]
 
     coefficients = [part.photo_from_measured.coefficients for part in parts]

@@ -12,14 +12,12 @@ from photostrip.triangulation.image_coordinates.fiducial_marks import QUARTER, f
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags
     from photostrip.camera import Camera
     from photostrip.errors import Fault
     from photostrip.points import PhotoPoints
     from photostrip.triangulation.image_coordinates.mark_fit import InteriorOrientation
 
-    Flags = NDArray[np.bool_]
 
 MICROMETRE = 1e-3  # mm
 POOR_FIT = 0.05  # mm; film that was stored well fits to a third of this

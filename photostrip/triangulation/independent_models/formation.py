@@ -20,14 +20,10 @@ from photostrip.triangulation.independent_models import linking
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.triangulation.independent_models.link_screening import ScreenedLinks
     from photostrip.triangulation.independent_models.linking import CommonPoints, Similarities, StripModels
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
-    Flags = NDArray[np.bool_]
 
 AGREE = 4.0  # times the critical value of a link, for positions that several links lie between
 NAMED = 4

@@ -18,13 +18,9 @@ from photostrip.statistics import chi2_quantile
 from photostrip.triangulation.independent_models import linking
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.triangulation.independent_models.linking import CommonPoints, PointTests, SolvedLinks, StripModels
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
-    Flags = NDArray[np.bool_]
 
 METHODS = ("auto", "none")
 MEDIAN = 2.366  # of chi-square with three degrees of freedom

@@ -19,11 +19,8 @@ from photostrip.geometry.rotation import from_vector
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from photostrip.arrays import Flags, Floats, Numbers
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
-    Flags = NDArray[np.bool_]
 
 LEAST_COMMON = 3
 ITERATIONS, CONVERGED = 20, 1e-12

@@ -19,13 +19,9 @@ from photostrip.geometry.rotation import cross_matrix
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.geometry.similarity import Similarity
     from photostrip.triangulation.independent_models.formation import FormedModels
-
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,12 +106,8 @@ def _gains(link: Numbers, xyz: Floats, covariance: Floats, origin: Floats, count
 def sums(errors: ModelErrors, nodes: Numbers, weights: Floats) -> Floats:
     """Coefficients (t, n, 3) of the model coordinates of all rows in weighted sums of displacements of nodes.
 
-    Parameters
-    ----------
-    nodes : ndarray of int, shape (c,)
-        Nodes, counted as ``FormedModels.node``, each at most once.
-    weights : ndarray, shape (t, c, 3)
-        Weight of each coordinate of each node in each sum.
+    nodes: (c,), nodes, counted as ``FormedModels.node``, each at most once.
+    weights: (t, c, 3), weight of each coordinate of each node in each sum.
     """
     place = np.full(len(errors.by_similarity), -1)
     place[nodes] = np.arange(len(nodes))

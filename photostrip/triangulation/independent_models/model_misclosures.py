@@ -12,14 +12,10 @@ from photostrip.triangulation.error_propagation.derivatives import ErrorRows
 from photostrip.triangulation.independent_models import model_errors
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.points import ControlPoints
     from photostrip.triangulation.error_propagation.control_errors import Misclosures
     from photostrip.triangulation.independent_models.model_errors import ModelErrors
-
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 
 def misclosures(control: ControlPoints, axes: Floats, xyz: Floats, origin: Floats) -> Misclosures:
@@ -44,12 +40,8 @@ def weights(seen: Misclosures, rows: Numbers, operator: Floats | None = None) ->
 def covariance(errors: ModelErrors, found: Misclosures, rows: Numbers, factor: float) -> Floats:
     """Covariance of all misclosures, strip and control together, metres^2, shape (w, w).
 
-    Parameters
-    ----------
-    rows : ndarray of int, shape (n,)
-        Rows of the control points in the points of the strip.
-    factor : float
-        Variance factor of the model coordinates.
+    rows: (n,), rows of the control points in the points of the strip.
+    factor: variance factor of the model coordinates.
     """
     spread = model_errors.covariance_of_sums(errors, model_errors.sums(errors, *weights(found, rows)))
     return np.asarray(spread * factor + np.diag(found.variance), float)

@@ -18,9 +18,8 @@ from photostrip.triangulation.polynomial.terms import POWERS
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
+    from photostrip.arrays import Floats
 
-    Floats = NDArray[np.float64]
 
 NEAREST = 3  # points at least that say where the ground below a centre is
 

@@ -78,12 +78,8 @@ def found(
 def accepted(findings: Iterable[Finding], entries: Sequence[str]) -> tuple[Finding, ...]:
     """Mark what the user has accepted, and bring all into the order of the report: every finding once, by code.
 
-    Parameters
-    ----------
-    findings : iterable of Finding
-        What was found; the same finding may come from two places.
-    entries : sequence of str
-        Codes, or ``code/id`` for one photo, point or strip.
+    findings: what was found; the same finding may come from two places.
+    entries: codes, or ``code/id`` for one photo, point or strip.
     """
     codes = {entry for entry in entries if "/" not in entry}
     single = {(code, name) for code, _, name in (entry.partition("/") for entry in entries) if name}

@@ -20,11 +20,9 @@ from photostrip.triangulation.polynomial.degree import GROUPS, Evidence, decide
 from photostrip.triangulation.polynomial.least_squares import AxisFit, FitProblem, fit_axes
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.triangulation.polynomial.degree import Fits
 
-    Floats = NDArray[np.float64]
 
 __all__ = ["DEGREES", "GROUPS", "AxisFit", "Evidence", "FitProblem", "Polynomial", "PolynomialSettings", "fit"]
 

@@ -13,12 +13,9 @@ from photostrip.triangulation.polynomial import terms as polynomial_terms
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.triangulation.polynomial.least_squares import AxisFit, FitProblem, Terms
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
     Fits = Callable[[Terms], list[AxisFit]]
 
 SURE_LEVEL = 0.10  # of the F test: enough by itself
@@ -70,19 +67,10 @@ def decide(
 ) -> tuple[tuple[str, ...], list[Evidence]]:
     """Go up the degrees of plan or height: each step must be asked for by its F test and not spoil left-out points.
 
-    Parameters
-    ----------
-    part : tuple
-        Name and axes of the part, one of ``GROUPS``.
-    asked : str
-        Degree, or ``"auto"``.
-    fits_of : callable
-        Fits of all axes with given terms, remembered.
-
-    Returns
-    -------
-    evidence : list of Evidence
-        Every degree that was weighed, ascending.
+    part: name and axes of the part, one of ``GROUPS``.
+    asked: degree, or ``"auto"``.
+    fits_of: fits of all axes with given terms, remembered.
+    Returns evidence: every degree that was weighed, ascending.
     """
     group, axes = part
     every = _candidates(problem, axes[0], asked)
@@ -135,8 +123,8 @@ def _expected(problem: FitProblem) -> Floats:
     return expected
 
 
-def _counted(problem: FitProblem, axis: int) -> NDArray[np.bool_]:
-    result: NDArray[np.bool_] = problem.by_axis[:, axis] > 0
+def _counted(problem: FitProblem, axis: int) -> Flags:
+    result: Flags = problem.by_axis[:, axis] > 0
     return result
 
 

@@ -11,11 +11,9 @@ import numpy as np
 from photostrip.triangulation.polynomial import terms as polynomial_terms
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats
     from photostrip.triangulation.absolute_orientation import Targets
 
-    Floats = NDArray[np.float64]
     Terms = tuple[tuple[str, ...], ...]  # of the three axes
 
 ITERATIONS = 4  # plan-only and height-only points take their missing coordinate from the fit itself
@@ -80,7 +78,7 @@ class Design:
     """What the fit of one axis is made of, before there are misclosures."""
 
     terms: tuple[str, ...]  # terms; empty when the axis is not corrected
-    rows: NDArray[np.bool_]  # (n,): points that count
+    rows: Flags  # (n,): points that count
     columns: Floats  # (n, k): scaled columns of all points
     scales: Floats  # (k,): what they were divided by
     root: Floats  # (n,): square roots of the weights over their mean; 0 for points that do not count

@@ -14,10 +14,8 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
+    from photostrip.arrays import Floats, Numbers
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 POWERS = {"1": (0, 0), "X": (1, 0), "Y": (0, 1), "XY": (1, 1), "X^2": (2, 0), "X^3": (3, 0)}
 # Ladder: terms, degree, stations along the strip, points for an exact fit. One more point is asked for unless forced.
@@ -71,12 +69,8 @@ def choose_terms(xyz: Floats, degree: int, sizes: Sizes, *, forced: bool = False
 
     Six points are necessary for six terms, not sufficient: [001] after eq. 151 says six, a cubic needs four stations.
 
-    Parameters
-    ----------
-    sizes : Sizes
-        Sizes that make the columns comparable.
-    forced : bool
-        Whether a fit without redundancy is allowed.
+    sizes: sizes that make the columns comparable.
+    forced: whether a fit without redundancy is allowed.
     """
     stations = count_stations(xyz[:, 0], sizes.spacing)
     terms = ladder(stations, len(xyz) if forced else len(xyz) - 1, degree)

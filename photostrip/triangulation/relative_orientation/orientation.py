@@ -29,9 +29,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
-    Flags = NDArray[np.bool_]
+    from photostrip.arrays import Flags, Floats, Numbers
+
 
 CONDITION_WARNING = 100.0  # of the column-normalised Jacobian: a band much narrower than the base
 CONDITION_LIMIT = 1e6
@@ -123,15 +122,8 @@ def _put(values: NDArray[Any], rows: Numbers, fresh: NDArray[Any]) -> NDArray[An
 def orient_pairs(pairs: Pairs, photos: Sequence[str]) -> Orientation:
     """Relative orientation of all pairs, refusing those that cannot be oriented.
 
-    Parameters
-    ----------
-    photos : sequence of str
-        Photos of the strip, to name a pair that is refused.
-
-    Raises
-    ------
-    GeometryError
-        For the first pair that is degenerate, does not converge, or lies behind its cameras.
+    photos: photos of the strip, to name a pair that is refused.
+    Raises GeometryError for the first pair that is degenerate, does not converge, or lies behind its cameras.
     """
     result, converged = orient_unchecked(pairs)
     refuse_unusable(result, converged, photos)
@@ -150,12 +142,8 @@ def orient_unchecked(pairs: Pairs) -> tuple[Orientation, Flags]:
 def orient_again(orientation: Orientation, weight: Floats, numbers: Numbers) -> Orientation:
     """Orient some pairs again with other weights, from their present elements.
 
-    Parameters
-    ----------
-    weight : ndarray, shape (m,)
-        New weights of all rows.
-    numbers : ndarray of int
-        Pairs whose weights changed, ascending; the others stay as they are.
+    weight: (m,), new weights of all rows.
+    numbers: pairs whose weights changed, ascending; the others stay as they are.
     """
     pairs = replace(orientation.pairs, weight=weight)
     part = pairs.take(numbers)
@@ -217,12 +205,8 @@ def condition_numbers(normal: Floats) -> Floats:
 def unusable_pairs(result: Orientation, converged: Flags, rays: tuple[Floats, Floats] | None = None) -> Flags:
     """Pairs that cannot be used as they are: degenerate, not converged, behind their cameras, or without a base.
 
-    Parameters
-    ----------
-    converged : ndarray of bool, shape (p,)
-        Whether the iteration of each pair converged.
-    rays : tuple of ndarray, shape (3, m), optional
-        Rays of its points in the base frame, when they are known already.
+    converged: (p,), whether the iteration of each pair converged.
+    rays: (3, m), optional, rays of its points in the base frame, when they are known already.
     """
     pairs = result.pairs
     left, right = base_rays(result.elements, pairs) if rays is None else rays

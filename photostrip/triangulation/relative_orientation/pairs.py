@@ -17,13 +17,9 @@ from photostrip.points import take_rows
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.points import PhotoPoints
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
-    Flags = NDArray[np.bool_]
 
 MINIMUM_POINTS = 5  # as many as elements
 BY_ROW = ("pair", "left", "right", "weight", "point", "rows")
@@ -74,24 +70,11 @@ class Pairs:
 def collect_pairs(observations: PhotoPoints, photos: Sequence[str], focal: float) -> Pairs:
     """Points measured on neighbouring photos of a strip, as pairs.
 
-    Parameters
-    ----------
-    observations : PhotoPoints
-        Image points, reduced to the principal point.
-    photos : sequence of str
-        Photos of the strip in flight order; pair i is made of photos i and i+1.
-    focal : float
-        Principal distance in mm.
-
-    Returns
-    -------
-    Pairs
-        Measurements; weights are 1 where both sigmas are the strip's median.
-
-    Raises
-    ------
-    GeometryError
-        When a pair has fewer than five common points.
+    observations: image points, reduced to the principal point.
+    photos: photos of the strip in flight order; pair i is made of photos i and i+1.
+    focal: principal distance in mm.
+    Returns measurements; weights are 1 where both sigmas are the strip's median.
+    Raises GeometryError when a pair has fewer than five common points.
     """
     place = {photo: number for number, photo in enumerate(photos)}
     order_of = np.array([place.get(photo, -1) for photo in observations.photo_ids], np.intp)

@@ -21,11 +21,9 @@ from photostrip.triangulation.relative_orientation.solution import (
 )
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats
     from photostrip.triangulation.relative_orientation.pairs import Pairs
 
-    Floats = NDArray[np.float64]
 
 ABSOLUTE_STEPS = 30
 WELSCH_STEPS = 15
@@ -41,7 +39,7 @@ DEGENERATE_SET = 1e-7  # determinant of a set, columns of unit length over the p
 CONVERGED = 1e-6  # rad; what follows is least squares
 
 
-def median_by_pair(values: Floats, pairs: Pairs, use: NDArray[np.bool_]) -> Floats:
+def median_by_pair(values: Floats, pairs: Pairs, use: Flags) -> Floats:
     """Lower median of the values of every pair over the rows that count; NaN for a pair without any."""
     count = pairs.sums(use.astype(float)).astype(np.intp)
     place = np.arange(len(values)) - pairs.starts[pairs.pair]
@@ -64,21 +62,12 @@ def start_values(pairs: Pairs) -> Floats:
 def solve(start: Floats, pairs: Pairs, sigma: Floats, *, near: bool = False) -> tuple[Floats, Floats]:
     """Orient pairs with weights that fall with the residual.
 
-    Parameters
-    ----------
-    start : ndarray, shape (p, 5)
-        Elements to start from, radians.
-    sigma : ndarray, shape (p,)
-        A-priori standard deviation of a y parallax of weight one, mm.
-    near : bool
-        Whether the start agrees with most points already: absolute residuals are not minimised first.
-
-    Returns
-    -------
-    elements : ndarray, shape (p, 5)
-        Elements in radians.
-    scale : ndarray, shape (p,)
-        Standard deviation of a y parallax of weight one from the median residual, mm; at least the one given.
+    start: (p, 5), elements to start from, radians.
+    sigma: (p,), a-priori standard deviation of a y parallax of weight one, mm.
+    near: whether the start agrees with most points already: absolute residuals are not minimised first.
+    Returns elements: (p, 5), elements in radians.
+    Returns scale: (p,), standard deviation of a y parallax of weight one from the median residual, mm; at least the one
+        given.
     """
     elements = start.copy()
     scale = sigma

@@ -16,9 +16,10 @@ import numpy as np
 from photostrip.geometry.rotation import alpha_omega_kappa, from_alpha_omega_kappa
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
-    Floats = NDArray[np.float64]
+    from photostrip.arrays import Floats
+
 
 SHARES = np.array([2.0, -2.0, -1.0, 1.0, -1.0, 1.0])  # of the six parallaxes in the closing error
 

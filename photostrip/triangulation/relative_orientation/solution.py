@@ -18,13 +18,9 @@ from photostrip.geometry.rotation import from_alpha_omega_kappa
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.triangulation.relative_orientation.pairs import Pairs
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
-    Flags = NDArray[np.bool_]
 
 ELEMENTS = ("alpha1", "kappa1", "alpha2", "omega2", "kappa2")
 CONVERGED = 1e-10  # rad
@@ -138,12 +134,8 @@ def iterate_elements(
 ) -> Solved:
     """Gauss-Newton iteration of all pairs from given elements; converged pairs leave the batch.
 
-    Parameters
-    ----------
-    elements : ndarray, shape (p, 5)
-        Start values in radians.
-    watch : callable, optional
-        Called at every step with the numbers of the pairs that take part, their elements before it, their sums of
+    elements: (p, 5), start values in radians.
+    watch: called at every step with the numbers of the pairs that take part, their elements before it, their sums of
         weighted squares of the y parallaxes in mm^2, and what is added to the elements.
     """
     result = elements.copy()

@@ -19,12 +19,9 @@ from photostrip.triangulation.resection.resection import resect
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.triangulation.resection.resection import Resection
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 LEAST_POINTS = 4  # of a photo: three have up to four solutions
 TRIPLES = 12  # sets of three points that are tried
@@ -52,10 +49,7 @@ def space_resection(xy: Floats, sigma: Floats, points: Floats, focal: float) -> 
 
     The solution weighs all image points (n, 2) alike; the covariance takes their standard deviations into account.
 
-    Raises
-    ------
-    GeometryError
-        With fewer than four points, with points on one line, or where no orientation fits.
+    Raises GeometryError with fewer than four points, with points on one line, or where no orientation fits.
     """
     center, rotation = approximate(xy, points, focal)
     number = np.zeros(len(xy), np.intp)
@@ -85,13 +79,8 @@ def _inverse(design: Floats) -> Floats:
 def approximate(xy: Floats, points: Floats, focal: float) -> tuple[Floats, Floats]:
     """Perspective centre and rotation in closed form: the solution of three points that suits the others best.
 
-    Raises
-    ------
-    GeometryError
-        With fewer than four points, with points on one line, or where no solution sees all points.
+    Raises GeometryError with fewer than four points, with points on one line, or where no solution sees all points.
 
-    Notes
-    -----
     Source: [Grunert 1841] in the form of [Haralick 1994].
     """
     if len(xy) < LEAST_POINTS:

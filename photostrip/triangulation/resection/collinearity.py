@@ -10,10 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
+    from photostrip.arrays import Floats, Numbers
 
 
 class KnownPhotos(NamedTuple):
@@ -36,14 +33,9 @@ class PhotoPartials(NamedTuple):
 def project(points: Floats, centers: Floats, rotations: Floats, photo: Numbers, focal: Floats) -> Floats:
     """Ideal image coordinates (m, 2), relative to the principal point, of a point and a photo in each row.
 
-    Parameters
-    ----------
-    rotations : ndarray, shape (n, 3, 3)
-        Photo to the frame of the points and of the centres (n, 3).
-    photo : ndarray of int, shape (m,)
-        Photo of each row.
-    focal : ndarray, shape (n,)
-        Principal distances in mm.
+    rotations: (n, 3, 3), photo to the frame of the points and of the centres (n, 3).
+    photo: (m,), photo of each row.
+    focal: (n,), principal distances in mm.
     """
     ray = np.einsum("mi,mij->mj", points - centers[photo], rotations[photo])
     xy: Floats = -focal[photo, None] * ray[:, :2] / ray[:, 2:]
@@ -55,12 +47,9 @@ def derivatives(
 ) -> tuple[Floats, Floats]:
     """Differentiate the image coordinates of rows, each of a point on a photo.
 
-    Returns
-    -------
-    by_photo : ndarray, shape (n, 2, 6)
-        By the centre (mm/m) and by a small rotation of the photo about the axes of the frame (mm/rad).
-    by_point : ndarray, shape (n, 2, 3)
-        By the point (mm/m).
+    Returns by_photo: (n, 2, 6), by the centre (mm/m) and by a small rotation of the photo about the axes of the frame
+        (mm/rad).
+    Returns by_point: (n, 2, 3), by the point (mm/m).
     """
     arm = points - centers[photo]
     turn = rotations[photo].transpose(0, 2, 1)
@@ -78,16 +67,10 @@ def derivatives(
 def partials(arm: Floats, rotations: Floats, focal: Floats, distance: Floats) -> PhotoPartials:
     """Image coordinates of points, and their derivatives by the orientation of the photo along its own axes.
 
-    Parameters
-    ----------
-    arm : ndarray, shape (m, 3)
-        Points from the perspective centre of their photo.
-    rotations : ndarray, shape (m, 3, 3)
-        Photo to the frame of the points.
-    focal : ndarray, shape (m,)
-        Principal distances in mm.
-    distance : ndarray, shape (m,)
-        Unit in which the centre moves.
+    arm: (m, 3), points from the perspective centre of their photo.
+    rotations: (m, 3, 3), photo to the frame of the points.
+    focal: (m,), principal distances in mm.
+    distance: (m,), unit in which the centre moves.
     """
     u, v, w = np.einsum("mi,mij->jm", arm, rotations)
     x, y = -focal * u / w, -focal * v / w

@@ -14,10 +14,8 @@ import numpy as np
 from photostrip.triangulation.resection.collinearity import KnownPhotos, derivatives, project
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from photostrip.arrays import Flags, Floats, Numbers
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 ITERATIONS = 12
 CONVERGED = 1e-12  # of the distance of a point from its photos
@@ -39,18 +37,10 @@ def intersect_points(
 ) -> Intersected:
     """Intersect points from photos of known orientation, all points in one batch.
 
-    Parameters
-    ----------
-    xy, sigma : ndarray, shape (n, 2)
-        Ideal image coordinates and their standard deviations, mm.
-    rows : tuple of ndarray of int
-        Photo and point of each row.
-
-    Returns
-    -------
-    Intersected
-        Points with their precision, the orientations taken as known. A point with one ray, with parallel rays, or with
-        rays that meet behind a camera has no coordinates.
+    xy, sigma: (n, 2), ideal image coordinates and their standard deviations, mm.
+    rows: photo and point of each row.
+    Returns points with their precision, the orientations taken as known. A point with one ray, with parallel rays, or
+        with rays that meet behind a camera has no coordinates.
     """
     (photo, point), (centers, rotations, focal) = rows, photos
     rays = np.bincount(point, minlength=count)
@@ -92,7 +82,7 @@ def _summed(values: Floats, point: Numbers, count: int) -> Floats:
     return np.asarray(sums.reshape(count, *values.shape[1:]), np.float64)
 
 
-def _solved(normal: Floats, right: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+def _solved(normal: Floats, right: Floats) -> tuple[Floats, Flags]:
     """Solve small systems; NaN where one is singular."""
     size = np.sqrt(np.maximum(np.einsum("nii->ni", normal), 0.0))
     size[size == 0.0] = 1.0

@@ -11,10 +11,8 @@ from photostrip.geometry.rotation import from_vector
 from photostrip.triangulation.resection.collinearity import partials, project
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from photostrip.arrays import Flags, Floats, Numbers
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 ITERATIONS = 20
 CONVERGED = 1e-10  # rad, and of the distance to the points; the next step would be its square
@@ -32,7 +30,7 @@ class Resection:
     residuals: Floats  # (m, 2): measured minus computed image coordinates in mm
     rms: Floats  # (n,): root mean square of a photo's residuals in mm
     # (n,): false where a photo kept its start orientation: too few points, or an iteration that does not converge
-    solved: NDArray[np.bool_]
+    solved: Flags
 
 
 def with_residuals(
@@ -40,12 +38,8 @@ def with_residuals(
 ) -> Resection:
     """Image residuals of photos whose orientation is known already, as a resection.
 
-    Parameters
-    ----------
-    xy, points, photo : ndarray, shapes (m, 2), (m, 3), (m,)
-        Image coordinates in mm, their points, and the photo of each.
-    centers, rotations : ndarray, shapes (n, 3), (n, 3, 3)
-        Perspective centres, and photo to the frame of the points.
+    xy, points, photo: (m, 2), (m, 3), (m,), image coordinates in mm, their points, and the photo of each.
+    centers, rotations: (n, 3), (n, 3, 3), perspective centres, and photo to the frame of the points.
     """
     count = len(centers)
     residuals = xy - project(points, centers, rotations, photo, np.full(count, focal))
@@ -57,16 +51,10 @@ def with_residuals(
 def resect(xy: Floats, points: Floats, photo: Numbers, focal: Floats, start: tuple[Floats, Floats]) -> Resection:
     """Orient every photo on its points by least squares on the image coordinates.
 
-    Parameters
-    ----------
-    xy : ndarray, shape (m, 2)
-        Image coordinates in mm, reduced to the principal point; rows ordered by photo.
-    points : ndarray, shape (m, 3)
-        Known points of the rows.
-    focal : ndarray, shape (n,)
-        Principal distances in mm.
-    start : tuple of ndarray
-        Centres (n, 3) and rotations (n, 3, 3) to start from. They stay for a photo with fewer than four points, or
+    xy: (m, 2), image coordinates in mm, reduced to the principal point; rows ordered by photo.
+    points: (m, 3), known points of the rows.
+    focal: (n,), principal distances in mm.
+    start: centres (n, 3) and rotations (n, 3, 3) to start from. They stay for a photo with fewer than four points, or
         whose iteration does not converge.
     """
     centers, rotations = start[0].copy(), start[1].copy()

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from photostrip.arrays import Flags, Floats
 
-    Floats = NDArray[np.float64]
 
 PARALLEL = 1e-6  # of the principal distance: a smaller x parallax intersects nothing
 
@@ -23,23 +22,16 @@ class Intersection:
     ray_factor: Floats  # (m,): ray factor N of the left ray (model unit per mm)
     gap: Floats  # (m,): left minus right Y of the two rays, in the unit of the base
     # (m,): false where the rays are parallel or meet behind a camera; the coordinates are NaN there
-    sound: NDArray[np.bool_]
+    sound: Flags
 
 
 def intersect(base: Floats, left: Floats, right: Floats, focal: float) -> Intersection:
     """Forward intersection of the rays of two photos.
 
-    Parameters
-    ----------
-    base : ndarray, shape (3,) or (3, m)
-        Base components BX, BY, BZ; BX is the longest.
-    left, right : ndarray, shape (3, m)
-        Rays of the left and right photo, turned into the frame of the base, mm.
-    focal : float
-        Principal distance in mm, the scale to which the rays are brought.
+    base: (3,) or (3, m), base components BX, BY, BZ; BX is the longest.
+    left, right: (3, m), rays of the left and right photo, turned into the frame of the base, mm.
+    focal: principal distance in mm, the scale to which the rays are brought.
 
-    Notes
-    -----
     Source: [001] eq. 137 (second line corrected to y2) and 138; [001] takes Y from the left ray, here it
     is the mean of both, which the theory of errors of [000] assumes too.
     """

@@ -16,13 +16,10 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.points import PhotoPoints
     from photostrip.triangulation.strip_formation.strip import FormedStrip
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 SMALLEST_ANGLE = 1e-4  # sine of the angle between the rays
 
@@ -34,10 +31,7 @@ def bridge(
 
     Such a point lies in the middle between its first and its last ray.
 
-    Parameters
-    ----------
-    rows : ndarray of int
-        Rows of the observations: good rays of points that the strip does not hold.
+    rows: rows of the observations: good rays of points that the strip does not hold.
     """
     place = {photo: number for number, photo in enumerate(photos)}
     position = np.array([place[observations.photo_ids[number]] for number in observations.photo[rows]], np.intp)
@@ -64,7 +58,7 @@ def bridge(
     )
 
 
-def meeting(centers: Floats, directions: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+def meeting(centers: Floats, directions: Floats) -> tuple[Floats, Flags]:
     """Middle of two rays where they are nearest, and whether they meet, in front of both cameras and not too flat.
 
     Centres and directions are (n, 2, 3); the middle is NaN where the rays do not meet.

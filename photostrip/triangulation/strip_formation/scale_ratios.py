@@ -23,13 +23,9 @@ from photostrip.triangulation.relative_orientation.solution import (
 )
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.triangulation.relative_orientation.orientation import Orientation
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
-    Flags = NDArray[np.bool_]
 
 ALPHA = 0.001  # of rejecting a point of a junction without gross errors
 FEWEST = 3  # with two ratios nobody can tell which is wrong
@@ -53,19 +49,10 @@ def spreads(
 ) -> tuple[Floats, Floats]:
     """Propagate image coordinates and orientations into scale ratios.
 
-    Parameters
-    ----------
-    vectors : ndarray, shape (m, 3)
-        Model points, base length 1.
-    sigma : ndarray, shape (p,), optional
-        Standard deviation of a y parallax of weight one in each pair, mm.
-
-    Returns
-    -------
-    single : ndarray, shape (t,)
-        Relative standard deviation of each ratio by its own image coordinates.
-    model : ndarray, shape (t,)
-        The same by the deformation of the two models, against the mean of the junction.
+    vectors: (m, 3), model points, base length 1.
+    sigma: (p,), optional, standard deviation of a y parallax of weight one in each pair, mm.
+    Returns single: (t,), relative standard deviation of each ratio by its own image coordinates.
+    Returns model: (t,), the same by the deformation of the two models, against the mean of the junction.
     """
     junction, before, after = joined
     scatter = _scatter(orientation) if sigma is None else sigma
@@ -159,12 +146,8 @@ def screen(
 ) -> tuple[Flags, Floats]:
     """Find the ratios that belong together, and the largest relative deviation of each that still belongs.
 
-    Parameters
-    ----------
-    spread : tuple of ndarray, shape (t,)
-        Relative standard deviations as ``spreads`` gives them.
-    junction : ndarray of int, shape (t,)
-        Junction of each ratio, ascending.
+    spread: (t,), relative standard deviations as ``spreads`` gives them.
+    junction: (t,), junction of each ratio, ascending.
     """
     size = np.hypot(*spread)
     count = np.bincount(junction, minlength=junctions)

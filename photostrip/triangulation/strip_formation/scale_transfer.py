@@ -21,13 +21,9 @@ from photostrip.triangulation.strip_formation.scale_ratios import PassPoints
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.triangulation.relative_orientation.orientation import Orientation
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
-    Flags = NDArray[np.bool_]
 
 SCALE_TRANSFERS = ("least_squares", "distances")
 
@@ -82,23 +78,13 @@ def transfer_scale(
 ) -> Junctions:
     """Scale of every model from the one before it, through the pass points at their common photo.
 
-    Parameters
-    ----------
-    vectors : ndarray, shape (m, 3)
-        Model points in the frame of the left photo, base length 1; NaN where there is none.
-    photos : sequence of str
-        Photos of the strip, to name a broken junction.
-    sigma : ndarray, shape (p,), optional
-        Standard deviation of a y parallax of weight one in each pair, mm; by default from the pairs' own residuals.
-    doubtful : ndarray of bool, shape (m,), optional
-        Rows that must not join models, unless a junction has no other.
-    renewed : ndarray of bool, shape (p - 1,), optional
-        Junctions that are wanted; all by default. The others have no rows and the factor NaN.
-
-    Raises
-    ------
-    GeometryError
-        When no point is common to three photos in a row.
+    vectors: (m, 3), model points in the frame of the left photo, base length 1; NaN where there is none.
+    photos: photos of the strip, to name a broken junction.
+    sigma: (p,), optional, standard deviation of a y parallax of weight one in each pair, mm; by default from the pairs'
+        own residuals.
+    doubtful: (m,), optional, rows that must not join models, unless a junction has no other.
+    renewed: (p - 1,), optional, junctions that are wanted; all by default. The others have no rows and the factor NaN.
+    Raises GeometryError when no point is common to three photos in a row.
     """
     junctions = orientation.pairs.size - 1
     wanted = np.ones(junctions, bool) if renewed is None else renewed

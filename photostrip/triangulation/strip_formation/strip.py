@@ -22,14 +22,10 @@ from photostrip.triangulation.strip_formation.scale_transfer import Junctions, t
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
-    Flags = NDArray[np.bool_]
 
 STEEPEST_BASE = 1e-6  # cosine of the base inclination
 
@@ -86,21 +82,13 @@ def form_from_pairs(
 ) -> FormedStrip:
     """Form the strip from its oriented pairs, in the frame of the first photo.
 
-    Parameters
-    ----------
-    orientation : Orientation
-        Oriented pairs in flight order.
-    sigma : ndarray, shape (p,), optional
-        Standard deviation of a y parallax of weight one in each pair, mm; by default from the pairs' own residuals.
-    doubtful : ndarray of bool, shape (m,), optional
-        Rows whose points are in doubt: they join models only where a junction has no other.
-    earlier : tuple of FormedStrip and ndarray of bool, shape (p,), optional
-        The strip as it was formed before some of its pairs changed, and which: only their junctions are made anew.
-
-    Raises
-    ------
-    GeometryError
-        When a junction is broken or a base is parallel to the strip's Z axis.
+    orientation: oriented pairs in flight order.
+    sigma: (p,), optional, standard deviation of a y parallax of weight one in each pair, mm; by default from the pairs'
+        own residuals.
+    doubtful: (m,), optional, rows whose points are in doubt: they join models only where a junction has no other.
+    earlier: (p,), optional, the strip as it was formed before some of its pairs changed, and which: only their
+        junctions are made anew.
+    Raises GeometryError when a junction is broken or a base is parallel to the strip's Z axis.
     """
     if earlier is None:
         models = model_points(orientation)

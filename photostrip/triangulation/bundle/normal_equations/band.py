@@ -13,10 +13,8 @@ import numpy as np
 from numpy.lib.stride_tricks import as_strided
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from photostrip.arrays import Flags, Floats, Numbers
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 STEP = 48  # columns of the inverse that are found at a time
 
@@ -38,9 +36,9 @@ class Band:
         """Places of elements (row >= column) in the flat storage."""
         return row + column * self.width
 
-    def holds(self, row: Numbers, column: Numbers) -> NDArray[np.bool_]:
+    def holds(self, row: Numbers, column: Numbers) -> Flags:
         """Whether elements (row >= column) lie within the band."""
-        near: NDArray[np.bool_] = row - column <= self.width
+        near: Flags = row - column <= self.width
         return near
 
     def at(self, row: Numbers, column: Numbers) -> Floats:

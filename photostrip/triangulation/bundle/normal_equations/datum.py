@@ -16,12 +16,10 @@ from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_der
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO, SIGNS
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.parameters import Parameters, ParameterStep, PreparedProblem
 
-    Floats = NDArray[np.float64]
 
 DEFECT = SIMILARITY_PARAMETERS
 

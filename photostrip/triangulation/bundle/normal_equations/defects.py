@@ -16,8 +16,7 @@ from photostrip.triangulation.bundle.observations.collinearity import PHOTO
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.triangulation.bundle.normal_equations.point_elimination import Eliminated
     from photostrip.triangulation.bundle.normal_equations.reduced import Reduced
     from photostrip.triangulation.bundle.observations.given_orientations import LinearisedOrientations
@@ -25,8 +24,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.bundle.observations.ray_batches import Batch
     from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 PARALLEL = 1e-10  # square of the sine of the angle between rays
 LOOSE = 0.1  # standard deviation, as a part of the size of the network, from which a datum parameter is not determined
@@ -165,9 +162,7 @@ def _held(prepared: PreparedProblem, state: Parameters, photos: Numbers) -> Held
     return Held(photos, origin, radius, normal, places)
 
 
-def _information(
-    linear: LinearisedOrientations, moves: Floats, inside: NDArray[np.bool_], prepared: PreparedProblem
-) -> Floats:
+def _information(linear: LinearisedOrientations, moves: Floats, inside: Flags, prepared: PreparedProblem) -> Floats:
     """Information (7, 7) of given orientations on the similarity, offsets and drifts eliminated from the normals."""
     rows = inside[linear.photo]
     of_photos = (linear.by_photo[rows] @ moves[linear.photo[rows]]) * linear.weight[rows][:, :, None]

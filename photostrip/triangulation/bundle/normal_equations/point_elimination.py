@@ -18,12 +18,10 @@ from photostrip.triangulation.bundle.observations.collinearity import PHOTO, by_
 from photostrip.triangulation.bundle.structure import triangle
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.triangulation.bundle.observations.collinearity import Rays
     from photostrip.triangulation.bundle.observations.ray_batches import Batch
 
-    Floats = NDArray[np.float64]
 
 SMALL_GROUP = 24  # points: up to here it pays to bring the numbers of a group together before they are multiplied
 

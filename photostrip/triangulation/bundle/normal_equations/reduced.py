@@ -14,12 +14,10 @@ from photostrip.triangulation.bundle.observations import given_orientations
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO, by_photo
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.triangulation.bundle.normal_equations.point_elimination import Eliminated
     from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem
 
-    Floats = NDArray[np.float64]
 
 Factor = Band | Sparse
 WIDE = 1e11  # multiplications for the factor of a band, some seconds: from there a sparse factor is tried

@@ -14,11 +14,10 @@ import numpy as np
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
     from scipy.sparse.linalg import SuperLU
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
+    from photostrip.arrays import Flags, Floats, Numbers
+
 
 TOGETHER = 64  # photos whose columns of the inverse are found at a time
 
@@ -78,14 +77,14 @@ class Sparse:
             found[pairs] = solved[self.rows[pairs], :, self.columns[pairs] - first]
         return Sparse(self.photos, self.rows, self.columns, found)
 
-    def _pair(self, row: Numbers, column: Numbers) -> tuple[Numbers, NDArray[np.bool_]]:
+    def _pair(self, row: Numbers, column: Numbers) -> tuple[Numbers, Flags]:
         """Return the number of the pair of elements (row >= column), and whether there is one."""
         keys = self.rows * self.photos + self.columns
         wanted = row // PHOTO * self.photos + column // PHOTO
         pair = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
         return pair, keys[pair] == wanted
 
-    def holds(self, row: Numbers, column: Numbers) -> NDArray[np.bool_]:
+    def holds(self, row: Numbers, column: Numbers) -> Flags:
         """Whether elements (row >= column) are stored."""
         return self._pair(row, column)[1]
 

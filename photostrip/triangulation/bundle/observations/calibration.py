@@ -10,12 +10,9 @@ import numpy as np
 from photostrip.triangulation.bundle.observations.problem import CALIBRATION
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.triangulation.bundle.observations.problem import BundleCameras
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 PRINCIPAL_DISTANCE = CALIBRATION.index("c")
 

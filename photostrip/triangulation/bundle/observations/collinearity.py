@@ -16,11 +16,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.triangulation.bundle.observations.ray_batches import Batch
 
-    Floats = NDArray[np.float64]
 
 PHOTO = 6  # parameters of a photo
 SIGNS = np.array([1.0, 1.0, 1.0, -1.0, 1.0, 1.0])  # of a photo's parameters, see above

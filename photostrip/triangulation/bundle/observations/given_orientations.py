@@ -11,12 +11,9 @@ from photostrip.geometry.rotation import cross_matrix, to_vector
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO, SIGNS
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.triangulation.bundle.observations.problem import AttitudeObservations, PositionObservations
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 SMALL = 1e-4  # radians: below it the series of the rotation's derivative is exact
 

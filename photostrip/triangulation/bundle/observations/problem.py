@@ -15,10 +15,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from photostrip.arrays import Floats, Numbers
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 CALIBRATION = ("c", "x0", "y0", "k1", "k2", "k3", "p1", "p2", "b1", "b2")
 """Names of the calibration parameters of a camera, in the order of the columns of ``Calibration``.

@@ -18,12 +18,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.triangulation.bundle.observations.problem import ImageObservations
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 LARGEST_GROUP = 64  # points; larger groups are split
 RAYS_OF_BATCH = 6144  # the arrays of a batch then fill some 2 MB

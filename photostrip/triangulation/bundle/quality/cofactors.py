@@ -21,17 +21,13 @@ from photostrip.triangulation.bundle.parameters import parameters_from
 from photostrip.triangulation.bundle.solution import Cofactors
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.triangulation.bundle.normal_equations.point_elimination import Eliminated
     from photostrip.triangulation.bundle.normal_equations.reduced import Factor, Reduced
     from photostrip.triangulation.bundle.observations.given_orientations import LinearisedOrientations
     from photostrip.triangulation.bundle.observations.ray_batches import Batch
     from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem
     from photostrip.triangulation.bundle.solution import BundleSolution
-
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,11 +12,9 @@ from photostrip.triangulation.bundle.observations.collinearity import PHOTO
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
-    Floats = NDArray[np.float64]
 
 LIMIT = 0.95
 ELEMENTS = (

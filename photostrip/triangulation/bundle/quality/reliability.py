@@ -14,13 +14,10 @@ import numpy as np
 from photostrip.statistics import chi2_quantile, normal_quantile, t_quantile
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
-    Floats = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
 
 IMAGE, CONTROL, POSITION, ATTITUDE = "image", "control", "position", "attitude"
 UNCONTROLLED = 0.01  # redundancy number below which an observation cannot be tested

@@ -14,13 +14,10 @@ from photostrip.triangulation.bundle.observations.problem import CALIBRATION
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 COLUMNS = {
     "principal_distance": ("c",),

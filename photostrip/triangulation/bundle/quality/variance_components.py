@@ -16,12 +16,10 @@ from photostrip.triangulation.bundle.quality import reliability
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
-    Floats = NDArray[np.float64]
 
 LEAST_REDUNDANCY = 3.0  # of a group, below which its residuals say nothing about it
 ITERATIONS = 12
@@ -43,7 +41,7 @@ class Component:
     estimated: bool  # whether its redundancy was enough
 
 
-def labels(kind: str, rows: int, level: Sequence[bool]) -> list[tuple[str, slice | NDArray[np.bool_]]]:
+def labels(kind: str, rows: int, level: Sequence[bool]) -> list[tuple[str, slice | Flags]]:
     """Split a kind of observations into groups of their own variance: name, and coordinates (rows, 3).
 
     ``level``: whether the axes of a row are plan and height; others, as of geocentric coordinates, stay one group.
@@ -75,7 +73,7 @@ def components(
     return tuple(found)
 
 
-def _component(name: str, group: reliability.Group, given: NDArray[np.bool_]) -> Component:
+def _component(name: str, group: reliability.Group, given: Flags) -> Component:
     squares = float(((group.error[given] / group.sigma[given]) ** 2).sum())
     redundancy = float(group.redundancy[given].sum())
     estimated = redundancy >= LEAST_REDUNDANCY

@@ -14,12 +14,10 @@ from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.triangulation.gross_errors.control.strip_at_control import tests_by_kept
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.points import ControlPoints
     from photostrip.triangulation.gross_errors.control.strip_at_control import StripAtControl
 
-    Floats = NDArray[np.float64]
 
 EXCHANGED = 0.2  # misclosures left by an exchange, over those before
 

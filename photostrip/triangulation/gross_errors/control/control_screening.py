@@ -35,14 +35,11 @@ from photostrip.triangulation.gross_errors.control.strip_at_control import (
 from photostrip.triangulation.polynomial import terms as polynomial_terms
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats
     from photostrip.points import ControlPoints
     from photostrip.triangulation.gross_errors.control.control_rejections import ControlRejection
     from photostrip.triangulation.gross_errors.control.strip_at_control import StripAtControl
 
-    Floats = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
 
 LARGEST_SHARE = 0.45  # of the control coordinates of plan or height that may be far off
 LARGEST_TESTED = 0.34  # of the others that single tests may reject

@@ -17,11 +17,8 @@ import numpy as np
 from photostrip.statistics import t_quantile
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from photostrip.arrays import Flags, Floats, Numbers
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
-    Flags = NDArray[np.bool_]
 
 LARGEST = 400  # control coordinates whose covariance is formed as a whole
 LONGEST = 300  # photos of a strip for which it is formed; for more it takes longer than all the rest
@@ -62,14 +59,9 @@ def predict_control(joint: ControlCovariance, misclosures: Floats, used: Flags, 
     has the error -(P w)_i / P_ii and the test value |(P w)_i| / sqrt(P_ii); one that takes no part is tested by those
     that do.
 
-    Parameters
-    ----------
-    misclosures : ndarray, shape (n, 3)
-        Strip minus given along the ground axes, metres, after any similarity near the truth.
-    used : ndarray of bool, shape (n, 3)
-        Coordinates that take part.
-    alpha : float
-        Level of rejecting anything in a strip without wrong control.
+    misclosures: (n, 3), strip minus given along the ground axes, metres, after any similarity near the truth.
+    used: (n, 3), coordinates that take part.
+    alpha: level of rejecting anything in a strip without wrong control.
     """
     w = misclosures[joint.point, joint.axis]
     inside = np.flatnonzero(used[joint.point, joint.axis])

@@ -20,14 +20,10 @@ from photostrip.statistics import SIGMA_FROM_MEDIAN
 from photostrip.triangulation import absolute_orientation
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.geometry.similarity import Similarity
     from photostrip.triangulation.absolute_orientation import Targets
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
-    Flags = NDArray[np.bool_]
 
 PLAN_COLUMNS, HEIGHT_COLUMNS = [0, 1, 5, 6], [2, 3, 4]  # shifts X, Y, turn about Z, scale; shift Z, turns about X, Y
 PLAN_POINTS, HEIGHT_POINTS = 2, 3  # of a set

@@ -23,14 +23,12 @@ from photostrip.triangulation.polynomial import terms as polynomial_terms
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.geodesy.local_frame import IntermediateFrame
     from photostrip.points import ControlPoints
     from photostrip.triangulation.gross_errors.control.control_significance import ControlCovariance
 
-    Floats = NDArray[np.float64]
 
 ALPHA = 0.01  # of rejecting anything in a strip without wrong control
 LEAST_REDUNDANCY = 3  # of plan and of height, for a test

@@ -17,11 +17,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from photostrip.arrays import Flags, Floats, Numbers
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
-    Flags = NDArray[np.bool_]
 
 LARGEST = 3  # points of a set
 TRIPLES_OF = 24  # points from which sets of three are formed; those of the best sets of two
@@ -39,14 +36,9 @@ def gains(residuals: Floats, matrix: Floats, sets: Numbers) -> Floats:
 
     -inf for a set whose errors cannot be told from a change of the elements.
 
-    Parameters
-    ----------
-    residuals : ndarray, shape (g, n)
-        Residuals v of g adjustments of n points each, in units of their a-priori standard deviation.
-    matrix : ndarray, shape (g, n, n)
-        The matrices M of residuals from errors.
-    sets : ndarray of int, shape (s, k) or (g, s, k)
-        Sets of k = 1, 2 or 3 points, the same for all adjustments or different ones.
+    residuals: (g, n), residuals v of g adjustments of n points each, in units of their a-priori standard deviation.
+    matrix: (g, n, n), the matrices M of residuals from errors.
+    sets: (s, k) or (g, s, k), sets of k = 1, 2 or 3 points, the same for all adjustments or different ones.
     """
     number = np.arange(len(residuals))[:, None]
     place = np.broadcast_to(sets, (len(residuals), *sets.shape[-2:]))

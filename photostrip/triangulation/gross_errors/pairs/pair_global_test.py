@@ -15,13 +15,9 @@ from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.triangulation.relative_orientation.orientation import Orientation
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
-    Flags = NDArray[np.bool_]
 
 CONFIDENCE = 0.999  # of the global test, and of the test of the largest residual of a pair
 NO_REDUNDANCY = 1e-6  # residuals with less are rounding

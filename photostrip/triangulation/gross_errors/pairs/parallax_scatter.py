@@ -16,13 +16,10 @@ from photostrip.triangulation.gross_errors.pairs.pair_global_test import failing
 from photostrip.triangulation.relative_orientation import robust
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.relative_orientation.pairs import Pairs
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 SMALLEST_REDUNDANCY = 0.05  # a residual with less says little about the scatter
 MEDIAN_SCATTER = 1.17  # sd of a standard deviation from the median of n residuals, times sqrt(n)

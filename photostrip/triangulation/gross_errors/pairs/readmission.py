@@ -18,12 +18,9 @@ from photostrip.triangulation.relative_orientation.solution import (
 )
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.triangulation.relative_orientation.orientation import Orientation
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
 
 READMIT = 3.0  # standard deviations of the predicted residual
 

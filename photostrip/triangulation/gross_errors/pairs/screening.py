@@ -31,13 +31,10 @@ from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.triangulation.relative_orientation.solution import base_rays, in_front_of_cameras, rays_meet_in_front
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.triangulation.gross_errors.pairs.parallax_scatter import ParallaxScatter
     from photostrip.triangulation.relative_orientation.orientation import Orientation
 
-    Floats = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
 
 METHODS = ("auto", "parallax+grubbs", "tau", "deletion", "robust", "none")
 SEARCHES = {"auto": (True, True), "deletion": (False, True), "robust": (True, False)}  # robust start, sets of points
@@ -75,16 +72,16 @@ class ScreenedPairs:
     rejections: tuple[PairRejection, ...]  # what was rejected, in order; re-admitted points are marked
     scatter: ParallaxScatter  # standard deviations of a y parallax of weight one
     # (p,): pairs that fail the global test with nothing left to reject: errors that hide each other are suspected
-    masked: NDArray[np.bool_]
-    converged: NDArray[np.bool_]  # (p,): whether the orientation of each pair converged
+    masked: Flags
+    converged: Flags  # (p,): whether the orientation of each pair converged
 
     @cached_property
-    def zone(self) -> NDArray[np.intp]:
+    def zone(self) -> Numbers:
         """Standard zone of every point, 1 to 6, shape (m,)."""
         return zones(self.orientation.elements, self.orientation.pairs)
 
     @property
-    def counts(self) -> NDArray[np.intp]:
+    def counts(self) -> Numbers:
         """Points that take part, by pair and zone, shape (p, 6)."""
         return Support.of(self.orientation, self.zone).counts
 
@@ -102,7 +99,7 @@ class ScreenedPairs:
 
 
 def screen_pairs(
-    orientation: Orientation, settings: RelativeSettings, sigma: float, converged: NDArray[np.bool_] | None = None
+    orientation: Orientation, settings: RelativeSettings, sigma: float, converged: Flags | None = None
 ) -> ScreenedPairs:
     """Reject points with gross errors, and say what can and what cannot be seen in each pair.
 
@@ -206,7 +203,7 @@ def _drop_behind(orientation: Orientation, behind: Flags) -> tuple[Orientation, 
     return _without(orientation, rows), log
 
 
-def _without(orientation: Orientation, rows: NDArray[np.intp]) -> Orientation:
+def _without(orientation: Orientation, rows: Numbers) -> Orientation:
     weight = orientation.pairs.weight.copy()
     weight[rows] = 0.0
     return orient_again(orientation, weight, np.unique(orientation.pairs.pair[rows]))

@@ -39,14 +39,10 @@ from photostrip.triangulation.relative_orientation.solution import (
 )
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.relative_orientation.pairs import Pairs
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
-    Flags = NDArray[np.bool_]
 
 GROSS_SIGMAS = 4.0  # standard deviations; residuals from the robust start beyond it are wrong points
 PAIRS_AT_ONCE = 64
@@ -108,17 +104,11 @@ def search(
     raised and the search repeated: for the whole strip when all pairs together prove it, for one pair as far as its
     own residuals do.
 
-    Parameters
-    ----------
-    sigma : float
-        Stated standard deviation of an image coordinate, mm.
-    start : bool
-        Orient failing pairs with falling weights first.
-    sets : bool
-        Look for the smallest set of points that explains the misfit; without it points beyond four standard deviations
-        go, worst first.
-    doubtful : ndarray of bool, shape (p,), optional
-        Pairs whose elements cannot be used as they are; they are searched whatever the test says.
+    sigma: stated standard deviation of an image coordinate, mm.
+    start: orient failing pairs with falling weights first.
+    sets: look for the smallest set of points that explains the misfit; without it points beyond four standard
+        deviations go, worst first.
+    doubtful: (p,), optional, pairs whose elements cannot be used as they are; they are searched whatever the test says.
     """
     scatter = ParallaxScatter.of(sigma, orientation.pairs.size)
     lost = np.zeros(orientation.pairs.size, bool) if doubtful is None else doubtful

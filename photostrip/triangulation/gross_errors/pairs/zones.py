@@ -21,14 +21,10 @@ import numpy as np
 from photostrip.triangulation.relative_orientation.solution import base_rays
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.relative_orientation.pairs import Pairs
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
-    Flags = NDArray[np.bool_]
 
 ZONES = 6
 MINIMUM_LEFT = 6  # a pair keeps at least one redundant point

@@ -19,13 +19,9 @@ from photostrip.statistics import chi2_quantile
 from photostrip.triangulation.gross_errors.rays.windows import FEWEST
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.triangulation.gross_errors.rays.window_points import Group
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
-    Flags = NDArray[np.bool_]
 
 ALPHA = 0.01  # of rejecting any point of a window without gross errors
 BETTER = 9.0  # difference of two test values that tells rays apart: a likelihood ratio of 90

@@ -26,17 +26,13 @@ from photostrip.triangulation.strip_formation.strip import form_from_pairs, with
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.points import PhotoPoints
     from photostrip.triangulation.gross_errors.pairs.screening import PairRejection
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
     from photostrip.triangulation.strip_formation.strip import FormedStrip
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
-    Flags = NDArray[np.bool_]
 
 MOST_FORMATIONS = 4  # most of the strips settle in the second
 NOTICEABLE_CHANGE = 5e-4  # rad, and relative: the second order of such a change is 0.04 µm on a photo of 150 mm

@@ -24,8 +24,7 @@ from photostrip.triangulation.gross_errors.rays.ray_decisions import GOOD, NONE,
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.points import PhotoPoints
     from photostrip.triangulation.gross_errors.rays.window_adjustment import AdjustedWindows
     from photostrip.triangulation.gross_errors.rays.window_points import Group
@@ -33,9 +32,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.strip import FormedStrip
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
-    Flags = NDArray[np.bool_]
 
 LONGEST_REACH = 8  # photos; windows do not grow for points that reach over more
 BATCH = 48  # windows solved together
@@ -189,15 +185,10 @@ def screen_rays(
 ) -> RayRejections:
     """Test all points near some suspected ones, and say which rays must not be used.
 
-    Parameters
-    ----------
-    kept : ndarray of int
-        Rows of the observations that the user keeps: their points are not tested.
-    earlier : RayRejections, optional
-        What was found in the same strip before its last small change.
-    moved : ndarray of bool, shape (p,), optional
-        Models that this change has turned or stretched by more than the adjustment of a window is linear for; what was
-        found where there is none stands. All by default.
+    kept: rows of the observations that the user keeps: their points are not tested.
+    earlier: what was found in the same strip before its last small change.
+    moved: (p,), optional, models that this change has turned or stretched by more than the adjustment of a window is
+        linear for; what was found where there is none stands. All by default.
     """
     if not len(points):
         return RayRejections()

@@ -14,13 +14,9 @@ from photostrip.triangulation.gross_errors.rays.window_points import projectors
 from photostrip.triangulation.gross_errors.rays.windows import PHOTO_PARAMETERS
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats
     from photostrip.triangulation.gross_errors.rays.window_points import Group
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
-    Flags = NDArray[np.bool_]
 
 RIDGE = 1e-11  # relative; holds the place and scale of a window, which no residual feels
 INVERTIBLE = 1e-9  # keeps a point that holds its photos alone from stopping the others

@@ -17,13 +17,9 @@ import numpy as np
 from photostrip.triangulation.gross_errors.rays.windows import FEWEST, PHOTO_PARAMETERS
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.triangulation.gross_errors.rays.windows import WindowRays
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
-    Flags = NDArray[np.bool_]
 
 CONCORDANT = 1e-9  # smallest share of a condition that the others do not hold already
 KEPT = (

@@ -21,11 +21,8 @@ import numpy as np
 from photostrip.geometry.rotation import cross_matrix
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from photostrip.arrays import Floats, Numbers
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
-    Flags = NDArray[np.bool_]
 
 PHOTO_PARAMETERS = 6  # of a photo: shift of its centre, rotation
 FEWEST = 2  # rays

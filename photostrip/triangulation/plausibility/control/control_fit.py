@@ -19,9 +19,9 @@ from photostrip.statistics import SIGMA_FROM_MEDIAN, t_quantile
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    Floats = NDArray[np.float64]
+    from photostrip.arrays import Flags, Floats, Numbers
+
     Complex = NDArray[np.complex128]
-    Flags = NDArray[np.bool_]
 
 LEAST_POINTS = 3  # in plan; two always fit
 PLAN_UNKNOWNS = 2  # complex ones: turn and shift
@@ -75,21 +75,10 @@ def fit_similarity(w: Complex, plan: Complex, *, mirrored: bool = False) -> Plan
     The similarity through two points whose median misclosure over all points is the smallest of all pairs of points,
     then fitted to the better half by least squares. Up to nearly half of the points may be wrong.
 
-    Parameters
-    ----------
-    w : ndarray of complex, shape (n,)
-        Places of the points in the upright strip.
-    plan : ndarray of complex, shape (n,)
-        Given places E + iN, metres.
-    mirrored : bool
-        Whether the strip is to be mirrored.
-
-    Returns
-    -------
-    PlanSimilarity or None
-        None for fewer than three points, or when all stand at one place.
-
-    Source: derived; least median of squares (Rousseeuw 1984).
+    w: (n,), places of the points in the upright strip.
+    plan: (n,), given places E + iN, metres.
+    mirrored: whether the strip is to be mirrored.
+    Returns none for fewer than three points, or when all stand at one place.
     """
     if len(w) < LEAST_POINTS:
         return None
@@ -105,7 +94,7 @@ def fit_similarity(w: Complex, plan: Complex, *, mirrored: bool = False) -> Plan
     return _refined(z, plan, complex(turn[best]), complex(shift[best]), mirrored=mirrored)
 
 
-def _evenly(count: int, most: int) -> NDArray[np.intp]:
+def _evenly(count: int, most: int) -> Numbers:
     """Numbers below a count, evenly drawn from all where there are too many."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.intp))
 
@@ -117,7 +106,7 @@ def _median(size: Floats, unknowns: int) -> Floats:
     return np.asarray(np.partition(size, place, axis=-1)[..., place])
 
 
-def _pairs(z: Complex, plan: Complex) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _pairs(z: Complex, plan: Complex) -> tuple[Numbers, Numbers]:
     """Pairs of points far enough from each other on both sides, evenly drawn from all."""
     n = len(z)
     if n * (n - 1) // 2 > 20 * MOST_PAIRS:
@@ -148,7 +137,7 @@ def _refined(z: Complex, plan: Complex, turn: complex, shift: complex, *, mirror
     return PlanSimilarity(turn, shift, mirrored, float(_median(size, PLAN_UNKNOWNS)))
 
 
-def _least_median(columns: NDArray[Any], values: NDArray[Any], rows: NDArray[np.intp]) -> Floats | None:
+def _least_median(columns: NDArray[Any], values: NDArray[Any], rows: Numbers) -> Floats | None:
     """Sizes of the residuals of the fit through as many points as unknowns whose middle residual is smallest."""
     unknowns = columns.shape[1]
     if len(rows) <= unknowns:
@@ -209,16 +198,10 @@ def fit_robustly(columns: NDArray[Any], values: NDArray[Any], in_fit: Flags, flo
     It starts from the fit through as many points as unknowns whose median residual is smallest, goes on with weights
     that fall with the residual, and ends with the points that go with each other, all of one weight.
 
-    Parameters
-    ----------
-    columns : ndarray of float or complex, shape (n, c)
-        Columns, the same for all points.
-    values : ndarray of float or complex, shape (n,)
-        Values, metres.
-    in_fit : ndarray of bool, shape (n,)
-        Points that may take part.
-    floor : float
-        Smallest standard deviation that makes sense, metres.
+    columns: (n, c), columns, the same for all points.
+    values: (n,), values, metres.
+    in_fit: (n,), points that may take part.
+    floor: smallest standard deviation that makes sense, metres.
     """
     size = np.maximum(np.abs(columns[in_fit]).max(axis=0, initial=TINY), TINY)
     scaled = columns / size

@@ -33,13 +33,10 @@ from photostrip.triangulation.plausibility.finding import found
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats
     from photostrip.notes import Finding
     from photostrip.triangulation.plausibility.finding import Evidence
 
-    Floats = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
 
 FALSE_ALARM = 1e-5  # probability of a finding where there is nothing to find
 LEAST_SCALE_ERROR = 0.03  # of the ratio of heights to plan: a smaller one harms nobody and may be a bent strip
@@ -72,10 +69,7 @@ class HeightComparison:
 def compare_heights(given: GivenPoints, fitted: StraightenedStrip, consistent: Flags) -> HeightComparison | None:
     """Compare given heights with those of a strip; None when too few are given.
 
-    Parameters
-    ----------
-    consistent : ndarray of bool, shape (n,)
-        Points of lists that go with each other.
+    consistent: (n,), points of lists that go with each other.
     """
     usable = given.use[:, 2] & np.isfinite(given.xyz[:, 2]) & np.isfinite(fitted.height)
     in_fit = usable & ~given.check & consistent
@@ -135,17 +129,9 @@ def find_wrong_heights(
 ) -> Iterator[Finding]:
     """Find heights of another unit or sense, and groups of heights that are off by a constant.
 
-    Parameters
-    ----------
-    fit : RobustFit
-        What is left of the heights, tilt and bending taken out.
-    floor : float
-        Smallest standard deviation that makes sense, metres.
-
-    Yields
-    ------
-    Finding
-        P105, P401, P404, P405, at most one.
+    fit: what is left of the heights, tilt and bending taken out.
+    floor: smallest standard deviation that makes sense, metres.
+    Yields P105, P401, P404, P405, at most one.
     """
     in_fit = heights.in_fit
     ratio, sigma = heights.ratio

@@ -20,12 +20,10 @@ from photostrip.triangulation.plausibility.control.control_strip import (
 from photostrip.triangulation.plausibility.finding import found
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags
     from photostrip.notes import Finding
     from photostrip.triangulation.plausibility.finding import Evidence
 
-    Flags = NDArray[np.bool_]
 
 LEAST_OFFSET = 0.1  # of the distance from camera to ground: lists that lie nearer to each other go together
 MOST_ODD_SHARE = 0.6  # of the points of a list: beyond it the list is wrong, not its points
@@ -40,17 +38,9 @@ def find_foreign_lists(
 ) -> tuple[list[int], list[Finding]]:
     """Find control lists that do not go with the largest one.
 
-    Parameters
-    ----------
-    in_fit : ndarray of bool, shape (n,)
-        Points on which the strip was laid.
-
-    Returns
-    -------
-    list of int
-        Numbers of the lists that do not go with the others.
-    list of Finding
-        P403, P407.
+    in_fit: (n,), points on which the strip was laid.
+    Returns numbers of the lists that do not go with the others.
+    Returns P403, P407.
     """
     numbers, counts = np.unique(given.group[in_fit], return_counts=True)
     if len(numbers) < 2:

@@ -17,13 +17,11 @@ from photostrip.triangulation.plausibility.finding import found
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.notes import Finding
     from photostrip.triangulation.plausibility.finding import Evidence
 
-    Floats = NDArray[np.float64]
 
 Area = tuple[float, float, float, float]
 MARGIN_SHARES = (0.6, 0.25)  # of the width and the height of the area: a neighbouring zone is used at times
@@ -47,12 +45,8 @@ class FramePlace(NamedTuple):
 def find_wrong_place(frame: GroundFrame, area: Area | None, enu: Floats, number: int) -> FramePlace:
     """Compare the place of control list `number` with the area of its coordinate reference system.
 
-    Parameters
-    ----------
-    area : Area or None
-        None when it is not known.
-    enu : ndarray, shape (n, 3)
-        Its points east, north, up, in the units of the frame.
+    area: none when it is not known.
+    enu: (n, 3), its points east, north, up, in the units of the frame.
     """
     known = enu[np.isfinite(enu[:, :2]).all(axis=1)]
     if area is None or not len(known) or frame.kind not in {"projected", "geographic"}:

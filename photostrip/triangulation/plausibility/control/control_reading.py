@@ -38,11 +38,11 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from photostrip.arrays import Flags
     from photostrip.notes import Finding
     from photostrip.triangulation.plausibility.finding import Evidence
 
     Complex = NDArray[np.complex128]
-    Flags = NDArray[np.bool_]
 
 MIRRORED_SHARE = 0.15  # of the misclosure of the strip as it is, left when it is mirrored
 FIT_SHARE = 0.1  # of the extent of the control: a misclosure above it is no fit
@@ -57,18 +57,10 @@ def find_wrong_readings(
 ) -> list[Finding]:
     """Compare given points with a strip.
 
-    Parameters
-    ----------
-    axes_are_right : bool or None
-        Whether the place on the Earth shows the axes of the control to be right (True) or wrong (False).
-    exchanged : callable
-        Gives the points with east and north exchanged before anything else is done with them: longitudes read as
+    axes_are_right: whether the place on the Earth shows the axes of the control to be right (True) or wrong (False).
+    exchanged: gives the points with east and north exchanged before anything else is done with them: longitudes read as
         latitudes are no mirror image of the ground, a degree of the one being shorter.
-
-    Returns
-    -------
-    list of Finding
-        P103, P105, P401, P403 to P408.
+    Returns P103, P105, P401, P403 to P408.
     """
     turn = upright(on_strip.axes)
     s = upright_coordinates(on_strip.xyz, turn)

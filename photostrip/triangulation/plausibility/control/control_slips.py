@@ -13,14 +13,11 @@ from photostrip.triangulation.plausibility.finding import found
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats
     from photostrip.notes import Finding
     from photostrip.triangulation.plausibility.control.control_fit import RobustFit
     from photostrip.triangulation.plausibility.control.control_strip import GivenPoints, StraightenedStrip, StripPoints
 
-    Floats = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
 
 SCALE_CHANGE = 3e-4  # of a large error: the scale of a map is not the same where the point came to lie
 LEAST_RAYS = 2

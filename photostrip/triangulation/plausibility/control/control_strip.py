@@ -25,10 +25,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    Floats = NDArray[np.float64]
+    from photostrip.arrays import Flags, Floats, Numbers
+
     Complex = NDArray[np.complex128]
-    Flags = NDArray[np.bool_]
-    Numbers = NDArray[np.intp]
 
 FOOT = 0.3048  # metres
 KINDS_OF_FEET = "international feet (0.3048 m) and US survey feet (1200/3937 m) differ by 2 ppm, 1.2 m at 600 km"
@@ -86,12 +85,8 @@ class Rays:
     def residuals(self, xyz: Floats) -> tuple[Floats, Floats]:
         """Image residuals of a place (3,) in the strip, and how a step of it moves its images.
 
-        Returns
-        -------
-        residual : ndarray, shape (r, 2)
-            Where the place comes to lie on each photo, minus where the point was measured; mm.
-        jacobian : ndarray, shape (r, 2, 3)
-            Millimetres on each photo for a step in the strip.
+        Returns residual: (r, 2), where the place comes to lie on each photo, minus where the point was measured; mm.
+        Returns jacobian: (r, 2, 3), millimetres on each photo for a step in the strip.
         """
         back = self.rotations.transpose(0, 2, 1)
         on_strip = np.einsum("rij,rj->ri", back, xyz - self.centers)
@@ -162,14 +157,9 @@ def turn_level(given: GivenPoints, level: LevelStrip, floor: float, in_fit: Flag
 
     Relief times that tilt is a displacement in plan. Where the heights do not help, all stays as it is.
 
-    Parameters
-    ----------
-    level : LevelStrip
-        The strip, set upright by its cameras.
-    floor : float
-        Smallest standard deviation of a height that makes sense, as a share of the distance from camera to ground.
-    in_fit : ndarray of bool, shape (n,)
-        Points on which the strip is laid in plan.
+    level: the strip, set upright by its cameras.
+    floor: smallest standard deviation of a height that makes sense, as a share of the distance from camera to ground.
+    in_fit: (n,), points on which the strip is laid in plan.
     """
     similarity = level.similarity
     place, height = similarity(level.w), level.scale * level.z
@@ -198,12 +188,9 @@ def turn_level(given: GivenPoints, level: LevelStrip, floor: float, in_fit: Flag
 def straighten(given: GivenPoints, level: LevelStrip, floor: tuple[float, float], in_fit: Flags) -> StraightenedStrip:
     """Take the bending out of the plan: a conformal polynomial of degree 0 to 2 along the strip.
 
-    Parameters
-    ----------
-    floor : tuple of float
-        Smallest standard deviations that make sense in plan and height, as shares of the distance of camera and ground.
-    in_fit : ndarray of bool, shape (n,)
-        Points that may say how the strip bends.
+    floor: smallest standard deviations that make sense in plan and height, as shares of the distance of camera and
+        ground.
+    in_fit: (n,), points that may say how the strip bends.
     """
     distance = level.depth * level.scale
     least = (
@@ -237,10 +224,7 @@ def fit_simplest(
 ) -> tuple[NDArray[Any], RobustFit]:
     """Fit as few columns, the simplest first, as leave no more than makes sense; `least` of them are always taken.
 
-    Returns
-    -------
-    columns : ndarray, shape (n, c)
-        Those that were fitted.
+    Returns columns: (n, c), those that were fitted.
     """
     number = least
     while True:

@@ -25,19 +25,11 @@ class Slip(NamedTuple):
 def slip(given: float, predicted: float, scatter: float, tolerance: float) -> Slip | None:
     """Find the slip that turns a coordinate into one that fits.
 
-    Parameters
-    ----------
-    given, predicted : float
-        The coordinate as it is written, and what everything else lets expect, in its own unit.
-    scatter : float
-        Standard deviation of the prediction.
-    tolerance : float
-        How far the corrected coordinate may lie from the prediction; never more than a part of the digit's value.
-
-    Returns
-    -------
-    Slip or None
-        The slip that brings the coordinate nearest to the prediction; None when none brings it near.
+    given, predicted: the coordinate as it is written, and what everything else lets expect, in its own unit.
+    scatter: standard deviation of the prediction.
+    tolerance: how far the corrected coordinate may lie from the prediction; never more than a part of the digit's
+        value.
+    Returns the slip that brings the coordinate nearest to the prediction; None when none brings it near.
     """
     if abs(given - predicted) < LEAST_SLIP_SIGMAS * scatter:
         return None

@@ -12,13 +12,10 @@ from photostrip.triangulation.plausibility.control.control_strip import GivenPoi
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.points import ControlPoints
 
-    Floats = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
 
 USUAL_SIGMA = 0.1  # metres, of coordinates without one
 
@@ -26,10 +23,7 @@ USUAL_SIGMA = 0.1  # metres, of coordinates without one
 def level(control: ControlPoints, frames: Sequence[GroundFrame], *, as_written: bool = False) -> GivenPoints | None:
     """Bring given points into one level frame; None when none of them has a plan position.
 
-    Parameters
-    ----------
-    as_written : bool
-        Take the numbers as plain coordinates in metres, when their frames cannot be right.
+    as_written: take the numbers as plain coordinates in metres, when their frames cannot be right.
     """
     plan = np.asarray(control.use[:, :2].all(axis=1), bool)
     height = control.use[:, 2]
@@ -73,7 +67,7 @@ def _plain(filled: Floats, control: ControlPoints, frames: Sequence[GroundFrame]
     return _LevelPoints((filled - np.mean(filled[plan], axis=0)) * unit, unit, axes)
 
 
-def _filled(written: Floats, lists: NDArray[np.intp]) -> Floats:
+def _filled(written: Floats, lists: Numbers) -> Floats:
     """Coordinates with the mean of their list, or of all, where they are not given."""
     filled = written.copy()
     for number in np.unique(lists).tolist():

@@ -11,12 +11,10 @@ from photostrip.triangulation.plausibility.finding import found
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.notes import Finding
     from photostrip.triangulation.plausibility.finding import Evidence
 
-    Floats = NDArray[np.float64]
 
 ONE_END_SHARE = 0.4  # of the strip's length: control that spans less, all in one half, is at one end
 HALF_SHARE = 0.55
@@ -31,10 +29,7 @@ def find_weak_control(
 ) -> Iterator[Finding]:
     """Find control of a strip that lies at one end, on one line or far from an end.
 
-    Yields
-    ------
-    Finding
-        P501, P502, P503.
+    Yields P501, P502, P503.
     """
     if len(ids) < LEAST_POINTS:
         return

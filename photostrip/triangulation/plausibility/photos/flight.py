@@ -15,12 +15,9 @@ from photostrip.triangulation.plausibility.finding import found, listed
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.notes import Finding
 
-    Floats = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
 
 MOST_HEIGHT_OFF = 0.2  # of the flying height, from the line of the neighbours
 LONG_BASE, SHORT_BASE = 1.75, 0.5  # of the usual base
@@ -36,19 +33,9 @@ def find_odd_centers(
 ) -> Iterator[Finding]:
     """Look for perspective centres that do not go with their neighbours.
 
-    Parameters
-    ----------
-    centers : ndarray, shape (n, 3)
-        Perspective centres in order, any unit and frame.
-    depth : ndarray, shape (n,)
-        Height of each above the points it shows, in that unit.
-    up : ndarray, shape (3,)
-        Direction from the ground to the cameras.
-
-    Yields
-    ------
-    Finding
-        P204 to P207.
+    centers: (n, 3), perspective centres in order, any unit and frame.
+    depth: (n,), height of each above the points it shows, in that unit.
+    up: (3,), direction from the ground to the cameras.
     """
     names = (strip,)
     below = np.flatnonzero(depth <= 0)
@@ -64,7 +51,7 @@ def find_odd_centers(
     yield from _directions(bases, up, photos, names)
 
 
-def _below(photos: Sequence[str], depth: Floats, below: NDArray[np.intp], names: tuple[str, ...]) -> Finding:
+def _below(photos: Sequence[str], depth: Floats, below: Numbers, names: tuple[str, ...]) -> Finding:
     """Say which perspective centres lie below the ground."""
     message = (
         f"the perspective centre of photo {photos[0]} lies below the points that it shows"

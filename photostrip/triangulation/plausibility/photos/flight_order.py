@@ -17,12 +17,10 @@ from photostrip.triangulation.plausibility.photos.units import reading_of
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Flags
     from photostrip.notes import Finding
     from photostrip.points import PhotoPoints
 
-    Flags = NDArray[np.bool_]
     Toward = Callable[[int, int], complex | None]
     Against = Callable[[Sequence[int]], list[int]]
     Closer = Callable[[str, str], tuple[complex, complex] | None]
@@ -52,20 +50,11 @@ def find_wrong_order(
 ) -> tuple[list[Finding], PhotoOrder]:
     """Compare the list of a strip's photos with what their common points say.
 
-    Parameters
-    ----------
-    observations : PhotoPoints
-        Image points of the project, in any unit.
-    closer : callable
-        Gives of two photos the direction of each from the other, tilts taken into account, or None; asked where the
+    observations: image points of the project, in any unit.
+    closer: gives of two photos the direction of each from the other, tilts taken into account, or None; asked where the
         layout contradicts the list.
-
-    Returns
-    -------
-    list of Finding
-        P102, P104, P201, P202, P203.
-    PhotoOrder
-        The strip as its photos lie.
+    Returns P102, P104, P201, P202, P203.
+    Returns the strip as its photos lie.
     """
     links = mosaic.link(observations, photos)
     plane = mosaic.lay_out(links, len(photos))

@@ -11,16 +11,12 @@ from photostrip.triangulation.plausibility.finding import found
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats, Numbers
     from photostrip.notes import Finding
     from photostrip.points import PhotoPoints
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.strip import FormedStrip
 
-    Floats = NDArray[np.float64]
-    Numbers = NDArray[np.intp]
-    Flags = NDArray[np.bool_]
 
 MOST_X_OVER_Y = 5.0  # times the y parallax: how large an error of the x parallax may be
 LEAST_APART_SHARE = 0.05  # of the distance from camera to ground: no bending of a strip moves a point by it
@@ -45,14 +41,9 @@ def find_shared_ids(
 
     What a pair says is believed within what its y parallax lets expect along the base.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Ids of the points by number.
-    photos : sequence of str
-        Photos of the strip in order.
-    sigma : float
-        Standard deviation of an image coordinate, mm.
+    names: ids of the points by number.
+    photos: photos of the strip in order.
+    sigma: standard deviation of an image coordinate, mm.
     """
     rows = np.flatnonzero(np.isfinite(formed.model_xyz).all(axis=1))
     pair = orientation.pairs.pair[rows]
@@ -125,12 +116,8 @@ def find_shared_ids_in_images(
 ) -> Iterator[Finding]:
     """Find ids that two groups of photos put at places far from each other along the strip.
 
-    Parameters
-    ----------
-    rows : ndarray of int, shape (m,)
-        Image points of the strip.
-    along : ndarray, shape (m,)
-        Where the photo of each puts its point along the strip, bases.
+    rows: (m,), image points of the strip.
+    along: (m,), where the photo of each puts its point along the strip, bases.
     """
     order = np.lexsort((along, observations.point[rows]))
     rows, along = rows[order], along[order]

@@ -20,12 +20,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.points import PhotoPoints
 
-    Floats = NDArray[np.float64]
     Complex = NDArray[np.complex128]
-    Numbers = NDArray[np.intp]
-    Flags = NDArray[np.bool_]
 
 LARGEST_LAG = 12  # photos on which a point is followed on; a strip with 90 % end lap has 10
 REWEIGHTINGS = 6  # of the reweighting: a gross error must not turn a link
@@ -78,12 +76,8 @@ class PhotoLinks:
 def link(observations: PhotoPoints, photos: Sequence[str]) -> PhotoLinks:
     """Link every two photos of a strip that have at least two common points.
 
-    Parameters
-    ----------
-    observations : PhotoPoints
-        Image points of the project, in any unit.
-    photos : sequence of str
-        Photos of the strip; a photo that is listed twice counts where it stands first.
+    observations: image points of the project, in any unit.
+    photos: photos of the strip; a photo that is listed twice counts where it stands first.
     """
     pair, z_a, z_b = _common_points(observations, photos)
     order = np.argsort(pair, kind="stable")

@@ -13,11 +13,9 @@ from photostrip.triangulation.plausibility.finding import found
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.notes import Finding
 
-    Floats = NDArray[np.float64]
 
 LEAST_PHOTOS = 3  # photos
 HARMLESS_DEG = 0.3  # rms difference: start values need not be better
@@ -36,17 +34,9 @@ UNITS = (
 def find_wrong_angles(angles: Floats, system: str, rotations: Floats, photos: Sequence[str]) -> Iterator[Finding]:
     """Compare given angles with the rotations that the photos turned out to have.
 
-    Parameters
-    ----------
-    angles : ndarray, shape (n, 3)
-        Given angles as they were read, radians, of the stated `system` (``geometry.rotation.SYSTEMS``).
-    rotations : ndarray, shape (n, 3, 3)
-        Rotations found, image axes to east, north, up.
-
-    Yields
-    ------
-    Finding
-        P601 or P602, at most one.
+    angles: (n, 3), given angles as they were read, radians, of the stated `system` (``geometry.rotation.SYSTEMS``).
+    rotations: (n, 3, 3), rotations found, image axes to east, north, up.
+    Yields P601 or P602, at most one.
     """
     if len(photos) < LEAST_PHOTOS:
         return

@@ -15,13 +15,11 @@ from photostrip.triangulation.plausibility.finding import found
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from photostrip.arrays import Floats
     from photostrip.camera import Camera
     from photostrip.notes import Finding
     from photostrip.points import PhotoPoints
 
-    Floats = NDArray[np.float64]
 
 REACH_SHARE = 0.98  # of the image points; the rest may be gross errors
 REACH = (0.12, 1.2)  # of half the format
@@ -76,11 +74,8 @@ def reading_of(ratio: float, likely: tuple[float, float], pixel_size: float | No
 def reaches(observations: PhotoPoints, cameras: Mapping[str, Camera]) -> dict[str, tuple[float, bool]]:
     """Measure how far image points reach, camera by camera.
 
-    Returns
-    -------
-    dict of str to (float, bool)
-        By name of the camera: the reach, in units of half the format (or of the principal distance), and whether the
-        format is known.
+    Returns by name of the camera: the reach, in units of half the format (or of the principal distance), and whether
+        the format is known.
     """
     size_of = {}
     owner = [cameras[photo].name if photo in cameras else "" for photo in observations.photo_ids]
@@ -99,12 +94,8 @@ def find_wrong_units(
 ) -> tuple[list[Finding], dict[str, float]]:
     """Look for image coordinates in another unit, and for principal distances that no lens has.
 
-    Returns
-    -------
-    list of Finding
-        P101, P105.
-    dict of str to float
-        Factor by camera that would bring its image coordinates to a likely size; 1 where nothing is wrong.
+    Returns P101, P105.
+    Returns factor by camera that would bring its image coordinates to a likely size; 1 where nothing is wrong.
     """
     findings, factors = [], {}
     by_name = {each.name: each for each in cameras.values()}
