@@ -84,7 +84,8 @@ NOTHING_BENT = Bending()
 class Refined:
     """Refined image coordinates."""
 
-    observations: PhotoPoints  # ideal image coordinates, reduced to the principal point, mm
+    # ideal image coordinates, reduced to the principal point, mm; every measured row, also what is rejected later
+    observations: PhotoPoints
     # largest shift by each effect that was corrected, micrometres: ``"principal point"``, ``"distortion"``,
     # ``"refraction"``, ``"earth curvature"``
     largest_um: dict[str, float]
