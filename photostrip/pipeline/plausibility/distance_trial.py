@@ -8,7 +8,7 @@ it then fits much better, and the pairs no worse, that is reported.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -40,6 +40,14 @@ FACTOR_RANGE = (0.2, 5.0)  # of the principal distance given
 FIRST_FACTORS = (1.4, 0.7, 2.0, 0.5)  # tried when the pairs cannot be oriented at all
 
 
+class DistanceTrial(NamedTuple):
+    """A strip formed with another principal distance."""
+
+    factor: float  # of the principal distance given
+    misfit: float  # of the heights, in units of what makes sense
+    sigma0: float  # of the pairs, mm
+
+
 def find_wrong_distance(
     formed: EvidenceStrip, observations: PhotoPoints, settings: Settings, compare: Compare
 ) -> list[Finding]:
@@ -51,24 +59,21 @@ def find_wrong_distance(
     first = compare(formed) or compare(formed.whole) if len(formed.strip.photos) <= MOST_PHOTOS else None
     if first is None or first.misfit < LEAST_MISFIT or abs(first.ratio - 1.0) < control_heights.LEAST_SCALE_ERROR:
         return []
+    sigma0 = _middle_sigma0(formed)
     for start in (first.ratio, *FIRST_FACTORS):
-        ratio, last, pairs = _followed(formed.strip, observations, settings, compare, start)
-        if (
-            last is None
-            or last.misfit > LEFT_SHARE * first.misfit
-            or pairs > MOST_SIGMA0_RATIO * _middle_sigma0(formed)
-        ):
+        trial = _followed(formed.strip, observations, settings, compare, start)
+        if trial is None or trial.misfit > LEFT_SHARE * first.misfit or trial.sigma0 > MOST_SIGMA0_RATIO * sigma0:
             continue
-        if abs(ratio - 1.0) * first.relief > SHOWN_MISFIT or pairs < BETTER_SIGMA0_RATIO * _middle_sigma0(formed):
+        if abs(trial.factor - 1.0) * first.relief > SHOWN_MISFIT or trial.sigma0 < BETTER_SIGMA0_RATIO * sigma0:
             break  # else a bend of the strip explains it
     else:
         return []
     numbers: Evidence = {
-        "heights_given_over_strip": first.ratio, "misfit_as_given": first.misfit, "misfit_then": last.misfit,
-        "pairs_sigma0_mm": _middle_sigma0(formed), "pairs_sigma0_then_mm": pairs,
+        "heights_given_over_strip": first.ratio, "misfit_as_given": first.misfit, "misfit_then": trial.misfit,
+        "pairs_sigma0_mm": sigma0, "pairs_sigma0_then_mm": trial.sigma0,
     }  # fmt: skip
-    times = first.misfit / last.misfit
-    return _finding(formed.strip, ratio, f"fits the heights of its control {times:.0f} times better", numbers)
+    times = first.misfit / trial.misfit
+    return _finding(formed.strip, trial.factor, f"fits the heights of its control {times:.0f} times better", numbers)
 
 
 def find_distance_without_pairs(
@@ -76,16 +81,11 @@ def find_distance_without_pairs(
 ) -> list[Finding]:
     """Try other principal distances on a strip whose pairs cannot be oriented (P105, at most one)."""
     for start in FIRST_FACTORS if len(strip.photos) <= MOST_PHOTOS else ():
-        ratio, last, pairs = _followed(strip, observations, settings, compare, start)
-        if last is not None and last.misfit < LEAST_MISFIT:
-            numbers: Evidence = {"misfit_then": last.misfit, "pairs_sigma0_then_mm": pairs}
-            return _finding(strip, ratio, "can be formed and fits the heights of its control only", numbers)
+        trial = _followed(strip, observations, settings, compare, start)
+        if trial is not None and trial.misfit < LEAST_MISFIT:
+            numbers: Evidence = {"misfit_then": trial.misfit, "pairs_sigma0_then_mm": trial.sigma0}
+            return _finding(strip, trial.factor, "can be formed and fits the heights of its control only", numbers)
     return []
-
-
-def _with_distance(strip: Strip, factor: float) -> Strip:
-    camera = replace(strip.camera, principal_distance=strip.camera.principal_distance * factor)
-    return replace(strip, camera=camera)
 
 
 def _middle_sigma0(formed: EvidenceStrip) -> float:
@@ -97,22 +97,23 @@ def _middle_sigma0(formed: EvidenceStrip) -> float:
 
 def _followed(
     strip: Strip, observations: PhotoPoints, settings: Settings, compare: Compare, ratio: float
-) -> tuple[float, HeightStretch | None, float]:
-    """Follow the stretch of the heights until it is gone: factor of the principal distance, fit, sigma0 of pairs."""
+) -> DistanceTrial | None:
+    """Follow the stretch of the heights until it is gone; None where no strip can be formed and compared."""
     last, pairs = None, 0.0
     for trial in range(TRIALS):
         if last is not None:
             ratio *= last.ratio
         if not FACTOR_RANGE[0] < ratio < FACTOR_RANGE[1]:
-            return ratio, None, 0.0
-        again = evidence.form(_with_distance(strip, ratio), observations, settings)
+            return None
+        camera = replace(strip.camera, principal_distance=strip.camera.principal_distance * ratio)
+        again = evidence.form(replace(strip, camera=camera), observations, settings)
         last = compare(again) if again is not None else None
         if again is None or last is None:
-            return ratio, None, 0.0
+            return None
         pairs = _middle_sigma0(again)
         if trial and last.misfit > GIVEN_UP_MISFIT:
             break
-    return ratio, last, pairs
+    return None if last is None else DistanceTrial(ratio, last.misfit, pairs)
 
 
 def _finding(strip: Strip, ratio: float, how: str, numbers: Evidence) -> list[Finding]:

@@ -143,9 +143,6 @@ def _base_angle(photos: Sequence[str], steps: Mapping[str, complex]) -> float:
     return float(np.angle((known / np.abs(known)).sum())) if len(known) else 0.0
 
 
-# ------------------------------------------------------------------------------------ given points in a formed strip
-
-
 def strip_points(
     formed: EvidenceStrip, observations: PhotoPoints, control: ControlPoints, steps: Mapping[str, complex]
 ) -> tuple[Numbers, StripPoints]:
@@ -203,9 +200,6 @@ def stretches(rows: Numbers, on_strip: StripPoints) -> Iterator[tuple[Numbers, S
         yield rows[inside], replace(on_strip, xyz=on_strip.xyz[inside], axes=axes, centers=centers)
 
 
-# ---------------------------------------------------------------------------------------- given points in a mosaic
-
-
 def mosaic_points(
     strip: Strip, observations: PhotoPoints, control: ControlPoints, steps: Mapping[str, complex]
 ) -> tuple[Numbers, StripPoints] | None:
@@ -251,9 +245,6 @@ def _photos_with_most(strip: Strip, observations: PhotoPoints, control: ControlP
     count = np.bincount(position[position >= 0], minlength=len(strip.photos))
     first = int(np.convolve(count, np.ones(MOSAIC_PHOTOS), "valid").argmax())
     return strip.photos[first : first + MOSAIC_PHOTOS]
-
-
-# ------------------------------------------------------------------------------------------- places along a strip
 
 
 def places_along_strip(

@@ -173,9 +173,6 @@ def _other_height(strip: Strip, plan: LevelPlan, photos: Sequence[str], depth: F
     return found("P205", message, fix, evidence, photos=photos, strips=(strip.id,), key=plan.key)
 
 
-# ------------------------------------------------------------------------------------------------- given angles
-
-
 def angles(
     inputs: Inputs,
     formed: Sequence[EvidenceStrip],

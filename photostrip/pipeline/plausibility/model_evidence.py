@@ -87,5 +87,4 @@ def _depths(formed: FormedModels) -> Floats:
     count = np.bincount(models.model[point], minlength=models.count)
     ground = np.bincount(models.model[point], formed.model_xyz[point, 2], models.count) / np.maximum(count, 1)
     both = np.concatenate([ground[:1], (ground[1:] + ground[:-1]) / 2, ground[-1:]])
-    depths: Floats = formed.centers[:, 2] - both
-    return depths
+    return np.asarray(formed.centers[:, 2] - both)

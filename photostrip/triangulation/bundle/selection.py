@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 
 LEAST_RAYS = 2
+FIELDS = {"image": "images", "control": "control", "position": "positions", "attitude": "attitudes"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,10 +36,14 @@ class Selection:
 
     def without(self, kind: str, row: int, axis: int) -> Selection:
         """Take one ray or one coordinate out."""
-        name = {"image": "images", "control": "control", "position": "positions", "attitude": "attitudes"}[kind]
-        flags = getattr(self, name).copy()
+        flags = getattr(self, FIELDS[kind]).copy()
         flags[row if kind == "image" else (row, axis)] = False
-        return replace(self, **{name: flags})
+        return replace(self, **{FIELDS[kind]: flags})
+
+    def holds(self, kind: str, row: int, axis: int) -> bool:
+        """Whether one ray or one coordinate takes part."""
+        flags = getattr(self, FIELDS[kind])
+        return bool(flags[row] if kind == "image" else flags[row, axis])
 
 
 def supported(problem: BundleProblem, selection: Selection) -> Selection:
@@ -52,9 +57,9 @@ def supported(problem: BundleProblem, selection: Selection) -> Selection:
     fixed[problem.control.point[selection.control.all(axis=1)]] = True
     images = selection.images & ((rays >= LEAST_RAYS) | fixed)[point]
     images &= np.isfinite(problem.start.points[point]).all(axis=1)
-    seen = np.zeros(problem.points, bool)
-    seen[point[images]] = True
-    return replace(selection, images=images, control=selection.control & seen[problem.control.point][:, None])
+    shown = np.zeros(problem.points, bool)
+    shown[point[images]] = True
+    return replace(selection, images=images, control=selection.control & shown[problem.control.point][:, None])
 
 
 def selected(problem: BundleProblem, selection: Selection) -> BundleProblem:

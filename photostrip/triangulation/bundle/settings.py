@@ -7,17 +7,6 @@ from dataclasses import dataclass, field
 SCREENINGS = ("snooping", "robust", "none")
 TESTS = ("tau", "baarda")
 CALIBRATION = ("principal_distance", "principal_point", "k1", "k2", "k3", "p1", "p2", "affinity", "shear")
-CALIBRATION_UNITS = {
-    "principal_distance": "mm",
-    "principal_point": "mm",
-    "k1": "mm^-2",
-    "k2": "mm^-4",
-    "k3": "mm^-6",
-    "p1": "mm^-1",
-    "p2": "mm^-1",
-    "affinity": "1",
-    "shear": "1",
-}
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from photostrip.triangulation.bundle import robust
 from photostrip.triangulation.bundle.quality import reliability
 from photostrip.triangulation.bundle.quality.cofactors import cofactors_of as precision_of
 from photostrip.triangulation.bundle.quality.self_calibration import image_shift
-from photostrip.triangulation.bundle.selection import Selection, restarted, selected, supported
+from photostrip.triangulation.bundle.selection import FIELDS, Selection, restarted, selected, supported
 from photostrip.triangulation.bundle.solve import solve
 from photostrip.triangulation.resection.collinearity import KnownPhotos, derivatives, project
 from photostrip.triangulation.resection.ray_intersection import intersect_points
@@ -102,13 +102,7 @@ class _Adjusted:
         """Rows of the whole problem that the observations of a kind have."""
         if kind == reliability.IMAGE:
             return np.flatnonzero(self.selection.images)
-        problem = self.problem
-        sizes = {
-            reliability.CONTROL: len(problem.control),
-            reliability.POSITION: len(problem.positions),
-            reliability.ATTITUDE: len(problem.attitudes),
-        }
-        return np.arange(sizes[kind])
+        return np.arange(len(getattr(self.selection, FIELDS[kind])))
 
 
 class _Search:
@@ -134,12 +128,12 @@ class _Search:
         self.problem = restarted(self.problem, solution)
         self.rounds += robust.REWEIGHTINGS
         rows = np.flatnonzero(selection.images)[weight < robust.NO_WEIGHT]
+        rows, unknown = rows[~self.kept[rows]], np.nan
         images = selection.images.copy()
-        for row in rows[~self.kept[rows]].tolist():
-            images[row] = False
-            self.out[reliability.IMAGE, row, 0] = BundleRejection(
-                reliability.IMAGE, row, 0, "robust", np.nan, np.nan, np.nan
-            )
+        images[rows] = False
+        for row in rows.tolist():
+            each = BundleRejection(reliability.IMAGE, row, 0, "robust", value=unknown, limit=unknown, size=unknown)
+            self.out[reliability.IMAGE, row, 0] = each
         return supported(self.problem, replace(selection, images=images))
 
     def clean(self, selection: Selection) -> _Adjusted:
@@ -183,11 +177,9 @@ class _Search:
         touched: set[tuple[str, int]] = set()
         for each in beyond:
             places = self._places(each)
-            if each.value < NEAR * beyond[0].value or touched & places:
-                touched |= places
-                continue
+            if each.value >= NEAR * beyond[0].value and not touched & places:
+                yield each
             touched |= places
-            yield each
 
     def _places(self, each: BundleRejection) -> set[tuple[str, int]]:
         """Photo and point that an observation belongs to."""
@@ -247,13 +239,11 @@ class _Search:
         value, size = predicted(self.problem, done.selection, (done.solution, done.precision))
         value = value / unit
         for (kind, row, axis), each in self.out.items():
-            inside = (
-                done.selection.images[row] if kind == reliability.IMAGE else self._in(done.selection, kind, row, axis)
-            )
+            inside = done.selection.holds(kind, row, axis)
             test = float(value[row]) if np.isnan(each.value) and kind == reliability.IMAGE else each.value
             bound = limit if np.isnan(each.limit) else each.limit
             error = float(size[row]) if np.isnan(each.size) and kind == reliability.IMAGE else each.size
-            yield replace(each, value=test, limit=bound, size=error, readmitted=bool(inside))
+            yield replace(each, value=test, limit=bound, size=error, readmitted=inside)
         known = {row for kind, row, _ in self.out if kind == reliability.IMAGE}
         for row in outside[~begin.images[outside]].tolist():
             if row not in known:
@@ -262,11 +252,6 @@ class _Search:
             if not done.selection.control[row, axis]:
                 error = -float(done.solution.control_residuals[row, axis])
                 yield BundleRejection(reliability.CONTROL, row, axis, "start", np.nan, limit, error)
-
-    @staticmethod
-    def _in(selection: Selection, kind: str, row: int, axis: int) -> bool:
-        part = {"control": selection.control, "position": selection.positions, "attitude": selection.attitudes}[kind]
-        return bool(part[row, axis])
 
 
 def predicted(

@@ -5,7 +5,6 @@ Source: [Granshaw 1980] for the reduced normal equations; step control after [Ma
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -37,20 +36,14 @@ if TYPE_CHECKING:
 FIRST_DAMPING = 1e-4
 MORE, LESS = 10.0, 0.1  # factors of the damping after a refused and after a taken step
 LARGEST_DAMPING = 1e8
+MOST_STEPS = 30
+# what the steps after the last one may still move, in standard deviations over all parameters together, estimated by
+# how much shorter the last step was than the one before it
+CONVERGED = 1e-6
 ROUNDING = 1e-9  # part of the sum of squares by which it may seem to grow at the minimum
 
 
-@dataclass(frozen=True)
-class IterationSettings:
-    """How the adjustment is driven."""
-
-    iterations: int = 30  # steps after which it is given up
-    # what the steps after the last one may still move, in standard deviations over all parameters together, judged by
-    # how much shorter the last step was than the one before it
-    converged: float = 1e-6
-
-
-def solve(problem: BundleProblem, settings: IterationSettings | None = None) -> BundleSolution:
+def solve(problem: BundleProblem) -> BundleSolution:
     """Adjust a bundle of rays by Gauss-Newton steps, damped where the sum of squares grows.
 
     Without control and positions the datum comes from inner constraints on the points: the adjusted points have no
@@ -59,17 +52,14 @@ def solve(problem: BundleProblem, settings: IterationSettings | None = None) -> 
     Raises GeometryError when points, photos or the datum cannot be determined, by name (``bundle-rays``,
         ``bundle-rank``), or when the steps do not come to an end (``bundle-diverged``).
     """
-    settings = settings or IterationSettings()
     defects.refuse_repeated(problem)
     prepared = prepare(problem)
     free = datum.is_free(problem)
-    state, steps = _iterate(prepared, settings, free=free)
+    state, steps = _iterate(prepared, free=free)
     return _solution(prepared, state, steps, free=free)
 
 
-def _iterate(
-    prepared: PreparedProblem, settings: IterationSettings, *, free: bool
-) -> tuple[Parameters, tuple[IterationStep, ...]]:
+def _iterate(prepared: PreparedProblem, *, free: bool) -> tuple[Parameters, tuple[IterationStep, ...]]:
     """Step until a step is short."""
     start = prepared.problem.start
     state = parameters_from(prepared, start.centers, start.rotations, start.points, np.zeros(len(prepared.prior)))
@@ -78,11 +68,11 @@ def _iterate(
         defects.refuse_loose(prepared, state)
     best = reduce(prepared, state)
     defects.refuse_weak_points(prepared, best)
-    for _ in range(settings.iterations):
+    for _ in range(MOST_STEPS):
         move = _move(prepared, state, best, damping, free=free)
         steps.append(_recorded(best, move, damping))
         moved = _moved(prepared, state, move)
-        if damping == 0.0 and _still_to_come(steps) < settings.converged:
+        if damping == 0.0 and _still_to_come(steps) < CONVERGED:
             return moved, tuple(steps)
         found = reduce(prepared, moved)
         if found.chi_square <= best.chi_square * (1.0 + ROUNDING):
@@ -111,11 +101,11 @@ def _move(
     N11 dx1 + N12 dx2 = b1 for photos and common parameters is solved by the factor of N11 and the Schur complement
     N22 - N12' N11^-1 N12; the length of the step is the root of dx' N dx.
     """
-    own = reduced.blocks[prepared.structure.own]
-    anchor = datum.anchor(prepared, state, own) if free else None
+    blocks = reduced.blocks[prepared.structure.own]
+    anchor = datum.anchor(prepared, state, blocks) if free else None
     add = anchor
     if damping:
-        add = np.eye(PHOTO) * (damping * own) + (0.0 if anchor is None else anchor)
+        add = np.eye(PHOTO) * (damping * blocks) + (0.0 if anchor is None else anchor)
     band = factored(prepared, reduced, add)
     if band is None:
         defects.refuse_weak_points(prepared, reduced)
@@ -145,8 +135,8 @@ def _shift(batch: Batch, eliminated: Eliminated, photos: Floats, common: Floats)
     shift = np.empty(rows.shape[1:])
     of_sets, done = photos[batch.sets].reshape(-1, 1, n), 0
     for first, last, count, size in batch.runs:
-        joint = rows[:n, :, first:last].reshape(n, 3, count, size).transpose(1, 2, 0, 3)
-        shift[:, first:last] = (of_sets[done : done + count] @ joint).reshape(3, -1)
+        run = rows[:n, :, first:last].reshape(n, 3, count, size).transpose(1, 2, 0, 3)
+        shift[:, first:last] = (of_sets[done : done + count] @ run).reshape(3, -1)
         done += count
     if len(common):
         shift += np.einsum("pcs,p->cs", rows[PHOTO * k : -1], common)
@@ -156,18 +146,16 @@ def _shift(batch: Batch, eliminated: Eliminated, photos: Floats, common: Floats)
 
 
 def _moved(prepared: PreparedProblem, state: Parameters, move: ParameterStep) -> Parameters:
-    """Apply a step."""
-    own = (move.photos * SIGNS)[prepared.structure.rank]
+    moves = (move.photos * SIGNS)[prepared.structure.rank]
     return Parameters(
-        state.centers + np.einsum("nij,nj->ni", state.rotations, own[:, :3]),
-        state.rotations @ from_vector(own[:, 3:]),
+        state.centers + np.einsum("nij,nj->ni", state.rotations, moves[:, :3]),
+        state.rotations @ from_vector(moves[:, 3:]),
         tuple(xyz + shift for xyz, shift in zip(state.xyz, move.points, strict=True)),
         state.common + move.common,
     )
 
 
 def _recorded(reduced: Reduced, move: ParameterStep, damping: float) -> IterationStep:
-    """Put a step on record."""
     shift = max(float(np.abs(part).max(initial=0.0)) for part in (move.photos[:, :3], *move.points))
     turn = float(np.abs(move.photos[:, 3:]).max(initial=0.0))
     return IterationStep(reduced.chi_square, move.length, damping, shift, turn)

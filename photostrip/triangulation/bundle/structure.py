@@ -72,6 +72,8 @@ def band_structure(problem: BundleProblem) -> BandStructure:
     rows, columns = np.divmod(key, m)
     control = control_normals(problem.control, problem.points)
     batches = tuple(_with_control(batch, control) for batch in arrange(problem.images, rays, m))
+    sets = ((batch.sets.T, *triangle(len(batch.photo))) for batch in batches)
+    of_sets = ((photo[later] * m + photo[earlier]).ravel() for photo, later, earlier in sets)
     return BandStructure(
         order=np.argsort(rank),
         rank=rank,
@@ -80,7 +82,7 @@ def band_structure(problem: BundleProblem) -> BandStructure:
         own=np.flatnonzero(rows == columns),
         width=int((rows - columns).max(initial=0)),
         batches=batches,
-        pairs=tuple(_gather(_keys(batch.sets, m).ravel(), key) for batch in batches),
+        pairs=tuple(_gather(pairs, key) for pairs in of_sets),
         singles=tuple(_gather(batch.sets.T.ravel(), None) for batch in batches),
     )
 
@@ -90,13 +92,6 @@ def triangle(rays: int) -> tuple[Numbers, Numbers]:
     """Pairs of a set of photos, the later one first: positions within the set."""
     row, column = np.tril_indices(rays)
     return row, column
-
-
-def _keys(sets: Numbers, photos: int) -> Numbers:
-    """Keys of the pairs of each set, shape (pairs, groups)."""
-    row, column = triangle(sets.shape[1])
-    keys: Numbers = sets.T[row] * photos + sets.T[column]
-    return keys
 
 
 def _gather(wanted: Numbers, keys: Numbers | None) -> BlockSums:
@@ -113,9 +108,9 @@ def _gather(wanted: Numbers, keys: Numbers | None) -> BlockSums:
 
 def _pairs(rays: SortedRays, photos: int) -> tuple[Numbers, Numbers]:
     """Pairs of photos that share a point, each once, the later photo first; every photo with itself."""
-    own = np.arange(photos) * (photos + 1)
+    alone = np.arange(photos) * (photos + 1)
     table = np.zeros(photos * photos, bool) if photos <= TABLE else None
-    found = [own]
+    found = [alone]
     longest = int(rays.counts.max(initial=1))
     for lag in range(1, longest):
         same = rays.point[lag:] == rays.point[:-lag]
@@ -127,7 +122,7 @@ def _pairs(rays: SortedRays, photos: int) -> tuple[Numbers, Numbers]:
     if table is None:
         keys = np.unique(np.concatenate(found))
     else:
-        table[own] = True
+        table[alone] = True
         keys = np.flatnonzero(table)
     row, column = np.divmod(keys, photos)
     return row, column

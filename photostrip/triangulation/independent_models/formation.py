@@ -128,13 +128,13 @@ def require_links(shared: CommonPoints, models: StripModels, used: Flags, names:
 def _neighbours(models: StripModels, link: int, names: Sequence[str]) -> str:
     """Say which model shares most with the one that could not be joined, when it is not its neighbour."""
     nodes = [set(models.node[models.model == number].tolist()) for number in range(models.count)]
-    for own in (link, link + 1):
+    for model in (link, link + 1):
         others = [number for number in range(models.count) if number not in {link, link + 1}]
-        best = max(others, key=lambda number: len(nodes[own] & nodes[number]), default=own)
-        number = len(nodes[own] & nodes[best])
-        if best != own and abs(best - own) > 1 and number >= linking.LEAST_COMMON:
+        best = max(others, key=lambda number: len(nodes[model] & nodes[number]), default=model)
+        number = len(nodes[model] & nodes[best])
+        if abs(best - model) > 1 and number >= linking.LEAST_COMMON:
             return (
-                f"; model {names[own]} shares {number} with model {names[best]}: are they in the order of the flight?"
+                f"; model {names[model]} shares {number} with model {names[best]}: are they in the order of the flight?"
             )
     return ""
 

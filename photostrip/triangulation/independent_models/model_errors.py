@@ -100,9 +100,6 @@ def _gains(link: Numbers, xyz: Floats, covariance: Floats, origin: Floats, count
     return np.asarray(operator[link] @ weighted, float)
 
 
-# ------------------------------------------------------------------------------------------ sums of displacements
-
-
 def sums(errors: ModelErrors, nodes: Numbers, weights: Floats) -> Floats:
     """Coefficients (t, n, 3) of the model coordinates of all rows in weighted sums of displacements of nodes.
 
@@ -112,11 +109,11 @@ def sums(errors: ModelErrors, nodes: Numbers, weights: Floats) -> Floats:
     place = np.full(len(errors.by_similarity), -1)
     place[nodes] = np.arange(len(nodes))
     rows = np.flatnonzero((errors.item >= 0) & (place[errors.item] >= 0))
-    own = errors.share[rows, None] * weights[:, place[errors.item[rows]]]
+    shares = errors.share[rows, None] * weights[:, place[errors.item[rows]]]
     found = np.zeros((len(weights), len(errors.model), 3))
-    found[:, rows] = own
+    found[:, rows] = shares
     by_model = np.zeros((errors.models, len(weights), SIMILARITY_PARAMETERS))
-    np.add.at(by_model, errors.model[rows], np.einsum("tri,rij->rtj", own, errors.by_similarity[errors.item[rows]]))
+    np.add.at(by_model, errors.model[rows], np.einsum("tri,rij->rtj", shares, errors.by_similarity[errors.item[rows]]))
     beyond = np.cumsum(by_model[::-1], axis=0)[::-1][1:]  # of all models after each link
     by_row = np.einsum("etj,eji->tei", beyond[errors.link], errors.gain)
     found[:, errors.first] += by_row
@@ -127,8 +124,8 @@ def sums(errors: ModelErrors, nodes: Numbers, weights: Floats) -> Floats:
 def covariance_of_sums(errors: ModelErrors, one: Floats) -> Floats:
     """Covariances of sums given by ``sums``, metres^2, shape (t, t)."""
     spread = np.einsum("trj,rij->tri", one, errors.covariance).reshape(len(one), -1)
-    joint = one.reshape(len(one), -1) @ spread.T
-    return np.asarray((joint + joint.T) / 2, float)
+    product = one.reshape(len(one), -1) @ spread.T
+    return np.asarray((product + product.T) / 2, float)
 
 
 def with_sums(errors: ModelErrors, coefficients: Floats) -> Floats:
@@ -143,9 +140,6 @@ def with_sums(errors: ModelErrors, coefficients: Floats) -> Floats:
     parts = errors.by_similarity[item] @ frames[errors.model[rows]] + by_row[rows]
     np.add.at(result, item, share[:, None, None] * parts)
     return result
-
-
-# ----------------------------------------------------------------------------------------------- covariances
 
 
 def covariances(errors: ModelErrors) -> Floats:
@@ -194,15 +188,15 @@ def _with_coordinates(errors: ModelErrors, place: Floats, rows: Numbers, first: 
     item, model, share = errors.item[rows], errors.model[rows], errors.share[rows]
     slot = model - first[item]
     mixed = np.zeros((len(place), SIMILARITY_PARAMETERS, 3))
-    own = share[:, None, None] * errors.covariance[rows]
+    shares = share[:, None, None] * errors.covariance[rows]
     behind, ahead = errors.after[rows], errors.before[rows]
     inside = np.flatnonzero(behind >= 0)
     part = np.where(slot[inside] > 0, beyond[item[inside], np.maximum(slot[inside] - 1, 0)], 1.0)
-    np.add.at(mixed, item[inside], -part[:, None, None] * (errors.gain[behind[inside]] @ own[inside]))
+    np.add.at(mixed, item[inside], -part[:, None, None] * (errors.gain[behind[inside]] @ shares[inside]))
     inside = np.flatnonzero(ahead >= 0)
     part = beyond[item[inside], slot[inside]]
-    np.add.at(mixed, item[inside], part[:, None, None] * (errors.gain[ahead[inside]] @ own[inside]))
+    np.add.at(mixed, item[inside], part[:, None, None] * (errors.gain[ahead[inside]] @ shares[inside]))
     cross = errors.by_similarity @ mixed
     result = errors.by_similarity @ place @ errors.by_similarity.transpose(0, 2, 1) + cross + cross.transpose(0, 2, 1)
-    np.add.at(result, item, share[:, None, None] * own)
+    np.add.at(result, item, share[:, None, None] * shares)
     return result

@@ -28,12 +28,12 @@ def misclosures(control: ControlPoints, axes: Floats, xyz: Floats, origin: Float
     return control_errors.Misclosures(point, axis, direction, control.sigma[point, axis] ** 2, rows)
 
 
-def weights(seen: Misclosures, rows: Numbers, operator: Floats | None = None) -> tuple[Numbers, Floats]:
+def weights(found: Misclosures, rows: Numbers, operator: Floats | None = None) -> tuple[Numbers, Floats]:
     """Nodes of given points, and sums of their coordinates as weighted sums of the nodes; by default each one."""
     if operator is None:
-        operator = np.eye(len(seen.point))
+        operator = np.eye(len(found.point))
     weights = np.zeros((len(rows), len(operator), 3))
-    np.add.at(weights, seen.point, operator.T[:, :, None] * seen.direction[:, None, :])
+    np.add.at(weights, found.point, operator.T[:, :, None] * found.direction[:, None, :])
     return rows, weights.transpose(1, 0, 2)
 
 

@@ -53,5 +53,4 @@ def heights_above(centers: Floats, points: Floats) -> Floats:
     order = np.argsort(points[:, 0], kind="stable")
     x, z = points[order, 0], np.concatenate([[0.0], np.cumsum(points[order, 2])])
     first = np.clip(np.searchsorted(x, centers[:, 0]) - near // 2, 0, len(points) - near)
-    above: Floats = centers[:, 2] - (z[first + near] - z[first]) / near
-    return above
+    return np.asarray(centers[:, 2] - (z[first + near] - z[first]) / near)

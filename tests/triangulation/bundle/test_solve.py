@@ -23,7 +23,7 @@ from photostrip.triangulation.bundle.observations.problem import (
     PositionObservations,
     StartValues,
 )
-from photostrip.triangulation.bundle.solve import IterationSettings, solve
+from photostrip.triangulation.bundle.solve import solve
 from tests.simulated_bundle import problem_of, truth_of
 
 if TYPE_CHECKING:
@@ -320,8 +320,9 @@ def test_parameters_of_a_camera_that_cannot_be_told_apart_are_named() -> None:
         solve(replace(problem, cameras=unused, camera_ids=("first", "second")))
 
 
-def test_steps_without_end_are_an_error() -> None:
+def test_steps_without_end_are_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     problem, _ = simulated(6, 1)
+    monkeypatch.setattr("photostrip.triangulation.bundle.solve.MOST_STEPS", 1)
     with pytest.raises(GeometryError, match="did not come to an end in 1 steps") as caught:
-        solve(problem, IterationSettings(iterations=1))
+        solve(problem)
     assert caught.value.code == "bundle-diverged"

@@ -38,13 +38,11 @@ class Band:
 
     def holds(self, row: Numbers, column: Numbers) -> Flags:
         """Whether elements (row >= column) lie within the band."""
-        near: Flags = row - column <= self.width
-        return near
+        return np.asarray(row - column <= self.width)
 
     def at(self, row: Numbers, column: Numbers) -> Floats:
         """Give elements within the band (row >= column)."""
-        found: Floats = self.flat[self.place(row, column)]
-        return found
+        return np.asarray(self.flat[self.place(row, column)])
 
     def look(self, row: int, column: int, rows: int, columns: int) -> Floats:
         """Look at a block; only what lies in the band's lower half belongs to the matrix."""
@@ -65,8 +63,7 @@ class Band:
         from scipy.linalg.lapack import dpbtrs
 
         solution, _ = dpbtrs(self.columns, right, lower=1)
-        found: Floats = solution
-        return found
+        return np.asarray(solution)
 
     def inverse(self) -> Band:
         """Find the elements of the inverse within the band, lower half; what stands outside the band is not defined.
@@ -81,16 +78,16 @@ class Band:
         for first in range((self.size - 1) // STEP * STEP, -1, -STEP):
             count = min(STEP, self.size - first)
             below = min(self.width, self.size - first - count)
-            own, _ = dtrtri(np.tril(np.triu(self.look(first, first, count, count), -self.width)), lower=1)
+            diagonal, _ = dtrtri(np.tril(np.triu(self.look(first, first, count, count), -self.width)), lower=1)
             # Below the diagonal blocks, what is within the band: first + count + row - (first + column) <= width.
-            coupling = np.triu(self.look(first + count, first, below, count), count - self.width) @ own
+            coupling = np.triu(self.look(first + count, first, below, count), count - self.width) @ diagonal
             under = -window[:below, :below] @ coupling
-            joint = np.zeros((count + self.width, count + self.width))
-            joint[:count, :count] = own.T @ own - coupling.T @ under
-            joint[count : count + below, :count], joint[:count, count : count + below] = under, under.T
-            joint[count:, count:] = window[: self.width, : self.width]
-            row, column = joint.strides
-            sheared = as_strided(joint, (count, self.width + 1), (row + column, row))
+            whole = np.zeros((count + self.width, count + self.width))
+            whole[:count, :count] = diagonal.T @ diagonal - coupling.T @ under
+            whole[count : count + below, :count], whole[:count, count : count + below] = under, under.T
+            whole[count:, count:] = window[: self.width, : self.width]
+            row, column = whole.strides
+            sheared = as_strided(whole, (count, self.width + 1), (row + column, row))
             inverse.columns.T[first : first + count] = sheared
-            window = joint[: self.width, : self.width]
+            window = whole[: self.width, : self.width]
         return inverse

@@ -30,20 +30,20 @@ def is_free(problem: BundleProblem) -> bool:
     return not any(np.isfinite(sigma).any() for sigma in sigmas)
 
 
-def anchor(prepared: PreparedProblem, state: Parameters, own: Floats) -> Floats:
+def anchor(prepared: PreparedProblem, state: Parameters, blocks: Floats) -> Floats:
     """Conditions that hold seven parameters: all of a photo, and its distance from the photo farthest away.
 
     Returns what is added to the photos' blocks (m, 6, 6); the conditions are made as strong as the rays, whose blocks
-    in the order of the band are ``own``.
+    in the order of the band are ``blocks``.
     """
     order = prepared.structure.order
     middle = len(order) // 2
     base = state.centers[order] - state.centers[order[middle]]
     far = int(np.argmax((base**2).sum(axis=1)))
-    add = np.zeros_like(own)
-    add[middle] = np.diag(np.diag(own[middle]))
+    add = np.zeros_like(blocks)
+    add[middle] = np.diag(np.diag(blocks[middle]))
     direction = state.rotations[order[far]].T @ base[far] / np.linalg.norm(base[far])
-    add[far, :3, :3] += np.trace(own[far, :3, :3]) / 3.0 * np.outer(direction, direction)
+    add[far, :3, :3] += np.trace(blocks[far, :3, :3]) / 3.0 * np.outer(direction, direction)
     return add
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 
@@ -14,14 +14,10 @@ from photostrip.triangulation.bundle.normal_equations.reduced import factored, g
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.triangulation.bundle.normal_equations.point_elimination import Eliminated
     from photostrip.triangulation.bundle.normal_equations.reduced import Reduced
     from photostrip.triangulation.bundle.observations.given_orientations import LinearisedOrientations
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
-    from photostrip.triangulation.bundle.observations.ray_batches import Batch
     from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem
 
 
@@ -61,14 +57,9 @@ def refuse_weak_points(prepared: PreparedProblem, reduced: Reduced) -> None:
 
     The normal equations are those without damping.
     """
-    refuse_weak(prepared, prepared.structure.batches, reduced.points)
-
-
-def refuse_weak(prepared: PreparedProblem, batches: Sequence[Batch], eliminated: Sequence[Eliminated]) -> None:
-    """Refuse weak points of some batches; see ``refuse_weak_points``."""
     weak = [
         prepared.problem.point_name(number)
-        for batch, each in zip(batches, eliminated, strict=True)
+        for batch, each in zip(prepared.structure.batches, reduced.points, strict=True)
         for number in batch.point[batch.real][~(each.strength[batch.real] > PARALLEL)].tolist()
     ]
     if weak:
@@ -84,9 +75,6 @@ def listed(noun: str, names: list[str]) -> str:
     """Name the first few of many, and how many more."""
     more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
     return f"{noun}{'s' if len(names) > 1 else ''} {', '.join(names[:NAMED])}{more}"
-
-
-# --------------------------------------------------------------------------------------------------- the datum
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,16 +129,16 @@ def _held(prepared: PreparedProblem, state: Parameters, photos: Numbers) -> Held
     problem = prepared.problem
     inside = np.zeros(problem.photos, bool)
     inside[photos] = True
-    seen = np.zeros(problem.points, bool)
-    seen[problem.images.point[inside[problem.images.photo]]] = True
+    with_rays = np.zeros(problem.points, bool)
+    with_rays[problem.images.point[inside[problem.images.photo]]] = True
     control = problem.control
-    given = seen[control.point] & np.isfinite(control.sigma).any(axis=1)
+    given = with_rays[control.point] & np.isfinite(control.sigma).any(axis=1)
     positions, attitudes = given_at(prepared, state)
     at = inside[positions.photo] & (positions.weight > 0.0).any(axis=1)
     places = np.concatenate([control.xyz[given], problem.positions.xyz[at]])
     around = state.centers[photos]
     origin = places.mean(axis=0) if len(places) else around.mean(axis=0)
-    everything = np.concatenate([around, problem.start.points[seen]])
+    everything = np.concatenate([around, problem.start.points[with_rays]])
     radius = float(np.linalg.norm(everything - everything.mean(axis=0), axis=1).max())
     units = np.array([radius, radius, radius, 1.0, 1.0, 1.0, 1.0])
     rows = np.einsum("nij,njd->nid", control.axes[given], similarity_derivatives(control.xyz[given], origin)) * units
@@ -171,8 +159,7 @@ def _information(linear: LinearisedOrientations, moves: Floats, inside: Flags, p
     normal = whole.T @ whole
     seven = datum.DEFECT
     corner = normal[seven:, seven:] + np.diag(prepared.prior**-2.0)
-    left: Floats = normal[:seven, :seven] - normal[:seven, seven:] @ np.linalg.pinv(corner) @ normal[seven:, :seven]
-    return left
+    return np.asarray(normal[:seven, :seven] - normal[:seven, seven:] @ np.linalg.pinv(corner) @ normal[seven:, :seven])
 
 
 def _moves(state: Parameters, held: Held, loose: Floats) -> str:
@@ -197,22 +184,15 @@ def _moves(state: Parameters, held: Held, loose: Floats) -> str:
     return ", ".join(dict.fromkeys(found)) or f"{loose.shape[1]} of the seven parameters of shift, rotation and scale"
 
 
-class FlightAxes(NamedTuple):
-    """Unit vectors of a part of the network."""
-
-    flight: Floats
-    across: Floats
-    up: Floats
-
-
-def _flight_axes(state: Parameters, photos: Numbers) -> FlightAxes:
+def _flight_axes(state: Parameters, photos: Numbers) -> Floats:
+    """Find unit vectors along the flight, across it and up, shape (3, 3), by rows."""
     up = state.rotations[photos, :, 2].mean(axis=0)
     up /= np.linalg.norm(up)
     centers = state.centers[photos] - state.centers[photos].mean(axis=0)
     flight = np.linalg.svd(centers, full_matrices=False)[2][0] if len(photos) > 1 else state.rotations[photos[0], :, 0]
     flight = flight - up * (up @ flight)
     flight /= np.linalg.norm(flight)
-    return FlightAxes(flight, np.cross(up, flight), up)
+    return np.array([flight, np.cross(up, flight), up])
 
 
 def _line(control: Floats) -> Floats | None:
@@ -235,19 +215,16 @@ def _reason(held: Held) -> str:
     return "too few of its coordinates are given"
 
 
-# ------------------------------------------------------------------------------------ photos and common parameters
-
-
 def refuse_singular(prepared: PreparedProblem, reduced: Reduced, extra: Floats | None) -> NoReturn:
     """Refuse normal equations that cannot be factored (``bundle-rank``), naming the photos that are not determined.
 
     They are those with large elements in the null vector, found by inverse iteration on the matrix made regular with a
     trifle of its diagonal. ``extra`` (m, 6, 6) is what was added to them as a datum.
     """
-    own = reduced.blocks[prepared.structure.own] + (0.0 if extra is None else extra)
-    diagonal = np.maximum(np.einsum("nii->ni", own), 0.0)
+    blocks = reduced.blocks[prepared.structure.own] + (0.0 if extra is None else extra)
+    diagonal = np.maximum(np.einsum("nii->ni", blocks), 0.0)
     least = TINY * np.where(diagonal > 0.0, diagonal, max(float(diagonal.max()), 1.0))
-    add = np.zeros_like(own)
+    add = np.zeros_like(blocks)
     add[:, range(PHOTO), range(PHOTO)] = least
     band = factored(prepared, reduced, add if extra is None else add + extra)
     photos, names = [], []

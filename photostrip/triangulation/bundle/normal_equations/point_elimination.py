@@ -2,7 +2,7 @@
 
 With A the partials of a ray by its point and B by its photo and the common parameters, both in units of sigma, and
 L L' the normal matrix of a point, the photos get B'B - T T' with T = B' A L^-T: a product of matrices for each group of
-points that are seen by the same photos.
+points on the same photos.
 
 Source: [Granshaw 1980] for the elimination.
 """
@@ -178,20 +178,20 @@ def squares(batch: Batch, partials: Floats, rows: Floats) -> GroupSquares:
 
 def _small_squares(run: tuple[Floats, Floats], to: tuple[Floats, Floats], count: int, size: int) -> None:
     """Bring the numbers of each group together, and multiply."""
-    own = np.ascontiguousarray(run[0].transpose(2, 3, 1, 0)).reshape(-1, count, 2 * size, len(run[0]))
-    np.matmul(own.swapaxes(-1, -2), own[..., :-1], out=to[0])
-    joint = np.ascontiguousarray(run[1].transpose(2, 1, 0)).reshape(count, 3 * size, len(run[1]))
-    np.matmul(joint.swapaxes(-1, -2), joint[..., :-1], out=to[1])
+    singles = np.ascontiguousarray(run[0].transpose(2, 3, 1, 0)).reshape(-1, count, 2 * size, len(run[0]))
+    np.matmul(singles.swapaxes(-1, -2), singles[..., :-1], out=to[0])
+    rows = np.ascontiguousarray(run[1].transpose(2, 1, 0)).reshape(count, 3 * size, len(run[1]))
+    np.matmul(rows.swapaxes(-1, -2), rows[..., :-1], out=to[1])
 
 
 def _large_squares(run: tuple[Floats, Floats], to: tuple[Floats, Floats], count: int, size: int) -> None:
     """Multiply where the numbers are."""
     p, _, k, _ = run[0].shape
-    own = run[0].reshape(p, 2, k, count, size).transpose(1, 2, 3, 0, 4)
-    both = own @ own[..., :-1, :].swapaxes(-1, -2)
+    singles = run[0].reshape(p, 2, k, count, size).transpose(1, 2, 3, 0, 4)
+    both = singles @ singles[..., :-1, :].swapaxes(-1, -2)
     np.add(both[0], both[1], out=to[0])
-    joint = run[1].reshape(-1, 3, count, size).transpose(1, 2, 0, 3)
-    three = joint @ joint[..., :-1, :].swapaxes(-1, -2)
+    rows = run[1].reshape(-1, 3, count, size).transpose(1, 2, 0, 3)
+    three = rows @ rows[..., :-1, :].swapaxes(-1, -2)
     three[0] += three[1]
     np.add(three[0], three[2], out=to[1])
 

@@ -75,10 +75,10 @@ def _add_given(prepared: PreparedProblem, state: Parameters, blocks: Floats, bor
     structure, total = prepared.structure, 0.0
     given_too = len(prepared.problem.positions) or len(prepared.problem.attitudes)
     for linear in given_at(prepared, state) if given_too else ():
-        by_own, others = linear.scaled()
+        by_photos, others = linear.scaled()
         place = structure.rank[linear.photo]
-        np.add.at(blocks, structure.own[place], by_own.swapaxes(1, 2) @ by_own)
-        np.add.at(border, place, by_own.swapaxes(1, 2) @ others)
+        np.add.at(blocks, structure.own[place], by_photos.swapaxes(1, 2) @ by_photos)
+        np.add.at(border, place, by_photos.swapaxes(1, 2) @ others)
         corner += np.einsum("gai,gaj->ij", others, others)
         total += float((others[:, :, -1] ** 2).sum())
     weight = prepared.prior**-2.0
@@ -121,8 +121,7 @@ def control_residuals(prepared: PreparedProblem, state: Parameters) -> Floats:
     for batch, xyz in zip(prepared.structure.batches, state.xyz, strict=True):
         points[where[batch.point[batch.control]]] = xyz[:, batch.control].T
     points = points[where[control.point]]
-    found: Floats = np.einsum("nij,nj->ni", control.axes, points - control.xyz)
-    return found
+    return np.asarray(np.einsum("nij,nj->ni", control.axes, points - control.xyz))
 
 
 def control_squares(prepared: PreparedProblem, state: Parameters) -> float:

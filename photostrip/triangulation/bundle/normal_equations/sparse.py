@@ -60,8 +60,7 @@ class Sparse:
         """Solve for columns (size, c) with the factor."""
         if self.factored is None:
             raise ValueError("not factored")
-        found: Floats = self.factored.solve(np.ascontiguousarray(right, float))
-        return found
+        return np.asarray(self.factored.solve(np.ascontiguousarray(right, float)))
 
     def inverse(self) -> Sparse:
         """Return the elements of the inverse at the pairs."""
@@ -90,5 +89,4 @@ class Sparse:
 
     def at(self, row: Numbers, column: Numbers) -> Floats:
         """Give stored elements (row >= column)."""
-        found: Floats = self.blocks[self._pair(row, column)[0], row % PHOTO, column % PHOTO]
-        return found
+        return np.asarray(self.blocks[self._pair(row, column)[0], row % PHOTO, column % PHOTO])

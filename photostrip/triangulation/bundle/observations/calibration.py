@@ -70,5 +70,4 @@ def partials(wanted: Calibrated, xy: Floats, ratio: Floats, camera: Numbers) -> 
     """
     table = -corrections(xy)
     table[PRINCIPAL_DISTANCE] = ratio
-    found: Floats = table[wanted.kind] * (camera == wanted.camera.reshape(-1, *[1] * camera.ndim))[:, None]
-    return found
+    return np.asarray(table[wanted.kind] * (camera == wanted.camera.reshape(-1, *[1] * camera.ndim))[:, None])

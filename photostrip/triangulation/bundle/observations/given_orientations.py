@@ -93,5 +93,4 @@ def _vector_by_turn(vector: Floats) -> Floats:
     safe = np.where(angle < SMALL, 1.0, angle)
     factor = np.where(angle < SMALL, 1.0 / 12.0, 1.0 / safe**2 - (1.0 + np.cos(safe)) / (2.0 * safe * np.sin(safe)))
     cross = cross_matrix(vector)
-    derivative: Floats = np.eye(3) + 0.5 * cross + factor[:, None, None] * (cross @ cross)
-    return derivative
+    return np.asarray(np.eye(3) + 0.5 * cross + factor[:, None, None] * (cross @ cross))

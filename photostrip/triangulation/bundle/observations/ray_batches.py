@@ -1,4 +1,4 @@
-"""How the rays lie in memory: points that are seen by the same photos stand side by side.
+"""How the rays lie in memory: points on the same photos stand side by side.
 
 Eliminating a point leaves a dense square over its photos in the normal equations of the photos. Points with the same
 photos fill the same square, so their contributions are one product of matrices: a few thousand products instead

@@ -39,7 +39,7 @@ class Inverse:
     common: Floats  # (p, p): cofactors of the common parameters
     factor: Factor  # factor of the photos' part: for photos farther apart than the band is wide
 
-    def joint(self, sets: Numbers, more: int) -> Floats:
+    def cofactors(self, sets: Numbers, more: int) -> Floats:
         """Joint cofactors (g, 6 k + more, 6 k + more) of sets of photos and the first common parameters.
 
         ``sets`` (g, k) holds places in the band; photos count in their own axes and signs. With Z of the photos alone,
@@ -71,7 +71,12 @@ class Inverse:
 def cofactors_of(solution: BundleSolution) -> Cofactors:
     """Cofactors of all parameters and residuals; ``bundle-rank`` when the normal matrix is singular at the solution."""
     prepared = solution.prepared
-    state, reduced, band = _at(solution)
+    state = parameters_from(prepared, solution.centers, solution.rotations, solution.points, solution.common)
+    reduced = reduce(prepared, state)
+    blocks = reduced.blocks[prepared.structure.own]
+    band = factored(prepared, reduced, datum.anchor(prepared, state, blocks) if solution.free else None)
+    if band is None:
+        raise GeometryError("the normal matrix is singular at the solution", code="bundle-rank")
     inverse = _inverse(reduced, band)
     points = np.full((prepared.problem.points, 3, 3), np.nan)
     residuals = np.zeros((len(prepared.problem.images), 2, 2))
@@ -80,11 +85,11 @@ def cofactors_of(solution: BundleSolution) -> Cofactors:
         of_points, of_rays = _batch(prepared, batch, eliminated, inverse, xyz, table)
         points[batch.point[batch.real]] = of_points[batch.real]
         residuals[batch.row[:, batch.real].ravel()] = of_rays[:, batch.real].reshape(-1, 2, 2)
-    joint = inverse.joint(np.arange(len(table[0]))[:, None], len(state.common))
-    positions, attitudes = (_given(prepared, linear, joint) for linear in given_at(prepared, state))
+    of_photos = inverse.cofactors(np.arange(len(table[0]))[:, None], len(state.common))
+    positions, attitudes = (_given(prepared, linear, of_photos) for linear in given_at(prepared, state))
     if solution.free:
-        points, joint = _inner(prepared, state, band, reduced, points, joint)
-    photos, cross = _turned(prepared, state, joint)
+        points, of_photos = _inner(prepared, state, band, reduced, points, of_photos)
+    photos, cross = _turned(prepared, state, of_photos)
     weights = prepared.prior**-2.0
     residuals *= prepared.problem.images.sigma[:, :, None] * prepared.problem.images.sigma[:, None, :]
     return Cofactors(
@@ -98,18 +103,6 @@ def cofactors_of(solution: BundleSolution) -> Cofactors:
         common_residuals=np.where(weights > 0.0, prepared.prior**2 - np.diag(inverse.common), 0.0),
         photo_common=cross,
     )
-
-
-def _at(solution: BundleSolution) -> tuple[Parameters, Reduced, Factor]:
-    """Linearise and factor at a solution."""
-    prepared = solution.prepared
-    state = parameters_from(prepared, solution.centers, solution.rotations, solution.points, solution.common)
-    reduced = reduce(prepared, state)
-    own = reduced.blocks[prepared.structure.own]
-    band = factored(prepared, reduced, datum.anchor(prepared, state, own) if solution.free else None)
-    if band is None:
-        raise GeometryError("the normal matrix is singular at the solution", code="bundle-rank")
-    return state, reduced, band
 
 
 def _inverse(reduced: Reduced, band: Factor) -> Inverse:
@@ -130,8 +123,8 @@ def _batch(
     rays, common = prepared.rays(batch, xyz, table, np.zeros(0) if not more else np.zeros(more))
     white = by_point(rays)
     eliminated.root.forward(white)
-    joint = inverse.joint(batch.sets, more)
-    spread = _carried(batch, joint, eliminated.rows[:-1])
+    of_sets = inverse.cofactors(batch.sets, more)
+    spread = _carried(batch, of_sets, eliminated.rows[:-1])
     of_point = np.einsum("pcs,pds->cds", eliminated.rows[:-1], spread)
     of_point[range(3), range(3)] += 1.0
     partials = by_photo(rays, more)[:-1]
@@ -142,7 +135,7 @@ def _batch(
     )
     if more:
         mixed += np.einsum("pakr,pcr->ackr", partials[PHOTO:], spread[PHOTO * k :])
-    fitted = _quadratic(batch, joint, partials)
+    fitted = _quadratic(batch, of_sets, partials)
     # white M white' - B Y white' - (B Y white')' + B Z B'
     half = 0.5 * np.einsum("cds,daks->caks", of_point, white) - mixed.transpose(1, 0, 2, 3)
     product = np.einsum("caks,cbks->abks", half, white)
@@ -155,31 +148,31 @@ def _batch(
     return of_point.transpose(2, 0, 1), found
 
 
-def _carried(batch: Batch, joint: Floats, rows: Floats) -> Floats:
+def _carried(batch: Batch, of_sets: Floats, rows: Floats) -> Floats:
     """Multiply the rows T of a batch with the joint cofactors of their photos: Z T, shape (q, 3, S)."""
     product = np.empty_like(rows)
     q, done = len(rows), 0
     for first, last, count, size in batch.runs:
         part = rows[..., first:last].reshape(q, 3, count, size).transpose(1, 2, 0, 3)
-        own = joint[done : done + count] @ part
-        product[..., first:last] = own.transpose(2, 0, 1, 3).reshape(q, 3, -1)
+        carried = of_sets[done : done + count] @ part
+        product[..., first:last] = carried.transpose(2, 0, 1, 3).reshape(q, 3, -1)
         done += count
     return product
 
 
-def _quadratic(batch: Batch, joint: Floats, partials: Floats) -> Floats:
+def _quadratic(batch: Batch, of_sets: Floats, partials: Floats) -> Floats:
     """Give B Z B' of each ray, with the photo's and the common parameters, shape (2, 2, k, S)."""
     q, _, k, slots = partials.shape
     n = PHOTO * k
     found, done = np.empty((2, 2, k, slots)), 0
     for first, last, count, size in batch.runs:
         groups = slice(done, done + count)
-        own = np.empty((k, count, q, q))
+        of_rays = np.empty((k, count, q, q))
         for ray in range(k):
             number = np.r_[PHOTO * ray : PHOTO * (ray + 1), n : n + q - PHOTO]
-            own[ray] = joint[groups][:, number[:, None], number]
+            of_rays[ray] = of_sets[groups][:, number[:, None], number]
         part = partials[..., first:last].reshape(q, 2, k, count, size)
-        product = own @ part.transpose(1, 2, 3, 0, 4)
+        product = of_rays @ part.transpose(1, 2, 3, 0, 4)
         found[..., first:last] = np.einsum("pakgn,bkgpn->abkgn", part, product).reshape(2, 2, k, -1)
         done += count
     return found
@@ -193,28 +186,28 @@ def _control(prepared: PreparedProblem, points: Floats) -> Floats:
     return found
 
 
-def _given(prepared: PreparedProblem, linear: LinearisedOrientations, joint: Floats) -> Floats:
+def _given(prepared: PreparedProblem, linear: LinearisedOrientations, of_photos: Floats) -> Floats:
     """Cofactors of the residuals of camera positions or attitudes."""
     partials = np.concatenate([linear.by_photo, linear.by_common], axis=2)
-    found: Floats = -partials @ joint[prepared.structure.rank[linear.photo]] @ partials.swapaxes(1, 2)
+    found: Floats = -partials @ of_photos[prepared.structure.rank[linear.photo]] @ partials.swapaxes(1, 2)
     with np.errstate(divide="ignore"):
         variance = np.where(linear.weight > 0.0, linear.weight**-2.0, 0.0)
     found[:, range(3), range(3)] += variance
     return found
 
 
-def _turned(prepared: PreparedProblem, state: Parameters, joint: Floats) -> tuple[Floats, Floats]:
+def _turned(prepared: PreparedProblem, state: Parameters, of_photos: Floats) -> tuple[Floats, Floats]:
     """Turn the cofactors of photos (and common parameters) into the Cartesian frame and the problem's order."""
     rank = prepared.structure.rank
     turn = np.zeros((len(rank), PHOTO, PHOTO))
     turn[:, :3, :3] = turn[:, 3:, 3:] = state.rotations
     turn *= SIGNS
-    own = turn @ joint[rank, :PHOTO, :PHOTO] @ turn.swapaxes(1, 2)
-    return own, turn @ joint[rank, :PHOTO, PHOTO:]
+    alone = turn @ of_photos[rank, :PHOTO, :PHOTO] @ turn.swapaxes(1, 2)
+    return alone, turn @ of_photos[rank, :PHOTO, PHOTO:]
 
 
 def _inner(
-    prepared: PreparedProblem, state: Parameters, band: Factor, reduced: Reduced, points: Floats, joint: Floats
+    prepared: PreparedProblem, state: Parameters, band: Factor, reduced: Reduced, points: Floats, of_photos: Floats
 ) -> tuple[Floats, Floats]:
     """Carry cofactors of points and photos over to inner constraints on the points.
 
@@ -250,19 +243,18 @@ def _inner(
     found = points.copy()
     for batch, move, shift in zip(prepared.structure.batches, moves, shifts, strict=True):
         real = batch.real
-        own, swept = move[..., real].transpose(2, 0, 1), shift[..., real].transpose(2, 0, 1) @ inverse
-        found[batch.point[real]] += _carried_over(own, swept, middle)
+        moved, swept = move[..., real].transpose(2, 0, 1), shift[..., real].transpose(2, 0, 1) @ inverse
+        found[batch.point[real]] += _carried_over(moved, swept, middle)
     turned = np.zeros((len(photos), PHOTO + p, datum.DEFECT))
     turned[:, :PHOTO] = datum.photo_generators(prepared, state, origin)
     swept = np.concatenate([photos, np.broadcast_to(common, (len(photos), *common.shape))], axis=1) @ inverse
-    return found, joint + _carried_over(turned, swept, middle)
+    return found, of_photos + _carried_over(turned, swept, middle)
 
 
 def _carried_over(moves: Floats, swept: Floats, middle: Floats) -> Floats:
     """Give G M G' - G P' - P G'."""
     product = moves @ swept.swapaxes(1, 2)
-    changed: Floats = moves @ middle @ moves.swapaxes(1, 2) - product - product.swapaxes(1, 2)
-    return changed
+    return np.asarray(moves @ middle @ moves.swapaxes(1, 2) - product - product.swapaxes(1, 2))
 
 
 def _push(batch: Batch, eliminated: Eliminated, pushed: Floats, right: Floats, corner: Floats) -> None:

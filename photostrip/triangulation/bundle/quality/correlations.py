@@ -25,7 +25,7 @@ ELEMENTS = (
     "rotation about y",
     "rotation about z",
 )
-"""Elements of a photo, along and about its own axes: there shift and rotation that replace each other are seen."""
+"""Elements of a photo, along and about its own axes, where shift and rotation that replace each other show."""
 
 
 @dataclass(frozen=True)
@@ -49,15 +49,17 @@ def correlations(solution: BundleSolution, precision: Cofactors, limit: float = 
     turn[:, :3, :3] = turn[:, 3:, 3:] = np.swapaxes(solution.rotations, 1, 2)
     photos = turn @ precision.photos @ turn.swapaxes(1, 2)
     cross = turn @ precision.photo_common
-    own = np.sqrt(np.einsum("nii->ni", photos))
+    sigma = np.sqrt(np.einsum("nii->ni", photos))
 
     def element(photo: int, number: int) -> str:
         return f"photo {problem.photo_name(photo)}: {ELEMENTS[number]}"
 
     shared = np.sqrt(np.diag(precision.common))
     found = _named(precision.common[None] / np.outer(shared, shared), limit, lambda _, i, j: (names[i], names[j]))
-    found += _named(cross / (own[:, :, None] * shared), limit, lambda n, i, j: (element(n, i), names[j]), lower=False)
-    found += _named(photos / (own[:, :, None] * own[:, None]), limit, lambda n, i, j: (element(n, i), element(n, j)))
+    found += _named(cross / (sigma[:, :, None] * shared), limit, lambda n, i, j: (element(n, i), names[j]), lower=False)
+    found += _named(
+        photos / (sigma[:, :, None] * sigma[:, None]), limit, lambda n, i, j: (element(n, i), element(n, j))
+    )
     return tuple(found)
 
 

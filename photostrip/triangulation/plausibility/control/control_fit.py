@@ -55,8 +55,7 @@ class PlanSimilarity:
 
     def __call__(self, w: Complex) -> Complex:
         """Bring places of the upright strip to the plan."""
-        result: Complex = self.turn * (np.conj(w) if self.mirrored else w) + self.shift
-        return result
+        return np.asarray(self.turn * (np.conj(w) if self.mirrored else w) + self.shift)
 
 
 def upright(axes: Floats) -> Floats:
@@ -118,7 +117,7 @@ def _pairs(z: Complex, plan: Complex) -> tuple[Numbers, Numbers]:
     enough = far > LEAST_PAIR_DISTANCE * far.max(initial=0.0)
     keep = np.flatnonzero(enough & (far > 0) & (np.abs(plan[j] - plan[i]) > TINY))
     if len(keep) > MOST_PAIRS:
-        keep = keep[np.linspace(0, len(keep) - 1, MOST_PAIRS).astype(np.intp)]
+        keep = keep[_evenly(len(keep), MOST_PAIRS)]
     return i[keep].astype(np.intp), j[keep].astype(np.intp)
 
 
@@ -152,8 +151,7 @@ def _least_median(columns: NDArray[Any], values: NDArray[Any], rows: Numbers) ->
         coefficient = np.linalg.solve(design[sound], values[chosen[sound]][:, :, None])[:, :, 0]
     some = rows[_evenly(len(rows), MEDIAN_POINTS)]
     best = int(_median(np.abs(values[some] - coefficient @ columns[some].T), unknowns).argmin())
-    result: Floats = np.abs(values - columns @ coefficient[best])
-    return result
+    return np.asarray(np.abs(values - columns @ coefficient[best]))
 
 
 def _robust(size: Floats, unknowns: int) -> float:
@@ -188,8 +186,7 @@ class RobustFit:
     @property
     def odd(self) -> Flags:
         """Points that contradict the others."""
-        found: Flags = np.abs(self.residual) > self.limit
-        return found
+        return np.asarray(np.abs(self.residual) > self.limit)
 
 
 def fit_robustly(columns: NDArray[Any], values: NDArray[Any], in_fit: Flags, floor: float) -> RobustFit:

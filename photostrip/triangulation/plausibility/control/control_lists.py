@@ -60,7 +60,7 @@ def find_foreign_lists(
         if (np.abs(off) > limit).mean() <= MOST_ODD_SHARE:
             continue
         wrong.append(number)
-        scale = None if (own := alone[number]) is None else abs(own.turn) / abs(reference.turn)
+        scale = None if (of_list := alone[number]) is None else abs(of_list.turn) / abs(reference.turn)
         shift = complex(np.median(off.real), np.median(off.imag))
         names = tuple(given.ids[row] for row in np.flatnonzero(rows))
         findings.append(_other_frame(on_strip, names, number, first, shift, scale))

@@ -99,9 +99,6 @@ def find_wrong_readings(
     return findings + (whole or list(control_slips.find_height_slips(given, on_strip, fitted, left)))
 
 
-# ------------------------------------------------------------------------------------------ the strip as a whole
-
-
 def _mirror(
     on_strip: StripPoints, normal: PlanSimilarity, mirror: PlanSimilarity, extent: float, *, axes_are_right: bool | None
 ) -> Finding:

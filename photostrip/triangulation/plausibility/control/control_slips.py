@@ -90,7 +90,7 @@ def find_height_slips(
         difference = np.array([0.0, 0.0, fit.residual[row]])
         spread, limit, doubt = float(fit.spread[row]), float(fit.limit[row]), ""
         if _one_ray_is_wrong(given, on_strip, fitted, left, row):
-            if on_strip.rays_of(given.ids[row]).count > LEAST_RAYS:
+            if len(on_strip.rays_of(given.ids[row])) > LEAST_RAYS:
                 continue
             # below a photo a wrong height goes with that photo's ray too: two rays cannot tell
             limit, spread = min(limit, NEAR_SIGMAS * spread), CLEARER_SIGMAS * spread
@@ -103,7 +103,7 @@ def _one_ray_is_wrong(
 ) -> bool:
     """Whether all rays of a point but one go with it as it is given."""
     rays = on_strip.rays_of(given.ids[row])
-    if rays.count < LEAST_RAYS:
+    if len(rays) < LEAST_RAYS:
         return False
     plan, (height, spread) = left.plan.residual[row], left.heights()
     off = np.array([plan.real, plan.imag, height[row]])
@@ -119,8 +119,8 @@ def _one_ray_is_wrong(
     size = np.sqrt(np.diag(covariance))
     test, within = residual.ravel() / size, covariance / np.outer(size, size) + RIDGE_SHARE * np.eye(len(size))
     limit = float(left.plan.limit[row] / of_plan) ** 2
-    for ray in range(rays.count):
-        others = np.delete(np.arange(2 * rays.count), [2 * ray, 2 * ray + 1])
+    for ray in range(len(rays)):
+        others = np.delete(np.arange(2 * len(rays)), [2 * ray, 2 * ray + 1])
         if test[others] @ np.linalg.solve(within[np.ix_(others, others)], test[others]) < limit:
             return True
     return False

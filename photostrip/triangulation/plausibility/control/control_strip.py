@@ -57,8 +57,7 @@ class GivenPoints:
     @property
     def plan(self) -> Complex:
         """Given places E + iN, metres."""
-        result: Complex = self.xyz[:, 0] + 1j * self.xyz[:, 1]
-        return result
+        return np.asarray(self.xyz[:, 0] + 1j * self.xyz[:, 1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,9 +70,8 @@ class Rays:
     rotations: Floats  # (r, 3, 3): photo to strip
     focal: float  # principal distance, mm
 
-    @property
-    def count(self) -> int:
-        """Number of photos."""
+    def __len__(self) -> int:
+        """Count the photos."""
         return len(self.xy)
 
     def shown(self, xyz: Floats) -> bool:

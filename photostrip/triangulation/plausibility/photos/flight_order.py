@@ -113,9 +113,6 @@ def _steps(links: mosaic.PhotoLinks, order: Sequence[int]) -> tuple[complex, ...
     return tuple(slope.tolist())
 
 
-# ------------------------------------------------------------------------------- photos unlike their neighbours
-
-
 def _other_size(plane: mosaic.Mosaic) -> list[int]:
     return [int(number) for number in np.flatnonzero(np.abs(np.log(plane.size)) > np.log(mosaic.SCALE_JUMP))]
 
@@ -175,14 +172,10 @@ def _twin(links: mosaic.PhotoLinks, pair: tuple[int, int], strip: str, photos: S
     return found("P203", message, fix, evidence, photos=(one, other), strips=(strip,))
 
 
-# ------------------------------------------------------------------------------------------------- the order
-
-
 def _sure(links: mosaic.PhotoLinks) -> Flags:
     """Links that are good enough to speak against the list."""
     base = np.abs(links.bases[1])
-    sure: Flags = (links.count >= SURE_COUNT) & (links.misfit < SURE_MISFIT * base)
-    return sure
+    return np.asarray((links.count >= SURE_COUNT) & (links.misfit < SURE_MISFIT * base))
 
 
 def _by_number(closer: Closer, photos: Sequence[str]) -> Toward:
