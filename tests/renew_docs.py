@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import tempfile
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from tests.pages import pages, renewed
 
 
 def main() -> None:
+    argparse.ArgumentParser(prog="python -m tests.renew_docs", description=__doc__).parse_args()
     for page in pages():
         with tempfile.TemporaryDirectory() as folder:
             text = renewed(page, Path(folder))

@@ -5,6 +5,7 @@ Simulated projects are written anew first, so that they are always those of the 
 
 from __future__ import annotations
 
+import argparse
 import os
 from pathlib import Path
 
@@ -45,6 +46,7 @@ def renew(path: Path, text: str) -> None:
 
 
 def main() -> None:
+    argparse.ArgumentParser(prog="python -m tests.renew_golden", description=__doc__).parse_args()
     os.chdir(ROOT)
     for name in SAMPLES:
         for file, text in simulated(name).items():

@@ -6,8 +6,8 @@ review the difference before committing it.
 
 from __future__ import annotations
 
+import argparse
 import json
-import sys
 from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING
@@ -68,8 +68,11 @@ SNAPSHOTS: dict[str, Callable[[], str]] = {
 
 def main() -> None:
     """Renew what stands in the folder."""
+    parser = argparse.ArgumentParser(prog="python -m tests.reports", description=__doc__)
+    parser.add_argument("what", nargs="?", choices=["result"], help="run the project anew first")
+    asked = parser.parse_args()
     FOLDER.mkdir(exist_ok=True)
-    if sys.argv[1:] == ["result"]:
+    if asked.what == "result":
         RESULT.write_text(to_json(fresh()), encoding="utf-8")
     for name, printed in SNAPSHOTS.items():
         (FOLDER / name).write_text(printed(), encoding="utf-8")
