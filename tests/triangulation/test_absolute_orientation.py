@@ -470,3 +470,16 @@ def test_two_heights_leave_the_rotation_about_their_own_line() -> None:
     error = refusal({"A": "xy", "H": "xy", "B": "z", "C": "z"})
     assert "2 in plan and 2 in height" in str(error)
     assert "the line of control points A and H" not in str(error)  # those are the plan points: the free axis is B-C
+
+
+def test_the_start_is_right_to_the_first_order_of_the_tilt() -> None:
+    """Plan by points at one end, heights by points at the other: what is left is of the order of the tilt squared."""
+    tilt = 1e-4
+    one = case(
+        {"A": "xy", "B": "xy", "C": "xy", "E": "z", "F": "z", "G": "z", "H": "z"},
+        angles_deg=np.degrees([0.7 * tilt, -tilt, 0.6]),
+    )
+    start = absolute_orientation._start_apart(one.strip, one.targets)
+    ground = np.array(list(GROUND.values()))
+    moved = one.targets.intermediate.cartesian_from_intermediate(start(one.truth.inverse(ground)))
+    assert np.abs(moved - ground)[:, 2].max() < 10 * tilt**2 * 8000.0

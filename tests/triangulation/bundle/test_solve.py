@@ -23,7 +23,8 @@ from photostrip.triangulation.bundle.observations.problem import (
     PositionObservations,
     StartValues,
 )
-from photostrip.triangulation.bundle.solve import solve
+from photostrip.triangulation.bundle.solution import IterationStep
+from photostrip.triangulation.bundle.solve import _still_to_come, solve
 from tests.simulated_bundle import problem_of, truth_of
 
 if TYPE_CHECKING:
@@ -326,3 +327,12 @@ def test_steps_without_end_are_an_error(monkeypatch: pytest.MonkeyPatch) -> None
     with pytest.raises(GeometryError, match="did not come to an end in 1 steps") as caught:
         solve(problem)
     assert caught.value.code == "bundle-diverged"
+
+
+@pytest.mark.parametrize(
+    ("lengths", "next_length"),
+    [([1e-3, 1e-5], 1e-7), ([1e-5, 1e-3], 1e-3), ([0.2], 0.04), ([0.0, 0.0], 0.0), ([0.0, 0.1], 0.1)],
+)
+def test_the_next_step_shrinks_as_the_last_did(lengths: list[float], next_length: float) -> None:
+    steps = [IterationStep(chi_square=1.0, length=each, damping=0.0, shift=0.0, turn=0.0) for each in lengths]
+    assert _still_to_come(steps) == pytest.approx(next_length, rel=1e-12)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
+from scipy.stats import chi2
 
 from photostrip.errors import GeometryError, InputError
 from photostrip.geometry.similarity import Similarity
@@ -235,3 +237,16 @@ def test_detectable_errors_are_found_in_four_of_five_cases() -> None:
         value, _, _ = linking.studentised(shared, linking.solve(shared, replace(models, xyz=xyz), ~none), ~none)
         found += value[0] > 16.27  # chi-square of three degrees of freedom at 0.001
     assert 0.70 < found / cases < 0.90
+
+
+@pytest.mark.parametrize(
+    ("known", "redundancy", "factor"),
+    [(4, 12, 50.0), (3, 12, 1.0), (4, 11, 1.0)],
+    ids=["four of both", "three points", "less than four independent points"],
+)
+def test_four_points_contradict_the_stated_precision(known: int, redundancy: int, factor: float) -> None:
+    """Median of test values over that of chi-square with three degrees of freedom."""
+    value = np.full(known, 50.0 * chi2.median(3))
+    tests = linking.PointTests(value=value, error=np.zeros((known, 3)), freedom=np.full(known, 3))
+    solved = cast("linking.SolvedLinks", SimpleNamespace(redundancy=np.array([redundancy])))
+    assert link_screening._scatter(tests, solved) == pytest.approx(factor, rel=1e-3)

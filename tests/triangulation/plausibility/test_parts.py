@@ -243,3 +243,20 @@ def test_a_strip_is_set_upright() -> None:
     assert np.linalg.det(turn) == pytest.approx(1.0)
     mean = axes.mean(axis=0)
     assert turn @ mean / np.linalg.norm(mean) == pytest.approx([0, 0, 1], abs=1e-12)
+
+
+def test_the_spread_of_a_fit_is_that_of_another_measurement() -> None:
+    """Of a mean of n values: sigma of one value times sqrt(1 + 1/n), also for what took no part."""
+    values = np.array([-1.0, 1.0] * 6)
+    found = fit_robustly(np.ones((12, 1)), values, np.ones(12, bool), 1e-3)
+    assert found.sigma0 == pytest.approx(np.std(values, ddof=1))
+    assert found.spread == pytest.approx(np.full(12, found.sigma0 * np.sqrt(1 + 1 / 12)))
+    assert found.sigma == pytest.approx([found.sigma0 / np.sqrt(12)])
+
+
+def test_a_finding_says_between_which_photos_control_lies() -> None:
+    photos = [f"{number}" for number in range(1, 12)]
+    plan = np.array([[0.0, 500.0], [100.0, -500.0], [900.0, 500.0], [1000.0, -500.0]])
+    (found,) = layout.find_weak_control(np.array([2.0, 2.1, 2.9, 3.0]), plan, 500.0, photos, "A", list("abcd"))
+    assert found.code == "P501"
+    assert found.evidence == {"first_control_at_photo": 3.0, "last_control_at_photo": 4.0, "photos": 11}

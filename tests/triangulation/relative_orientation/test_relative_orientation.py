@@ -23,6 +23,7 @@ from photostrip.triangulation.relative_orientation.solution import (
     in_front_of_cameras,
     linearised_parallaxes,
     normal_matrices,
+    rays_meet_in_front,
     solve_elements,
     start_values,
     y_parallaxes,
@@ -590,3 +591,10 @@ def test_the_same_photo_measured_twice() -> None:
     error = refusal(of_arrays(left, left + rng.normal(0, 5 * MICROMETRE, left.shape)), 153.0)
     assert error.code == "no-base"
     assert "the same photo twice" in str(error)
+
+
+@pytest.mark.parametrize(("to_left", "front"), [(1e-3, True), (0.0, False), (-1e-3, False)])
+def test_rays_that_meet_at_a_camera_do_not_meet_in_front_of_it(*, to_left: float, front: bool) -> None:
+    """The left ray looks down from (0, 0, 0); the right one from (1, 0, 0) meets it at the height -to_left."""
+    left, right = np.array([[0.0], [0.0], [-1.0]]), np.array([[-1.0], [0.0], [-to_left]])
+    assert rays_meet_in_front(left, right).tolist() == [front]

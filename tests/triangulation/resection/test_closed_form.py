@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_alpha_omega_kappa, from_vector
-from photostrip.triangulation.resection.closed_form import space_resection
+from photostrip.triangulation.resection.closed_form import _triples, space_resection
 from photostrip.triangulation.resection.collinearity import KnownPhotos, derivatives, project
 from photostrip.triangulation.resection.ray_intersection import intersect_points
 from tests.source_tree import ROOT
@@ -183,3 +183,13 @@ def test_a_published_pair_comes_back_from_its_points_and_its_points_from_the_pai
     known = KnownPhotos(stations, rotations, np.full(2, 75.0))
     met = intersect_points(np.concatenate([x1, x2]), np.full((2 * count, 2), 0.0005), rows, known, count)
     assert np.abs(met.xyz - points).max() < 0.006
+
+
+def test_the_triangles_are_of_the_nine_points_farthest_out() -> None:
+    """Far from the middle of the points, not of the photo."""
+    turns = np.linspace(0.0, 2 * np.pi, 9, endpoint=False)
+    ring = 30.0 * np.column_stack([np.cos(turns), np.sin(turns)])
+    within = 5.0 * np.column_stack([np.cos(turns), np.sin(turns)])
+    sets = _triples(np.concatenate([within, ring]) + np.array([70.0, 60.0]))
+    assert min(each.min() for each in sets) >= 9
+    assert sets[0].tolist() in [[9, 12, 15], [10, 13, 16], [11, 14, 17]] or np.ptp(np.sort(sets[0])) == 6
