@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import sys
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import typer
 
+from photostrip.cli.stdout import print_json, print_sections
+
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Iterable
 
     from photostrip.notes import Note
     from photostrip.report.page.parts import Section
@@ -22,16 +23,6 @@ Form = Literal["text", "md", "json", "csv"]
 FORMS: dict[str, Form] = {".json": "json", ".csv": "csv", ".md": "md", ".txt": "text"}  # by the ending of a file
 
 
-@contextmanager
-def failures_in(form: Form) -> Iterator[None]:
-    """Report failures in the form that was asked for: as JSON on stdout, else as lines on stderr."""
-    from photostrip.cli.failures import failures_as
-    from photostrip.cli.stdout import Format
-
-    with failures_as(Format.JSON if form == "json" else Format.TEXT):
-        yield
-
-
 @dataclass(frozen=True)
 class Rendering:
     """How documents of one kind become a report, and a table."""
@@ -39,30 +30,23 @@ class Rendering:
     report: Callable[[Document], tuple[str, tuple[Section, ...]]]
     table: Callable[[Document], str]
 
-    def rendered(self, document: Document, form: Form, *, ascii_only: bool = False) -> str:
-        """Return a document as text without colours."""
-        from photostrip.report.page import layout, text
+    def rendered(self, document: Document, form: Form) -> str:
+        """Return a document as a file holds it."""
+        from photostrip.formats.output.result_json import to_json
+        from photostrip.report.page.text import to_markdown, to_text
 
-        if form == "json":
-            from photostrip.formats.output.result_json import to_json
-
-            return to_json(document, ascii_only=ascii_only)
-        if form == "csv":
-            return self.table(document)
-        if form == "md":
-            page = text.to_markdown(*self.report(document))
-            return layout.plain_ascii(page) if ascii_only else page
-        return text.to_text(*self.report(document))
+        if form in {"json", "csv"}:
+            return to_json(document) if form == "json" else self.table(document)
+        return (to_markdown if form == "md" else to_text)(*self.report(document))
 
     def show(self, document: Document, form: Form) -> None:
         """Print a document."""
-        from photostrip.report.page import console
-
-        if form == "text":
-            console.print_report(*self.report(document), sys.stdout)
+        if form == "json":
+            print_json(document)
+        elif form == "csv":
+            sys.stdout.write(self.table(document))
         else:
-            ascii_only = not console.speaks_unicode(sys.stdout)
-            sys.stdout.write(self.rendered(document, form, ascii_only=ascii_only))
+            print_sections(*self.report(document), markdown=form == "md")
 
 
 def say(notes: Iterable[Note], *, quiet: bool) -> None:

@@ -63,7 +63,7 @@ def as_fault(error: OSError) -> InputError:
 
 
 @contextmanager
-def failures_as(form: Format) -> Iterator[None]:
+def failures_as(form: str) -> Iterator[None]:
     """Print failures in the form that was asked for: as JSON or annotations on stdout, else as lines on stderr.
 
     The exit code is the same whatever the form.
@@ -79,7 +79,7 @@ def failures_as(form: Format) -> Iterator[None]:
 
         failure = as_fault(error) if isinstance(error, OSError) else error
         findings = messages.findings_of(failure)
-        if form is Format.GITHUB:
+        if form == Format.GITHUB:
             sys.stdout.write(messages.annotated(findings))
         else:
             document = messages.as_document(findings, failure.exit_code)

@@ -6,7 +6,7 @@ Here the user's units, axes and directions end: inside there are millimetres wit
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from photostrip.triangulation.image_coordinates import certificate
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from _typeshed import DataclassInstance
     from numpy.typing import NDArray
 
     from photostrip.arrays import Floats, Numbers
@@ -30,9 +31,10 @@ if TYPE_CHECKING:
     from photostrip.project.schema.ground import CameraPositions as PositionsBlock
     from photostrip.project.schema.ground import Control, Ellipsoid, GivenList, Orientations, Output
     from photostrip.project.schema.project_file import ProjectFile
+    from photostrip.project.schema.values import Section
     from photostrip.triangulation.image_coordinates.certificate import Certificate
 
-
+T = TypeVar("T", bound="DataclassInstance")
 PER_MILLIMETRE = {"mm": 1.0, "um": 1e3, "0.1um": 1e4}
 RADIANS = {"deg": np.pi / 180, "gon": np.pi / 200, "rad": 1.0}  # in a unit of angles
 
@@ -93,13 +95,14 @@ def distortion_of(given: Distortion) -> camera.Distortion:
 def strips(project: ProjectFile, known: Mapping[str, camera.Camera]) -> tuple[Strip, ...]:
     """Return the strips of a project."""
     usual = project.processing.bundle.self_calibration
-    own = {name: each.self_calibration for name, each in project.cameras.items()}
     return tuple(
         Strip(
             str(each.id),
             known[each.camera],
             tuple(map(str, each.photos)),
-            tuple(dict.fromkeys(usual if (wanted := own[each.camera]) is None else wanted)),
+            tuple(
+                dict.fromkeys(usual if (wanted := project.cameras[each.camera].self_calibration) is None else wanted)
+            ),
         )
         for each in project.strips
         if each.camera is not None
@@ -249,9 +252,11 @@ def _columns(spec: FrameSpec) -> list[int]:
 
 
 def camera_positions(
-    read: PositionTable, given: PositionsBlock, photos: Mapping[str, camera.Camera]
-) -> CameraPositions:
+    read: PositionTable | None, given: PositionsBlock | None, photos: Mapping[str, camera.Camera]
+) -> CameraPositions | None:
     """Return the measured positions of the cameras of `photos`, in the internal order of axes."""
+    if read is None or given is None:
+        return None
     rows = np.array([row for row, name in enumerate(read.ids) if name in photos and read.used[row]], np.intp)
     spec = frame_spec(given)
     columns = _columns(spec)
@@ -268,9 +273,11 @@ def camera_positions(
 
 
 def given_orientations(
-    read: OrientationTable, given: Orientations, photos: Mapping[str, camera.Camera]
-) -> GivenOrientations:
+    read: OrientationTable | None, given: Orientations | None, photos: Mapping[str, camera.Camera]
+) -> GivenOrientations | None:
     """Return the given orientations of `photos`, in the internal order of axes and in radians."""
+    if read is None or given is None:
+        return None
     rows = np.array([row for row, name in enumerate(read.ids) if name in photos], np.intp)
     spec = frame_spec(given)
     columns, radians = _columns(spec), RADIANS[given.angles.unit]
@@ -300,29 +307,14 @@ def settings(project: ProjectFile) -> Settings:
     return Settings(
         adjustment=wanted.adjustment,
         precision=wanted.precision,
-        relative=replace(usual.relative, **wanted.relative.model_dump()),
-        links=replace(
-            usual.links,
-            screening=wanted.links.screening,
-            alpha=wanted.links.alpha,
-            keep=tuple(map(str, wanted.links.keep)),
-            drop=tuple(map(str, wanted.links.drop)),
-        ),
+        relative=_laid_over(usual.relative, wanted.relative),
+        links=_laid_over(usual.links, wanted.links),
         formation=replace(usual.formation, scale_transfer=wanted.scale_transfer),
         absolute=replace(usual.absolute, earth_curvature=wanted.earth_curvature, earth_radius=wanted.earth_radius),
-        polynomial=replace(usual.polynomial, degree=wanted.polynomial.degree),
-        covariance=replace(usual.covariance, **wanted.covariance.model_dump()),
-        bundle=replace(
-            usual.bundle,
-            screening=wanted.bundle.screening,
-            test=wanted.bundle.test,
-            alpha=wanted.bundle.alpha,
-            power=wanted.bundle.power,
-            variance_components=wanted.bundle.variance_components,
-            self_calibration=tuple(wanted.bundle.self_calibration),
-            calibration_sigma=dict(wanted.bundle.calibration_sigma),
-        ),
-        interior=replace(usual.interior, **wanted.interior.model_dump()),
+        polynomial=_laid_over(usual.polynomial, wanted.polynomial),
+        covariance=_laid_over(usual.covariance, wanted.covariance),
+        bundle=_laid_over(usual.bundle, wanted.bundle),
+        interior=_laid_over(usual.interior, wanted.interior),
         refinement=replace(
             usual.refinement,
             principal_point=wanted.principal_point,
@@ -337,3 +329,12 @@ def settings(project: ProjectFile) -> Settings:
         tolerances=project.tolerances.model_dump(exclude_none=True),
         accept=tuple(map(str, project.accept)),
     )
+
+
+def _laid_over(usual: T, given: Section) -> T:
+    """Replace the fields of settings by the keys of a section that has the same names."""
+    changed: dict[str, Any] = given.model_dump()
+    for name, value in changed.items():
+        if isinstance(value, list):
+            changed[name] = type(getattr(usual, name))(map(str, value))
+    return replace(usual, **changed)

@@ -50,7 +50,6 @@ if TYPE_CHECKING:
     from photostrip.errors import Fault
     from photostrip.notes import Finding, Note
     from photostrip.pipeline import MeasuredModels, Result
-    from photostrip.pipeline.inputs import CameraPositions, GivenOrientations
     from photostrip.points import PhotoPoints
 
 __all__ = ["Project", "json_schema", "load_project"]
@@ -89,14 +88,14 @@ class Project:
 
     def result(self, result: Result) -> Result:
         """Return a result whose findings say where, with files as seen from the project's folder."""
-        seen = (replace(each, file=_seen_from(each.file, self.directory)) for each in self.placed(result.findings))
-        return replace(result, findings=tuple(seen))
+        placed = (replace(each, file=_seen_from(each.file, self.directory)) for each in self.placed(result.findings))
+        return replace(result, findings=tuple(placed))
 
     def files_read(self, result: Result) -> tuple[Path, ...]:
         """Return every file that a run read, the project file first, grids of geoids and datum shifts included."""
         grids = [Path(grid) for frame in (*result.frames, result.output) for grid in frame.grids]
-        here = self.directory.resolve()
-        near = [self.directory / grid.relative_to(here) if grid.is_relative_to(here) else grid for grid in grids]
+        folder = self.directory.resolve()
+        near = [self.directory / grid.relative_to(folder) if grid.is_relative_to(folder) else grid for grid in grids]
         return tuple(dict.fromkeys([*self.files, *near]))
 
     @contextmanager
@@ -213,8 +212,8 @@ def _inputs(
         frames=frames,
         output=(output or first) if not frames else None if output == first else output,
         fiducials=_fiducials(project, tables, photos),
-        positions=_positions(project, tables, photos),
-        orientations=_orientations(project, tables, photos),
+        positions=camera_positions(tables.positions, project.camera_positions, photos),
+        orientations=given_orientations(tables.orientations, project.orientations, photos),
         models=models,
     )
     return inputs, list(hints(project, tables, root))
@@ -238,20 +237,6 @@ def _models(project: ProjectFile, tables: Tables, placed_models: Mapping[int, Se
         for number, strip in enumerate(project.strips)
     ]
     return measured_models(tables.models, project.models, flights)
-
-
-def _positions(project: ProjectFile, tables: Tables, photos: dict[str, Camera]) -> CameraPositions | None:
-    """Measured positions of the cameras of the strips."""
-    if project.camera_positions is None or tables.positions is None:
-        return None
-    return camera_positions(tables.positions, project.camera_positions, photos)
-
-
-def _orientations(project: ProjectFile, tables: Tables, photos: dict[str, Camera]) -> GivenOrientations | None:
-    """Return the orientations of photos of the strips that are known beforehand."""
-    if project.orientations is None or tables.orientations is None:
-        return None
-    return given_orientations(tables.orientations, project.orientations, photos)
 
 
 def _fiducials(project: ProjectFile, tables: Tables, photos: dict[str, Camera]) -> PhotoPoints | None:

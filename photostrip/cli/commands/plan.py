@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from photostrip.cli.documents import FORMS, Form, Rendering, failures_in, require_target, write_rule
+from photostrip.cli.documents import FORMS, Form, Rendering, require_target, write_rule
+from photostrip.cli.failures import failures_as
 from photostrip.cli.option_groups import with_groups
 from photostrip.cli.options import Silent
 
@@ -213,7 +214,7 @@ def model(
     delivery: Delivery,
 ) -> None:
     """Compute the expected errors all over one model, and what each source of errors does alone."""
-    with failures_in(delivery.form):
+    with failures_as(delivery.form):
         from photostrip.formats.output.plans import model_document
         from photostrip.planning.model_plan import plan_model
         from photostrip.project.plans.model import load_model_plan
@@ -267,7 +268,7 @@ def strip(  # noqa: PLR0913 (an argument for each option)
     delivery: Delivery,
 ) -> None:
     """Compute the expected accuracy along a strip, for layouts of control and methods of adjustment."""
-    with failures_in(delivery.form):
+    with failures_as(delivery.form):
         from photostrip.formats.output.plan_strip import strip_document
         from photostrip.project.plans.strip import layout_option, load_strip_plan
 
@@ -311,7 +312,7 @@ def camera(
     delivery: Delivery,
 ) -> None:
     """Compare cameras by their efficiency coefficient K = f m_p: the smaller, the fewer photos."""
-    with failures_in(delivery.form):
+    with failures_as(delivery.form):
         from photostrip.errors import Fault, InputError
         from photostrip.formats.output.plans import camera_document, source_document
         from photostrip.project.plans.cameras import load_camera_plan

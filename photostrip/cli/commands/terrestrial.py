@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from photostrip.cli.commands.terrestrial_directions import HELP_NAMES, CameraByPoint, Format, directions
-from photostrip.cli.documents import Rendering, failures_in, require_target, say, write_rule
+from photostrip.cli.documents import Rendering, require_target, say, write_rule
+from photostrip.cli.failures import failures_as
 from photostrip.cli.option_groups import with_groups
 from photostrip.cli.options import Silent
 
@@ -82,7 +83,7 @@ def displacement(  # noqa: PLR0913 (an argument for each option)
     PROJECT describes stations, cameras, epochs and measurements. A table alone is enough where the cameras stand in
     the normal case: axes parallel and at right angles to the base.
     """
-    with failures_in(form):
+    with failures_as(form):
         from photostrip.formats.output.terrestrial_displacements import displacement_document, displacements_csv
         from photostrip.report.commands.terrestrial_displacements import displacement_report
         from photostrip.report.pictures.terrestrial import check_plot

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from photostrip.cli.documents import Form, Rendering, failures_in, say
+from photostrip.cli.documents import Form, Rendering, say
+from photostrip.cli.failures import failures_as
 from photostrip.cli.option_groups import with_groups
 from photostrip.cli.options import Silent
 
@@ -140,7 +141,7 @@ def from_photo(
 
     x grows to the right, z upwards; lambda is an azimuth clockwise from north, beta an elevation.
     """
-    with failures_in(form):
+    with failures_as(form):
         from photostrip.formats.output.terrestrial_directions import directions_document
         from photostrip.project.terrestrial.options import image_points, image_sigma
 
@@ -164,7 +165,7 @@ def to_photo(
     quiet: Silent = False,
 ) -> None:
     """Compute where directions meet the photo, in millimetres."""
-    with failures_in(form):
+    with failures_as(form):
         from photostrip.formats.output.terrestrial_directions import photo_document
         from photostrip.project.terrestrial.options import direction_points
 
@@ -190,7 +191,7 @@ def accuracy(
     plot: Plot = None,
 ) -> None:
     """Tell how accurately correction directions must be measured, all over the photo."""
-    with failures_in(form):
+    with failures_as(form):
         from photostrip.errors import Fault, InputError
         from photostrip.formats.output.terrestrial_directions import required_accuracy
         from photostrip.project.terrestrial.options import image_sigma
@@ -225,7 +226,7 @@ def theodolite(  # noqa: PLR0913 (an argument for each option)
     plot: Plot = None,
 ) -> None:
     """Tell which image accuracy a theodolite can vouch for, all over the photo."""
-    with failures_in(form):
+    with failures_as(form):
         from photostrip.formats.output.terrestrial_directions import theodolite_accuracy
         from photostrip.project.terrestrial.options import image_sigma, theodolite_sigmas
         from photostrip.report.pictures.terrestrial import theodolite_plot
@@ -306,7 +307,7 @@ def orient(  # noqa: PLR0913 (an argument for each option)
 
     The directions are measured with a theodolite where the camera stood. alpha comes out in the zero of its circle.
     """
-    with failures_in(form):
+    with failures_as(form):
         from photostrip.formats.output.terrestrial_directions import oriented
         from photostrip.project.terrestrial import options
         from photostrip.project.terrestrial.ranges import SIGNIFICANCE, within
@@ -327,7 +328,7 @@ def orient(  # noqa: PLR0913 (an argument for each option)
 @_command("examples", "")
 def examples(form: Format = "text") -> None:
     """Compute the worked examples of the source again, and explain what is misprinted."""
-    with failures_in(form):
+    with failures_as(form):
         from photostrip.formats.output.terrestrial_directions import worked_examples
 
         _print(worked_examples(), form)
@@ -336,7 +337,7 @@ def examples(form: Format = "text") -> None:
 @_command("cameras", "--presets my-cameras.yaml")
 def cameras(presets: Presets = None, form: Format = "text") -> None:
     """List the cameras that can be named."""
-    with failures_in(form):
+    with failures_as(form):
         from photostrip.formats.output.terrestrial_directions import camera_list
         from photostrip.project.terrestrial.cameras import read_presets
 

@@ -1,6 +1,9 @@
 """Files that are written: results, plans, simulations, batches.
 
-Plain documents come in, texts go out: ``result_json`` and ``result_files`` for result.json and its tables,
-``result_lines`` for where its records stand, ``simulation`` for a project with its truth, ``batch`` for summaries and
-records. Nothing of a result is computed here; columns and decimals come from its description.
+In come documents of results and outcomes of batches, plans and reports of ``planning``, surveys, simulations; out go
+texts by file name, and documents that reports print: angles in the user's unit, ground in metres, errors in µm and ″.
+
+- ``result_json``, ``result_files``, ``result_lines``: result.json, its tables, and where its records stand;
+- ``plans``, ``plan_strip``, ``terrestrial_directions``, ``terrestrial_displacements``: documents, and tables of them;
+- ``simulation``, ``simulation_tables``, ``simulation_truth``: a project with its truth; ``batch``: summaries, records.
 """

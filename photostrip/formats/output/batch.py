@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from typing import TYPE_CHECKING, Any
 
 from photostrip import __version__
+from photostrip.formats.output.csv_text import to_csv
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -40,13 +39,9 @@ def summary_json(outcomes: Sequence[Document], exit_code: int, *, ascii_only: bo
 
 def summary_csv(outcomes: Sequence[Document]) -> str:
     """Return the summary as CSV: a row for each project, the first message in the last column."""
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow((*COLUMNS, "message"))
-    for each in outcomes:
-        message = " ".join(each["messages"][0].split()) if each["messages"] else ""
-        writer.writerow([*("" if each[name] is None else each[name] for name in COLUMNS), message])
-    return stream.getvalue()
+    messages = (" ".join(each["messages"][0].split()) if each["messages"] else "" for each in outcomes)
+    rows = ([*(each[name] for name in COLUMNS), message] for each, message in zip(outcomes, messages, strict=True))
+    return to_csv((*COLUMNS, "message"), rows)
 
 
 # ------------------------------------------------------------------------------------------------------ records

@@ -59,12 +59,11 @@ def head(kind: str, camera: Phototheodolite | None = None) -> Document:
     return document
 
 
-def orientation_block(angles: Sequence[float], unit: str) -> Document:
-    """Return the angles of a photo, azimuth from 0 to a full circle."""
-    alpha, omega, kappa = angles
-    values = (positive(alpha), omega, kappa)
-    names = dict(zip(ANGLES, rounded(np.array(values) * PER_RADIAN[unit], ANGLE), strict=True))
-    return {"unit": unit, **names}
+def _oriented_head(kind: str, camera: Phototheodolite, attitude: Attitude) -> Document:
+    """Begin a document of an oriented camera, azimuth from 0 to a full circle."""
+    alpha, omega, kappa = attitude.angles
+    angles = rounded(np.array([positive(alpha), omega, kappa]) * PER_RADIAN[attitude.unit], ANGLE)
+    return head(kind, camera) | {"orientation": {"unit": attitude.unit, **dict(zip(ANGLES, angles, strict=True))}}
 
 
 def positive(angle: float) -> float:
@@ -105,10 +104,8 @@ def photo_document(camera: Phototheodolite, attitude: Attitude, ids: Sequence[st
 def _points_and_directions(
     kind: str, camera: Phototheodolite, attitude: Attitude, ids: Sequence[str], reduced: Floats, directions: Floats
 ) -> Document:
-    """Return photo coordinates, which are reduced to the principal point here, with their directions."""
-    document = head(kind, camera)
-    unit = attitude.unit
-    document["orientation"] = orientation_block(attitude.angles, unit)
+    """Return photo coordinates, given from the principal point, with their directions."""
+    document, unit = _oriented_head(kind, camera, attitude), attitude.unit
     document["units"] = {"x": "mm", "z": "mm", "lambda": unit, "beta": unit, "_arcsec": "seconds of arc"}
     xz = rounded(reduced + np.array(camera.principal_point), MILLIMETRE)
     turned = np.array([[positive(each[0]), each[1]] for each in directions]).reshape(-1, 2)
@@ -132,8 +129,7 @@ def required_accuracy(
     """
     xz = _grid_points(grid)
     exact = accuracy.required(xz, camera.principal_distance, sigma, attitude.rotation)
-    document = head("direction-accuracy", camera)
-    document["orientation"] = orientation_block(attitude.angles, attitude.unit)
+    document = _oriented_head("direction-accuracy", camera, attitude)
     document["image_sigma_um"] = rounded(sigma * UM, MICROMETRE)
     document["formulas"] = "as printed" if as_printed else "exact"
     document["units"] = {"x": "mm from the principal point", "z": "mm from the principal point"}
@@ -173,8 +169,7 @@ def theodolite_accuracy(
     means = [accuracy.of_rounds(each, rounds) for each in (horizontal, vertical)]
     by = (means[0] / ARCSECONDS, means[1] / ARCSECONDS)
     image = accuracy.supported(xz, camera.principal_distance, *by, attitude.rotation) * UM
-    document = head("theodolite-accuracy", camera)
-    document["orientation"] = orientation_block(attitude.angles, attitude.unit)
+    document = _oriented_head("theodolite-accuracy", camera, attitude)
     document["theodolite"] = {
         "horizontal_arcsec": rounded(horizontal, ARCSEC),
         "vertical_arcsec": rounded(vertical, ARCSEC),
@@ -251,8 +246,7 @@ def oriented(
         _element(name, value, sigma, unit)
         for name, value, sigma in zip(found.names, found.values, found.sigma, strict=True)
     ]
-    deviations = found.sigma
-    document["correlations"] = rounded(found.cofactors / np.outer(deviations, deviations), RATIO)
+    document["correlations"] = rounded(found.cofactors / np.outer(found.sigma, found.sigma), RATIO)
     document["rotation"] = rounded(found.rotation.ravel(), 12)
     document["points"] = _sighted(sightings, found)
     document["rejected"] = [
@@ -273,20 +267,10 @@ def _element(name: str, value: float, sigma: float, unit: str) -> Document:
     """Return one unknown: angles in the user's unit with seconds, the others in mm with micrometres."""
     if name in ANGLES:
         angle = positive(value) if name == "alpha" else value
-        return {
-            "name": name,
-            "value": rounded(angle * PER_RADIAN[unit], ANGLE),
-            "unit": unit,
-            "sigma": rounded(sigma * ARCSECONDS, ARCSEC),
-            "sigma_unit": "arcsec",
-        }
-    return {
-        "name": name,
-        "value": rounded(value, MILLIMETRE),
-        "unit": "mm",
-        "sigma": rounded(sigma * UM, MICROMETRE),
-        "sigma_unit": "um",
-    }
+        found = {"value": rounded(angle * PER_RADIAN[unit], ANGLE), "unit": unit}
+        return {"name": name, **found, "sigma": rounded(sigma * ARCSECONDS, ARCSEC), "sigma_unit": "arcsec"}
+    found = {"value": rounded(value, MILLIMETRE), "unit": "mm"}
+    return {"name": name, **found, "sigma": rounded(sigma * UM, MICROMETRE), "sigma_unit": "um"}
 
 
 def _sighted(sightings: Sightings, found: PhotoOrientation) -> list[Document]:

@@ -83,8 +83,11 @@ def displacement_document(
 
 def _station(result: Monitoring, side: int, camera: Phototheodolite, order: list[int]) -> Document:
     given = head("", camera)["camera"]
-    place = rounded(result.pair.centers[side][order], METRE)
-    return {"side": SIDES[side], "camera": given, **dict(zip("xyz", place, strict=True))}
+    return {"side": SIDES[side], "camera": given, **_by_axis("", result.pair.centers[side][order])}
+
+
+def _by_axis(head: str, values: Floats) -> Document:
+    return {f"{head}{axis}": value for axis, value in zip("xyz", rounded(values, METRE), strict=True)}
 
 
 def _summary(result: Monitoring) -> Document:
@@ -147,17 +150,15 @@ def _point(result: Monitoring, row: int, order: list[int], axes: Sequence[str]) 
         if reason is not None:
             entry["reason"] = reason
         if np.isfinite(result.positions[number].values[row, 0]):
-            entry |= dict(zip("xyz", rounded(result.positions[number].values[row][order], METRE), strict=True))
-            sigma = result.positions[number].sigma[row][order]
-            entry |= {f"sigma_{axis}": value for axis, value in zip("xyz", rounded(sigma, METRE), strict=True)}
+            entry |= _by_axis("", result.positions[number].values[row][order])
+            entry |= _by_axis("sigma_", result.positions[number].sigma[row][order])
             entry["parallax_um"] = rounded(result.parallax[number, row] * UM, MICROMETRE)
         if number and np.isfinite(result.since_first[number - 1].values[row, 0]):
             entry["since_first"] = _step(result, result.since_first[number - 1], row, order, axes)
             if number > 1:
                 step = result.since_previous[number - 1]
-                entry["since_previous"] = (
-                    _step(result, step, row, order, axes) if np.isfinite(step.values[row, 0]) else None
-                )
+                known = np.isfinite(step.values[row, 0])
+                entry["since_previous"] = _step(result, step, row, order, axes) if known else None
         epochs.append(entry)
     point: Document = {"id": series.points[row], "stable": bool(series.stable[row]), "epochs": epochs}
     rates = result.rates
@@ -181,11 +182,8 @@ def _step(result: Monitoring, step: Step, row: int, order: list[int], axes: Sequ
     values = step.values[row][order]
     tested = bool(np.isfinite(step.statistic[row]))
     return {
-        **{f"d{axis}": value for axis, value in zip("xyz", rounded(values, METRE), strict=True)},
-        **{
-            f"sigma_{axis}": value
-            for axis, value in zip("xyz", rounded(np.sqrt(np.diag(covariance)), METRE), strict=True)
-        },
+        **_by_axis("d", values),
+        **_by_axis("sigma_", np.sqrt(np.diag(covariance))),
         "length": rounded(np.linalg.norm(values), METRE),
         "covariance": significant([covariance[place] for place in COVARIANCES], 6),
         "ellipse": {

@@ -22,9 +22,9 @@ from photostrip.pipeline.refusals import require_whole
 from photostrip.project.checks.models import (
     counts_of_models,
     links_of_models,
-    model_sigma,
     photos_of_points,
     points_of_strip,
+    sigma_of,
     source_of,
 )
 from photostrip.project.checks.table_rows import gaps_of, observations_used, table_rows
@@ -81,21 +81,25 @@ def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
         project = load_project(path, overrides)
     except InputError as error:
         return Checked(str(path), error.faults, (), (), {})
-    faults = _refused(project, partial(overruling.require, project.settings.relative, project.inputs.observations))
-    if project.inputs.models is not None:
-        from photostrip.pipeline.overruling import require_named
-
-        faults += _refused(project, partial(require_named, project.settings.links, project.inputs.models.points))
+    inputs, models = project.inputs, project.inputs.models
+    faults = _refused(project, partial(overruling.require, project.settings.relative, inputs.observations))
+    if models is not None:
+        faults += _refused(project, partial(overruling.require_named, project.settings.links, models.points))
     notes = list(project.hints)
     notes += _image_coordinates(project, faults)
-    faults += [*_pairs(project), *_junctions(project)] if project.inputs.models is None else links_of_models(project)
+    faults += [*_pairs(project), *_junctions(project)] if models is None else links_of_models(project, models)
     if project.settings.adjustment != "bundle":  # strips of a block may hang on others
         faults += _control_of_strips(project)
     frames = _frames(project, faults)
+    if models is not None and (read := project.tables.models) is not None:
+        sigma = {"model_sigma": sigma_of(project, "models", (read.points, read.centers), models.points.sigma)}
+    else:
+        tables = (project.tables.observations,)
+        sigma = {"image_sigma": sigma_of(project, "observations", tables, inputs.observations.sigma)}
     document: Document = {
-        "name": project.inputs.name,
+        "name": inputs.name,
         "counts": _counts(project),
-        **({"model_sigma": model_sigma(project)} if project.inputs.models else {"image_sigma": _image_sigma(project)}),
+        **sigma,
         "frames": frames,
         "control": list(_control(project)),
         "rows": table_rows(project),
@@ -106,7 +110,7 @@ def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
 
 
 def _against_themselves(project: Project) -> tuple[Finding, ...]:
-    """Let the gate examine the data as far as that needs no adjustment."""
+    """Let the gate look for what the data alone show, without an adjustment."""
     try:
         return project.placed(gate.of_inputs(project.inputs, project.settings, project.directory))
     except (InputError, GeometryError):
@@ -147,8 +151,8 @@ def _image_coordinates(project: Project, faults: list[Fault]) -> list[Note]:
     return notes
 
 
-def _seen(observations: PhotoPoints) -> dict[str, set[int]]:
-    """Points of each photo, by number."""
+def _points_of_photos(observations: PhotoPoints) -> dict[str, set[int]]:
+    """Numbers of the points of each photo."""
     order = np.argsort(observations.photo, kind="stable")
     ends = np.cumsum(np.bincount(observations.photo, minlength=len(observations.photo_ids)))
     parts = np.split(observations.point[order], ends[:-1])
@@ -159,10 +163,10 @@ def _pairs(project: Project) -> Iterator[Fault]:
     """Refuse neighbouring photos with too few common points for their relative orientation."""
     from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 
-    seen = _seen(project.inputs.observations)
+    points = _points_of_photos(project.inputs.observations)
     for i, strip in enumerate(project.inputs.strips):
         for j, (left, right) in enumerate(zip(strip.photos, strip.photos[1:], strict=False)):
-            common = len(seen.get(left, set()) & seen.get(right, set()))
+            common = len(points.get(left, set()) & points.get(right, set()))
             if common < MINIMUM_POINTS:
                 message = f"photos {left} and {right} have {common} points in common"
                 fix = "measure more, or correct the order of the photos"
@@ -173,10 +177,10 @@ def _pairs(project: Project) -> Iterator[Fault]:
 
 def _junctions(project: Project) -> Iterator[Fault]:
     """Refuse three photos in a row without a common point: nothing would carry the scale on."""
-    seen = _seen(project.inputs.observations)
+    points = _points_of_photos(project.inputs.observations)
     for i, strip in enumerate(project.inputs.strips):
         for j, names in enumerate(zip(strip.photos, strip.photos[1:], strip.photos[2:], strict=False)):
-            if set.intersection(*(seen.get(name, set()) for name in names)):
+            if set.intersection(*(points.get(name, set()) for name in names)):
                 continue
             message = f"no point is common to photos {', '.join(names[:2])} and {names[2]}: nothing carries the scale"
             fix = "measure at least one pass point on all three"
@@ -190,8 +194,8 @@ def _control_of_strips(project: Project) -> Iterator[Fault]:
     given = np.array([number.get(name, -1) for name in inputs.control.ids], np.intp)
     usable = observations_used(inputs) if inputs.models is None else np.zeros(0, np.intp)
     for i, strip in enumerate(inputs.flights):
-        here = points_of_strip(inputs, i) if inputs.models else np.unique(inputs.observations.point[usable == i])
-        rows = np.isin(given, here) & ~inputs.control.check
+        points = inputs.observations.point[usable == i] if inputs.models is None else points_of_strip(inputs.models, i)
+        rows = np.isin(given, points) & ~inputs.control.check
         plan, height = (int(inputs.control.use[rows, axis].sum()) for axis in (0, 2))
         if plan >= LEAST_PLAN and height >= LEAST_HEIGHT:
             continue
@@ -205,8 +209,7 @@ def _control_of_strips(project: Project) -> Iterator[Fault]:
 def _counts(project: Project) -> Document:
     inputs = project.inputs
     given, measured = inputs.control, set(inputs.observations.point_ids)
-    seen = np.array([name in measured for name in given.ids], bool)
-    new = measured - set(given.ids)
+    shown = np.array([name in measured for name in given.ids], bool)
     return {
         "files": len(project.files),
         "strips": len(inputs.flights),
@@ -214,27 +217,12 @@ def _counts(project: Project) -> Document:
         **({} if inputs.models is None else counts_of_models(inputs.models)),
         "image_points": len(inputs.observations),
         "points": len(measured),
-        "new": len(new),
-        "control_plan": int((given.use[:, 0] & ~given.check & seen).sum()),
-        "control_height": int((given.use[:, 2] & ~given.check & seen).sum()),
-        "check_plan": int((given.use[:, 0] & given.check & seen).sum()),
-        "check_height": int((given.use[:, 2] & given.check & seen).sum()),
+        "new": len(measured - set(given.ids)),
+        "control_plan": int((given.use[:, 0] & ~given.check & shown).sum()),
+        "control_height": int((given.use[:, 2] & ~given.check & shown).sum()),
+        "check_plan": int((given.use[:, 0] & given.check & shown).sum()),
+        "check_height": int((given.use[:, 2] & given.check & shown).sum()),
         "without_neighbour": len(gaps_of(inputs)) if inputs.models is None else 0,
-    }
-
-
-def _image_sigma(project: Project) -> Document:
-    """Say which standard deviation the image coordinates get, and how many rows have their own."""
-    table = project.tables.observations
-    own = 0 if table is None else int((~np.isnan(table.sigma).any(axis=1)).sum())
-    rows = 0 if table is None else len(table.table)
-    sigma = project.inputs.observations.sigma * 1000.0
-    return {
-        "rows_with_own": own,
-        "rows_with_default": rows - own,
-        "default_from": source_of(project, ("observations", "sigma")),
-        "smallest_um": float(sigma.min(initial=np.inf)) if len(sigma) else None,
-        "largest_um": float(sigma.max(initial=0.0)) if len(sigma) else None,
     }
 
 
@@ -319,8 +307,9 @@ def _of_list(project: Project, number: int, read: ControlTable, photos: dict[str
     values = [] if default is None else [float(each.text) for each in default.elements]
     source = source_of(project, ("control", number, "sigma"))
     for row, name in enumerate(read.ids):
-        own = ~np.isnan(read.sigma[row])
-        sigma = [float(read.sigma[row, axis]) if own[axis] else values[axis] if values else None for axis in range(3)]
+        stated = ~np.isnan(read.sigma[row])
+        usual = values or (None, None, None)
+        sigma = [float(read.sigma[row, axis]) if stated[axis] else usual[axis] for axis in range(3)]
         line = {"source": "row", "file": read.table.file, "line": int(read.table.lines[row]), "key": ""}
         use = read.use[row].tolist()
         yield {
@@ -332,7 +321,7 @@ def _of_list(project: Project, number: int, read: ControlTable, photos: dict[str
             "counts": use,
             "sigma": [value if counts else None for value, counts in zip(sigma, use, strict=True)],
             "sigma_from": [
-                None if not counts else line if its else source for its, counts in zip(own, use, strict=True)
+                None if not counts else line if its else source for its, counts in zip(stated, use, strict=True)
             ],
             "photos": len(photos.get(name, ())),
         }

@@ -10,11 +10,13 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.project.yaml.document import fault_at, key_path
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator
 
-    from photostrip.arrays import Numbers
+    from photostrip.arrays import Floats, Numbers
     from photostrip.errors import Fault
-    from photostrip.pipeline import Inputs, MeasuredModels
+    from photostrip.formats.measured.measurements import Measurements
+    from photostrip.formats.measured.models import ModelTable
+    from photostrip.pipeline import MeasuredModels
     from photostrip.project.loading import Project
 
     Document = dict[str, Any]
@@ -22,15 +24,13 @@ if TYPE_CHECKING:
 MICROMETRES = 1000.0  # in a millimetre
 
 
-def links_of_models(project: Project) -> Iterator[Fault]:
+def links_of_models(project: Project, models: MeasuredModels) -> Iterator[Fault]:
     """Refuse neighbouring models that cannot be linked, and models of the other hand."""
     from photostrip.pipeline.strips.models import form_models  # strips of photos need none of it
 
-    models = project.inputs.models
-    for number, strip in enumerate(() if models is None else models.strips):
+    for number, strip in enumerate(models.strips):
         try:
-            if models is not None:
-                form_models(strip, models.points, project.settings)
+            form_models(strip, models.points, project.settings)
         except GeometryError as error:
             yield fault_at(project.tree, ("strips", number, "id"), str(error), error.code)
         except InputError as error:
@@ -57,28 +57,26 @@ def counts_of_models(models: MeasuredModels) -> Document:
     }
 
 
-def model_sigma(project: Project) -> Document:
-    """Say which standard deviations the model coordinates get, and how many rows have their own."""
-    tables, models = project.tables.models, project.inputs.models
-    tables_read = [] if tables is None else [each for each in (tables.points, tables.centers) if each is not None]
-    rows = sum(len(each.table) for each in tables_read)
-    own = sum(int((~np.isnan(each.sigma).any(axis=1)).sum()) for each in tables_read)
-    sigma = np.zeros((0, 3)) if models is None else models.points.sigma * MICROMETRES
+def sigma_of(
+    project: Project, section: str, tables: Iterable[Measurements | ModelTable | None], sigma: Floats
+) -> Document:
+    """Say which standard deviations (mm) the measured coordinates get, and how many rows of the tables have some."""
+    read = [each for each in tables if each is not None]
+    rows = sum(len(each.table) for each in read)
+    stated = sum(int((~np.isnan(each.sigma).any(axis=1)).sum()) for each in read)
     return {
-        "rows_with_own": own,
-        "rows_with_default": rows - own,
-        "default_from": source_of(project, ("models", "sigma")),
-        "smallest_um": float(sigma.min()) if len(sigma) else None,
-        "largest_um": float(sigma.max()) if len(sigma) else None,
+        "rows_with_own": stated,
+        "rows_with_default": rows - stated,
+        "default_from": source_of(project, (section, "sigma")),
+        "smallest_um": float((sigma * MICROMETRES).min()) if len(sigma) else None,
+        "largest_um": float((sigma * MICROMETRES).max()) if len(sigma) else None,
     }
 
 
-def points_of_strip(inputs: Inputs, number: int) -> Numbers:
+def points_of_strip(models: MeasuredModels, number: int) -> Numbers:
     """Points that the models of a strip hold, by number."""
-    if inputs.models is None:
-        return np.zeros(0, np.intp)
-    points = inputs.models.points
-    known = set(inputs.models.strips[number].models)
+    points = models.points
+    known = set(models.strips[number].models)
     inside = np.array([name in known for name in points.model_ids], bool)[points.model]
     return np.unique(points.node[inside & (points.node < len(points.point_ids))])
 

@@ -10,7 +10,7 @@ from photostrip.formats.measured.exterior import OrientationTable, PositionTable
 from photostrip.project.tables import rays
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -89,8 +89,9 @@ def table_rows(project: Project) -> list[Document]:
     control = {name for name, use in zip(inputs.control.ids, inputs.control.use, strict=True) if use.all()}
     if tables.observations is not None:
         found.append(_measured(tables.observations, photos, apart, control if bundle else set()))
-    if tables.fiducials is not None:
-        found.append(_marks(tables.fiducials, photos))
+    if (marks := tables.fiducials) is not None:
+        reasons = [_outside(IN_NO_STRIP, marks.photo_ids, photos, marks.photo)]
+        found.append(_block(marks.table.file, marks.table.lines, reasons, marks.times))
     count = {} if tables.observations is None else rays(tables.observations, photos)
     if bundle:  # and control of a single one
         count = {name: max(number, 2) for name, number in count.items()}
@@ -106,52 +107,47 @@ def model_rows(tables: Tables, models: MeasuredModels) -> list[Document]:
     read = tables.models
     for each in () if read is None else (read.points, read.centers):
         if each is not None:
-            stranger = np.array([name not in known for name in each.model_ids], bool)[each.models]
-            owners = np.array(each.model_ids, object)[each.models]
-            found.append(_block(each.table.file, each.table.lines, [Reason(IN_NO_MODEL, stranger, owners)]))
+            reasons = [_outside(IN_NO_MODEL, each.model_ids, known, each.models)]
+            found.append(_block(each.table.file, each.table.lines, reasons))
     points = set(models.points.point_ids)
     for control in tables.control:
         if control is not None:
-            names = np.array(control.ids, object)
-            missing = np.array([name not in points for name in control.ids], bool)
-            reasons = [Reason(OFF, ~control.used, names), Reason(NO_MODEL, control.used & missing, names)]
+            missing = _outside(NO_MODEL, control.ids, points)
+            off = Reason(OFF, ~control.used, missing.ids)
+            reasons = [off, missing._replace(rows=control.used & missing.rows)]
             found.append(_block(control.table.file, control.table.lines, reasons))
     return found
 
 
+def _outside(why: str, ids: Sequence[str], known: set[str], codes: Numbers | slice = slice(None)) -> Reason:
+    """Rows whose id, the one of a number each, is not known."""
+    return Reason(why, np.array([name not in known for name in ids], bool)[codes], np.array(ids, object)[codes])
+
+
 def _cameras(read: PositionTable | OrientationTable, photos: set[str], bundle: bool) -> Document:  # noqa: FBT001
-    names = np.array(read.ids, object)
-    stranger = np.array([name not in photos for name in read.ids], bool)
-    off = ~read.used if isinstance(read, PositionTable) else np.zeros(len(names), bool)
-    idle = ~stranger & ~off & (not bundle)
+    outside = _outside(IN_NO_STRIP, read.ids, photos)
+    off = ~read.used if isinstance(read, PositionTable) else np.zeros(len(read.ids), bool)
     reasons = [
-        Reason(IN_NO_STRIP, stranger, names),
-        Reason(OFF, ~stranger & off, names),
-        Reason(NO_BUNDLE, idle, names),
+        outside,
+        Reason(OFF, ~outside.rows & off, outside.ids),
+        Reason(NO_BUNDLE, ~outside.rows & ~off & (not bundle), outside.ids),
     ]
     return _block(read.table.file, read.table.lines, reasons)
 
 
 def _measured(read: Measurements, photos: set[str], gaps: set[str], whole: set[str]) -> Document:
     """Sort the rows of measured points by what becomes of them."""
-    stranger = np.array([name not in photos for name in read.photo_ids], bool)[read.photo]
+    outside = _outside(IN_NO_STRIP, read.photo_ids, photos, read.photo)
     count = rays(read, photos)
     once = np.array([count.get(name) == 1 and name not in whole for name in read.target_ids], bool)[read.target]
     apart = np.array([name in gaps for name in read.target_ids], bool)[read.target]
     names = np.array(read.target_ids, object)[read.target]
-    owners = np.array(read.photo_ids, object)[read.photo]
     reasons = [
-        Reason(IN_NO_STRIP, stranger, owners),
-        Reason(ONCE, ~stranger & once, names),
-        Reason(NO_NEIGHBOUR, ~stranger & ~once & apart, names),
+        outside,
+        Reason(ONCE, ~outside.rows & once, names),
+        Reason(NO_NEIGHBOUR, ~outside.rows & ~once & apart, names),
     ]
     return _block(read.table.file, read.table.lines, reasons, read.times)
-
-
-def _marks(read: Measurements, photos: set[str]) -> Document:
-    stranger = np.array([name not in photos for name in read.photo_ids], bool)[read.photo]
-    owners = np.array(read.photo_ids, object)[read.photo]
-    return _block(read.table.file, read.table.lines, [Reason(IN_NO_STRIP, stranger, owners)], read.times)
 
 
 def _given(read: ControlTable, count: dict[str, int], gaps: set[str]) -> Document:
