@@ -14,7 +14,7 @@ from photostrip.triangulation.bundle.normal_equations import defects
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.bundle.observations.parameters import Parameters
+    from photostrip.triangulation.bundle.parameters import Parameters
 
 
 def state(centers: NDArray[np.float64], heading: float = 0.0) -> Parameters:
