@@ -25,7 +25,7 @@ def state(centers: NDArray[np.float64], heading: float = 0.0) -> Parameters:
 def flown(heading: float) -> NDArray[np.float64]:
     """Five centres in a direction, far from the origin."""
     way = np.array([np.cos(heading), np.sin(heading), 0.0])
-    return np.array([40_000.0, -90_000.0, 1500.0]) + np.arange(5)[:, None] * 900.0 * way
+    return np.asarray(np.array([40_000.0, -90_000.0, 1500.0]) + np.arange(5)[:, None] * 900.0 * way)
 
 
 def test_the_flight_goes_from_photo_to_photo_wherever_it_is() -> None:
