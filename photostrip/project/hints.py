@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from photostrip.formats.measured.control import ControlTable
     from photostrip.formats.measured.exterior import OrientationTable, PositionTable
     from photostrip.formats.measured.measurements import Measurements
+    from photostrip.formats.text.tables import Table
     from photostrip.project.models import ModelTables
     from photostrip.project.schema.cameras import Camera
     from photostrip.project.schema.project_file import ProjectFile
@@ -112,10 +113,8 @@ def _cameras_not_used(
         return
     others = [name for name in read.ids if name not in photos]
     if others:
-        message = f"{counted(len(others), 'row')} of {counted(len(others), 'photo')} in no strip not used"
-        message = f"{message}: {listed(others)}{_twins(alike(others, photos))}"
-        note = read.table.note(read.ids.index(others[0]), "photo-in-no-strip", message, "note", key="photo")
-        yield replace(note, photos=tuple(others))
+        note = _in_no_strip(read.table, [read.ids.index(name) for name in others], others, photos)
+        yield replace(note, severity="note")
 
 
 def _unused_cameras(project: ProjectFile, root: Node) -> Iterator[Note]:
@@ -152,9 +151,13 @@ def _photos_in_no_strip(read: Measurements, photos: set[str]) -> Iterator[Note]:
         return
     number = {name: code for code, name in enumerate(read.photo_ids)}
     rows = np.flatnonzero(np.isin(read.photo, [number[name] for name in others]))
+    yield _in_no_strip(read.table, rows.tolist(), others, photos)
+
+
+def _in_no_strip(table: Table, rows: list[int], others: list[str], photos: set[str]) -> Note:
     message = f"{counted(len(rows), 'row')} of {counted(len(others), 'photo')} in no strip not used"
     message = f"{message}: {listed(others)}{_twins(alike(others, photos))}"
-    yield replace(read.table.note(rows[0], "photo-in-no-strip", message, key="photo"), photos=tuple(others))
+    return replace(table.note(rows[0], "photo-in-no-strip", message, key="photo"), photos=tuple(others))
 
 
 def _measured_once(
@@ -165,10 +168,8 @@ def _measured_once(
     control = [name for name in once if name in given]
     new = [name for name in once if name not in given]
     if control and not together:
-        what = (
-            f"{counted(len(control), 'control or check point is', 'control or check points are')} measured on one photo"
-        )
-        message = f"{what} only and cannot be used: {listed(control)}"
+        number = counted(len(control), "control or check point is", "control or check points are")
+        message = f"{number} measured on one photo only and cannot be used: {listed(control)}"
         row = _first_row(read, control)
         yield read.table.note(row, "control-measured-once", message, key="point", points=control)
     if new:

@@ -129,7 +129,8 @@ def load_project(path: Path, overrides: Sequence[str] = ()) -> Project:
     findings.add(*_check_certificates(root), *_check_frames(root, grid_folder))
     project = completed(reading.complete(checked), root, reading.file)
     inputs, notes = _inputs(project, tables, root, placed_models)
-    grids = _grids(inputs)
+    specs = (*inputs.frames, *(() if inputs.output is None else (inputs.output,)))
+    grids = tuple(dict.fromkeys(grid for spec in specs for grid in grid_names(spec.crs)))
     return Project(
         inputs=inputs,
         settings=settings(project),
@@ -142,12 +143,6 @@ def load_project(path: Path, overrides: Sequence[str] = ()) -> Project:
         grids=grids,
         grid_folder=grid_folder,
     )
-
-
-def _grids(inputs: Inputs) -> tuple[str, ...]:
-    """Names of the grid files that the ground frames ask for."""
-    specs = (*inputs.frames, *(() if inputs.output is None else (inputs.output,)))
-    return tuple(dict.fromkeys(grid for spec in specs for grid in grid_names(spec.crs)))
 
 
 def _seen_from(file: str, folder: Path) -> str:

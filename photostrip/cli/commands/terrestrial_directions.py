@@ -253,15 +253,15 @@ def _over_the_photo(
 ) -> None:
     """Compute a table over the photo and print it; draw it on a finer one."""
     from photostrip.errors import Fault, InputError
-    from photostrip.project.terrestrial.options import require_format
+    from photostrip.project.terrestrial.options import required_format
     from photostrip.project.terrestrial.ranges import STEP, within
     from photostrip.report.pictures.terrestrial import FINE, check_plot
     from photostrip.terrestrial.accuracy import grid
 
     if plot is not None:
         check_plot(str(plot))
-    chosen = require_format(camera.chosen())
-    width, height = chosen.format or (0.0, 0.0)
+    chosen = camera.chosen()
+    width, height = required_format(chosen)
     step = within("--step", step, STEP)
     if width * height / step**2 > MOST_POINTS:
         message = f"a step of {step:g} mm gives more than {MOST_POINTS} points"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -25,8 +24,3 @@ class Measurements:
     xy: Floats  # (n, 2): coordinates in the unit of the table
     sigma: Floats  # (n, 2): standard deviations in the unit of the table; NaN where the row has none
     times: Numbers  # (n,): number of measurements of which each row is the mean
-
-    @cached_property
-    def photos_measured(self) -> frozenset[str]:
-        """Photos on which anything is measured."""
-        return frozenset(self.photo_ids)

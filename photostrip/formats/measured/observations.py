@@ -53,7 +53,7 @@ def read_measurements(file: str, findings: Findings, manner: Manner | None = Non
     table = read_table(file, layout, findings, others=others, columns=manner.columns)
     if table is None:
         return None
-    in_pairs = pairs.is_pair_list(table)
+    in_pairs = "photo" not in table.ids
     table = pairs.photos_of_pairs(table, manner.photos, findings) if in_pairs else table
     if table is None:
         return None

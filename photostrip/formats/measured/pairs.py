@@ -38,11 +38,6 @@ LAYOUTS = tuple(
 SIGNS = "-–—/:_+ "  # dashes as spreadsheets write them
 
 
-def is_pair_list(table: Table) -> bool:
-    """Whether a table was read in one of the layouts of pairs."""
-    return "photo" not in table.ids
-
-
 def photos_of_pairs(table: Table, photos: AbstractSet[str], findings: Findings) -> Table | None:
     """Make a table of photos of a table of pairs, two rows for each row: left, then right.
 

@@ -51,21 +51,12 @@ PSEUDO_PARALLAXES = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class PointTable:
-    """A table with one row for each point."""
-
-    table: Table
-    ids: tuple[str, ...]
-
-
-def read_points(file: str, layout: Sequence[Column], findings: Findings) -> PointTable | None:
+def read_points(file: str, layout: Sequence[Column], findings: Findings) -> Table | None:
     """Read a table with one row for each point; None when the header is wrong."""
     table = read_table(file, layout, findings)
-    if table is None:
-        return None
-    _refuse_repeated(table, table.codes["point"], "", findings)
-    return PointTable(table, tuple(table.cells("point")))
+    if table is not None:
+        _refuse_repeated(table, table.codes["point"], "", findings)
+    return table
 
 
 def _refuse_repeated(table: Table, keys: Numbers, where: str, findings: Findings) -> None:

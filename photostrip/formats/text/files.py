@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from photostrip.errors import Fault, InputError
 from photostrip.formats.text.findings import suggestion
-from photostrip.formats.text.source import current
+from photostrip.formats.text.source import current, digest
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -46,7 +46,7 @@ def read_bytes(file: str, limit: int) -> bytes:
     else:
         data = _from_disk(file, limit)
     if source is not None:
-        source.account(file, data)
+        source.digests[file] = digest(data)
     return data
 
 

@@ -56,10 +56,6 @@ class Findings:
         for file, number in other._count.items():
             self._count[file] += number - kept[file]
 
-    def extend(self, error: InputError) -> None:
-        """Keep the faults of an error."""
-        self.add(*error.faults)
-
     @property
     def faults(self) -> tuple[Fault, ...]:
         """All faults, file by file in the order the files were met, each by line; what was only counted comes last."""

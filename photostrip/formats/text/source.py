@@ -27,10 +27,6 @@ class Source:
     grids: Path | None = None  # folder that stands in for the project's folder where grid files are looked for
     digests: dict[str, str] = field(default_factory=dict)  # SHA-256 of every file read so far, by its path
 
-    def account(self, file: str, data: bytes) -> None:
-        """Remember what was read."""
-        self.digests[file] = digest(data)
-
 
 _current: ContextVar[Source | None] = ContextVar("source", default=None)
 

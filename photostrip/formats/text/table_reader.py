@@ -57,7 +57,7 @@ def read_table(
     try:
         data, marked = content(file)
     except InputError as error:
-        findings.extend(error)
+        findings.add(*error.faults)
         return None
     if marked:
         findings.notes.append(Note("byte-order-mark", BYTE_ORDER_MARK, "note", file=file, line=1))
@@ -105,8 +105,7 @@ class _Reader:
             self._take(rows, lines)
         places = np.concatenate([np.zeros(0, np.intp), *self.lines])
         if not len(places) and not self.findings.number(self.source.file):
-            fault = Fault("has a header but no rows", code="no-rows", file=self.source.file, line=1)
-            self.findings.add(fault)
+            self.findings.add(Fault("has a header but no rows", code="no-rows", file=self.source.file, line=1))
         numbers = {name: np.concatenate([np.zeros(0), *parts]) for name, parts in self.numbers.items()}
         codes, ids = {}, {}
         for column in self.columns:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.errors import Fault, InputError
-from photostrip.formats.measured.terrestrial import DIRECTION_POINTS, IMAGE_POINTS, SIGHTINGS, PointTable, read_points
+from photostrip.formats.measured.terrestrial import DIRECTION_POINTS, IMAGE_POINTS, SIGHTINGS, read_points
 from photostrip.formats.output.terrestrial_directions import Attitude, Theodolite
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.numbers import NotANumber, number, shown
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from photostrip.arrays import Floats
-    from photostrip.formats.text.tables import Column
+    from photostrip.formats.text.tables import Column, Table
     from photostrip.notes import Note
     from photostrip.project.schema.values import Range
 
@@ -67,12 +67,12 @@ def chosen_camera(
     return chosen
 
 
-def require_format(camera: Phototheodolite) -> Phototheodolite:
-    """Refuse a camera without a format."""
+def required_format(camera: Phototheodolite) -> tuple[float, float]:
+    """Return the format of a camera, or refuse one without."""
     if camera.format is None:
         message = f"the camera {camera.name} has no format"
         raise InputError(Fault(message, "no-format", key="--photo-format", expected="WIDTH,HEIGHT in mm"))
-    return camera
+    return camera.format
 
 
 def image_sigma(sigma_um: float) -> float:
@@ -124,7 +124,7 @@ class Points(NamedTuple):
     ids: tuple[str, ...]
     values: Floats  # (n, 2): coordinates x, z in mm, or directions lambda, beta in radians
     notes: tuple[Note, ...]
-    table: PointTable | None
+    table: Table | None
 
 
 def image_points(file: str | None, at: Sequence[str], unit: str) -> Points:
@@ -150,11 +150,11 @@ def direction_points(file: str | None, at: Sequence[str], camera: Phototheodolit
     return points._replace(values=directions)
 
 
-def _outside(table: PointTable | None, row: int, column: str, message: str) -> Fault:
+def _outside(table: Table | None, row: int, column: str, message: str) -> Fault:
     expected = "an elevation between -90 and 90 degrees" if column == "beta" else "a direction into the photo"
     if table is None:
         return Fault(message, "range", key="--at", expected=expected)
-    return table.table.fault(row, column, message, "range", expected=expected)
+    return table.fault(row, column, message, "range", expected=expected)
 
 
 def _points(file: str | None, at: Sequence[str], layout: Sequence[Column], limits: Range) -> Points:
@@ -172,9 +172,9 @@ def _points(file: str | None, at: Sequence[str], layout: Sequence[Column], limit
     read = read_points(file, layout, findings)
     if read is None:
         raise InputError(findings.faults)
-    refuse_outside(read.table, names, limits, findings)
+    refuse_outside(read, names, limits, findings)
     findings.stop()
-    return Points(read.ids, read.table.columns(*names), tuple(findings.notes), read)
+    return Points(tuple(read.cells("point")), read.columns(*names), tuple(findings.notes), read)
 
 
 class SightingOptions(NamedTuple):
@@ -195,26 +195,26 @@ def read_sightings(file: str, options: SightingOptions) -> tuple[Sightings, tupl
     read = read_points(file, SIGHTINGS, findings)
     if read is None:
         raise InputError(findings.faults)
-    scale = MILLIMETRES[options.unit]
-    refuse_outside(read.table, ("x", "z"), COORDINATE, findings, scale=scale, unit=options.unit)
-    refuse_outside(read.table, ("sx", "sz"), IMAGE_SIGMA, findings, scale=scale, unit=options.unit)
-    refuse_outside(read.table, ("s_lambda", "s_beta"), DIRECTION_SIGMA, findings)
-    refuse_outside(read.table, ("lambda",), DEGREES, findings, unit=options.angles)
-    directions = read.table.columns("lambda", "beta")
+    scale, ids = MILLIMETRES[options.unit], tuple(read.cells("point"))
+    refuse_outside(read, ("x", "z"), COORDINATE, findings, scale=scale, unit=options.unit)
+    refuse_outside(read, ("sx", "sz"), IMAGE_SIGMA, findings, scale=scale, unit=options.unit)
+    refuse_outside(read, ("s_lambda", "s_beta"), DIRECTION_SIGMA, findings)
+    refuse_outside(read, ("lambda",), DEGREES, findings, unit=options.angles)
+    directions = read.columns("lambda", "beta")
     for row in np.flatnonzero(np.isnan(directions).all(axis=1)):
         if not findings.number(file):
-            message = f"neither direction to point {read.ids[row]} is given"
-            findings.add(read.table.fault(int(row), "lambda", message, "no-direction", expected="lambda, beta or both"))
+            message = f"neither direction to point {ids[row]} is given"
+            findings.add(read.fault(int(row), "lambda", message, "no-direction", expected="lambda, beta or both"))
     for row in np.flatnonzero(np.abs(np.nan_to_num(directions[:, 1])) * RADIANS[options.angles] > STEEPEST):
         message = f"{directions[row, 1]:g} {options.angles} is not below the zenith"
         expected = "an elevation between -90 and 90 degrees, not a zenith distance"
-        findings.add(read.table.fault(int(row), "beta", message, "range", expected=expected))
+        findings.add(read.fault(int(row), "beta", message, "range", expected=expected))
     findings.stop()
-    image, angular = read.table.columns("sx", "sz") * scale, read.table.columns("s_lambda", "s_beta")
+    image, angular = read.columns("sx", "sz") * scale, read.columns("s_lambda", "s_beta")
     usual = np.array([options.theodolite.horizontal, options.theodolite.vertical]) / options.theodolite.rounds**0.5
     sightings = Sightings(
-        ids=read.ids,
-        xz=read.table.columns("x", "z") * scale,
+        ids=ids,
+        xz=read.columns("x", "z") * scale,
         directions=directions * RADIANS[options.angles],
         sigma_xz=np.where(np.isnan(image), options.sigma, image),
         sigma_directions=np.where(np.isnan(angular), usual, angular) / ARCSECONDS,

@@ -14,7 +14,7 @@ from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.project.terrestrial.cameras import listed_cameras, own_presets
 from photostrip.project.terrestrial.ranges import RADIANS
 from photostrip.project.terrestrial.series import Table, Wanted, read_series
-from photostrip.project.terrestrial.survey_file import Camera, Measurements, Station, TerrestrialFile
+from photostrip.project.terrestrial.survey_file import Camera, Measurements, TerrestrialFile
 from photostrip.project.yaml.parsing import read_document
 from photostrip.project.yaml.reading import Reading
 from photostrip.project.yaml.validation import valid_section
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from photostrip.arrays import Floats
     from photostrip.notes import Note
 
 
@@ -143,12 +142,8 @@ def _pair(given: TerrestrialFile, cameras: Sequence[Phototheodolite]) -> StereoP
     scale = RADIANS[given.angle_unit]
     both = (given.stations.left, given.stations.right)
     centers = np.array([each.position for each in both], float)[:, order]
-    return StereoPair(focal, centers, np.array([_rotation(each, scale) for each in both]))
-
-
-def _rotation(station: Station, scale: float) -> Floats:
-    angles = np.array([station.alpha or 0.0, station.omega or 0.0, station.kappa or 0.0]) * scale
-    return ground_from_photo(*angles)
+    angles = np.array([[each.alpha or 0.0, each.omega or 0.0, each.kappa or 0.0] for each in both]) * scale
+    return StereoPair(focal, centers, np.array([ground_from_photo(*each) for each in angles]))
 
 
 # -------------------------------------------------------------------------------------------------- measurements

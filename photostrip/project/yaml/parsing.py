@@ -34,7 +34,7 @@ def read_document(file: str, findings: Findings) -> Node | None:
     try:
         text, marked = decode(file, read_bytes(file, LARGEST_PROJECT))
     except InputError as error:
-        findings.extend(error)
+        findings.add(*error.faults)
         return None
     if marked:
         findings.notes.append(Note("byte-order-mark", BYTE_ORDER_MARK, "note", file=file, line=1))
@@ -71,18 +71,10 @@ def parse(text: str, file: str, findings: Findings) -> Node | None:
     except UnicodeEncodeError:
         findings.add(Fault("is not valid Unicode text", "encoding", file))
         return None
-    except _TooMuchError as error:
-        findings.add(error.fault)
+    except InputError as error:  # no document that a person would write
+        findings.add(*error.faults)
         return None
     return builder.root if builder.sound else None
-
-
-class _TooMuchError(Exception):
-    """The document is not one that a person would write; reading stops."""
-
-    def __init__(self, fault: Fault) -> None:
-        super().__init__(str(fault))
-        self.fault = fault
 
 
 class _Builder:
@@ -122,7 +114,7 @@ class _Builder:
         self.documents += 1
         if self.documents > 1:
             message = "a second document (`---`) begins"
-            raise _TooMuchError(place.fault(message, "yaml", expected="one project in one file"))
+            raise InputError(place.fault(message, "yaml", expected="one project in one file"))
 
     def _properties(self, event: Any, place: Place) -> None:  # noqa: ANN401 (three kinds of event, without a type)
         """Refuse anchors and tags: a value is what is typed, where it is typed."""
@@ -146,14 +138,14 @@ class _Builder:
         self.key.append(None)
         if len(self.open) > DEEPEST:
             message = f"values are nested more than {DEEPEST} deep"
-            raise _TooMuchError(node.place.fault(message, "yaml", expected="a project"))
+            raise InputError(node.place.fault(message, "yaml", expected="a project"))
 
     def _put(self, node: Node) -> None:
         """Return a new value its place in the tree."""
         self.values += 1
         if self.values > MOST_VALUES:
             message = f"the file has more than {MOST_VALUES} values"
-            raise _TooMuchError(Fault(message, "file-size", self.file, expected="a project"))
+            raise InputError(Fault(message, "file-size", self.file, expected="a project"))
         if not self.open:
             self.root = node
             return

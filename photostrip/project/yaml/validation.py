@@ -13,6 +13,8 @@ from photostrip.project.schema.values import Section
 from photostrip.project.yaml.document import Node, fault_at, key_path, type_names
 
 if TYPE_CHECKING:
+    from pydantic.fields import FieldInfo
+
     from photostrip.errors import Fault
     from photostrip.formats.text.findings import Findings
     from photostrip.project.yaml.document import Path
@@ -78,7 +80,7 @@ def _unknown(schema: Model, root: Node, path: Path) -> Fault:
     name = str(path[-1])
     owner = root.find(*path[:-1])
     place = owner.keys[name] if owner is not None and name in owner.keys else root.place_of(path)
-    known = _keys_at(schema, path[:-1])
+    known = list(_fields_at(schema, path[:-1]))
     fix = suggestion(name, known)
     if not fix and name in homes(schema):
         fix = f"`{name}` belongs into `{homes(schema)[name]}`"
@@ -134,16 +136,15 @@ def _bare(annotation: Any) -> Any:  # noqa: ANN401 (a type)
             return annotation
 
 
-def _keys_at(schema: Model, path: Path) -> list[str]:
+def _fields_at(schema: Model, path: Path) -> dict[str, FieldInfo]:
     """Keys that the schema has at a path."""
     annotation = _annotation(schema, path)
-    return list(annotation.model_fields) if isinstance(annotation, type) and issubclass(annotation, Section) else []
+    return annotation.model_fields if isinstance(annotation, type) and issubclass(annotation, Section) else {}
 
 
 def _described(schema: Model, path: Path) -> str:
     """Say what the schema wants at a path: the description of the key, which ends with its unit."""
-    owner = _annotation(schema, path[:-1])
-    field = owner.model_fields.get(str(path[-1])) if isinstance(owner, type) and issubclass(owner, Section) else None
+    field = _fields_at(schema, path[:-1]).get(str(path[-1]))
     description = (field.description or "") if field is not None else ""
     return description[:1].lower() + description[1:] if description[1:2].islower() else description
 

@@ -16,6 +16,8 @@ Detected = tuple[float | None, bool | None]  # size in metres, whether anything 
 
 PHOTOS_SHOWN = 11  # columns of the tables along a strip
 PLACES_SHOWN = 6
+LAYOUT_AND_METHOD = (words("layout", "layout"), words("method", "method"))
+MEETS = {True: "yes", False: "no", None: DASH}
 
 
 def strip_sections(document: Document) -> tuple[Section, ...]:
@@ -61,27 +63,21 @@ def _facts(document: Document) -> tuple[tuple[str, str], ...]:
 
 
 def _layouts(document: Document) -> Table:
-    columns = (
-        Column("layout", left=True),
-        Column("points"),
-        Column("σ of control", "along, across, up, m", left=True),
-        Column("σ of perspective centres", "m", left=True),
-        Column("at photo/row", left=True, rank=1),
+    return tabulated(
+        document["layouts"],
+        (
+            words("layout", "name"),
+            number("points", lambda layout: len(layout["points"])),
+            words("σ of control", lambda layout: _three(layout["sigma_m"]), "along, across, up, m"),
+            words("σ of perspective centres", _gnss, "m"),
+            words("at photo/row", lambda layout: listed(map(_at, layout["points"]), PLACES_SHOWN), rank=1),
+        ),
     )
-    rows = []
-    for layout in document["layouts"]:
-        gnss = layout["gnss_sigma_m"]
-        offset = ", offset free" if layout["gnss_offset"] else ""
-        rows.append(
-            (
-                layout["name"],
-                str(len(layout["points"])),
-                _three(layout["sigma_m"]),
-                f"{_three(gnss)}{offset}" if gnss else "not measured",
-                listed((_at(point) for point in layout["points"]), PLACES_SHOWN),
-            )
-        )
-    return Table(columns, tuple(rows))
+
+
+def _gnss(layout: Document) -> str:
+    offset = ", offset free" if layout["gnss_offset"] else ""
+    return f"{_three(layout['gnss_sigma_m'])}{offset}" if layout["gnss_sigma_m"] else "not measured"
 
 
 def _three(values: Sequence[float]) -> str:
@@ -95,34 +91,25 @@ def _at(point: Document) -> str:
 
 def _accuracy(document: Document) -> Table:
     required = any(document["required_m"].values())
+    nothing = dict.fromkeys(("rms_plan_m", "worst_plan_m", "rms_z_m", "worst_z_m", "meets"))
     columns = (
-        Column("layout", left=True),
-        Column("method", left=True),
-        Column("plan rms", "m"),
-        Column("worst", "m"),
-        Column("height rms", "m"),
-        Column("worst", "m"),
-        Column("at photo"),
-        *((Column("meets", left=True),) if required else ()),
-        Column("the control carries", left=True, rank=1),
+        *LAYOUT_AND_METHOD,
+        number("plan rms", "rms_plan_m", 3, "m"),
+        number("worst", "worst_plan_m", 3, "m"),
+        number("height rms", "rms_z_m", 3, "m"),
+        number("worst", "worst_z_m", 3, "m"),
+        number("at photo", "worst_z_at.photo"),
+        *((words("meets", lambda row: MEETS[row["meets"]]),) if required else ()),
+        words("the control carries", _carried, rank=1),
     )
-    rows = []
-    for row in document["accuracy"]:
-        head = (row["layout"], row["method"])
-        if row["used"] is None:
-            rows.append((*head, *[DASH] * (6 if required else 5), "too little"))
-            continue
-        names = ("rms_plan_m", "worst_plan_m", "rms_z_m", "worst_z_m")
-        rows.append(
-            (
-                *head,
-                *(metres(row[name]) for name in names),
-                str(row["worst_z_at"]["photo"]),
-                *(("yes" if row["meets"] else "no",) if required else ()),
-                "" if row["used"] == row["method"] else row["used"],
-            )
-        )
-    return Table(columns, tuple(rows), note="plan: both coordinates together; photo: nearest to the worst height")
+    rows = [{**nothing, "worst_z_at": {"photo": DASH}, **row} for row in document["accuracy"]]
+    return tabulated(rows, columns, note="plan: both coordinates together; photo: nearest to the worst height")
+
+
+def _carried(row: Document) -> str:
+    if row["used"] is None:
+        return "too little"
+    return "" if row["used"] == row["method"] else str(row["used"])
 
 
 def _reasons(document: Document) -> tuple[Words, ...]:
@@ -138,46 +125,31 @@ def _along(document: Document, name: str) -> Table:
     """One row for each layout and method; photos of a long strip are thinned out."""
     photos = document["geometry"]["photos"]
     shown = sorted({*range(0, photos, -(-photos // PHOTOS_SHOWN)), photos - 1})
-    columns = (
-        Column("layout", left=True),
-        Column("method", left=True),
-        *(Column(str(photo + 1)) for photo in shown),
-    )
-    rows = tuple(
-        (row["layout"], row["method"], *(fixed(row["along"][photo][name], 2) for photo in shown))
+    rows = [
+        {**row, "along": {str(photo): row["along"][photo][name] for photo in shown}}
         for row in document["accuracy"]
         if row["used"] is not None
-    )
-    return Table(columns, rows)
+    ]
+    return tabulated(rows, (*LAYOUT_AND_METHOD, *(number(str(photo + 1), f"along.{photo}", 2) for photo in shown)))
 
 
 # --------------------------------------------------------------------------------------------------- reliability
 
 
 def _detectable(document: Document) -> Table:
-    columns = (
-        Column("layout", left=True),
-        Column("method", left=True),
-        Column("plan", "m"),
-        Column("height", "m"),
-        Column("worst at photo/row", left=True),
-    )
     rows = []
     for row in document["accuracy"]:
-        if row["used"] is None or not row["detectable"]:
-            continue
-        plan = max(row["detectable"], key=lambda each: max(map(_size, _in_plan(each))))
-        height = max(row["detectable"], key=lambda each: _size(_in_height(each)))
-        rows.append(
-            (
-                row["layout"],
-                row["method"],
-                _largest(_in_plan(plan)),
-                _largest([_in_height(height)]),
-                f"{_at(plan)} in plan, {_at(height)} in height",
-            )
-        )
-    return Table(columns, tuple(rows), note="found in 80 % of cases by a test at 0.1 %, at the worst control point")
+        if row["used"] is not None and row["detectable"]:
+            plan = max(row["detectable"], key=lambda each: max(map(_size, _in_plan(each))))
+            height = max(row["detectable"], key=lambda each: _size(_in_height(each)))
+            rows.append({**row, "plan": plan, "height": height})
+    columns = (
+        *LAYOUT_AND_METHOD,
+        number("plan", lambda row: _largest(_in_plan(row["plan"])), str, "m"),
+        number("height", lambda row: _largest([_in_height(row["height"])]), str, "m"),
+        words("worst at photo/row", lambda row: f"{_at(row['plan'])} in plan, {_at(row['height'])} in height"),
+    )
+    return tabulated(rows, columns, note="found in 80 % of cases by a test at 0.1 %, at the worst control point")
 
 
 def _in_plan(each: Document) -> list[Detected]:

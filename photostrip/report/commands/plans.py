@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from photostrip.report.commands.plan_strip import strip_sections
-from photostrip.report.page.numbers import counted, fixed, metres, micrometres, short
+from photostrip.report.page.numbers import calibrated, counted, fixed, metres, micrometres, short
 from photostrip.report.page.parts import Column, Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
 
@@ -145,7 +145,7 @@ def _camera_table(rows: Sequence[Document]) -> Table:
         rows,
         (
             words("camera", "camera"),
-            number("f", "principal_distance_mm", _nine_digits, "mm"),
+            number("f", "principal_distance_mm", calibrated, "mm"),
             number("m_p", "sigma_um", 1, "µm"),
             number("base", "base_mm", 1, "mm", rank=1),
             number("K = f m_p", "coefficient_mm2", 3, "mm²"),
@@ -200,11 +200,6 @@ def _misprints(document: Document) -> tuple[Part, ...]:
         ),
     )
     return tuple(Words(text, mark=f"{number}.") for number, text in enumerate(texts, 1))
-
-
-def _nine_digits(value: float | None) -> str:
-    """Write a calibrated length with all its digits."""
-    return short(value, 9)
 
 
 BUILDERS = {

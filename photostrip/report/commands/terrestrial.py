@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from photostrip.report.page.numbers import counted, fixed, short
+from photostrip.report.page.numbers import calibrated, counted, fixed, short
 from photostrip.report.page.parts import DASH, Column, Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
 
@@ -13,22 +13,13 @@ if TYPE_CHECKING:
 
 Document = dict[str, Any]
 
-ANGLE_DECIMALS = {"deg": 5, "gon": 5}  # 0.04 and 0.03 seconds of arc
-TITLES = {
-    "directions": "Directions of image points",
-    "photo-coordinates": "Image coordinates of directions",
-    "direction-accuracy": "Required accuracy of correction directions",
-    "theodolite-accuracy": "Image accuracy that a theodolite supports",
-    "worked-examples": "The worked examples of the source",
-    "photo-orientation": "Orientation of a photo by directions",
-    "cameras": "Cameras",
-}
+ANGLE_DECIMALS = 5  # in deg and gon: 0.04 and 0.03 seconds of arc
 
 
 def direction_report(document: Document) -> tuple[str, tuple[Section, ...]]:
     """Return the report of a direction computation."""
-    kind = document["kind"]
-    return TITLES[kind], BUILDERS[kind](document)
+    title, build = BUILDERS[document["kind"]]
+    return title, build(document)
 
 
 def _camera_facts(document: Document) -> list[tuple[str, str]]:
@@ -40,10 +31,8 @@ def _camera_facts(document: Document) -> list[tuple[str, str]]:
     rows = [("camera", f"{camera['name']}, {interior}")]
     if "orientation" in document:
         angles = document["orientation"]
-        unit = angles["unit"]
-        decimals = ANGLE_DECIMALS[unit]
-        words = ", ".join(f"{name} {fixed(angles[name], decimals)}" for name in ("alpha", "omega", "kappa"))
-        rows.append(("orientation", f"{words} {unit}"))
+        values = ", ".join(f"{name} {fixed(angles[name], ANGLE_DECIMALS)}" for name in ("alpha", "omega", "kappa"))
+        rows.append(("orientation", f"{values} {angles['unit']}"))
     return rows
 
 
@@ -56,17 +45,13 @@ def _sigma(document: Document) -> str:
 
 def _conversion(document: Document) -> tuple[Section, ...]:
     unit = document["orientation"]["unit"]
-    decimals = ANGLE_DECIMALS[unit]
     facts = _camera_facts(document)
-    columns = [Column("point", left=True), Column("x", "mm"), Column("z", "mm")]
-    columns += [Column("lambda", unit), Column("beta", unit)]
-    places = {"x": 4, "z": 4, "lambda": decimals, "beta": decimals}
+    columns = [words("point", "id"), number("x", "x", 4, "mm"), number("z", "z", 4, "mm")]
+    columns += [number(name, name, ANGLE_DECIMALS, unit) for name in ("lambda", "beta")]
     if "image_sigma_um" in document:
         facts.append(("standard error", _sigma(document)))
-        columns += [Column("m_lambda", "″"), Column("m_beta", "″")]
-        places |= {"sigma_lambda_arcsec": 2, "sigma_beta_arcsec": 2}
-    rows = [(row["id"], *(fixed(row[name], each) for name, each in places.items())) for row in document["points"]]
-    return (Section("", (Facts(tuple(facts)), Table(tuple(columns), tuple(rows)))),)
+        columns += [number(f"m_{name}", f"sigma_{name}_arcsec", 2, "″") for name in ("lambda", "beta")]
+    return (Section("", (Facts(tuple(facts)), tabulated(document["points"], columns))),)
 
 
 # ------------------------------------------------------------------------------------------------------ accuracy
@@ -251,7 +236,7 @@ def _orientation(document: Document) -> tuple[Section, ...]:
 def _element(row: Document) -> tuple[str, ...]:
     if row["unit"] == "mm":
         return row["name"], fixed(row["value"], 4), "mm", fixed(row["sigma"], 1), "µm"
-    return row["name"], fixed(row["value"], ANGLE_DECIMALS[row["unit"]]), row["unit"], fixed(row["sigma"], 1), "″"
+    return row["name"], fixed(row["value"], ANGLE_DECIMALS), row["unit"], fixed(row["sigma"], 1), "″"
 
 
 def _rejected(row: Document) -> Words:
@@ -269,9 +254,9 @@ def _cameras(document: Document) -> tuple[Section, ...]:
         document["cameras"],
         (
             words("camera", "id"),
-            number("f", "principal_distance_mm", _nine_digits, "mm"),
-            number("x0", "x0_mm", _nine_digits, "mm"),
-            number("z0", "z0_mm", _nine_digits, "mm"),
+            number("f", "principal_distance_mm", calibrated, "mm"),
+            number("x0", "x0_mm", calibrated, "mm"),
+            number("z0", "z0_mm", calibrated, "mm"),
             number("format", _format, str, "mm"),
         ),
     )
@@ -282,17 +267,12 @@ def _format(camera: Document) -> str:
     return DASH if camera["width_mm"] is None else f"{short(camera['width_mm'])} × {short(camera['height_mm'])}"
 
 
-def _nine_digits(value: float | None) -> str:
-    """Write a calibrated length with all its digits."""
-    return short(value, 9)
-
-
 BUILDERS = {
-    "directions": _conversion,
-    "photo-coordinates": _conversion,
-    "direction-accuracy": _accuracy,
-    "theodolite-accuracy": _theodolite,
-    "worked-examples": _examples,
-    "photo-orientation": _orientation,
-    "cameras": _cameras,
+    "directions": ("Directions of image points", _conversion),
+    "photo-coordinates": ("Image coordinates of directions", _conversion),
+    "direction-accuracy": ("Required accuracy of correction directions", _accuracy),
+    "theodolite-accuracy": ("Image accuracy that a theodolite supports", _theodolite),
+    "worked-examples": ("The worked examples of the source", _examples),
+    "photo-orientation": ("Orientation of a photo by directions", _orientation),
+    "cameras": ("Cameras", _cameras),
 }

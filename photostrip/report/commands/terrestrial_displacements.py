@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from photostrip.report.page.numbers import counted, fixed, metres, micrometres, short, signed
 from photostrip.report.page.parts import DASH, Column, Facts, Part, Section, Table, Words
+from photostrip.report.page.tables import number, tabulated, words
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -20,8 +21,8 @@ def displacement_report(document: Document) -> tuple[str, tuple[Section, ...]]:
     sections = [_overview(document)]
     if any(row["determined"] for row in document["cameras"]):
         sections.append(_camera_section(document))
-    for number in range(1, len(document["epochs"])):
-        sections += _epoch_sections(document, number)
+    for epoch in range(1, len(document["epochs"])):
+        sections += _epoch_sections(document, epoch)
     if any("rate" in point for point in document["points"]):
         sections.append(_rates(document))
     if document["notes"]:
@@ -75,52 +76,39 @@ def _scatter(summary: Document) -> str:
 
 def _camera_section(document: Document) -> Section:
     """Table of the turns of the cameras."""
+    heads = {"right": "right", "up": "up", "counter_clockwise": "ccw"}
+    turns = {f"{name}_arcsec": head for name, head in heads.items()}
+    sigmas = [f"sigma_{name}" for name in turns]
     columns = (
-        Column("epoch", left=True),
-        Column("camera", left=True),
-        Column("right", "″"),
-        Column("up", "″"),
-        Column("ccw", "″"),
-        Column("±", "″"),
-        Column("±", "″"),
-        Column("±", "″"),
-        Column("points"),
-        Column("test"),
-        Column("limit"),
-        Column("", left=True),
+        words("epoch", "epoch"),
+        words("camera", "side"),
+        *(number(head, name, 1, "″") for name, head in turns.items()),
+        *(number("±", name, 1, "″") for name in sigmas),
+        number("points", "stable_points"),
+        number("test", "statistic", 1),
+        number("limit", "limit", 1),
+        words("", _camera_verdict),
     )
-    names = ("right", "up", "counter_clockwise")
-    rows = []
-    for row in document["cameras"]:
-        if not row["determined"]:
-            rows.append((row["epoch"], row["side"], *[DASH] * 9, "not determined"))
-            continue
-        verdict = f"{'turned' if row['turned'] else 'stood still'}, {'removed' if row['removed'] else 'left in'}"
-        rows.append(
-            (
-                row["epoch"],
-                row["side"],
-                *(fixed(row[f"{name}_arcsec"], 1) for name in names),
-                *(fixed(row[f"sigma_{name}_arcsec"], 1) for name in names),
-                str(row["stable_points"]),
-                fixed(row["statistic"], 1),
-                fixed(row["limit"], 1),
-                verdict,
-            )
-        )
+    nothing = {**dict.fromkeys((*turns, *sigmas, "statistic", "limit")), "stable_points": DASH}
     note = "Turns against the first epoch in the camera's own axes; ccw: counter-clockwise for the photographer."
-    return Section("Cameras", (Table(columns, tuple(rows), note=note),))
+    return Section("Cameras", (tabulated([nothing | row for row in document["cameras"]], columns, note=note),))
 
 
-def _epoch_sections(document: Document, number: int) -> Iterator[Section]:
+def _camera_verdict(row: Document) -> str:
+    if not row["determined"]:
+        return "not determined"
+    return f"{'turned' if row['turned'] else 'stood still'}, {'removed' if row['removed'] else 'left in'}"
+
+
+def _epoch_sections(document: Document, epoch: int) -> Iterator[Section]:
     """Tables of one epoch: since the first epoch, and since the one before."""
     epochs = [epoch["id"] for epoch in document["epochs"]]
-    yield Section(f"{epochs[0]} to {epochs[number]}", (_steps(document, number, "since_first"),))
-    if number > 1:
-        yield Section(f"{epochs[number - 1]} to {epochs[number]}", (_steps(document, number, "since_previous"),))
+    yield Section(f"{epochs[0]} to {epochs[epoch]}", (_steps(document, epoch, "since_first"),))
+    if epoch > 1:
+        yield Section(f"{epochs[epoch - 1]} to {epochs[epoch]}", (_steps(document, epoch, "since_previous"),))
 
 
-def _steps(document: Document, number: int, key: str) -> Table:
+def _steps(document: Document, epoch: int, key: str) -> Table:
     axes = document["frame"]["axes"]
     columns = (
         Column("point", left=True),
@@ -134,14 +122,12 @@ def _steps(document: Document, number: int, key: str) -> Table:
     )
     rows = []
     for point in document["points"]:
-        entry = point["epochs"][number]
+        entry = point["epochs"][epoch]
         step = entry.get(key)
         if step is None:
             rows.append((point["id"], *[DASH] * (len(columns) - 2), entry.get("reason", "")))
             continue
         ellipse = step["ellipse"]
-        verdict = VERDICTS[step["significant"]]
-        words = [word for word in ("stable" if point["stable"] else "", verdict) if word]
         axes_of_ellipse = f"{metres(ellipse['major'])} × {metres(ellipse['minor'])}"
         rows.append(
             (
@@ -152,7 +138,7 @@ def _steps(document: Document, number: int, key: str) -> Table:
                 axes_of_ellipse if ellipse["major"] is not None else DASH,
                 fixed(ellipse["azimuth_deg"], 0),
                 fixed(step["statistic"], 1),
-                ", ".join(words),
+                ", ".join(filter(None, ("stable" if point["stable"] else "", VERDICTS[step["significant"]]))),
             )
         )
     settings = document["settings"]
@@ -168,35 +154,26 @@ def _rates(document: Document) -> Section:
     unit = document["units"]["rate"].replace("metres", "m").replace(" per ", "/")
     axes = document["frame"]["axes"]
     columns = (
-        Column("point", left=True),
-        *(Column(f"v {axis}", unit) for axis in axes),
-        *(Column("±", unit) for _ in axes),
-        Column("speed", unit),
-        Column("test"),
-        Column("misfit"),
-        Column("limit"),
-        Column("", left=True),
+        words("point", "id"),
+        *(
+            number(f"v {name}", f"rate.d{axis}", "{:+z.4f}".format, unit)
+            for axis, name in zip("xyz", axes, strict=True)
+        ),
+        *(number("±", f"rate.sigma_{axis}", 4, unit) for axis in "xyz"),
+        number("speed", "rate.length", 4, unit),
+        number("test", "rate.statistic", 1),
+        number("misfit", "rate.misfit", 1),
+        number("limit", "rate.misfit_limit", 1),
+        words("", _motion),
     )
-    rows = []
-    for point in document["points"]:
-        rate = point.get("rate")
-        if rate is None:
-            continue
-        words = [VERDICTS[rate["significant"]], "not uniform" if rate["uniform"] is False else ""]
-        rows.append(
-            (
-                point["id"],
-                *(f"{rate[f'd{axis}']:+z.4f}" for axis in "xyz"),
-                *(fixed(rate[f"sigma_{axis}"], 4) for axis in "xyz"),
-                fixed(rate["length"], 4),
-                fixed(rate["statistic"], 1),
-                fixed(rate["misfit"], 1),
-                fixed(rate["misfit_limit"], 1),
-                ", ".join(word for word in words if word),
-            )
-        )
+    moving = [point for point in document["points"] if point.get("rate") is not None]
     note = "Misfit: what a uniform motion leaves, chi-square; above its limit the motion is not uniform."
-    return Section("Rates", (Table(columns, tuple(rows), note=note),))
+    return Section("Rates", (tabulated(moving, columns, note=note),))
+
+
+def _motion(point: Document) -> str:
+    rate = point["rate"]
+    return ", ".join(filter(None, (VERDICTS[rate["significant"]], "not uniform" if rate["uniform"] is False else "")))
 
 
 def _notes(document: Document) -> Section:

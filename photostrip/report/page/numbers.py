@@ -44,6 +44,11 @@ def short(value: Number, digits: int = 4) -> str:
     return DASH if value is None else f"{value:.{digits}g}"
 
 
+def calibrated(value: Number) -> str:
+    """Return a calibrated length with all its digits."""
+    return short(value, 9)
+
+
 def power(value: Number, digits: int = 4) -> str:
     """Return a number in scientific form."""
     return DASH if value is None else f"{value:.{digits}e}"
