@@ -62,7 +62,6 @@ from photostrip.simulate import Flight, Ground, Image, Spec, simulate  # noqa: E
 from photostrip.simulate.spec import FILM  # noqa: E402
 from photostrip.triangulation.bundle.solve import solve  # noqa: E402
 from photostrip.triangulation.polynomial import correction  # noqa: E402
-from photostrip.triangulation.relative_orientation import six_points  # noqa: E402
 from photostrip.triangulation.relative_orientation.orientation import RelativeSettings, orient_unchecked  # noqa: E402
 from photostrip.triangulation.relative_orientation.pairs import Pairs  # noqa: E402
 from photostrip.triangulation.strip_formation.strip import model_points  # noqa: E402
@@ -336,7 +335,7 @@ def measured_models(spec: ModelSpec, places: Floats, count: int) -> Floats:
     )
     oriented, _ = orient_unchecked(pairs)
     vectors = model_points(oriented).vectors
-    direction, _ = six_points.dependent_pair(oriented.elements)
+    direction, _ = oriented.relative
     model = vectors.reshape(count, n, 3) * (spec.base / direction[:, :1])[:, :, None]
     error = (model - np.column_stack([every, np.full(n, -spec.focal)]))[:, len(six) :]
     control = ModelControl(

@@ -52,13 +52,3 @@ def curvature_correction(distance: ArrayLike, radius: ArrayLike) -> Floats:
     Source: [001] eq. 153.
     """
     return np.asarray(np.square(np.asarray(distance, dtype=np.float64)) / (2.0 * np.asarray(radius)))
-
-
-def height_from_tangent(z: ArrayLike, distance: ArrayLike, radius: ArrayLike) -> Floats:
-    """Height above the level surface from the coordinate above the tangent plane: results, after the orientation."""
-    return np.asarray(z, dtype=np.float64) + curvature_correction(distance, radius)  # eq. 153
-
-
-def tangent_from_height(height: ArrayLike, distance: ArrayLike, radius: ArrayLike) -> Floats:
-    """Coordinate above the tangent plane from the height above the level surface: control, before the orientation."""
-    return np.asarray(height, dtype=np.float64) - curvature_correction(distance, radius)  # eq. 153

@@ -62,13 +62,7 @@ class FrameSpec:
 
 
 class Refusal(Exception):  # noqa: N818 (not an error of its own: it carries one fault to where faults are collected)
-    """One fault of one frame, on its way to the list of all faults.
-
-    Parameters
-    ----------
-    key : str
-        Key of the control list that is at fault.
-    """
+    """One fault of one frame, on its way to the list of all faults; `key` is that of the control list at fault."""
 
     def __init__(self, message: str, *, code: str, key: str = "crs", expected: str = "", fix: str = "") -> None:
         super().__init__(message)

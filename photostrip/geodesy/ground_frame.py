@@ -16,12 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import GeometryError, PhotostripError
-from photostrip.geodesy.curvature import (
-    height_from_tangent,
-    meridian_radius,
-    prime_vertical_radius,
-    tangent_from_height,
-)
+from photostrip.geodesy.curvature import curvature_correction, meridian_radius, prime_vertical_radius
 from photostrip.geodesy.datum_shift import DatumShift, Operation, wrapped_longitude
 from photostrip.geodesy.domain import finite_rows, named_rows, require_reached, require_rows
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec, Kind
@@ -29,7 +24,7 @@ from photostrip.geodesy.ground_axes import axes_along_north, axes_between, true_
 from photostrip.geodesy.local_frame import geocentric_from_geodetic, geodetic_from_geocentric
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import ArrayLike
 
@@ -85,10 +80,6 @@ class GroundFrame:
         first, second, third = (names.index(axis) for axis in self.axes)
         return first, second, third
 
-    def internal_from_user(self, columns: ArrayLike) -> Floats:
-        """Bring columns (coordinates or sigmas) in the order of ``axes`` into the internal order."""
-        return np.asarray(columns, dtype=np.float64)[..., np.argsort(self.order)]
-
     def user_from_internal(self, columns: ArrayLike) -> Floats:
         """Bring columns (coordinates or sigmas) in the internal order into the order of ``axes``."""
         return np.asarray(columns, dtype=np.float64)[..., list(self.order)]
@@ -118,7 +109,7 @@ class GroundFrame:
         points = np.array(enu, dtype=np.float64).reshape(-1, 3)
         require_rows(finite_rows(points), "a coordinate is not a number", ids)
         if self.kind == "local":
-            return self._bent(points, tangent_from_height)
+            return self._bent(points, -1.0)
         if self.kind == "geocentric":
             xyz = points * self.plan_factor
             if self._shift is None:
@@ -140,7 +131,7 @@ class GroundFrame:
         """
         points = np.array(xyz, dtype=np.float64).reshape(-1, 3)
         if self.kind == "local":
-            return self._bent(points, height_from_tangent)
+            return self._bent(points, 1.0)
         if self.kind == "geocentric" and self._shift is None:
             return points / self.plan_factor
         geodetic = self.geodetic(points)
@@ -268,15 +259,15 @@ class GroundFrame:
 
     # ------------------------------------------------------------- the steps
 
-    def _bent(self, points: Floats, formula: Callable[[Floats, Floats, float], Floats]) -> Floats:
-        """Heights of a local frame to or from the tangent plane, where a radius is given."""
+    def _bent(self, points: Floats, sign: float) -> Floats:
+        """Heights of a local frame from (+1) or to (-1) the tangent plane, where a radius is given."""
         radius = self.spec.curvature_radius
         if radius is None:
             return points
         if self.origin is None:
             raise PhotostripError("the curvature correction of a local frame has no origin: call with_origin first")
         distance = np.hypot(points[:, 0] - self.origin[0], points[:, 1] - self.origin[1])
-        points[:, 2] = formula(points[:, 2], distance, radius)  # eq. 153
+        points[:, 2] += sign * curvature_correction(distance, radius)  # eq. 153
         return points
 
     def _lonlat(self, plan: Floats, ids: Sequence[str] | None) -> Floats:

@@ -126,12 +126,7 @@ def strip_azimuth(first: ArrayLike, last: ArrayLike) -> float:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IntermediateFrame:
-    """The Cartesian frame Pi in which a strip is adjusted.
-
-    Notes
-    -----
-    Source: [001] eq. 142-144, 152. Way there and way back use the same origin and axes by construction.
-    """
+    """The Cartesian frame Pi in which a strip is adjusted. Source: [001] eq. 142-144, 152."""
 
     origin: Floats  # (3,): origin, in the project's Cartesian frame, metres
     axes: Floats  # (3, 3): M: columns are the axes X, Y, Z in the project's Cartesian frame
@@ -177,14 +172,6 @@ class IntermediateFrame:
     def cartesian_from_intermediate(self, points: ArrayLike) -> Floats:
         """Points (..., 3) from this frame back into the Cartesian frame. Source: [001] eq. 152."""
         return np.asarray(self.origin + np.asarray(points, dtype=np.float64) @ self.axes.T)  # eq. 152
-
-    def intermediate_vectors(self, vectors: ArrayLike) -> Floats:
-        """Directions or differences from the Cartesian frame into this frame: turned, not shifted."""
-        return np.asarray(np.asarray(vectors, dtype=np.float64) @ self.axes)
-
-    def cartesian_vectors(self, vectors: ArrayLike) -> Floats:
-        """Directions or differences from this frame into the Cartesian frame: turned, not shifted."""
-        return np.asarray(np.asarray(vectors, dtype=np.float64) @ self.axes.T)
 
     def intermediate_rotations(self, rotations: ArrayLike) -> Floats:
         """Rotations (..., 3, 3) from image axes to Cartesian axes, turned to lead to the axes of this frame."""

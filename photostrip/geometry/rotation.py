@@ -69,8 +69,8 @@ def from_alpha_omega_kappa(alpha: ArrayLike, omega: ArrayLike, kappa: ArrayLike)
     return matrix
 
 
-def alpha_omega_kappa(matrix: ArrayLike) -> tuple[Floats, Floats, Floats]:
-    """Angles alpha, omega, kappa, shape (...), of rotations (..., 3, 3), photo to object.
+def alpha_omega_kappa(matrix: ArrayLike) -> Floats:
+    """Angles alpha, omega, kappa (..., 3) of rotations (..., 3, 3), photo to object.
 
     Raises GeometryError when omega is +-90 degrees: alpha and kappa cannot be separated.
 
@@ -78,11 +78,8 @@ def alpha_omega_kappa(matrix: ArrayLike) -> tuple[Floats, Floats, Floats]:
     """
     a = np.asarray(matrix, float)
     _refuse_gimbal(a[..., 1, 2], "omega", "alpha")
-    return (
-        np.arctan2(-a[..., 0, 2], a[..., 2, 2]),
-        np.arcsin(np.clip(-a[..., 1, 2], -1, 1)),
-        np.arctan2(a[..., 1, 0], a[..., 1, 1]),
-    )
+    alpha, omega = np.arctan2(-a[..., 0, 2], a[..., 2, 2]), np.arcsin(np.clip(-a[..., 1, 2], -1, 1))
+    return np.stack([alpha, omega, np.arctan2(a[..., 1, 0], a[..., 1, 1])], axis=-1)
 
 
 def _refuse_gimbal(sine: Floats, middle: str, first: str) -> None:
@@ -91,33 +88,34 @@ def _refuse_gimbal(sine: Floats, middle: str, first: str) -> None:
         raise GeometryError(msg, code="gimbal")
 
 
+def _require_system(system: str) -> None:
+    if system not in SYSTEMS:
+        msg = f"unknown system of angles {system!r}"
+        raise ValueError(msg)
+
+
 def angles(matrix: ArrayLike, system: str) -> Floats:
     """Angles (..., 3) of rotations, photo to object, in a system of ``SYSTEMS`` and in the order of its name.
 
     Raises GeometryError when the middle angle is +-90 degrees.
     Raises ValueError when the system is not known.
     """
+    _require_system(system)
     a = np.asarray(matrix, float)
     if system == "omega-phi-kappa":
         _refuse_gimbal(a[..., 0, 2], "phi", "omega")
         omega = np.arctan2(-a[..., 1, 2], a[..., 2, 2])
         phi = np.arcsin(np.clip(a[..., 0, 2], -1, 1))
         return np.stack([omega, phi, np.arctan2(-a[..., 0, 1], a[..., 0, 0])], axis=-1)
-    if system not in SYSTEMS:
-        msg = f"unknown system of angles {system!r}"
-        raise ValueError(msg)
-    alpha, omega, kappa = alpha_omega_kappa(a)
-    return np.stack([-alpha if system == "phi-omega-kappa" else alpha, omega, kappa], axis=-1)
+    return alpha_omega_kappa(a) * [-1.0 if system == "phi-omega-kappa" else 1.0, 1.0, 1.0]
 
 
 def from_angles(values: ArrayLike, system: str) -> Floats:
     """Rotations from angles (..., 3) in a system of ``SYSTEMS``; the inverse of ``angles``."""
+    _require_system(system)
     first, second, kappa = np.moveaxis(np.asarray(values, float), -1, 0)
     if system == "omega-phi-kappa":
         return rotation_x(first) @ rotation_y(second) @ rotation_z(kappa)
-    if system not in SYSTEMS:
-        msg = f"unknown system of angles {system!r}"
-        raise ValueError(msg)
     return from_alpha_omega_kappa(-first if system == "phi-omega-kappa" else first, second, kappa)
 
 
@@ -127,15 +125,13 @@ def angle_rates(values: ArrayLike, system: str) -> Floats:
     ``exp([theta]) R`` is the rotation of the changed angles; theta refers to the axes of the object. D is singular
     where the middle angle is 90 degrees.
     """
+    _require_system(system)
     first, second, _ = np.moveaxis(np.asarray(values, float), -1, 0)
     if system == "omega-phi-kappa":
         turns, axes, sign = (rotation_x(first), rotation_y(second)), (0, 1, 2), 1.0
-    elif system in SYSTEMS:
+    else:
         sign = 1.0 if system == "phi-omega-kappa" else -1.0  # alpha turns the other way about Y
         turns, axes = (rotation_y(sign * first), rotation_x(second)), (1, 0, 2)
-    else:
-        msg = f"unknown system of angles {system!r}"
-        raise ValueError(msg)
     columns = [
         np.broadcast_to(sign * np.eye(3)[axes[0]], turns[0].shape[:-1]),
         turns[0][..., :, axes[1]],
@@ -167,14 +163,6 @@ def cross_matrix(vector: ArrayLike) -> Floats:
     matrix[..., 2, 0] = -v[..., 1]
     matrix[..., 0, 1] = -v[..., 2]
     return matrix
-
-
-def angle_between(first: ArrayLike, second: ArrayLike) -> Floats:
-    """Angle, 0 to pi, of the rotation from one attitude to another, exact also when it is tiny."""
-    a, b = np.asarray(first, float), np.asarray(second, float)
-    chord = np.linalg.norm(a - b, axis=(-2, -1)) / np.sqrt(8.0)
-    angle: Floats = 2 * np.arcsin(np.clip(chord, 0, 1))
-    return angle
 
 
 def to_vector(matrix: ArrayLike) -> Floats:

@@ -134,7 +134,7 @@ def fit(pair: ImagePair, used: Flags) -> Turn | None:
 
 def _composed(turn: Floats, step: Floats) -> Floats:
     """Turn of a camera that turned first by `turn`, then by `step` in its new axes."""
-    return np.array(alpha_omega_kappa(small_turn(turn) @ small_turn(step)))
+    return alpha_omega_kappa(small_turn(turn) @ small_turn(step))
 
 
 def determined(normal: Floats) -> bool:

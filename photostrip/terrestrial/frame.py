@@ -42,8 +42,8 @@ def ground_from_photo(alpha: ArrayLike, omega: ArrayLike = 0.0, kappa: ArrayLike
     return matrix
 
 
-def angles_of(rotation: ArrayLike) -> tuple[Floats, Floats, Floats]:
-    """Azimuth, elevation, roll of a camera that does not look straight up or down; inverse of ``ground_from_photo``."""
+def angles_of(rotation: ArrayLike) -> Floats:
+    """Azimuth, elevation, roll (..., 3) of a camera not looking straight up or down; inverse of ``ground_from_photo``."""
     return alpha_omega_kappa(GROUND_FROM_HOUSE.T @ np.asarray(rotation, float))
 
 

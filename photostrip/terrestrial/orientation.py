@@ -210,7 +210,7 @@ def _start(sightings: Sightings, used: Flags, interior: Floats) -> Floats:
         left, size, right = np.linalg.svd(vectors_of(sightings.directions[both]).T @ unit)
         if size[1] > 1e-9 * size[0]:  # two different directions
             sign = np.diag([1.0, 1.0, np.linalg.det(left @ right)])
-            return np.array(angles_of(left @ sign @ right))
+            return angles_of(left @ sign @ right)
     across = directions_of(ray @ GROUND_FROM_HOUSE.T)[:, 0]
     turned = (sightings.directions[:, 0] - across)[used & sightings.measured[:, 0]]
     if not len(turned):
@@ -301,7 +301,7 @@ def _result(
     hat = np.einsum("niu,uv,njv,njk->nik", system.design, cofactors, system.design, system.weight)
     redundancy = np.where(sightings.measured & used[:, None], 1.0 - hat[:, [0, 1], [0, 1]], np.nan)
     values = values.copy()
-    values[:3] = np.array(angles_of(ground_from_photo(*values[:3])))
+    values[:3] = angles_of(ground_from_photo(*values[:3]))
     return PhotoOrientation(
         names=names,
         values=values[active],

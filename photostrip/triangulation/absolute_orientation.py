@@ -17,7 +17,8 @@ import numpy as np
 
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geometry.rotation import cross_matrix, from_vector
-from photostrip.geometry.similarity import Similarity, collinearity
+from photostrip.geometry.similarity import SIMILARITY_PARAMETERS as PARAMETERS
+from photostrip.geometry.similarity import Similarity, collinearity, similarity_derivatives
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -34,7 +35,6 @@ CONVERGED = 1e-10  # of the strip's half length; the next step would be its squa
 LAST_AXES_UPDATE = 2  # iteration; afterwards the directions of the ground axes no longer change
 RANK_LIMIT = 1e-3  # smallest over largest singular value: a motion of the strip of which the control sees a thousandth
 WEAK_LIMIT = 1 / 8  # well spread control has about 1; at an eighth errors of the control grow eightfold somewhere
-PARAMETERS = 7
 IDS_NAMED = 6  # in a message
 PLAN, HEIGHT = slice(0, 2), 2
 
@@ -254,27 +254,16 @@ def _corrected(similarity: Similarity, step: Floats, center: Floats, half: float
     # control that is wrong beyond measure asks for steps that no number holds
     growth = float(np.exp(np.clip(step[6] / half, -LARGEST_SCALE_STEP, LARGEST_SCALE_STEP)))
     shift = center + step[:3] + growth * turn @ (similarity.shift - center)
-    return Similarity(similarity.scale * growth, _orthonormal(turn @ similarity.rotation), shift)
-
-
-def _orthonormal(matrix: Floats) -> Floats:
-    """Remove the rounding that many small rotations leave."""
-    u, _, vt = np.linalg.svd(matrix)
-    result: Floats = u @ vt
-    return result
+    u, _, vt = np.linalg.svd(turn @ similarity.rotation)  # without the rounding that many small rotations leave
+    return Similarity(similarity.scale * growth, u @ vt, shift)
 
 
 def _motion(reach: Floats | None, center: Floats, half: float) -> Floats:
     """Triangular root of the matrix that gives the mean square motion of the strip's points from seven parameters."""
     if reach is None:
         return np.eye(PARAMETERS)
-    arm = (reach - center) / half
-    columns = np.zeros((len(arm), 3, PARAMETERS))
-    columns[:, :, :3] = np.eye(3)
-    columns[:, :, 3:6] = -cross_matrix(arm)  # theta x arm
-    columns[:, :, 6] = arm
-    flat = columns.reshape(-1, PARAMETERS)
-    return np.asarray(np.linalg.cholesky(flat.T @ flat / len(arm) + 1e-15 * np.eye(PARAMETERS)), float)
+    flat = similarity_derivatives((reach - center) / half, np.zeros(3)).reshape(-1, PARAMETERS)
+    return np.asarray(np.linalg.cholesky(flat.T @ flat / len(reach) + 1e-15 * np.eye(PARAMETERS)), float)
 
 
 def _scaled_design(design: Floats, root: Floats) -> Floats:

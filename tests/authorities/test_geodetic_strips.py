@@ -58,7 +58,7 @@ def errors(name: str, result: Result) -> Floats:
     check = vector(name).expected["check_points_true"]
     rows = [names.index(point) for point in check]
     truth = np.array([geocentric(*position) for position in check.values()])
-    return result.strips[0].intermediate.intermediate_vectors(result.points.cartesian[rows] - truth)
+    return np.asarray((result.points.cartesian[rows] - truth) @ result.strips[0].intermediate.axes)
 
 
 @FRAMES

@@ -105,7 +105,7 @@ def test_krassovsky_gauss_krueger_with_the_zone_in_front(crs: str) -> None:
         found = grid.ground_from_cartesian(given.cartesian_from_ground([[row["lon_deg"], row["lat_deg"], 0.0]]))
         user = grid.user_from_internal(found)[0]
         assert user == pytest.approx((row["x_north_m"], row["y_east_with_zone_m"], 0.0), abs=MILLIMETRE)
-        assert grid.internal_from_user(user) == pytest.approx(found[0])
+        assert user[..., np.argsort(grid.order)] == pytest.approx(found[0])
 
 
 @pytest.mark.parametrize("example", cases("gauss_kruger"))
@@ -125,7 +125,7 @@ def test_geocentric_and_intermediate_vectors(example: Vector) -> None:
     crs = "+proj=longlat +ellps=krass" if "Krasovsky" in example.input["ellipsoid"] else "+proj=longlat +ellps=GRS80"
     expected, tol = example.expected, example.tol
     ground = frame(crs, axes=("north", "east", "up"))
-    xyz = ground.cartesian_from_ground(ground.internal_from_user(points))
+    xyz = ground.cartesian_from_ground(points[..., np.argsort(ground.order)])
     assert np.abs(xyz - expected["geocentric"]).max() < tol["geocentric_m"]
 
     lat, lon, height = mean_position(np.radians(points[:, 0]), np.radians(points[:, 1]), points[:, 2])

@@ -250,7 +250,7 @@ def test_a_constant_undulation_lifts_heights_to_the_ellipsoid() -> None:
 
 def test_a_three_dimensional_crs_has_ellipsoidal_heights() -> None:
     given, output = pair(spec("EPSG:4979", axes=NEU), "EPSG:32633")
-    assert given.internal_from_user([45.0, 15.0, 100.0]) == pytest.approx((15.0, 45.0, 100.0))
+    assert given.user_from_internal([15.0, 45.0, 100.0]) == pytest.approx((45.0, 15.0, 100.0))
     found = output.ground_from_cartesian(given.cartesian_from_ground([[15.0, 45.0, 100.0]]))[0]
     assert found == pytest.approx((500000.0, 4982950.4, 100.0), abs=0.05)
 

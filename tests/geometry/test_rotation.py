@@ -14,7 +14,6 @@ from photostrip.errors import EXIT_GEOMETRY, GeometryError
 from photostrip.geometry.rotation import (
     SYSTEMS,
     alpha_omega_kappa,
-    angle_between,
     angles,
     cross_matrix,
     from_alpha_omega_kappa,
@@ -24,6 +23,7 @@ from photostrip.geometry.rotation import (
     rotation_y,
     rotation_z,
 )
+from tests.attitudes import angle_between
 from tests.vectors import cases, section
 
 if TYPE_CHECKING:

@@ -19,7 +19,6 @@ from pyproj import Proj
 
 from photostrip.camera import Camera, Distortion
 from photostrip.formats.output.simulation import inputs_of, settings_of
-from photostrip.geometry.rotation import angle_between
 from photostrip.pipeline import Inputs, Settings, triangulate
 from photostrip.points import ControlPoints, PhotoPoints
 from photostrip.result.document import document_of
@@ -40,6 +39,7 @@ from photostrip.simulate import (
 from photostrip.triangulation.polynomial import correction
 from photostrip.triangulation.relative_orientation.orientation import RelativeSettings
 from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
+from tests.attitudes import angle_between
 from tests.loops import nonempty
 
 if TYPE_CHECKING:

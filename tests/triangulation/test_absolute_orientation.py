@@ -274,7 +274,7 @@ def test_a_target_is_the_point_with_the_given_coordinates_put_in(seed: int) -> N
     )
     axes = one.targets.axes(present)
     assert np.allclose(axes @ axes.transpose(0, 2, 1), np.eye(3), rtol=0, atol=1e-12)
-    assert np.allclose(axes @ frame.intermediate_vectors(np.array([0.0, 0, 1])), [[0, 0, 1]] * 3, rtol=0, atol=1e-12)
+    assert np.allclose(axes @ (np.array([0.0, 0, 1]) @ frame.axes), [[0, 0, 1]] * 3, rtol=0, atol=1e-12)
 
 
 # -------------------------------------------------------------------------------------- what stays free

@@ -128,7 +128,10 @@ class FormedPhotos:
         if covariance is None:
             resection = self._resected(oriented, rays, points, xyz)
         else:
-            focal, xy = strip.camera.principal_distance, self.observations.xy[rays.rows]
+            focal, xy = (
+                np.full(len(covariance.centers), strip.camera.principal_distance),
+                self.observations.xy[rays.rows],
+            )
             resection = with_residuals(xy, xyz[points], rays.photo, focal, covariance.centers, covariance.rotations)
         arm = xyz[points] - resection.centers[rays.photo]
         return StripResult(

@@ -168,7 +168,7 @@ def _chain(strip: StripResult, factor: float) -> list[Document]:
 
 def _angles(rotation: Floats, factor: float) -> list[float]:
     """Return alpha, omega, kappa of a rotation in the unit of the output."""
-    values: list[float] = rounded(np.array(alpha_omega_kappa(rotation)).ravel() * factor, ANGLE)
+    values: list[float] = rounded(alpha_omega_kappa(rotation).ravel() * factor, ANGLE)
     return values
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
-from photostrip.triangulation.polynomial.terms import POWERS
+from photostrip.triangulation.polynomial.terms import columns
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -49,22 +49,17 @@ class FitOperator:
 
     def influence(self, xyz: Floats) -> Floats:
         """Phi: displacement of points (n, 3) after the similarity by the parameters, shape (n, 3, t)."""
-        columns = self.polynomial_columns(xyz)
         result = np.zeros((len(xyz), 3, len(self.operator)))
         result[:, :, :SIMILARITY_PARAMETERS] = similarity_derivatives(xyz, self.origin)
         start = SIMILARITY_PARAMETERS
-        for axis, values in enumerate(columns):
+        for axis, values in enumerate(self.polynomial_columns(xyz)):
             result[:, axis, start : start + values.shape[1]] = values
             start += values.shape[1]
         return result
 
     def polynomial_columns(self, xyz: Floats) -> list[Floats]:
         """Terms of the three polynomials at points, scaled to about one."""
-        x, y = xyz[:, 0] / self.reach, xyz[:, 1] / self.breadth
-        return [
-            np.column_stack([x**i * y**j for i, j in (POWERS[t] for t in terms)] or [np.zeros((len(x), 0))])
-            for terms in self.terms
-        ]
+        return [columns(xyz[:, :2] / (self.reach, self.breadth), terms) for terms in self.terms]
 
 
 def misclosures(points: ErrorRows, control: ControlPoints, control_rows: Numbers, axes: Floats) -> Misclosures:
@@ -115,15 +110,15 @@ def _polynomials(found: Misclosures, weight: Floats, xyz: Floats, fit: FitOperat
     axis of the intermediate frame has its own fit; a point that gives only some of its ground coordinates takes
     the others from the fit itself, so the residual that counts is its projection on the axes given.
     """
-    columns = fit.polynomial_columns(xyz)
+    by_term = fit.polynomial_columns(xyz)
     plan = weight[:, :2].mean(axis=1)
     by_axis = (plan, plan, weight[:, 2])
     given = np.zeros((len(xyz), 3, 3))
     np.add.at(given, found.point, found.direction[:, :, None] * found.direction[:, None, :])
-    weighted = [c * w[:, None] for c, w in zip(columns, by_axis, strict=True)]
+    weighted = [c * w[:, None] for c, w in zip(by_term, by_axis, strict=True)]
     normal = np.block(
         [
-            [weighted[a].T @ (given[:, a, b, None] * columns[b]) for b in range(3)]
+            [weighted[a].T @ (given[:, a, b, None] * by_term[b]) for b in range(3)]
             for a in range(3)
         ]
     )  # fmt: skip

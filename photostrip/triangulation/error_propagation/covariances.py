@@ -17,7 +17,7 @@ import numpy as np
 from photostrip.distributions import gamma_cdf
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS
 from photostrip.statistics import chi2_quantile
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, REACH, SPAN, ErrorRows
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, REACH, SPAN, ErrorRows, add_by_item
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 
 if TYPE_CHECKING:
@@ -271,9 +271,7 @@ def local_covariances(errors: StripErrors, rows: ErrorRows, with_components: Flo
             term = by[:, slot] @ errors.component_covariances[model, apart] @ by[:, slot + apart].transpose(0, 2, 1)
             mixed += term / 2 if apart == 0 else term
         result += mixed + mixed.transpose(0, 2, 1)
-    if len(rows.item):
-        present, starts = np.unique(rows.item, return_index=True)
-        result[present] += np.add.reduceat(rows.by_image @ rows.by_image.transpose(0, 2, 1), starts, axis=0)
+    add_by_item(result, rows.item, rows.by_image @ rows.by_image.transpose(0, 2, 1))
     return result
 
 
@@ -284,7 +282,5 @@ def _with_parameters(rows: ErrorRows, fit: ParameterCovariances) -> Floats:
         model = rows.first + slot
         inside = np.flatnonzero(model < len(fit.components))
         result[inside] += rows.by_component[inside, slot] @ fit.components[model[inside]]
-    if len(rows.item):
-        present, starts = np.unique(rows.item, return_index=True)
-        result[present] += np.add.reduceat(rows.by_image @ fit.images[rows.image], starts, axis=0)
+    add_by_item(result, rows.item, rows.by_image @ fit.images[rows.image])
     return result

@@ -140,3 +140,10 @@ def ranges(start: Numbers, stop: Numbers) -> tuple[Numbers, Numbers]:
     counts = stop - start
     number = np.repeat(np.arange(len(counts)), counts)
     return number, np.arange(len(number)) - np.repeat(np.cumsum(counts) - counts, counts) + start[number]
+
+
+def add_by_item(target: Floats, item: Numbers, values: Floats) -> None:
+    """Add values to the rows of ascending items."""
+    if len(item):
+        present, starts = np.unique(item, return_index=True)
+        target[present] += np.add.reduceat(values, starts, axis=0)

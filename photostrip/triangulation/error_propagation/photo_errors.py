@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ErrorRows, ranges
+from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ErrorRows, add_by_item, ranges
 from photostrip.triangulation.resection.collinearity import partials
 
 if TYPE_CHECKING:
@@ -107,17 +107,10 @@ def _by_component(
         chosen = np.flatnonzero(shift == ahead)
         for slot in range(slots):
             values = by_point[chosen] @ points.by_component[sightings.point[chosen], slot]
-            _add_by_item(result[:, ahead + slot], item[chosen], values)
+            add_by_item(result[:, ahead + slot], item[chosen], values)
         beyond = np.flatnonzero(shift > ahead)
         if len(beyond):
             present, starts = np.unique(item[beyond], return_index=True)
             sums = np.add.reduceat(moved[beyond], starts, axis=0)
             result[present, ahead] += sums @ steps[first[present] + ahead]
     return result
-
-
-def _add_by_item(target: Floats, item: Numbers, values: Floats) -> None:
-    """Add values to the rows of ascending items."""
-    if len(item):
-        present, starts = np.unique(item, return_index=True)
-        target[present] += np.add.reduceat(values, starts, axis=0)

@@ -54,7 +54,7 @@ class ImageCorrectionSettings:
     ground_height: float | None = None
     earth_radius: float | None = None  # radius of the Earth in metres for the correction in image space; None: none
 
-    def seen_by(self, camera: Camera) -> Camera:
+    def applied_to(self, camera: Camera) -> Camera:
         """Return a camera with its principal point in the middle, or without distortion, where that is switched off."""
         point = camera.principal_point if self.principal_point else (0.0, 0.0)
         return replace(camera, principal_point=point, distortion=camera.distortion if self.distortion else None)
@@ -109,7 +109,7 @@ def refine(
         heights, or a point lies beyond the radii of a distortion table: with photo, point and radius.
     """
     cameras = {camera_of_photo[photo].name: camera_of_photo[photo] for photo in observations.photo_ids}
-    cameras = {name: settings.seen_by(camera) for name, camera in cameras.items()}
+    cameras = {name: settings.applied_to(camera) for name, camera in cameras.items()}
     number = {name: row for row, name in enumerate(cameras)}
     camera_of_row = np.array([number[camera_of_photo[photo].name] for photo in observations.photo_ids], np.intp)[
         observations.photo
@@ -120,7 +120,7 @@ def refine(
     xy = observations.xy
     largest: dict[str, float] = {}
     for name, camera in cameras.items():
-        if not _active(camera, bending):
+        if not (any(camera.principal_point) or camera.distortion is not None or bending):
             continue
         if xy is observations.xy:
             xy = xy.copy()
@@ -172,10 +172,6 @@ def _bending(settings: ImageCorrectionSettings, flying_height: float | None, gro
 
 def _distorts(distortion: Distortion | None) -> TypeGuard[Distortion]:
     return distortion is not None and any((*distortion.k, *distortion.p, *distortion.b, *distortion.distortion))
-
-
-def _active(camera: Camera, bending: Bending) -> bool:
-    return any(camera.principal_point) or camera.distortion is not None or bool(bending)
 
 
 def _corrected(image: Floats, camera: Camera, bending: Bending) -> tuple[Floats, dict[str, float]]:

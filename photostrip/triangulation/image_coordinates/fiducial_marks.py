@@ -7,7 +7,7 @@ transformation in both hands.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import TYPE_CHECKING
 
@@ -39,6 +39,7 @@ class Marks:
     calibrated: Floats  # (m, 2): calibrated coordinates, mm
     measured: Floats  # (p, m, 2): measured coordinates
     weights: Floats  # (p, m): weights, of mean 1 over the marks of each photo
+    mirrored: bool = False  # whether the measured system is left-handed against that of the camera
 
     @property
     def count(self) -> Numbers:
@@ -115,19 +116,18 @@ def enough(marks: Marks, kind: str) -> tuple[Marks, list[Fault]]:
     return kept.take(apart), faults
 
 
-def right_pattern(marks: Marks) -> tuple[Marks, Flags, list[Fault]]:
+def right_pattern(marks: Marks) -> tuple[Marks, list[Fault]]:
     """Find the hand of the measured system, and the photos whose marks are not where their numbers say.
 
     The hand is that of most photos of the camera. A photo of the other hand is refused: when only that photo was
     scanned from the other side its points need no repair, but when two of its marks are exchanged they come out
     mirrored, and the residuals are equally small in both cases.
 
-    Returns the marks of the photos in which they lie as calibrated, at least two on each.
-    Returns (p,), whether these photos were measured mirrored.
-    Returns one for each of the other photos, with the mark that seems wrongly numbered.
+    Returns the marks of the photos in which they lie as calibrated, at least two on each, and one fault for each of the
+    other photos, with the mark that seems wrongly numbered.
     """
     if not marks.photos:
-        return marks, np.zeros(0, bool), []
+        return marks, []
     direct, turned = (_pattern(marks.measured, marks.weights, marks.calibrated, mirrored=m) for m in (False, True))
     distinct = np.maximum(direct.misfit, turned.misfit) > WRONG_PATTERN  # else the marks fit in both hands
     hand = distinct & (turned.misfit < direct.misfit)
@@ -142,8 +142,7 @@ def right_pattern(marks: Marks) -> tuple[Marks, Flags, list[Fault]]:
         _wrong_numbers(marks, row, usual, mirrored=camera_hand, off=pattern.largest[row], alone=bool(fits[row]))
         for row in np.flatnonzero(~right).tolist()
     ]
-    kept = marks.take(right)
-    return kept, np.full(len(kept.photos), camera_hand), faults
+    return replace(marks.take(right), mirrored=camera_hand), faults
 
 
 def _pattern(measured: Floats, weights: Floats, calibrated: Floats, *, mirrored: bool) -> Pattern:

@@ -67,9 +67,9 @@ def orient(fiducials: PhotoPoints, cameras: Mapping[str, Camera], settings: Inte
         faults += wrong
         marks, wrong = enough(marks, settings.transform)
         faults += wrong
-        marks, mirrored, wrong = right_pattern(marks)
+        marks, wrong = right_pattern(marks)
         faults += wrong
-        part, wrong = fit_marks(marks, mirrored, settings.transform)
+        part, wrong = fit_marks(marks, settings.transform)
         faults += wrong
         parts.append(part)
         notes += notes_on_marks(part, camera)

@@ -60,7 +60,7 @@ class InteriorOrientation:
         object.__setattr__(self, "residuals", tuple(frozen(each) for each in self.residuals))
 
 
-def fit_marks(marks: Marks, mirrored: Flags, kind: str) -> tuple[InteriorOrientation, list[Fault]]:
+def fit_marks(marks: Marks, kind: str) -> tuple[InteriorOrientation, list[Fault]]:
     """Fit the transformations of the photos of one camera."""
     kinds, faults = _kinds(marks, kind)
     coefficients = np.zeros((len(marks.photos), 3, 4))
@@ -69,16 +69,14 @@ def fit_marks(marks: Marks, mirrored: Flags, kind: str) -> tuple[InteriorOrienta
         if len(rows) == 0:
             continue
         # only a conformal transformation has to be told that it shall mirror; the others find it themselves
-        flip = np.ones((len(rows), 1, 2))
-        if each == "conformal":
-            flip[:, 0, 1] = np.where(mirrored[rows], -1.0, 1.0)
+        flip = np.array([1.0, -1.0 if each == "conformal" and marks.mirrored else 1.0])
         target = np.broadcast_to(marks.calibrated, (len(rows), *marks.calibrated.shape))
         fit = plane.KINDS[each].fit(marks.measured[rows] * flip, target, marks.weights[rows])
         coefficients[rows] = fit.coefficients
-        coefficients[rows, :, 1] *= flip[:, 0, 1:]
+        coefficients[rows, :, 1] *= flip[1]
     good = kinds != ""
     photo_from_measured = plane.PlaneTransform(coefficients[good])
-    return _described(marks.take(good), tuple(kinds[good].tolist()), photo_from_measured, mirrored[good]), faults
+    return _described(marks.take(good), tuple(kinds[good].tolist()), photo_from_measured), faults
 
 
 def _kinds(marks: Marks, kind: str) -> tuple[NDArray[np.str_], list[Fault]]:
@@ -104,9 +102,7 @@ def _weak(kind: str, marks: Marks) -> Flags:
     return weak
 
 
-def _described(
-    marks: Marks, kinds: tuple[str, ...], photo_from_measured: plane.PlaneTransform, mirrored: Flags
-) -> InteriorOrientation:
+def _described(marks: Marks, kinds: tuple[str, ...], photo_from_measured: plane.PlaneTransform) -> InteriorOrientation:
     """Residuals, precision and shape of fitted transformations."""
     used = marks.weights > 0
     residuals = photo_from_measured.residuals(marks.measured, marks.calibrated)
@@ -127,7 +123,7 @@ def _described(
         scale_y=linear.scale_y,
         rotation=linear.rotation,
         shear=linear.shear,
-        mirrored=mirrored,
+        mirrored=np.full(len(marks.photos), marks.mirrored),
     )
 
 

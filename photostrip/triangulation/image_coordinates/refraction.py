@@ -30,7 +30,8 @@ def refraction_constant(flying_height: float, ground_height: float) -> float:
     _require_above(flying_height, ground_height, "refraction")
     camera, ground = flying_height / 1000, ground_height / 1000
     fall = _pressure(ground) - _pressure(camera)
-    return REFRACTIVITY * (SCALE_HEIGHT * fall / (camera - ground) - _density(camera))
+    density = _pressure(camera) / (1 - LAPSE * min(camera, TROPOPAUSE))  # over that at sea level
+    return REFRACTIVITY * (SCALE_HEIGHT * fall / (camera - ground) - density)
 
 
 def curvature_constant(flying_height: float, ground_height: float, radius: float) -> float:
@@ -58,8 +59,3 @@ def _pressure(height_km: float) -> float:
     if height_km <= TROPOPAUSE:
         return float((1 - LAPSE * height_km) ** EXPONENT)
     return _pressure(TROPOPAUSE) * float(np.exp((TROPOPAUSE - height_km) / STRATOSPHERE_SCALE))
-
-
-def _density(height_km: float) -> float:
-    """Density of the standard atmosphere relative to sea level: pressure over relative temperature."""
-    return _pressure(height_km) / (1 - LAPSE * min(height_km, TROPOPAUSE))

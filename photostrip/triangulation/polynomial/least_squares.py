@@ -126,20 +126,8 @@ class Design:
         estimate = self.effects(misclosure)
         residuals = np.where(self.rows, misclosure + self.columns @ estimate, 0.0)
         redundancy = int(self.rows.sum()) - len(self.terms)
-        if not self.terms:
-            return AxisFit(
-                terms=(),
-                coefficients=estimate,
-                sigmas=estimate,
-                effects=estimate,
-                residuals=residuals,
-                basis=self.basis,
-                sigma0=float("nan"),
-                redundancy=redundancy,
-                condition=float("nan"),
-            )
         squares = float(((residuals * self.root) ** 2).sum())
-        sigma0 = float(np.sqrt(squares / redundancy)) if redundancy > 0 else float("nan")
+        sigma0 = float(np.sqrt(squares / redundancy)) if self.terms and redundancy > 0 else float("nan")
         return AxisFit(
             terms=self.terms,
             coefficients=estimate / self.scales,

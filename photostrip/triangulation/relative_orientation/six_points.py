@@ -1,4 +1,4 @@
-"""Six standard points: relative orientation in closed form to the first order, its precision, the dependent pair.
+"""Six standard points: relative orientation in closed form to the first order and its precision.
 
 The points, in the left photo: 1 (0, 0), 2 (b, 0), 3 (0, a), 4 (b, a), 5 (0, -a), 6 (b, -a) with the photo base b.
 Elements are those of ``relative``: alpha1', kappa1', alpha2', omega2', kappa2'.
@@ -12,8 +12,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-
-from photostrip.geometry.rotation import alpha_omega_kappa, from_alpha_omega_kappa
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -71,24 +69,3 @@ def dependent_from_base(base: float) -> Floats:
     matrix[2, [1, 4]] = matrix[3, [0, 2]] = -1.0, 1.0
     matrix[4, 3] = 1.0
     return matrix
-
-
-def dependent_pair(elements: ArrayLike) -> tuple[Floats, Floats]:
-    """Direction of the base and rotation of the right photo in the left photo's frame, from base-frame elements; exact.
-
-    by/bx and bz/bx are ratios of the components of the direction; dalpha, domega, dkappa are angles of the rotation.
-    """
-    al1, ka1, al2, om2, ka2 = np.moveaxis(np.asarray(elements, float), -1, 0)
-    left = from_alpha_omega_kappa(al1, 0.0, ka1)
-    return left[..., 0, :], np.swapaxes(left, -1, -2) @ from_alpha_omega_kappa(al2, om2, ka2)
-
-
-def base_elements(direction: ArrayLike, rotation: ArrayLike) -> Floats:
-    """Base-frame elements, shape (..., 5), radians, of a dependent pair; the inverse of ``dependent_pair``.
-
-    The base `direction`, shape (..., 3), may have any length; it must not be parallel to the left principal ray.
-    """
-    x, y, z = np.moveaxis(np.asarray(direction, float), -1, 0)
-    al1, ka1 = -np.arctan2(z, np.hypot(x, y)), -np.arctan2(y, x)
-    right = from_alpha_omega_kappa(al1, 0.0, ka1) @ np.asarray(rotation, float)
-    return np.stack([al1, ka1, *alpha_omega_kappa(right)], axis=-1)

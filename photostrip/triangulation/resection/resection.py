@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,7 +34,7 @@ class Resection:
 
 
 def with_residuals(
-    xy: Floats, points: Floats, photo: Numbers, focal: float, centers: Floats, rotations: Floats
+    xy: Floats, points: Floats, photo: Numbers, focal: Floats, centers: Floats, rotations: Floats
 ) -> Resection:
     """Image residuals of photos whose orientation is known already, as a resection.
 
@@ -42,7 +42,7 @@ def with_residuals(
     centers, rotations: (n, 3), (n, 3, 3), perspective centres, and photo to the frame of the points.
     """
     count = len(centers)
-    residuals = xy - project(points, centers, rotations, photo, np.full(count, focal))
+    residuals = xy - project(points, centers, rotations, photo, focal)
     squares = np.bincount(photo, (residuals**2).sum(axis=1), count)
     rms = np.sqrt(squares / np.maximum(2 * np.bincount(photo, minlength=count), 1))
     return Resection(centers, rotations, residuals, rms, np.ones(count, bool))
@@ -78,10 +78,7 @@ def resect(xy: Floats, points: Floats, photo: Numbers, focal: Floats, start: tup
         np.where(solved[:, None], centers, start[0]),
         np.where(solved[:, None, None], rotations, start[1]),
     )
-    residuals = xy - project(points, centers, rotations, photo, focal)
-    squares = np.bincount(photo, (residuals**2).sum(axis=1), len(centers))
-    rms = np.sqrt(squares / np.maximum(2 * counts, 1))
-    return Resection(centers, rotations, residuals, rms, solved)
+    return replace(with_residuals(xy, points, photo, focal, centers, rotations), solved=solved)
 
 
 def _steps(

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from photostrip.errors import GeometryError, InputError
-from photostrip.geometry.rotation import angle_between, from_vector
+from photostrip.geometry.rotation import from_vector
 from photostrip.simulate import Control as SimulatedControl
 from photostrip.simulate import Flight, Image, Points, Spec, simulate
 from photostrip.triangulation.bundle.observations.problem import (
@@ -25,6 +25,7 @@ from photostrip.triangulation.bundle.observations.problem import (
 )
 from photostrip.triangulation.bundle.solution import IterationStep
 from photostrip.triangulation.bundle.solve import _still_to_come, solve
+from tests.attitudes import angle_between
 from tests.simulated_bundle import problem_of, truth_of
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from photostrip.geometry.rotation import alpha_omega_kappa
+from photostrip.geometry.rotation import alpha_omega_kappa, from_alpha_omega_kappa
 from photostrip.triangulation.relative_orientation import six_points
 from photostrip.triangulation.relative_orientation.solution import solve_elements
 from tests.loops import nonempty
@@ -17,7 +17,7 @@ from tests.strips import attitude, batch
 from tests.vectors import cases, section
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from tests.vectors import Vector
 
@@ -37,6 +37,27 @@ def design(left: Floats, focal: float, base: float) -> Floats:
     """Derivatives of the y parallaxes at zero elements, written down from the condition."""
     (x1, y), x2 = left.T, left[:, 0] - base
     return np.column_stack([x1 * y / focal, x1, -x2 * y / focal, -(focal + y**2 / focal), -x2])
+
+
+def dependent_pair(elements: ArrayLike) -> tuple[Floats, Floats]:
+    """Direction of the base and rotation of the right photo in the left photo's frame, from base-frame elements; exact.
+
+    by/bx and bz/bx are ratios of the components of the direction; dalpha, domega, dkappa are angles of the rotation.
+    """
+    al1, ka1, al2, om2, ka2 = np.moveaxis(np.asarray(elements, float), -1, 0)
+    left = from_alpha_omega_kappa(al1, 0.0, ka1)
+    return left[..., 0, :], np.swapaxes(left, -1, -2) @ from_alpha_omega_kappa(al2, om2, ka2)
+
+
+def base_elements(direction: ArrayLike, rotation: ArrayLike) -> Floats:
+    """Base-frame elements, shape (..., 5), radians, of a dependent pair; the inverse of ``dependent_pair``.
+
+    The base `direction`, shape (..., 3), may have any length; it must not be parallel to the left principal ray.
+    """
+    x, y, z = np.moveaxis(np.asarray(direction, float), -1, 0)
+    al1, ka1 = -np.arctan2(z, np.hypot(x, y)), -np.arctan2(y, x)
+    right = from_alpha_omega_kappa(al1, 0.0, ka1) @ np.asarray(rotation, float)
+    return np.stack([al1, ka1, *np.moveaxis(alpha_omega_kappa(right), -1, 0)], axis=-1)
 
 
 @pytest.mark.parametrize("example", cases("gruber_six_points"))
@@ -72,7 +93,7 @@ def test_the_examples_of_the_formula_book(example: Vector) -> None:
 def test_the_dependent_pair_of_the_formula_book(example: Vector) -> None:
     names = ("alpha1p", "kappa1p", "alpha2p", "omega2p", "kappa2p")
     elements = np.radians([example.input[f"{name}_deg"] for name in names])
-    direction, rotation = six_points.dependent_pair(elements)
+    direction, rotation = dependent_pair(elements)
     expected, tol = example.expected["dependent_pair"], example.tol["abs"]
     assert direction[1] / direction[0] == pytest.approx(expected["by_over_bx"], abs=tol)
     assert direction[2] / direction[0] == pytest.approx(expected["bz_over_bx"], abs=tol)
@@ -80,7 +101,7 @@ def test_the_dependent_pair_of_the_formula_book(example: Vector) -> None:
     assert np.allclose(degrees, expected["alpha_omega_kappa_right_deg"], rtol=0, atol=tol)
     ratios = [1.0, expected["by_over_bx"], expected["bz_over_bx"]]
     given_rotation = attitude(expected["alpha_omega_kappa_right_deg"])[0]
-    assert np.allclose(six_points.base_elements(ratios, given_rotation), elements, rtol=0, atol=tol)
+    assert np.allclose(base_elements(ratios, given_rotation), elements, rtol=0, atol=tol)
 
 
 def test_all_examples_are_here() -> None:
@@ -141,8 +162,8 @@ def test_the_rigorous_solution_is_close(elements: tuple[float, ...]) -> None:
 
 @given(st.tuples(TILTS, KAPPAS, TILTS, TILTS, KAPPAS))
 def test_the_dependent_pair_leads_back(elements: tuple[float, ...]) -> None:
-    direction, rotation = six_points.dependent_pair(elements)
-    again = six_points.base_elements(direction * 7.0, rotation)
+    direction, rotation = dependent_pair(elements)
+    again = base_elements(direction * 7.0, rotation)
     difference = (again - elements + np.pi) % (2 * np.pi) - np.pi
     assert np.abs(difference).max() < 1e-13
     assert np.linalg.norm(direction) == pytest.approx(1, abs=1e-15)
@@ -154,7 +175,7 @@ def test_to_the_first_order_the_dependent_pair_is_linear() -> None:
     for number in range(5):
         elements = np.zeros(5)
         elements[number] = step
-        direction, rotation = six_points.dependent_pair(elements)
+        direction, rotation = dependent_pair(elements)
         dalpha, domega, dkappa = alpha_omega_kappa(rotation)
         found = [b * direction[1] / direction[0], b * direction[2] / direction[0], dkappa, dalpha, domega]
         assert np.allclose(found, t[:, number] * step, rtol=0, atol=1e-7 * step * b)
@@ -162,7 +183,7 @@ def test_to_the_first_order_the_dependent_pair_is_linear() -> None:
 
 def test_many_pairs_at_once() -> None:
     elements = np.random.default_rng(1).uniform(-0.3, 0.3, (4, 3, 5))
-    direction, rotation = six_points.dependent_pair(elements)
+    direction, rotation = dependent_pair(elements)
     assert direction.shape == (4, 3, 3)
     assert rotation.shape == (4, 3, 3, 3)
-    assert np.allclose(six_points.base_elements(direction, rotation), elements, rtol=0, atol=1e-14)
+    assert np.allclose(base_elements(direction, rotation), elements, rtol=0, atol=1e-14)
