@@ -43,7 +43,7 @@ def ground_from_photo(alpha: ArrayLike, omega: ArrayLike = 0.0, kappa: ArrayLike
 
 
 def angles_of(rotation: ArrayLike) -> Floats:
-    """Azimuth, elevation, roll (..., 3) of a camera not looking straight up or down; inverse of ``ground_from_photo``."""
+    """Azimuth, elevation, roll (..., 3), not straight up or down; the inverse of ``ground_from_photo``."""
     return alpha_omega_kappa(GROUND_FROM_HOUSE.T @ np.asarray(rotation, float))
 
 
