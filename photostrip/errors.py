@@ -6,9 +6,7 @@ The tree::
     ├── InputError                 exit  2  wrong usage, project file or data; carries every fault found
     └── GeometryError              exit  3  too weak, singular or not converging; names photos and points
 
-A ``Fault`` says what is wrong, where, what was expected and what would fix it. Readers collect
-faults and raise one ``InputError`` for all of them; mathematics raises ``GeometryError``
-with the ids of the photos and points concerned.
+Readers collect faults and raise one ``InputError`` for all of them; mathematics raises ``GeometryError``.
 """
 
 from __future__ import annotations

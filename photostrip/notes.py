@@ -1,8 +1,4 @@
-"""What a run has to say beside its numbers: warnings and remarks, each with a stable code.
-
-A ``Note`` says what was noticed. A ``Finding`` says that the data themselves seem to be wrong, with the
-numbers that say so.
-"""
+"""What a run has to say beside its numbers: warnings and remarks, each with a stable code."""
 
 from __future__ import annotations
 

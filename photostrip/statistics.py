@@ -1,7 +1,4 @@
-"""Quantiles and critical values of the tests, and nothing else.
-
-The distribution functions themselves are in ``distributions``.
-"""
+"""Quantiles and critical values of the tests."""
 
 from __future__ import annotations
 

@@ -29,11 +29,7 @@ _GRIDS = re.compile(r"(\b(?:geoid|nad)grids=)(\S+)")
 
 @dataclass(frozen=True, eq=False)
 class CrsParts:
-    """What the text of a CRS turned out to be made of.
-
-    `plane` is the horizontal part (with its towgs84 or nadgrids when it has them), `core` the same without; `vertical`
-    says what the heights refer to when the CRS brings heights above a geoid.
-    """
+    """What the text of a CRS is made of."""
 
     kind: Kind
     title: str
@@ -41,9 +37,9 @@ class CrsParts:
     units: tuple[str, str] = ("metre", "metre")
     factors: tuple[float, float] = (1.0, 1.0)
     whole: CRS | None = None
-    plane: CRS | None = None
-    core: CRS | None = None
-    vertical: str = ""
+    plane: CRS | None = None  # the horizontal part, with its towgs84 or nadgrids when it has them
+    core: CRS | None = None  # the same without
+    vertical: str = ""  # what heights above a geoid refer to
     three_dimensional: bool = False
 
     @cached_property

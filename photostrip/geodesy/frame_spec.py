@@ -74,11 +74,7 @@ class Refusal(Exception):  # noqa: N818 (not an error of its own: it carries one
 
 
 def contradictions(spec: FrameSpec, kind: Kind, vertical: str, *, three_dimensional: bool) -> Iterator[Refusal]:
-    """Find what does not fit together in the description of one frame.
-
-    vertical: what the heights of the CRS refer to when it says so (a vertical datum, a geoid grid); empty otherwise.
-    three_dimensional: whether the CRS has ellipsoidal heights of its own.
-    """
+    """Find what does not fit together in the description of one frame; the rest as in ``CrsParts``."""
     yield from _axes(spec, kind)
     yield from _curvature(spec, kind)
     yield from _ellipsoid(spec)

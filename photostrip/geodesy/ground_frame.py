@@ -43,11 +43,7 @@ _CENTRE = 0.1  # of the radius: nearer to the centre of the body, latitude means
 
 @dataclass(frozen=True, eq=False)
 class GroundFrame:
-    """One frame of ground coordinates, tied to the project's Cartesian frame.
-
-    Made by ``tie_frames``. All arrays of ground coordinates are in the internal order east, north, up
-    (longitude, latitude, height; X, Y, Z) and in the CRS's own units.
-    """
+    """One frame of ground coordinates, in the CRS's own units; made by ``tie_frames``."""
 
     spec: FrameSpec
     kind: Kind  # ``projected``, ``geographic``, ``geocentric`` or ``local``
@@ -85,23 +81,17 @@ class GroundFrame:
         return np.asarray(columns, dtype=np.float64)[..., list(self.order)]
 
     def with_origin(self, origin: ArrayLike) -> GroundFrame:
-        """Set the point of tangency of the curvature correction: east and north of the control's centre of gravity.
-
-        A frame without the correction stays what it is. Give every frame of a project the same origin.
-        """
+        """Set the point of tangency of the curvature correction, east and north: one for all frames of a project."""
         if self.spec.curvature_radius is None:
             return self
         east, north = np.asarray(origin, dtype=np.float64)[:2]
         return replace(self, origin=(float(east), float(north)))
-
-    # ---------------------------------------------------------------- points
 
     def cartesian_from_ground(self, enu: ArrayLike, *, ids: Sequence[str] | None = None) -> Floats:
         """Cartesian coordinates (n, 3), metres, of ground points (n, 3) in the CRS's own units.
 
         They are geocentric; in a local world they are east, north, up in metres above the tangent plane.
 
-        ids: ids of the points, for messages; without them rows are named, counted from 0.
         Raises InputError if a coordinate is not a number, lies outside the domain of the projection or outside a grid.
 
         Source: [001] eq. 153 for a local frame with a radius.
@@ -124,7 +114,6 @@ class GroundFrame:
 
         Longitudes are in (-180, 180] degrees.
 
-        ids: ids of the points, for messages; without them rows are named, counted from 0.
         Raises GeometryError if a point lies where the projection or a grid does not reach.
 
         Source: [001] eq. 152, 153.
@@ -164,8 +153,6 @@ class GroundFrame:
             geodetic = self._shift.inverse(geodetic)
             require_reached(finite_rows(geodetic), f"no datum shift is known there to {self.spec.name}", None)
         return geodetic
-
-    # ------------------------------------------------------------ directions
 
     def axes_at(self, xyz: ArrayLike) -> Floats:
         """Directions (n, 3, 3) of the ground axes at Cartesian points; rows are unit vectors in the Cartesian frame.
@@ -256,8 +243,6 @@ class GroundFrame:
         if self._shift is not None and self.datum_accuracy != 0.0:
             text += f"; datum shift: {self.datum_shift}"
         return text
-
-    # ------------------------------------------------------------- the steps
 
     def _bent(self, points: Floats, sign: float) -> Floats:
         """Heights of a local frame from (+1) or to (-1) the tangent plane, where a radius is given."""

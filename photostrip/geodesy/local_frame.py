@@ -141,11 +141,10 @@ class IntermediateFrame:
 
     @classmethod
     def at_centre(cls, cartesian_control: ArrayLike, lat: float, lon: float, azimuth: float) -> Self:
-        """Frame at the middle of control points on an ellipsoid.
+        """Frame at the middle of control points on an ellipsoid, given by geocentric coordinates (n, 3).
 
-        The mean of their geocentric coordinates (n, 3) is the origin, which lies below the surface by the mean sagitta
-        of the network, a few metres for 20 km; that does no harm. The mean latitude and longitude (``mean_position``)
-        give only the directions, `azimuth` that of the X axis.
+        The origin lies below the surface by the mean sagitta of the network, a few metres for 20 km; that does no harm.
+        The mean latitude and longitude (``mean_position``) give only the directions.
 
         Source: [001] eq. 142, 143.
         """

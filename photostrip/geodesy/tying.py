@@ -37,12 +37,10 @@ def tie_frames(
 ) -> tuple[list[GroundFrame], GroundFrame]:
     """Tie the frames of all control lists and of the output to one Cartesian frame.
 
-    specs: frame of each control list.
-    output: frame of the results; None: that of the first control list.
+    specs, output: frame of each control list, and of the results; None: that of the first control list.
     directory: where grid files named in PROJ strings are looked for first: the project file's directory.
-    keys: key of each frame in the project file; without it they are those of the control lists.
-    Returns the control lists' frames, in their order, and the output's. The Cartesian frame is the geocentric one of
-        the output's datum, or the local frame.
+    keys: key of each frame in the project file.
+    Returns the control lists' frames, in their order, and the output's.
     Raises InputError with every fault of every frame: unknown or unsuitable CRS, contradictory heights, missing geoid
         grid, no sound operation between two datums, local and geodetic frames in one project.
     """
@@ -144,9 +142,6 @@ def _frame(
         _shift=shift,
         _cartesian=cartesian,
     )
-
-
-# -------------------------------------------------------------------------------- datums and geoids
 
 
 def _same_datum(one: CrsParts, other: CrsParts) -> bool:

@@ -32,7 +32,7 @@ def _block(strip: StripResult, found: CovarianceAdjustment) -> Document:
     block = {
         "strip": strip.strip.id,
         "models": len(strip.of_photos.formed.scale),
-        "passes": found.passes,
+        "passes": found.formations,
         "control_coordinates": len(found.control.point),
         "distances": tested.distances,
         "squares": tested.squares,

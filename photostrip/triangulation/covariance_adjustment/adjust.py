@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from photostrip.triangulation.strip_formation.strip import FormedStrip
 
 
-MOST_PASSES = 10
+MOST_FORMATIONS = 10
 FRESH = 0.05  # radians that a strip may turn before its derivatives are made afresh
 ENOUGH = 0.1  # of the angle that an image coordinate's standard deviation spans: what squares of turns may leave
 
@@ -45,7 +45,7 @@ class CovarianceAdjustment:
     basis: str  # where it comes from
     sigma: float  # standard deviation of an image coordinate of weight one, mm
     system: strip_system.System  # the solved system, with the rows of the strip and the conditions
-    passes: int  # how often the strip was formed
+    formations: int  # how often the strip was formed
 
     def by_control(self, points: Numbers, coordinates: Numbers) -> Floats:
         """Return what errors of control coordinates subtract from points.
@@ -77,18 +77,15 @@ class StripOnControl:
 
 
 def adjust(start: StripOnControl, settings: strip_conditions.CovarianceSettings) -> CovarianceAdjustment:
-    """Adjust a strip with its own covariance.
-
-    settings: which misclosures are distributed.
-    """
+    """Adjust a strip with its own covariance."""
     factor, basis = image_variance(start.orientation, start.sigma)
     run = _Adjustment(start, settings, factor)
-    one, passes = run.first(), 1
+    one, formations = run.first(), 1
     turn = rate = relinearisation.largest_turn(one.system)
-    while passes < MOST_PASSES and turn * rate / 2 > ENOUGH * start.sigma / start.focal:
+    while formations < MOST_FORMATIONS and turn * rate / 2 > ENOUGH * start.sigma / start.focal:
         one, fresh = run.next(one, fresh=turn > FRESH), turn > FRESH
         turn = relinearisation.largest_turn(one.system)
-        passes, rate = passes + 1, turn if fresh else rate
+        formations, rate = formations + 1, turn if fresh else rate
     errors = one.system.errors
     tables = [errors.points, prediction.photo_rows(errors)]
     (points, photos), cofactors = prediction.predict(one.system, tables)
@@ -107,7 +104,7 @@ def adjust(start: StripOnControl, settings: strip_conditions.CovarianceSettings)
         basis=basis,
         sigma=start.sigma * float(np.sqrt(factor)),
         system=one.system,
-        passes=passes,
+        formations=formations,
     )
 
 
@@ -147,9 +144,9 @@ class _Adjustment:
         """
         start, targets, rows = self.start, self.start.targets, self.start.control_rows
         images = relinearisation.image_errors(before.system)
-        seen = before.system.errors.images
+        measured = before.system.errors.images
         xy = start.observations.xy.copy()
-        xy[seen.row] -= images * seen.sigma
+        xy[measured.row] -= images * measured.sigma
         orientation = relinearisation.oriented_again(before.orientation, xy)
         observations = replace(start.observations, xy=xy)
         formed = relinearisation.formed_again(before.formed, orientation, observations, start.photos)

@@ -78,15 +78,11 @@ class Conditions:
         """Put conditions together, model by model."""
         rows = ErrorRows.joined([part.rows for part in parts])
         order = np.argsort(rows.first, kind="stable")
-        return cls(
-            rows=rows.take(order),
-            following=np.concatenate([part.following for part in parts])[order],
-            value=np.concatenate([part.value for part in parts])[order],
-            noise=np.concatenate([part.noise for part in parts])[order],
-            kind=np.concatenate([part.kind for part in parts])[order],
-            source=np.concatenate([part.source for part in parts])[order],
-            local=parts[0].local,
-        )
+        columns = {
+            name: np.concatenate([getattr(part, name) for part in parts])[order]
+            for name in ("following", "value", "noise", "kind", "source")
+        }
+        return cls(rows=rows.take(order), local=parts[0].local, **columns)
 
     def of_control(self, coordinates: Numbers) -> Numbers:
         """Conditions of control coordinates, given by their rows in the misclosures."""
@@ -105,12 +101,7 @@ def conditions(
     *,
     distances: bool = True,
 ) -> Conditions:
-    """Collect all conditions of a strip.
-
-    control: control coordinates that count.
-    misclosures: (w,), strip minus given there, metres.
-    distances: whether distances of pass points from the common centres count.
-    """
+    """Collect all conditions of a strip; `misclosures` (w,) is strip minus given of the control coordinates, metres."""
     local = LocalSimilarities.of(errors)
     parts = [_junctions(errors, local), _control(control, misclosures, local)]
     if distances:

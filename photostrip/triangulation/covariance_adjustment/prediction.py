@@ -1,8 +1,4 @@
-"""The strip adjusted with its own covariance: misclosures go to every point by least-squares prediction.
-
-No polynomial is chosen. The similarities of all models are unknowns; the steps between them, the control and the
-distances of the pass points from the common centres are conditions, whose covariances are exact products of their rows
-by the image coordinates. Written model by model the system is banded and its cost grows with the length of the strip.
+"""Points, photos and tests read from the solved system by least-squares prediction.
 
 Source: derived; see docs/precision.md, eq. 7.
 """
@@ -83,9 +79,6 @@ class AdjustmentTest:
         return beyond[np.argsort(-np.abs(self.normalised[beyond]), kind="stable")]
 
 
-# ----------------------------------------------------------------------------------------------------- prediction
-
-
 def predict(found: System, tables: Sequence[ErrorRows]) -> tuple[list[Predicted], Floats]:
     """Predict the errors of points and photos, and say how well they are known.
 
@@ -104,25 +97,25 @@ def predict(found: System, tables: Sequence[ErrorRows]) -> tuple[list[Predicted]
     zero = np.zeros((layout.height, layout.height))
     none = InverseRow(zero, zero, zero)
 
-    def visit(number: int, before: InverseRow, own: InverseRow, after: InverseRow) -> None:
+    def visit(number: int, before: InverseRow, middle: InverseRow, after: InverseRow) -> None:
         around = np.block(
             [
                 [before.diagonal, before.following, before.after],
-                [before.following.T, own.diagonal, own.following],
-                [before.after.T, own.following.T, after.diagonal],
+                [before.following.T, middle.diagonal, middle.following],
+                [before.after.T, middle.following.T, after.diagonal],
             ]
         )
         for each, result in zip(columns, predicted, strict=True):
             each.predict(number, around, result)
 
-    own = after = none
+    middle = after = none
     for number, before in found.factors.inverse():
         position = layout.position[ends[number] : ends[number + 1]]
         cofactors[ends[number] : ends[number + 1]] = before.diagonal[position, position]
         if number + 1 < layout.blocks:
-            visit(number + 1, before, own, after)
-        own, after = before, own
-    visit(0, none, own, after)
+            visit(number + 1, before, middle, after)
+        middle, after = before, middle
+    visit(0, none, middle, after)
     for each, result, order in zip(columns, predicted, orders, strict=True):
         formed = local_covariances(found.errors, each.rows, images_with_components(found.errors, each.rows))
         back = np.argsort(order, kind="stable")

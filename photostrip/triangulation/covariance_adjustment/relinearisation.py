@@ -71,9 +71,6 @@ def largest_turn(found: System) -> float:
     return float(np.sqrt(np.square(unknowns).sum(axis=1).max()))
 
 
-# --------------------------------------------------------------------------------------------- the strip formed again
-
-
 def oriented_again(orientation: Orientation, xy: Floats) -> Orientation:
     """Orient the pairs of a strip on other image coordinates (k, 2), starting at the elements they have.
 

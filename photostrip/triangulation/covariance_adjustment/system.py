@@ -100,9 +100,6 @@ def same_images(a: ErrorRows, b: ErrorRows) -> SameImages:
     return SameImages(a.item[of_a], b.item[of_b], a.by_image[of_a] @ b.by_image[of_b].transpose(0, 2, 1))
 
 
-# --------------------------------------------------------------------------------------------------------- layout
-
-
 @dataclass(frozen=True, eq=False)
 class SystemLayout:
     """Where conditions and unknowns stand."""

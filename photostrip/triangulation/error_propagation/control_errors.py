@@ -88,7 +88,6 @@ def fit_operator(
     weight: (c, 3), weights of the control coordinates in the fit, as ``absolute_orientation.weights`` gives them.
     xyz: (c, 3), control points after the similarity, intermediate frame, metres.
     terms: terms of the polynomials of X, Y, Z; all empty without.
-    origin: (3,), origin of the similarities.
     """
     design, share = found.rows.by_similarity[:, 0], np.sqrt(weight[found.point, found.axis])
     size = np.abs(design).max(axis=0)

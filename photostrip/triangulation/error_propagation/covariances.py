@@ -192,9 +192,6 @@ def _times_covariances(errors: StripErrors, by_component: Floats) -> Floats:
     return result
 
 
-# ---------------------------------------------------------------------------------------------------- covariances
-
-
 def covariances(errors: StripErrors, rows: ErrorRows, fit: ParameterCovariances, influence: Floats) -> Floats:
     """Covariances (n, d, d) of corrected points or photos, for a variance factor of 1 of the image coordinates.
 

@@ -1,8 +1,5 @@
 """Errors inside pairs: what errors of the image coordinates do to the elements, the base and the points of a model.
 
-All pairs of a strip go in one batch of flat columns. Derivatives are those of the operations as they run: the weighted
-least squares of the y parallaxes (``relative``) and the intersection with the mean Y of both rays (``intersection``).
-
 Source: derived, docs/precision.md, eq. 1; [001] eq. 126-138 for the operations.
 """
 

@@ -7,9 +7,7 @@ The order of the corrections, from the image to the ideal, is that in which ligh
 3. atmospheric ``refraction``;
 4. Earth curvature, only where the ground frame does not carry it and it is asked for in image space.
 
-Film deformation is taken out before, by the interior orientation. Earth curvature is no error of an image: the ground
-frames carry it, unless plane map coordinates of an unknown projection are given as Cartesian ones. ``distort`` goes
-the other way and is the exact inverse.
+Film deformation is corrected before, by the interior orientation. ``distort`` goes the other way.
 """
 
 from __future__ import annotations

@@ -119,9 +119,8 @@ def enough(marks: Marks, kind: str) -> tuple[Marks, list[Fault]]:
 def right_pattern(marks: Marks) -> tuple[Marks, list[Fault]]:
     """Find the hand of the measured system, and the photos whose marks are not where their numbers say.
 
-    The hand is that of most photos of the camera. A photo of the other hand is refused: when only that photo was
-    scanned from the other side its points need no repair, but when two of its marks are exchanged they come out
-    mirrored, and the residuals are equally small in both cases.
+    The hand is that of most photos of the camera. A photo of the other hand is refused: it may have been scanned from
+    the other side or have two marks exchanged, and the residuals are equally small in both cases.
 
     Returns the marks of the photos in which they lie as calibrated, at least two on each, and one fault for each of the
     other photos, with the mark that seems wrongly numbered.

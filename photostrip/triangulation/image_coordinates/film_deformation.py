@@ -34,10 +34,7 @@ class Deformation:
 
     @classmethod
     def from_residuals(cls, calibrated: Sequence[Floats], residuals: Sequence[Floats]) -> Deformation:
-        """Take the residuals of the marks of each photo, transformed minus calibrated (m, 2), for deformation.
-
-        There is none for photos of fewer than four marks or with all of them on one line.
-        """
+        """Interpret the residuals of the marks of each photo, transformed minus calibrated (m, 2), as deformation."""
         usable = [_spread(each) for each in calibrated]
         none = np.zeros((0, 2))
         nodes = [c + r if s else none for c, r, s in zip(calibrated, residuals, usable, strict=True)]

@@ -1,9 +1,6 @@
 """Interior orientation: from measured fiducial marks to photo coordinates.
 
-The marks of a photo are measured in the system of a comparator or scanner, together with the points. A plane
-transformation takes them to their calibrated coordinates, and all points of that photo with them. Residuals cannot
-show everything that goes wrong here, so the pattern of the marks is looked at first: see
-``fiducial_marks``.
+A plane transformation takes the marks of a photo to their calibrated coordinates, and all its points with them.
 """
 
 from __future__ import annotations
@@ -54,9 +51,7 @@ def orient(fiducials: PhotoPoints, cameras: Mapping[str, Camera], settings: Inte
     cameras: camera of each photo of the project. Photos of cameras without fiducial marks are left as they are.
     Returns transformations in the order of `cameras`. Photos that were scanned turned or, all of one camera alike,
         mirrored are put right by the transformation, and a note says so.
-    Raises InputError with one fault for each photo that has no marks, too few, marks that its camera does not have, one
-        mark twice, marks on one line, or marks that do not form the pattern of the camera: then the mark that seems
-        wrongly numbered is named. One photo mirrored against the others of its camera is such a case.
+    Raises InputError with one fault for each photo whose marks do not determine its transformation.
     """
     faults: list[Fault] = []
     notes: list[Note] = []

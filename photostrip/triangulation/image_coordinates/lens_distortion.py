@@ -1,7 +1,7 @@
 """Lens distortion, in both directions of definition, and its inverse.
 
-A calibration gives a shift D of image points, as a function of the image point or of the ideal one: the contract of
-the project file names the direction, and the other direction is found here by iteration. Both models have the form
+A calibration gives a shift D of image points, as a function of the image point or of the ideal one; the other
+direction is found by iteration. Both models have the form
 ``D = X g(r) + decentering``, X reduced to the principal point.
 
 Between the radii of a table stands a cubic spline made for what is tabulated: distortion is an odd function of the

@@ -1,11 +1,4 @@
-"""Strip polynomials: the deformation that a similarity leaves, taken out axis by axis.
-
-Every axis of the intermediate frame, X along the strip, gets its own polynomial in X and Y. How many terms the control
-can carry is decided by where it stands (``terms``), how many it should carry by evidence
-(``degree``).
-
-Source: [001] eq. 150-151, the free term of 151 corrected to X - X'.
-"""
+"""Strip polynomials: the deformation that a similarity leaves, corrected axis by axis."""
 
 from __future__ import annotations
 

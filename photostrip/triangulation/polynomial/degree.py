@@ -68,9 +68,7 @@ def decide(
     """Go up the degrees of plan or height: each step must be asked for by its F test and not spoil left-out points.
 
     part: name and axes of the part, one of ``GROUPS``.
-    asked: degree, or ``"auto"``.
-    fits_of: fits of all axes with given terms, remembered.
-    Returns evidence: every degree that was weighed, ascending.
+    Returns the terms, and every degree that was weighed, ascending.
     """
     group, axes = part
     every = _candidates(problem, axes[0], asked)

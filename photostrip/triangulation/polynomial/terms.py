@@ -68,9 +68,7 @@ def choose_terms(xyz: Floats, degree: int, sizes: Sizes, *, forced: bool = False
     """Terms that given control points (n, 3) can carry, up to a degree; none when the control carries none.
 
     Six points are necessary for six terms, not sufficient: [001] after eq. 151 says six, a cubic needs four stations.
-
-    sizes: sizes that make the columns comparable.
-    forced: whether a fit without redundancy is allowed.
+    `forced` allows a fit without redundancy.
     """
     stations = count_stations(xyz[:, 0], sizes.spacing)
     terms = ladder(stations, len(xyz) if forced else len(xyz) - 1, degree)

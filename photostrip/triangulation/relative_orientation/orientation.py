@@ -120,31 +120,20 @@ def _put(values: NDArray[Any], rows: Numbers, fresh: NDArray[Any]) -> NDArray[An
 
 
 def orient_pairs(pairs: Pairs, photos: Sequence[str]) -> Orientation:
-    """Relative orientation of all pairs, refusing those that cannot be oriented.
-
-    photos: photos of the strip, to name a pair that is refused.
-    Raises GeometryError for the first pair that is degenerate, does not converge, or lies behind its cameras.
-    """
+    """Relative orientation of all pairs, refusing those that cannot be oriented."""
     result, converged = orient_unchecked(pairs)
     refuse_unusable(result, converged, photos)
     return result
 
 
 def orient_unchecked(pairs: Pairs) -> tuple[Orientation, Flags]:
-    """Relative orientation of all pairs, whatever comes of it, and whether the iteration of each converged.
-
-    Gross errors may still be in it.
-    """
+    """Relative orientation of all pairs, whatever comes of it, and whether the iteration of each converged."""
     solved = solve_elements(pairs)
     return assess_pairs(solved.elements, pairs, solved.iterations), solved.converged
 
 
 def orient_again(orientation: Orientation, weight: Floats, numbers: Numbers) -> Orientation:
-    """Orient some pairs again with other weights, from their present elements.
-
-    weight: (m,), new weights of all rows.
-    numbers: pairs whose weights changed, ascending; the others stay as they are.
-    """
+    """Orient pairs whose weights changed, given by ascending numbers, again; `weight` (m,) is that of all rows."""
     pairs = replace(orientation.pairs, weight=weight)
     part = pairs.take(numbers)
     elements, converged, steps = iterate_elements(orientation.elements[numbers], part)
@@ -205,8 +194,7 @@ def condition_numbers(normal: Floats) -> Floats:
 def unusable_pairs(result: Orientation, converged: Flags, rays: tuple[Floats, Floats] | None = None) -> Flags:
     """Pairs that cannot be used as they are: degenerate, not converged, behind their cameras, or without a base.
 
-    converged: (p,), whether the iteration of each pair converged.
-    rays: (3, m), optional, rays of its points in the base frame, when they are known already.
+    rays: (3, m) each, optional, rays of their points in the base frame, when they are known already.
     """
     pairs = result.pairs
     left, right = base_rays(result.elements, pairs) if rays is None else rays

@@ -70,9 +70,7 @@ class Pairs:
 def collect_pairs(observations: PhotoPoints, photos: Sequence[str], focal: float) -> Pairs:
     """Points measured on neighbouring photos of a strip, as pairs.
 
-    observations: image points, reduced to the principal point.
     photos: photos of the strip in flight order; pair i is made of photos i and i+1.
-    focal: principal distance in mm.
     Returns measurements; weights are 1 where both sigmas are the strip's median.
     Raises GeometryError when a pair has fewer than five common points.
     """

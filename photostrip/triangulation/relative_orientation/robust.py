@@ -65,9 +65,8 @@ def solve(start: Floats, pairs: Pairs, sigma: Floats, *, near: bool = False) -> 
     start: (p, 5), elements to start from, radians.
     sigma: (p,), a-priori standard deviation of a y parallax of weight one, mm.
     near: whether the start agrees with most points already: absolute residuals are not minimised first.
-    Returns elements: (p, 5), elements in radians.
-    Returns scale: (p,), standard deviation of a y parallax of weight one from the median residual, mm; at least the one
-        given.
+    Returns elements, (p, 5), and scale, (p,): standard deviation of a y parallax of weight one from the median
+        residual, mm; at least the one given.
     """
     elements = start.copy()
     scale = sigma

@@ -134,7 +134,6 @@ def iterate_elements(
 ) -> Solved:
     """Gauss-Newton iteration of all pairs from given elements; converged pairs leave the batch.
 
-    elements: (p, 5), start values in radians.
     watch: called at every step with the numbers of the pairs that take part, their elements before it, their sums of
         weighted squares of the y parallaxes in mm^2, and what is added to the elements.
     """

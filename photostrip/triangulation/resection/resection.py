@@ -39,7 +39,6 @@ def with_residuals(
     """Image residuals of photos whose orientation is known already, as a resection.
 
     xy, points, photo: (m, 2), (m, 3), (m,), image coordinates in mm, their points, and the photo of each.
-    centers, rotations: (n, 3), (n, 3, 3), perspective centres, and photo to the frame of the points.
     """
     count = len(centers)
     residuals = xy - project(points, centers, rotations, photo, focal)

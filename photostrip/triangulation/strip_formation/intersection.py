@@ -30,7 +30,6 @@ def intersect(base: Floats, left: Floats, right: Floats, focal: float) -> Inters
 
     base: (3,) or (3, m), base components BX, BY, BZ; BX is the longest.
     left, right: (3, m), rays of the left and right photo, turned into the frame of the base, mm.
-    focal: principal distance in mm, the scale to which the rays are brought.
 
     Source: [001] eq. 137 (second line corrected to y2) and 138; [001] takes Y from the left ray, here it
     is the mean of both, which the theory of errors of [000] assumes too.

@@ -79,7 +79,6 @@ def transfer_scale(
     """Scale of every model from the one before it, through the pass points at their common photo.
 
     vectors: (m, 3), model points in the frame of the left photo, base length 1; NaN where there is none.
-    photos: photos of the strip, to name a broken junction.
     sigma: (p,), optional, standard deviation of a y parallax of weight one in each pair, mm; by default from the pairs'
         own residuals.
     doubtful: (m,), optional, rows that must not join models, unless a junction has no other.

@@ -82,10 +82,7 @@ def form_from_pairs(
 ) -> FormedStrip:
     """Form the strip from its oriented pairs, in the frame of the first photo.
 
-    orientation: oriented pairs in flight order.
-    sigma: (p,), optional, standard deviation of a y parallax of weight one in each pair, mm; by default from the pairs'
-        own residuals.
-    doubtful: (m,), optional, rows whose points are in doubt: they join models only where a junction has no other.
+    sigma, doubtful: as in ``transfer_scale``.
     earlier: (p,), optional, the strip as it was formed before some of its pairs changed, and which: only their
         junctions are made anew.
     Raises GeometryError when a junction is broken or a base is parallel to the strip's Z axis.

@@ -162,7 +162,7 @@ def test_passes_go_on_until_nothing_is_left_to_be_linear(monkeypatch: pytest.Mon
     inputs = bent(20, 0.2)
     off, passes = [], []
     for most, fresh in ((10, 0.05), (10, 0.0), (1, 0.05)):  # with the first derivatives, with new ones, at once
-        monkeypatch.setattr(adjust, "MOST_PASSES", most)
+        monkeypatch.setattr(adjust, "MOST_FORMATIONS", most)
         monkeypatch.setattr(adjust, "FRESH", fresh)
         result = triangulate(inputs, COVARIANCE)
         assert result.precision is not None
