@@ -250,7 +250,7 @@ def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> F
         oriented, formed, verdict = screened_formation.form_screened(
             oriented, measured, settings.formation, readmit=readmit
         )
-        rejections = screened_formation.taken_back(screened.rejections, oriented.used)
+        rejections = screened_formation.with_readmitted(screened.rejections, oriented.used)
         screened = replace(screened, orientation=oriented, rejections=rejections)
     return FormedPhotos(
         strip=strip,

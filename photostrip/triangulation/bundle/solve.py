@@ -101,7 +101,7 @@ def _move(
     N11 dx1 + N12 dx2 = b1 for photos and common parameters is solved by the factor of N11 and the Schur complement
     N22 - N12' N11^-1 N12; the length of the step is the root of dx' N dx.
     """
-    blocks = reduced.blocks[prepared.structure.own]
+    blocks = reduced.blocks[prepared.structure.diagonal]
     anchor = datum.anchor(prepared, state, blocks) if free else None
     add = anchor
     if damping:

@@ -46,7 +46,7 @@ class BandStructure:
     # itself among them
     rows: Numbers
     columns: Numbers
-    own: Numbers  # (m,): which of the pairs is each photo with itself
+    diagonal: Numbers  # (m,): which of the pairs is each photo with itself
     width: int
     batches: tuple[Batch, ...]
     # pairs, singles: for each batch: of its blocks to the pairs (by pair within the set of photos, then group), and of
@@ -79,7 +79,7 @@ def band_structure(problem: BundleProblem) -> BandStructure:
         rank=rank,
         rows=rows,
         columns=columns,
-        own=np.flatnonzero(rows == columns),
+        diagonal=np.flatnonzero(rows == columns),
         width=int((rows - columns).max(initial=0)),
         batches=batches,
         pairs=tuple(_gather(pairs, key) for pairs in of_sets),

@@ -221,7 +221,7 @@ def refuse_singular(prepared: PreparedProblem, reduced: Reduced, extra: Floats |
     They are those with large elements in the null vector, found by inverse iteration on the matrix made regular with a
     trifle of its diagonal. ``extra`` (m, 6, 6) is what was added to them as a datum.
     """
-    blocks = reduced.blocks[prepared.structure.own] + (0.0 if extra is None else extra)
+    blocks = reduced.blocks[prepared.structure.diagonal] + (0.0 if extra is None else extra)
     diagonal = np.maximum(np.einsum("nii->ni", blocks), 0.0)
     least = TINY * np.where(diagonal > 0.0, diagonal, max(float(diagonal.max()), 1.0))
     add = np.zeros_like(blocks)

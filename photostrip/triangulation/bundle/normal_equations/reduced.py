@@ -77,7 +77,7 @@ def _add_given(prepared: PreparedProblem, state: Parameters, blocks: Floats, bor
     for linear in given_at(prepared, state) if given_too else ():
         by_photos, others = linear.scaled()
         place = structure.rank[linear.photo]
-        np.add.at(blocks, structure.own[place], by_photos.swapaxes(1, 2) @ by_photos)
+        np.add.at(blocks, structure.diagonal[place], by_photos.swapaxes(1, 2) @ by_photos)
         np.add.at(border, place, by_photos.swapaxes(1, 2) @ others)
         corner += np.einsum("gai,gaj->ij", others, others)
         total += float((others[:, :, -1] ** 2).sum())
@@ -141,7 +141,7 @@ def factored(prepared: PreparedProblem, reduced: Reduced, add: Floats | None = N
     blocks = reduced.blocks
     if add is not None:
         blocks = blocks.copy()
-        blocks[structure.own] += add
+        blocks[structure.diagonal] += add
     if PHOTO * len(structure.order) * (PHOTO * structure.width) ** 2 > WIDE:
         matrix = Sparse(len(structure.order), structure.rows, structure.columns, blocks)
         return matrix if matrix.factor() else None
@@ -151,7 +151,7 @@ def factored(prepared: PreparedProblem, reduced: Reduced, add: Floats | None = N
     column = (PHOTO * structure.columns)[:, None, None] + element
     places = band.place(row, column)
     upper = np.zeros(places.shape, bool)
-    upper[structure.own] = element[:, None] < element
+    upper[structure.diagonal] = element[:, None] < element
     places[upper] = len(band.flat) - 1  # of the diagonal blocks only the lower half belongs into the band
     band.flat[places] = blocks
     band.flat[-1] = 0.0

@@ -73,7 +73,7 @@ def cofactors_of(solution: BundleSolution) -> Cofactors:
     prepared = solution.prepared
     state = parameters_from(prepared, solution.centers, solution.rotations, solution.points, solution.common)
     reduced = reduce(prepared, state)
-    blocks = reduced.blocks[prepared.structure.own]
+    blocks = reduced.blocks[prepared.structure.diagonal]
     band = factored(prepared, reduced, datum.anchor(prepared, state, blocks) if solution.free else None)
     if band is None:
         raise GeometryError("the normal matrix is singular at the solution", code="bundle-rank")

@@ -1,7 +1,4 @@
-"""What was rejected of the control, and which points seem to have been exchanged.
-
-Source: derived, see docs/sources.md.
-"""
+"""What was rejected of the control, and which points seem to have been exchanged."""
 
 from __future__ import annotations
 
@@ -50,7 +47,8 @@ def control_rejections(
     tests = tests_by_kept(control, kept, strip)
     value, limit, size = tests.value, tests.limit, tests.size
     partner = _exchanges(control, kept, strip, size)
-    detectable = _detectable(control, kept, strip)
+    by_covariance = strip.tests_by_covariance(control, kept)
+    detectable = np.full(control.use.shape, np.nan) if by_covariance is None else by_covariance.detectable
     rows = np.flatnonzero(out.any(axis=1)).tolist()
     found = []
     for row in rows:
@@ -71,12 +69,6 @@ def control_rejections(
             )
         )
     return tuple(found)
-
-
-def _detectable(control: ControlPoints, kept: ControlPoints, strip: StripAtControl) -> Floats:
-    """Smallest errors that are found in 80 % of cases, metres; NaN without the strip's covariance."""
-    found = strip.tests_by_covariance(control, kept)
-    return np.full(control.use.shape, np.nan) if found is None else found.detectable
 
 
 def _exchanges(control: ControlPoints, kept: ControlPoints, strip: StripAtControl, size: Floats) -> dict[int, str]:

@@ -1,6 +1,6 @@
 """Wrong control: coordinates that the strip and all other control contradict.
 
-A wrong coordinate pulls the similarity, and a polynomial bends towards it. It is therefore judged by what the others
+A wrong coordinate pulls the similarity, and a polynomial bends towards it. It is therefore tested by what the others
 predict: its residual against a polynomial of the highest degree that the control carries, divided by the share of it
 that the fit leaves (its redundancy number), in units of the scatter of the others. Very large errors go first, by a
 similarity that minimises absolute residuals. Two large ones that fit exchanged are named as an exchange.
@@ -59,7 +59,7 @@ def screen_control(control: ControlPoints, strip: StripAtControl) -> tuple[Contr
         strip, kept = _snooped(control, start, strip)
         if np.array_equal(kept.use, control.use):
             return control, ()
-        kept = _taken_back(control, kept, strip)
+        kept = _readmitted(control, kept, strip)
         return kept, control_rejections(control, kept, strip)
     except PhotostripError:
         # without the suspected coordinates the strip hangs free: nothing can be said against them
@@ -100,11 +100,6 @@ def _witnessed(x: Floats, spacing: float, kept: Flags) -> Flags:
     total = np.zeros((int(group.max()) + 1, 3), np.intp)
     np.add.at(total, group, kept)
     return np.array(total[group] - kept > 0, bool)
-
-
-def _together(axis: int) -> list[int]:
-    """Coordinates that go with a wrong one: a point with half of its plan position left would bend the fit."""
-    return [0, 1] if axis < 2 else [axis]
 
 
 def _enough(control: ControlPoints, out: Flags, share: float = LARGEST_SHARE) -> bool:
@@ -183,7 +178,9 @@ def _snoop(control: ControlPoints, strip: StripAtControl) -> ControlPoints:
         ratio = _by_covariance(kept, strip) if strip.covariance is not None else _by_polynomial(kept, strip)
         row = int(ratio.max(axis=1).argmax())
         out = np.zeros(kept.use.shape, bool)
-        out[row, _together(int(ratio[row].argmax()))] = True
+        axis = int(ratio[row].argmax())
+        # a point with half of its plan position left would bend the fit
+        out[row, PLAN if axis < 2 else axis] = True
         if ratio.max() <= 1 or not _enough(control, ~kept.use | out, LARGEST_TESTED):
             return kept
         kept = _without(kept, out)
@@ -212,7 +209,7 @@ def _by_polynomial(kept: ControlPoints, strip: StripAtControl) -> Floats:
     return np.where(_witnessed(problem.xyz[:, 0], strip.spacing, kept.use), tests.value / tests.limit, 0.0)
 
 
-def _taken_back(control: ControlPoints, kept: ControlPoints, strip: StripAtControl) -> ControlPoints:
+def _readmitted(control: ControlPoints, kept: ControlPoints, strip: StripAtControl) -> ControlPoints:
     """Take back coordinates that the final fit predicts after all."""
     tests = tests_by_kept(control, kept, strip)
     good = np.array(tests.value <= tests.limit, bool)

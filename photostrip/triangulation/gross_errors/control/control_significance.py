@@ -1,4 +1,4 @@
-"""Control coordinates judged with the strip's own covariance.
+"""Control coordinates tested with the covariance of the strip itself.
 
 The misclosures of a formed strip at its control are correlated: the strip bends as a whole. With the covariance of all
 of them together, every coordinate is predicted by all others, near ones most, and no band mate is needed to tell a
@@ -52,7 +52,7 @@ class ControlTests:
     sigma0: float  # standard deviation of unit weight of the coordinates that took part; NaN without redundancy
 
 
-def predict_control(joint: ControlCovariance, misclosures: Floats, used: Flags, alpha: float) -> ControlTests:
+def predict_control(control: ControlCovariance, misclosures: Floats, used: Flags, alpha: float) -> ControlTests:
     """Test every control coordinate against what the others predict, with their covariances.
 
     With the projector P = W - W A (A^T W A)^-1 A^T W of those that take part and the misclosures w, the coordinate i
@@ -63,24 +63,24 @@ def predict_control(joint: ControlCovariance, misclosures: Floats, used: Flags, 
     used: (n, 3), coordinates that take part.
     alpha: level of rejecting anything in a strip without wrong control.
     """
-    w = misclosures[joint.point, joint.axis]
-    inside = np.flatnonzero(used[joint.point, joint.axis])
+    w = misclosures[control.point, control.axis]
+    inside = np.flatnonzero(used[control.point, control.axis])
     count = len(inside)
     columns = [np.zeros(misclosures.shape) for _ in range(5)]
     value, limit, size, redundancy, detectable = columns
     limit[:] = detectable[:] = np.inf
-    freedom = count - joint.design.shape[1]
+    freedom = count - control.design.shape[1]
     if freedom < LEAST_REDUNDANCY:
         return ControlTests(value, limit, size, redundancy, detectable, float("nan"))
     tail = alpha / (2 * max(len(w), 1))
     critical = t_quantile(1 - tail, freedom - 1)
-    projector = _projector(joint, inside)
+    projector = _projector(control, inside)
     pulled = projector @ w[inside]
     total = float(w[inside] @ pulled)
     for number in range(len(w)):
-        place = joint.point[number], joint.axis[number]
-        weight, pull, rest = _of_one(joint, w, inside, number, (projector, pulled, total))
-        share = weight * joint.covariance[number, number]
+        place = control.point[number], control.axis[number]
+        weight, pull, rest = _of_one(control, w, inside, number, (projector, pulled, total))
+        share = weight * control.covariance[number, number]
         if share < LEAST_CHECKED_SHARE:
             continue
         # a covariance is never believed to be too large: what is not modelled makes misclosures larger
@@ -90,20 +90,22 @@ def predict_control(joint: ControlCovariance, misclosures: Floats, used: Flags, 
         size[place] = -pull / weight
         detectable[place] = (critical + POWER) * spread / np.sqrt(weight)
         redundancy[place] = 1.0
-    redundancy[joint.point[inside], joint.axis[inside]] = np.diag(projector @ joint.covariance[np.ix_(inside, inside)])
+    redundancy[control.point[inside], control.axis[inside]] = np.diag(
+        projector @ control.covariance[np.ix_(inside, inside)]
+    )
     return ControlTests(value, limit, size, redundancy, detectable, float(np.sqrt(max(total, 0.0) / freedom)))
 
 
-def _projector(joint: ControlCovariance, rows: Numbers) -> Floats:
+def _projector(control: ControlCovariance, rows: Numbers) -> Floats:
     """Weight matrix of the coordinates after a similarity has taken what it can."""
-    weight = np.linalg.inv(joint.covariance[np.ix_(rows, rows)])
-    design = joint.design[rows] / np.maximum(np.abs(joint.design[rows]).max(axis=0), 1e-300)
+    weight = np.linalg.inv(control.covariance[np.ix_(rows, rows)])
+    design = control.design[rows] / np.maximum(np.abs(control.design[rows]).max(axis=0), 1e-300)
     pulled = weight @ design
     return np.asarray(weight - pulled @ np.linalg.pinv(design.T @ pulled, hermitian=True) @ pulled.T, float)
 
 
 def _of_one(
-    joint: ControlCovariance, w: Floats, inside: Numbers, number: int, whole: tuple[Floats, Floats, float]
+    control: ControlCovariance, w: Floats, inside: Numbers, number: int, whole: tuple[Floats, Floats, float]
 ) -> tuple[float, float, float]:
     """Weight, pull and remaining sum of squares for an error of one coordinate, which may be outside."""
     projector, pulled, total = whole
@@ -112,7 +114,7 @@ def _of_one(
         at = int(found[0])
     else:
         rows = np.append(inside, number)
-        projector = _projector(joint, rows)
+        projector = _projector(control, rows)
         pulled, at = projector @ w[rows], len(rows) - 1
         total = float(w[rows] @ pulled)
     weight, pull = float(projector[at, at]), float(pulled[at])

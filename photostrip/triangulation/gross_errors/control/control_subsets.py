@@ -1,6 +1,6 @@
 """Control that agrees: similarities of the fewest points that determine them, tried one after the other.
 
-Weights that fall with the misclosure can settle between good and wrong control when a third of it is wrong. Here two
+Weights that fall with the misclosure can end between good and wrong control when a third of it is wrong. Here two
 points give the position, azimuth and scale of a strip that is nearly level, three heights its height and tilts; of all
 such sets the one is taken whose similarity suits the better half of the control best. Up to nearly half of the control
 may be wrong.
@@ -79,7 +79,7 @@ def _agreeing(xyz: Floats, targets: Targets, expected: Floats) -> Flags:
 
 
 def _half(count: int, fewest: int) -> int:
-    """Place of the misclosure that a set is judged by: half of the points beside those of the set."""
+    """Place of the misclosure that a set is rated by: half of the points beside those of the set."""
     return min((count + fewest + 1) // 2, count) - 1
 
 

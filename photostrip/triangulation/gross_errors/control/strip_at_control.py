@@ -2,8 +2,6 @@
 
 The prediction is by the covariance of the strip where it is known (``control_significance``), else by a polynomial of
 the highest degree that the control carries.
-
-Source: derived, see docs/sources.md.
 """
 
 from __future__ import annotations

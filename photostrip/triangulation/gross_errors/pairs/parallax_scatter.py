@@ -98,8 +98,8 @@ def revised_scatter(scatter: ParallaxScatter, pairs: Pairs, left: ParallaxSizes)
     level, factor = (scatter.stated, max(CONTRADICTION, proof)) if first else (scatter.found, UNCHANGED)
     found_now = pooled if pooled > factor * level else scatter.found
     level = max(level, np.nan_to_num(found_now))
-    own = SIGMA_FROM_MEDIAN * np.nan_to_num(robust.median_by_pair(sizes, pairs, tested))
-    proven = np.where(freedom < ENOUGH, 0.0, own / (1 + PROOF * MEDIAN_SCATTER / np.sqrt(np.maximum(freedom, 1.0))))
+    of_pair = SIGMA_FROM_MEDIAN * np.nan_to_num(robust.median_by_pair(sizes, pairs, tested))
+    proven = np.where(freedom < ENOUGH, 0.0, of_pair / (1 + PROOF * MEDIAN_SCATTER / np.sqrt(np.maximum(freedom, 1.0))))
     return ParallaxScatter(scatter.stated, found_now, np.maximum(level, np.maximum(proven, scatter.by_pair)))
 
 

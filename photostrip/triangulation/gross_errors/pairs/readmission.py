@@ -1,7 +1,4 @@
-"""Points taken back into their pairs: what the final orientation predicts well was rejected wrongly.
-
-Source: derived, see docs/sources.md.
-"""
+"""Points taken back into their pairs: what the final orientation predicts well was rejected wrongly."""
 
 from __future__ import annotations
 

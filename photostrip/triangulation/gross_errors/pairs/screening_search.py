@@ -61,9 +61,6 @@ class DeletedPoints:
     limits: Floats
 
 
-# ---------------------------------------------------------------------------------------------- robust start
-
-
 def robust_start(orientation: Orientation, todo: Numbers, sigma: Floats) -> tuple[Floats, Floats]:
     """Orient some pairs with falling weights, from the median parallax or, where that fails, as they are.
 
@@ -90,9 +87,6 @@ def _share(elements: Floats, pairs: Pairs, scale: Floats) -> Floats:
         good = fits & in_front_of_cameras(elements, pairs) & (pairs.weight > 0)
     share: Floats = pairs.sums(good.astype(float)) / np.maximum(pairs.sums((pairs.weight > 0).astype(float)), 1.0)
     return share
-
-
-# ------------------------------------------------------------------------------------------------------ search
 
 
 def search(
@@ -127,12 +121,12 @@ def search(
             if not scatter.contradicted(revised_scatter(scatter, orientation.pairs, sizes)):
                 return scatter, _whole(orientation, todo, rows, found)
     elements, scale = robust_start(part, every, scatter.by_pair[todo])
-    seen = _seen_from(part, elements, every)
-    cleaned = _cleaned(seen, every, scale)
+    begun = _assessed_at(part, elements, every)
+    cleaned = _cleaned(begun, every, scale)
     while True:
         sigma_now = scatter.by_pair[todo]
         failed = np.flatnonzero(failing(part, sigma_now) | lost[todo])
-        found = _search_once(part, seen if start else part, failed, sigma_now, sets=sets, start=start)
+        found = _search_once(part, begun if start else part, failed, sigma_now, sets=sets, start=start)
         sizes = passed.with_part(rows, sizes_left(part, found.orientation, cleaned, sigma_now))
         revised = revised_scatter(scatter, orientation.pairs, sizes)
         if not scatter.contradicted(revised):
@@ -157,29 +151,29 @@ def _whole(orientation: Orientation, todo: Numbers, rows: Numbers, found: Delete
     return replace(found, orientation=orientation.with_pairs(todo, found.orientation), rows=rows[found.rows])
 
 
-def _cleaned(seen: Orientation, todo: Numbers, scale: Floats) -> Orientation:
+def _cleaned(begun: Orientation, todo: Numbers, scale: Floats) -> Orientation:
     """Orient some pairs on what their robust start leaves of their points."""
-    pairs = seen.pairs
+    pairs = begun.pairs
     limit = np.full(pairs.size, np.inf)
     limit[todo] = GROSS_SIGMAS * scale
     with np.errstate(invalid="ignore"):
-        inside = np.abs(seen.parallax) * np.sqrt(pairs.weight) <= limit[pairs.pair]
-    enough = pairs.sums((inside & seen.used).astype(float)) > MINIMUM_POINTS
+        inside = np.abs(begun.parallax) * np.sqrt(pairs.weight) <= limit[pairs.pair]
+    enough = pairs.sums((inside & begun.used).astype(float)) > MINIMUM_POINTS
     weight = np.where(inside | ~enough[pairs.pair], pairs.weight, 0.0)
-    return orient_again(seen, weight, todo)
+    return orient_again(begun, weight, todo)
 
 
 def _search_once(
-    given: Orientation, seen: Orientation, todo: Numbers, sigma: Floats, *, sets: bool, start: bool
+    given: Orientation, begun: Orientation, todo: Numbers, sigma: Floats, *, sets: bool, start: bool
 ) -> DeletedPoints:
-    """Search with a given scatter; ``seen`` holds the elements and residuals to begin with."""
+    """Search with a given scatter; ``begun`` holds the elements and residuals at the start."""
     log = _Log([], [], [], [])
     rows = np.isin(given.pairs.pair, todo)
     # pairs that pass keep their least-squares elements
     elements = given.elements.copy()
-    elements[todo] = seen.elements[todo]
-    parallax = np.where(rows, seen.parallax, given.parallax)
-    redundancy = np.where(rows, seen.redundancy, given.redundancy)
+    elements[todo] = begun.elements[todo]
+    parallax = np.where(rows, begun.parallax, given.parallax)
+    redundancy = np.where(rows, begun.redundancy, given.redundancy)
     result = replace(given, elements=elements, parallax=parallax, redundancy=redundancy)
     if sets and len(todo):
         result = _delete_sets(result, sigma, todo, log)
@@ -212,7 +206,7 @@ class _Log:
         return DeletedPoints(orientation, rows, tuple(self.tests), np.array(self.values), np.array(self.limits))
 
 
-def _seen_from(orientation: Orientation, elements: Floats, todo: Numbers) -> Orientation:
+def _assessed_at(orientation: Orientation, elements: Floats, todo: Numbers) -> Orientation:
     """Residuals and redundancy of some pairs at given elements, which need not be those of least squares."""
     part, rows = orientation.pairs.take(todo), orientation.pairs.rows_of(todo)
     steps = np.zeros(len(todo), np.intp)

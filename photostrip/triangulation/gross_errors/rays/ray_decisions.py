@@ -3,8 +3,6 @@
 The wrong ray is the only one without which the others agree. An error along the base of a point on three photos can lie
 in any of them: removing one leaves two, which always meet. Then no ray of the point places it; its y parallaxes
 are good all the same.
-
-Source: derived; see docs/sources.md.
 """
 
 from __future__ import annotations
@@ -25,14 +23,14 @@ if TYPE_CHECKING:
 
 ALPHA = 0.01  # of rejecting any point of a window without gross errors
 BETTER = 9.0  # difference of two test values that tells rays apart: a likelihood ratio of 90
-TINY = 1e-12  # keeps a ray that cannot be judged from stopping the others
+TINY = 1e-12  # keeps a ray that cannot be tested from stopping the others
 GOOD, RAY, PAIR, RAYS, NONE = range(5)
 """Kinds: all rays agree; the wrong ones are known; two rays disagree; any of several may be wrong; none agree."""
 
 
 @dataclass(frozen=True, eq=False)
 class RayDecisions:
-    """Points judged."""
+    """What was decided about points."""
 
     group: Group
     weight: Floats  # (k, r): 1 for a ray that may be used, 0 for one that may not
@@ -101,7 +99,7 @@ def decide(group: Group, expected: tuple[Floats, Floats], number: Numbers) -> Ra
     )
     bad = np.flatnonzero(~(total <= limit))
     doubted = _Doubted(bad, group.basis[bad], held[bad], pulled[bad], total[bad], level[bad])
-    return _of_two(start, bad, gap) if r == FEWEST else _told(start, doubted)
+    return _of_two(start, bad, gap) if r == FEWEST else _of_several(start, doubted)
 
 
 def _quantiles(level: Floats, freedom: int) -> Floats:
@@ -119,7 +117,7 @@ def _of_two(start: RayDecisions, bad: Numbers, gap: Floats) -> RayDecisions:
     return replace(start, weight=weight, kind=kind, size=size)
 
 
-def _told(start: RayDecisions, doubted: _Doubted) -> RayDecisions:
+def _of_several(start: RayDecisions, doubted: _Doubted) -> RayDecisions:
     """Look for the smallest sets of rays without which the others agree."""
     r = start.group.ray.shape[1]
     weight, kind, size = start.weight.copy(), start.kind.copy(), start.size.copy()
@@ -131,18 +129,18 @@ def _told(start: RayDecisions, doubted: _Doubted) -> RayDecisions:
         left = np.column_stack([squares for squares, _ in tried])
         possible = left <= _quantiles(doubted.level, 2 * (r - out) - 3)[:, None]
         order = np.sort(left, axis=1)
-        told = (possible.sum(axis=1) == 1) | (order[:, 1] - order[:, 0] > BETTER)
+        clear = (possible.sum(axis=1) == 1) | (order[:, 1] - order[:, 0] > BETTER)
         found = np.asarray(possible.any(axis=1), bool)
         for place in np.flatnonzero(found).tolist():
             point = doubted.number[place]
-            if told[place]:
+            if clear[place]:
                 best = int(left[place].argmin())
                 size[point, list(sets[best])] = tried[best][1][place]
                 weight[point, list(sets[best])] = 0.0
             else:
                 size[point] = _apparent(sets, np.where(possible[place], left[place], np.inf), tried, place)
                 weight[point] = 0.0
-            kind[point] = RAY if told[place] else RAYS
+            kind[point] = RAY if clear[place] else RAYS
         if out == r - 2:
             for place in np.flatnonzero(~found).tolist():
                 size[doubted.number[place]] = _apparent(sets, left[place], tried, place)

@@ -1,7 +1,4 @@
-"""The strip formed, judged and formed again, until what is left out no longer changes.
-
-Source: derived; see docs/sources.md.
-"""
+"""The strip formed, tested and formed again, until what is left out no longer changes."""
 
 from __future__ import annotations
 
@@ -34,7 +31,7 @@ if TYPE_CHECKING:
     from photostrip.triangulation.strip_formation.strip import FormedStrip
 
 
-MOST_FORMATIONS = 4  # most of the strips settle in the second
+MOST_FORMATIONS = 4  # most of the strips end with the second
 NOTICEABLE_CHANGE = 5e-4  # rad, and relative: the second order of such a change is 0.04 µm on a photo of 150 mm
 
 
@@ -114,7 +111,7 @@ def _bridged(formed: FormedStrip, oriented: Orientation, measured: Measurements,
     """Add the points whose good rays come from photos that are no neighbours."""
     placed = np.zeros(len(measured.observations.point_ids), bool)
     placed[formed.point] = True
-    gone = verdict.judged[~placed[verdict.judged]]
+    gone = verdict.tested[~placed[verdict.tested]]
     if not len(gone):
         return formed
     missing = np.isin(oriented.point, gone)
@@ -128,17 +125,17 @@ def _uses(of_pairs: Orientation, verdict: RayRejections, *, readmit: bool) -> tu
     Where it cannot be told which of several rays is wrong, those pairs that found nothing wrong keep the point: its
     y parallaxes are good, its place is not.
     """
-    if not len(verdict.judged):
+    if not len(verdict.tested):
         return of_pairs.used, np.zeros(len(of_pairs.point), bool)
     flags = np.zeros(int(of_pairs.point.max()) + 1, bool)
-    flags[verdict.judged] = True
-    judged = flags[of_pairs.point]
+    flags[verdict.tested] = True
+    tested = flags[of_pairs.point]
     wrong, unclear = np.zeros((2, int(of_pairs.rows.max()) + 1), bool)
     wrong[verdict.wrong] = True
     several = np.array([kind == SEVERAL_RAYS for kind in verdict.kind], bool)
     unclear[verdict.wrong[several & verdict.across]] = True
     gone, aside = (np.asarray(each[of_pairs.rows].any(axis=1), bool) for each in (wrong, unclear))
-    used = np.where(judged, np.where(aside, of_pairs.used, ~gone), of_pairs.used)
+    used = np.where(tested, np.where(aside, of_pairs.used, ~gone), of_pairs.used)
     if not readmit:
         used &= of_pairs.used
     return _supported(of_pairs, used), aside
@@ -154,6 +151,6 @@ def _supported(of_pairs: Orientation, used: Flags) -> Flags:
     return result
 
 
-def taken_back(rejections: Sequence[PairRejection], used: Flags) -> tuple[PairRejection, ...]:
+def with_readmitted(rejections: Sequence[PairRejection], used: Flags) -> tuple[PairRejection, ...]:
     """Mark the rejections of pairs that the strip took back; ``used`` (m,) are the rows used in the end."""
     return tuple(replace(each, readmitted=bool(used[each.row])) for each in rejections)

@@ -1,14 +1,12 @@
-"""Wrong rays by the evidence of the whole strip: every point judged by all its rays, on photos that all others orient.
+"""Wrong rays by the evidence of the whole strip: every point tested by all its rays, on photos that all others orient.
 
 A pair sees y parallaxes only, and an error in a corner zone can make a good point look wrong. A point on three photos
 says more: its y parallaxes in two pairs, and whether both models put it at one place. So wherever a pair or a
-joint had to reject something, windows of the strip are adjusted with all their measurements, those rejected before
+junction had to reject something, windows of the strip are adjusted with all their measurements, those rejected before
 included: first with weights that fall with the misclosure, then with those points that agree. Each point is predicted
 by an adjustment without it. What contradicts the prediction is left out, what agrees is taken back.
 
-What a point's rays say of each other is judged in ``ray_decisions``.
-
-Source: derived; see docs/sources.md.
+What a point's rays say of each other is decided in ``ray_decisions``.
 """
 
 from __future__ import annotations
@@ -49,7 +47,7 @@ KINDS = {GOOD: SEVERAL_RAYS, RAY: WRONG_RAY, PAIR: TWO_RAYS, RAYS: SEVERAL_RAYS,
 class RayRejections:
     """What the strip says about the points it was asked about."""
 
-    judged: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))  # (j,): points that were judged
+    tested: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))  # (j,): points that were tested
     # (c,): rows of the observations that must not be used
     wrong: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))
     point: Numbers = field(default_factory=lambda: np.zeros(0, np.intp))  # (c,): their points
@@ -65,10 +63,10 @@ class RayRejections:
 
     def of(self, points: Flags) -> RayRejections:
         """Return what was found of some points, a flag for each point of the observations."""
-        here = points[self.point]
-        kind = tuple(each for each, yes in zip(self.kind, here.tolist(), strict=True) if yes)
-        rows = (getattr(self, name)[here] for name in ("value", "limit", "size", "across"))
-        return RayRejections(self.judged[points[self.judged]], self.wrong[here], self.point[here], kind, *rows)
+        rows = points[self.point]
+        kind = tuple(each for each, yes in zip(self.kind, rows.tolist(), strict=True) if yes)
+        values = (getattr(self, name)[rows] for name in ("value", "limit", "size", "across"))
+        return RayRejections(self.tested[points[self.tested]], self.wrong[rows], self.point[rows], kind, *values)
 
     def joined(self, other: RayRejections) -> RayRejections:
         """Give both together; they know different points."""
@@ -77,7 +75,7 @@ class RayRejections:
         rows = {name: np.concatenate([getattr(self, name), getattr(other, name)])[order] for name in names}
         kind = self.kind + other.kind
         return RayRejections(
-            np.union1d(self.judged, other.judged), kind=tuple(kind[number] for number in order), **rows
+            np.union1d(self.tested, other.tested), kind=tuple(kind[number] for number in order), **rows
         )
 
 
@@ -124,7 +122,7 @@ class MeasuredStrip:
 
 
 def suspects(scene: MeasuredStrip) -> Numbers:
-    """Points that were rejected in a pair or at a joint, or stand on one of two photos only."""
+    """Points that were rejected in a pair or at a junction, or stand on one of two photos only."""
     oriented, junctions = scene.orientation, scene.formed.junctions
     out = oriented.point[~oriented.used]
     return np.union1d(out, junctions.point[~junctions.used]).astype(np.intp)
@@ -165,9 +163,9 @@ def _best_start(
     best = np.full((int(new.sum()), 3), np.nan)
     cost = np.full(len(best), np.inf)
     for count in range(int(slot.max(initial=-1)) + 1):
-        here = slot == count
+        of_slot = known[slot == count]
         candidate = np.full(best.shape, np.nan)
-        candidate[point[here]] = formed.model_xyz[known[here]]
+        candidate[point[slot == count]] = formed.model_xyz[of_slot]
         rays = windows.linearise(place, image, photos, candidate[of_ray])
         size = np.minimum(np.nan_to_num(np.abs(rays.misfit).max(axis=1), nan=np.inf), 1e6)
         total = np.bincount(of_ray, np.sqrt(size), len(best))
@@ -193,33 +191,33 @@ def screen_rays(
     if not len(points):
         return RayRejections()
     begin, last = scene.layout.begin, scene.layout.last
-    seen = last >= 0
-    reach = int(min((last - begin)[seen].max(initial=1), LONGEST_REACH)) + 1
+    in_pairs = last >= 0
+    reach = int(min((last - begin)[in_pairs].max(initial=1), LONGEST_REACH)) + 1
     first = windows.starts(scene.photos, reach)
     length = min(windows.size_of(reach)[0], scene.photos)
     home = np.full(len(begin), -1)
-    home[seen] = windows.homes((begin + last)[seen] / 2, first, reach)
+    home[in_pairs] = windows.homes((begin + last)[in_pairs] / 2, first, reach)
     at = np.unique(home[points])
     if earlier is None:
-        return _examined(scene, (first[at], length), (home, at), kept, None)
+        return _tested(scene, (first[at], length), (home, at), kept, None)
     if moved is not None:
         before = np.concatenate([[0], np.cumsum(moved)])
         quiet = before[first + length - 1] == before[first]
-        at = at[~(quiet[at] & np.isin(at, home[earlier.judged]))]
+        at = at[~(quiet[at] & np.isin(at, home[earlier.tested]))]
     if not len(at):
         return earlier
-    fresh = _examined(scene, (first[at], length), (home, at), kept, earlier)
+    fresh = _tested(scene, (first[at], length), (home, at), kept, earlier)
     return earlier.of(~np.isin(home, at)).joined(fresh)
 
 
-def _examined(
+def _tested(
     scene: MeasuredStrip,
     place: tuple[Numbers, int],
     homes: tuple[Numbers, Numbers],
     kept: Numbers,
     earlier: RayRejections | None,
 ) -> RayRejections:
-    """Judge the points at home in some windows, given by first photos and length."""
+    """Test the points at home in some windows, given by first photos and length."""
     first, length = place
     home, at = homes
     wanted = np.zeros(scene.photos, bool)
@@ -239,34 +237,34 @@ def _examined(
 
 
 def _adjusted(groups: list[Group], count: int, length: int, start: list[Floats] | None) -> list[RayDecisions]:
-    """Adjust windows and judge their points, until the points that take part are those that agree.
+    """Adjust windows and test their points, until the points that take part are those that agree.
 
-    Without weights of the rays to start from, which an earlier judgement gives, the start is a robust one.
+    Without weights of the rays to start from, which an earlier decision gives, the start is a robust one.
     """
     number = np.sum([np.bincount(group.window, minlength=count) for group in groups], axis=0)
     if start is None:
         solved = _robust(groups, count, length)
         found = [decide(group, window_adjustment.expected(group, solved), number) for group in groups]
     else:
-        found = _judged(groups, start, number, length)
+        found = _decided(groups, start, number, length)
         if all((each.weight == weight).all() for each, weight in zip(found, start, strict=True)):
             return found  # those that were left out before are left out again
     state = [_State(each, each.weight, *(np.zeros(each.weight.shape, bool) for _ in range(2))) for each in found]
     for _ in range(DECISION_ROUNDS):
-        judged = _judged(groups, [each.weight for each in state], number, length)
+        decided = _decided(groups, [each.weight for each in state], number, length)
         worst = np.zeros(count)
-        for old, new in zip(state, judged, strict=True):
+        for old, new in zip(state, decided, strict=True):
             np.maximum.at(worst, old.group.window, np.where(old.loses(new), new.value / new.limit, 0.0))
-        fresh = [old.after(new, worst) for old, new in zip(state, judged, strict=True)]
-        settled = all((new.weight == old.weight).all() for new, old in zip(fresh, state, strict=True))
+        fresh = [old.after(new, worst) for old, new in zip(state, decided, strict=True)]
+        unchanged = all((new.weight == old.weight).all() for new, old in zip(fresh, state, strict=True))
         state = fresh
-        if settled:
+        if unchanged:
             break
     return [each.decided for each in state]
 
 
-def _judged(groups: list[Group], weights: list[Floats], number: Numbers, length: int) -> list[RayDecisions]:
-    """Adjust windows with the rays that count, and judge each point by an adjustment without it."""
+def _decided(groups: list[Group], weights: list[Floats], number: Numbers, length: int) -> list[RayDecisions]:
+    """Adjust windows with the rays that count, and decide on each point by an adjustment without it."""
     solved = _least_squares(groups, weights, len(number), length)
     parts = zip(groups, weights, strict=True)
     return [decide(group, window_adjustment.without(group, weight, solved), number) for group, weight in parts]
@@ -360,11 +358,11 @@ def _least_squares(groups: list[Group], weights: list[Floats], count: int, lengt
 def _verdict(scene: MeasuredStrip, rays: WindowRays, found: list[RayDecisions], kept: Numbers) -> RayRejections:
     """Put what was found about all points into one list, by rows of the observations."""
     spared = np.unique(scene.observations.point[kept])
-    judged, columns = [], []
+    tested, columns = [], []
     for each in found:
         point = rays.point[each.group.ray[:, 0]]
         free = ~np.isin(point, spared)
-        judged.append(point[free])
+        tested.append(point[free])
         place, number = np.nonzero((each.weight == 0) & free[:, None])
         ray = each.group.ray[place, number]
         size = each.size[place, number] * rays.sigma[ray]
@@ -373,7 +371,7 @@ def _verdict(scene: MeasuredStrip, rays: WindowRays, found: list[RayDecisions], 
     order = np.argsort(rows, kind="stable")
     rows = np.asarray(rows[order], np.intp)
     return RayRejections(
-        np.unique(np.concatenate(judged)).astype(np.intp),
+        np.unique(np.concatenate(tested)).astype(np.intp),
         rows,
         np.asarray(scene.observations.point[rows], np.intp),
         tuple(KINDS[int(each)] for each in kind[order]),

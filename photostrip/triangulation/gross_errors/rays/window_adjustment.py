@@ -1,7 +1,4 @@
-"""Adjustment of windows, and what it says of each point when that point takes no part.
-
-Source: derived; see docs/sources.md.
-"""
+"""Adjustment of windows, and what it says of each point when that point takes no part."""
 
 from __future__ import annotations
 

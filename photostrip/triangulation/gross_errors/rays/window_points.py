@@ -2,8 +2,6 @@
 
 Points with equally many rays stand together in arrays. What their rays demand does not change from adjustment to
 adjustment and is computed once.
-
-Source: derived; see docs/sources.md.
 """
 
 from __future__ import annotations
@@ -104,15 +102,15 @@ def groups(rays: WindowRays, first: Numbers, length: int) -> list[Group]:
     found = []
     for r in np.unique(count[count > 1]).tolist():
         place = begin[count == r, None] + np.arange(r)
-        of_point, own = ray[place], window[begin[count == r]]
-        k = len(own)
+        of_point, of_window = ray[place], window[begin[count == r]]
+        k = len(of_window)
         design = np.zeros((k, r, 2, r, PHOTO_PARAMETERS))
         design[:, range(r), :, range(r), :] = rays.by_photo[of_point].transpose(1, 0, 2, 3)
         found.append(
             Group(
-                own,
+                of_window,
                 of_point,
-                rays.photo[of_point] - first[own, None],
+                rays.photo[of_point] - first[of_window, None],
                 rays.by_point[of_point].reshape(k, 2 * r, 3),
                 design.reshape(k, 2 * r, PHOTO_PARAMETERS * r),
                 rays.misfit[of_point].reshape(k, 2 * r),

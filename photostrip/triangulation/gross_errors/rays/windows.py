@@ -7,8 +7,6 @@ adjustment is linear, about a strip that has been formed. Points are eliminated
 (``window_adjustment``).
 
 Windows are solved in batches: the arrays of a batch have the window as their first axis.
-
-Source: derived; see docs/sources.md.
 """
 
 from __future__ import annotations

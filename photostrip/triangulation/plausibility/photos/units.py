@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 REACH_SHARE = 0.98  # of the image points; the rest may be gross errors
 REACH = (0.12, 1.2)  # of half the format
-LIKELY_REACH = (0.3, 1.1)  # a reading that brings the reach here explains it
+LIKELY_REACH = (0.3, 1.1)  # a reading that brings the reach into this range explains it
 REACH_OF_DISTANCE = (0.02, 8.0)  # of the principal distance, when no format is given
 LIKELY_OF_DISTANCE = (0.1, 2.0)
 MOST_LIKELY = 0.5  # of the upper end of such a range; below it other readings come first
