@@ -125,10 +125,16 @@ def _positions(observations: PhotoPoints, photos: Sequence[str]) -> Numbers:
     return np.array([place.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo]
 
 
-def _point_numbers(observations: PhotoPoints, ids: Sequence[str]) -> Numbers:
+def _point_numbers(point_ids: Sequence[str], ids: Sequence[str]) -> Numbers:
     """Numbers of points among the measured ones; -1 for those that are not measured."""
-    number = {name: n for n, name in enumerate(observations.point_ids)}
+    number = {name: n for n, name in enumerate(point_ids)}
     return np.array([number.get(name, -1) for name in ids], np.intp)
+
+
+def rows_of(point: Numbers, point_ids: Sequence[str], ids: Sequence[str]) -> Numbers:
+    """Rows of given points among those of a strip, which have the numbers `point`; -1 for those that it lacks."""
+    row_of = {number: row for row, number in enumerate(point.tolist())}
+    return np.array([row_of.get(number, -1) for number in _point_numbers(point_ids, ids).tolist()], np.intp)
 
 
 def _sigma(observations: PhotoPoints, strip: Strip) -> float:
@@ -148,8 +154,7 @@ def strip_points(
 ) -> tuple[Numbers, StripPoints]:
     """Rows of the given points that a formed strip holds, and the same points in the strip."""
     strip, depth = formed.formed, float(np.median(formed.depth))
-    row_of = {int(n): row for row, n in enumerate(strip.point)}
-    row = np.array([row_of.get(n, -1) for n in _point_numbers(observations, control.ids).tolist()], np.intp)
+    row = rows_of(strip.point, observations.point_ids, control.ids)
     rows = np.flatnonzero(row >= 0)
     base = float(np.median(np.linalg.norm(np.diff(strip.centers, axis=0), axis=1)))
     share = _sigma(observations, formed.strip) / formed.strip.camera.principal_distance
@@ -220,7 +225,7 @@ def mosaic_points(
     total = np.bincount(point, minlength=len(observations.point_ids))
     count = np.maximum(total, 1)
     x, y = (np.bincount(point, part, len(total)) / count for part in (z.real, z.imag))
-    numbers = _point_numbers(observations, control.ids)
+    numbers = _point_numbers(observations.point_ids, control.ids)
     given = np.flatnonzero((numbers >= 0) & (total[numbers] > 0))
     held = numbers[given]
     depth = strip.camera.principal_distance * float(np.median(np.abs(plane.factor)))
@@ -260,7 +265,7 @@ def places_along_strip(
     size = len(observations.point_ids)
     count = np.bincount(observations.point[rows], minlength=size)
     total = np.bincount(observations.point[rows], along, size)
-    numbers = _point_numbers(observations, control.ids)
+    numbers = _point_numbers(observations.point_ids, control.ids)
     given = np.flatnonzero((numbers >= 0) & (count[numbers] >= LEAST_RAYS))
     chosen = numbers[given]
     return given, total[chosen] / count[chosen]

@@ -55,7 +55,9 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     points = result.refined.observations
     photo = PhotoCoordinates(result.measured, result.interior)
     images = replace(of_images(inputs, settings, photo), observations=points)
-    control = _given_control(inputs, directory, _plain_frames(result))
+    # frames of the run may carry a curvature that the given coordinates do not
+    frames = () if settings.absolute.earth_curvature == "model" else result.frames
+    control = _given_control(inputs, directory, frames)
     stages = result.strips if result.bundle is None else result.bundle.start.strips  # as they were formed
     formed = [
         evidence.EvidenceStrip(each.strip, each.orientation, each.formed) for each in (s.of_photos for s in stages)
@@ -106,11 +108,6 @@ def _given_control(inputs: Inputs, directory: Path | None, frames: Sequence[Grou
     except InputError:
         return None
     return GivenControl.placed(inputs, tied, directory)
-
-
-def _plain_frames(result: Result) -> Sequence[GroundFrame]:
-    """Ground frames of a run; none where they carry a curvature that the given coordinates do not."""
-    return () if result.settings.absolute.earth_curvature == "model" else result.frames
 
 
 def _of_control(

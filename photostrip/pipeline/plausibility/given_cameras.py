@@ -10,6 +10,7 @@ import numpy as np
 from photostrip.errors import GeometryError, InputError
 from photostrip.geodesy.tying import tie_frames
 from photostrip.geometry.similarity import Similarity, collinearity
+from photostrip.pipeline.plausibility import evidence
 from photostrip.triangulation.plausibility import found
 from photostrip.triangulation.plausibility.photos import flight
 from photostrip.triangulation.plausibility.photos import rotations as given_angles
@@ -168,9 +169,9 @@ def _other_height(strip: Strip, plan: LevelPlan, photos: Sequence[str], depth: F
         f"the perspective centres of strip {strip.id} are given {np.median(depth):.4g} m above the control, and the "
         f"scale of the photos asks for {np.median(wanted):.4g} m"
     )
-    evidence = {"given_above_control_m": float(np.median(depth)), "by_photo_scale_m": float(np.median(wanted))}
+    numbers = {"given_above_control_m": float(np.median(depth)), "by_photo_scale_m": float(np.median(wanted))}
     fix = "are their heights in another unit, or of another vertical datum? or is the principal distance wrong?"
-    return found("P205", message, fix, evidence, photos=photos, strips=(strip.id,), key=plan.key)
+    return found("P205", message, fix, numbers, photos=photos, strips=(strip.id,), key=plan.key)
 
 
 def angles(
@@ -215,10 +216,8 @@ def _on_control(
 ) -> Similarity | None:
     """Similarity from the strip to its control; None where that does not hold all rotations."""
     strip = formed.formed
-    number = {name: n for n, name in enumerate(observations.point_ids)}
-    row_of = {int(n): row for row, n in enumerate(strip.point)}
     counts = control.use.all(axis=1) & ~control.check
-    places = np.array([row_of.get(number.get(name, -1), -1) for name in control.ids], np.intp)
+    places = evidence.rows_of(strip.point, observations.point_ids, control.ids)
     rows = np.flatnonzero(counts & (places >= 0))
     source, target = strip.xyz[places[rows]], _cartesian(control.take(rows), frames)
     keep = np.ones(len(rows), bool)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import GeometryError
+from photostrip.pipeline.plausibility.evidence import rows_of
 from photostrip.pipeline.strips.models import form_models
 from photostrip.triangulation.plausibility.control.control_strip import StripPoints
 
@@ -53,9 +54,7 @@ def _evidence(
 ) -> ModelStripEvidence:
     known = np.flatnonzero(np.isfinite(formed.centers[:, 0]))
     centers, depth = formed.centers[known], _depths(formed)[known]
-    number = {name: n for n, name in enumerate(point_ids)}
-    row_of = {int(n): row for row, n in enumerate(formed.point)}
-    places = np.array([row_of.get(number.get(name, -1), -1) for name in control.ids], np.intp)
+    places = rows_of(formed.point, point_ids, control.ids)
     rows = np.flatnonzero(places >= 0)
     xyz, middle = formed.xyz[places[rows]], float(np.median(depth))
     turn = formed.places.rotation[formed.models.model]

@@ -82,9 +82,8 @@ class Held:
     """How a connected part of the network is held by what is given."""
 
     photos: Numbers  # its photos, in the order of the problem
-    origin: Floats  # (3,): mean of what is given, metres
-    radius: float  # size of the part, metres
-    normal: Floats  # (7, 7): information on shift (in radii), rotation about the origin and scale
+    # (7, 7): information on shift (in units of its size), rotation about the mean of what is given and scale
+    normal: Floats
     control: Floats  # (c, 3): positions that are given at all, of points and photos
 
 
@@ -147,7 +146,7 @@ def _held(prepared: PreparedProblem, state: Parameters, photos: Numbers) -> Held
     of_photos = datum.photo_generators(prepared, state, origin)[prepared.structure.rank] * units
     for linear in (positions, attitudes):
         normal += _information(linear, of_photos, inside, prepared)
-    return Held(photos, origin, radius, normal, places)
+    return Held(photos, normal, places)
 
 
 def _information(linear: LinearisedOrientations, moves: Floats, inside: Flags, prepared: PreparedProblem) -> Floats:

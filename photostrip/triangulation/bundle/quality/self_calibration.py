@@ -85,11 +85,6 @@ def millimetre(xy: Floats) -> Floats:
     return np.asarray(edge ** -powers.astype(float), float)
 
 
-def columns(xy: Floats) -> Floats:
-    """Shift of image points (n, 2) by each parameter of one unit, shape (n, 2, 10); 0 for the principal distance."""
-    return corrections(xy.T).transpose(2, 1, 0)
-
-
 def values_of(problem: BundleProblem, common: Floats) -> Floats:
     """Calibration parameters camera by camera, (cameras, 10); 0 for what was not estimated."""
     sigma = problem.cameras.sigma
@@ -108,7 +103,7 @@ def image_shift(problem: BundleProblem, common: Floats, xy: Floats, photo: Numbe
     if not values.any():
         return np.zeros_like(xy)
     camera = problem.cameras.of_photo[photo]
-    shifted = xy + np.einsum("nij,nj->ni", columns(xy), values[camera])
+    shifted = xy + np.einsum("nij,nj->ni", corrections(xy.T).transpose(2, 1, 0), values[camera])
     focal = problem.cameras.focal[camera]
     return np.asarray(shifted * (focal / (focal + values[camera, 0]))[:, None] - xy, float)
 

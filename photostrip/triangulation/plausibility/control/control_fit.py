@@ -69,10 +69,7 @@ def upright(axes: Floats) -> Floats:
 
 
 def fit_similarity(w: Complex, plan: Complex, *, mirrored: bool = False) -> PlanSimilarity | None:
-    """Lay a strip on given points in plan.
-
-    The similarity through two points whose median misclosure over all points is the smallest of all pairs of points,
-    then fitted to the better half by least squares. Up to nearly half of the points may be wrong.
+    """Lay a strip on given points in plan, by least median of squares, then least squares on the better half.
 
     w: (n,), places of the points in the upright strip.
     plan: (n,), given places E + iN, metres.

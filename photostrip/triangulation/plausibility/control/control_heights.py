@@ -60,11 +60,6 @@ class HeightComparison:
     deviation: Floats  # (n,): heights in the strip, against their mean
     scaled: RobustFit  # fit with the scale of the heights free; its last coefficient is that scale minus one
 
-    @property
-    def ratio(self) -> tuple[float, float]:
-        """Heights given over heights in the strip, and its standard deviation."""
-        return 1.0 + float(self.scaled.coefficient[-1]), float(self.scaled.sigma[-1])
-
 
 def compare_heights(given: GivenPoints, fitted: StraightenedStrip, consistent: Flags) -> HeightComparison | None:
     """Compare given heights with those of a strip; None when too few are given.
@@ -134,7 +129,7 @@ def find_wrong_heights(
     Yields P105, P401, P404, P405, at most one.
     """
     in_fit = heights.in_fit
-    ratio, sigma = heights.ratio
+    ratio, sigma = 1.0 + float(heights.scaled.coefficient[-1]), float(heights.scaled.sigma[-1])
     feet = min(abs(ratio * each - 1.0) for each in (FOOT, 1 / FOOT)) < FEET_TOLERANCE
     explains = heights.scaled.sigma0 < (EXPLAINED_SHARE_IN_FEET if feet else EXPLAINED_SHARE) * fit.sigma0
     if explains and _significant(ratio - 1.0, sigma, heights.scaled.freedom, LEAST_SCALE_ERROR):

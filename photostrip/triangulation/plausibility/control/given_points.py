@@ -52,7 +52,7 @@ def level(control: ControlPoints, frames: Sequence[GroundFrame], *, as_written: 
 
 
 class _LevelPoints(NamedTuple):
-    """Given points in one level frame, with what their written coordinates mean there."""
+    """Given points in the level frame."""
 
     xyz: Floats  # (n, 3)
     unit: Floats  # (n, 3): metres in a unit of the written coordinates

@@ -17,7 +17,6 @@ from photostrip.triangulation.plausibility.photos.units import reading_of
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from photostrip.arrays import Flags
     from photostrip.notes import Finding
     from photostrip.points import PhotoPoints
 
@@ -172,12 +171,6 @@ def _twin(links: mosaic.PhotoLinks, pair: tuple[int, int], strip: str, photos: S
     return found("P203", message, fix, evidence, photos=(one, other), strips=(strip,))
 
 
-def _sure(links: mosaic.PhotoLinks) -> Flags:
-    """Links that are good enough to speak against the list."""
-    base = np.abs(links.bases[1])
-    return np.asarray((links.count >= SURE_COUNT) & (links.misfit < SURE_MISFIT * base))
-
-
 def _by_number(closer: Closer, photos: Sequence[str]) -> Toward:
     """Return the direction of one photo on another, both by number, as the closer look has it."""
 
@@ -193,7 +186,7 @@ def turned_back(links: mosaic.PhotoLinks, order: Sequence[int], closer: Toward =
 
     None is named where a link is missing or doubtful, or where `closer`, which takes tilts into account, contradicts.
     """
-    sure = _sure(links)
+    sure = (links.count >= SURE_COUNT) & (links.misfit < SURE_MISFIT * np.abs(links.bases[1]))
     found: list[int] = []
     looked_at = 0
     for before, photo, after in zip(order, order[1:], order[2:], strict=False):

@@ -214,7 +214,7 @@ def test_control_that_others_no_longer_contradict_is_named_all_the_same(monkeypa
         Settings(),
     )
     assert not sound.strips[0].wrong_control
-    monkeypatch.setattr(control_screening, "_taken_back", lambda *given: _without_first(given[1]))
+    monkeypatch.setattr(control_screening, "_readmitted", lambda *given: _without_first(given[1]))
     result = adjusted(strip, {"p6_0": (0.0, 0.0, 4.0)})
     found = {each.id: each for each in result.strips[0].wrong_control}
     first = result.inputs.control.ids[0]
