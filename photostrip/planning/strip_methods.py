@@ -148,7 +148,7 @@ def _fitted(strip: IdealStrip, ground: _Fit, method: str) -> Accuracy:
 
 def _used(terms: list[tuple[str, ...]]) -> str:
     """Say which degree the control carries; plan and height apart where they differ."""
-    powers = [max((polynomial_terms.POWERS[term][0] for term in each), default=0) for each in (terms[0], terms[2])]
+    powers = [polynomial_terms.degree_of(each) for each in (terms[0], terms[2])]
     names = ["similarity" if power == 0 else f"degree {power}" for power in powers]
     return names[0] if names[0] == names[1] else f"{names[0]} in plan, {names[1]} in height"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -232,8 +233,8 @@ def _choice(document: Document, block: Document) -> str:
 
 
 def _degree(terms: Sequence[str]) -> int:
-    """Return the highest power of X among the terms."""
-    return max((int(t[2:]) if t.startswith("X^") else int("X" in t) for t in terms), default=0)
+    """Return the highest power of X among the names of terms: 2 of X^2Y."""
+    return max((int(found[1] or 1) for term in terms if (found := re.search(r"X(?:\^(\d))?", term))), default=0)
 
 
 EVIDENCE = (

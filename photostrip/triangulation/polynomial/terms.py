@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
 
 
+# powers of X and Y; a term here and in the ladder is a term of X, Y and Z alike
 POWERS = {"1": (0, 0), "X": (1, 0), "Y": (0, 1), "XY": (1, 1), "X^2": (2, 0), "X^3": (3, 0)}
 # Ladder: terms, degree, stations along the strip, points for an exact fit. One more point is asked for unless forced.
 LADDER = (
@@ -41,7 +42,7 @@ class Sizes:
 
 def columns(xyz: Floats, terms: Sequence[str]) -> Floats:
     """Design columns (n, k) of the terms, powers of X and Y of positions (n, 3), unscaled."""
-    x, y = xyz[:, 0], xyz[:, 1]
+    x, y = xyz[:, 0], xyz[:, 1]  # eq. 150
     return np.column_stack([x**i * y**j for i, j in (POWERS[t] for t in terms)] or [np.zeros((len(xyz), 0))])
 
 

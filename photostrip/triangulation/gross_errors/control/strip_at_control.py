@@ -158,8 +158,7 @@ def tests_by_kept(control: ControlPoints, kept: ControlPoints, strip: StripAtCon
 
 def _leverages(problem: correction.FitProblem, terms: Sequence[str], weight: Floats) -> Floats:
     """Variance of the fit at every point in units of that of a coordinate of mean weight, shape (n,)."""
-    x, y = problem.xyz[:, 0] / problem.sizes.reach, problem.xyz[:, 1] / problem.breadth
-    columns = np.column_stack([x**i * y**j for i, j in (polynomial_terms.POWERS[term] for term in terms)])
+    columns = polynomial_terms.columns(problem.xyz[:, :2] / [problem.sizes.reach, problem.breadth], terms)
     used = weight > 0
     design = columns[used] * np.sqrt(weight[used] / weight[used].mean())[:, None]
     cofactors = np.linalg.pinv(design.T @ design, hermitian=True)
