@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photostrip.pipeline.precision.all_strips import precision_of
+from photostrip.pipeline.precision import photo_precision, strip_precision
 from photostrip.pipeline.results import Adjusted, AdjustedStrips, Ties
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.inputs import Settings
     from photostrip.pipeline.results import StripResult
-    from photostrip.pipeline.strips.absolute import ScreenedStrip
+    from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip
     from photostrip.points import ControlPoints, PhotoPoints
 
 
@@ -36,7 +36,11 @@ def join_strips(
     points, ties = _joined(strips, observations.point_ids, output)
     precision = None
     if settings.precision:
-        precision = precision_of(strips, [each.oriented for each in screened], observations, given, points)
+        each = [
+            _precision_of(strip, before.oriented, observations, given)
+            for strip, before in zip(strips, screened, strict=True)
+        ]
+        precision = strip_precision.joined(each, strips, points)
     return AdjustedStrips(
         strips=strips,
         points=points,
@@ -45,6 +49,16 @@ def join_strips(
         precision=precision,
         notes=tuple(note for strip in strips for note in strip.notes),
     )
+
+
+def _precision_of(
+    strip: StripResult, oriented: OrientedStrip[Any], observations: PhotoPoints, given: ControlPoints
+) -> strip_precision.StripPrecision:
+    if strip.photo_stages is not None:
+        return photo_precision.of_photos(strip, oriented, observations, given)
+    from photostrip.pipeline.precision import model_precision  # strips of photos need none of it
+
+    return model_precision.of_models(strip, oriented, observations, given)
 
 
 def _joined(strips: Sequence[StripResult], point_ids: Sequence[str], output: GroundFrame) -> tuple[Adjusted, Ties]:

@@ -14,6 +14,7 @@ from photostrip.notes import Note
 from photostrip.pipeline.refusals import refuse_curvature_twice
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
     from photostrip.geodesy.ground_frame import GroundFrame
@@ -71,12 +72,11 @@ def _nothing_given(inputs: Inputs) -> bool:
     return not given and not cameras
 
 
-def curvature_notes(inputs: Inputs, settings: Settings) -> list[Note]:
+def curvature_notes(inputs: Inputs, settings: Settings) -> Iterator[Note]:
     """Say where a setting of Earth curvature changes nothing."""
-    if settings.absolute.earth_curvature != "none" or not inputs.frames or inputs.frames[0].crs == "local":
-        return []
-    text = (
-        "earth_curvature: none changes nothing here: the coordinates go through geocentric space, where the Earth is "
-        "curved"
-    )
-    return [Note("curvature-in-frames", text, severity="note")]
+    if settings.absolute.earth_curvature == "none" and inputs.frames and inputs.frames[0].crs != "local":
+        text = (
+            "earth_curvature: none changes nothing here: the coordinates go through geocentric space, where the Earth "
+            "is curved"
+        )
+        yield Note("curvature-in-frames", text, severity="note")

@@ -12,7 +12,7 @@ from photostrip.notes import Note
 from photostrip.triangulation.relative_orientation.orientation import RelativeSettings, orient_again
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.points import ModelPoints, PhotoPoints
@@ -24,54 +24,35 @@ CENTER = "center of photo "  # before the name of a perspective centre in model 
 
 
 def require(settings: RelativeSettings, observations: PhotoPoints) -> None:
-    """Refuse entries that name no measurement, and those that are to be kept and dropped.
-
-    Raises InputError with a fault for each such entry.
-    """
-    faults = []
-    for key in ("keep", "drop"):
-        found = rows_of(getattr(settings, key), observations)
-        faults += [
-            Fault(
-                f"`{entry}` names no measurement",
-                code="no-such-measurement",
-                key=f"processing.relative.{key}",
-                expected="photo/point, as in the table of observations",
-            )
-            for entry, row in found.items()
-            if row < 0
-        ]
-    faults += [
-        Fault(f"`{entry}` is to be kept and dropped", code="kept-and-dropped", key="processing.relative.drop")
-        for entry in settings.drop
-        if entry in settings.keep
-    ]
-    if faults:
-        raise InputError(faults)
+    """Refuse entries of `keep` and `drop` that name no measurement, and those in both, with a fault for each."""
+    found = rows_of((*settings.keep, *settings.drop), observations)
+    known = {entry for entry, row in found.items() if row >= 0}
+    _require_known(settings, known, "relative", "photo/point, as in the table of observations")
 
 
 def require_named(settings: LinkSettings, measured: ModelPoints) -> None:
-    """Refuse entries of ``keep`` and ``drop`` that name nothing, and those in both.
-
-    Raises InputError with a fault for each such entry.
-    """
+    """Refuse the same in lists of model coordinates."""
     if not (settings.keep or settings.drop):
         return
     nodes = [measured.name(node).removeprefix(CENTER) for node in measured.node.tolist()]
     known = {f"{measured.model_ids[k]}/{name}" for k, name in zip(measured.model.tolist(), nodes, strict=True)}
+    _require_known(settings, known, "links", "model/point or model/photo, as in the table of models")
+
+
+def _require_known(settings: RelativeSettings | LinkSettings, known: set[str], block: str, expected: str) -> None:
     faults = [
         Fault(
             f"`{entry}` names no measurement",
             code="no-such-measurement",
-            key=f"processing.links.{key}",
-            expected="model/point or model/photo, as in the table of models",
+            key=f"processing.{block}.{key}",
+            expected=expected,
         )
         for key, entries in (("keep", settings.keep), ("drop", settings.drop))
-        for entry in entries
+        for entry in dict.fromkeys(entries)
         if entry not in known
     ]
     faults += [
-        Fault(f"`{entry}` is to be kept and dropped", code="kept-and-dropped", key="processing.links.drop")
+        Fault(f"`{entry}` is to be kept and dropped", code="kept-and-dropped", key=f"processing.{block}.drop")
         for entry in settings.drop
         if entry in settings.keep
     ]
@@ -80,11 +61,7 @@ def require_named(settings: LinkSettings, measured: ModelPoints) -> None:
 
 
 def rows_of(entries: Sequence[str], observations: PhotoPoints) -> dict[str, int]:
-    """Find the rows of the measurements of a list.
-
-    entries: measurements, photo/point.
-    Returns row of each; -1 for none.
-    """
+    """Row of each measurement of a list, photo/point; -1 for none."""
     if not entries:
         return {}
     wanted = dict.fromkeys(entries, -1)
@@ -97,32 +74,19 @@ def rows_of(entries: Sequence[str], observations: PhotoPoints) -> dict[str, int]
 
 
 def rows(entries: Sequence[str], observations: PhotoPoints) -> Numbers:
-    """Return the rows of the measurements of a list.
-
-    entries: measurements, photo/point.
-    Returns their rows, ascending.
-    """
+    """Rows of the measurements of a list, ascending."""
     return np.array(sorted(rows_of(entries, observations).values()), np.intp)
 
 
 def touched(entries: Sequence[str], observations: PhotoPoints, rows: Numbers) -> Flags:
-    """Find the rows of a pairs' table that use a measurement of a list.
-
-    entries: measurements, photo/point.
-    rows: (m, 2), rows of the two measurements in the observations.
-    Returns (m,), true for those.
-    """
-    hits = np.isin(rows, list(rows_of(entries, observations).values()))
-    found: Flags = hits[:, 0] | hits[:, 1]
-    return found
+    """Which rows (m,) of a table of pairs, with the rows (m, 2) of their measurements, use one of a list."""
+    return np.asarray(np.isin(rows, list(rows_of(entries, observations).values())).any(axis=1), bool)
 
 
 def restored(screened: ScreenedPairs, weight: Floats, kept: Flags) -> ScreenedPairs:
-    """Take rejected measurements back that the user keeps.
+    """Take rejected measurements back that the user keeps; their rejections are marked as re-admitted.
 
-    weight: (m,), weights before the search.
-    kept: (m,), rows that are kept.
-    Returns the search with those rows in use; their rejections are marked as re-admitted.
+    weight, kept: (m,), weights before the search, and rows that are kept.
     """
     oriented = screened.orientation
     back = kept & ~oriented.used
@@ -134,20 +98,15 @@ def restored(screened: ScreenedPairs, weight: Floats, kept: Flags) -> ScreenedPa
     return replace(screened, orientation=oriented, rejections=log)
 
 
-def notes(settings: RelativeSettings, strip: str, photos: Sequence[str]) -> list[Note]:
-    """Say what the user has decided.
-
-    Returns one for each list that touches the strip.
-    """
+def notes(settings: RelativeSettings, strip: str, photos: Sequence[str]) -> Iterator[Note]:
+    """Say what the user has decided, one note for each list that touches the strip."""
     kept, dropped = (
         ", ".join(entry for entry in entries if any(entry.startswith(f"{photo}/") for photo in photos))
         for entries in (settings.keep, settings.drop)
     )
-    found = []
     if kept:
         text = f"strip {strip}: kept at the user's wish, whatever the tests say: {kept}"
-        found.append(Note("user-keep", text, severity="note", strip=strip))
+        yield Note("user-keep", text, severity="note", strip=strip)
     if dropped:
         text = f"strip {strip}: left out at the user's wish: {dropped}"
-        found.append(Note("user-drop", text, severity="note", strip=strip))
-    return found
+        yield Note("user-drop", text, severity="note", strip=strip)

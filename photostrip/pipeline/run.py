@@ -23,6 +23,8 @@ from photostrip.pipeline.strips.forming import form_strips
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from photostrip.pipeline.frames import GroundFrames
+    from photostrip.pipeline.image_coordinates import PhotoCoordinates
     from photostrip.pipeline.inputs import Inputs, Settings
 
 
@@ -35,27 +37,28 @@ def triangulate(inputs: Inputs, settings: Settings, *, directory: Path | None = 
 
     Either error carries in ``findings`` what the data say against themselves.
     """
+    ground = photo = None
     try:
-        result = _walk(inputs, settings, directory)
+        require_runnable(inputs, settings)
+        ground = tie_ground_frames(inputs, settings, directory)
+        require_whole(inputs, ground.control)
+        # 1 interior orientation
+        photo = orient_interior(inputs, settings)
+        result = _walk(inputs, settings, ground, photo)
     except (InputError, GeometryError) as error:
-        error.findings = gate.of_failure(inputs, settings, directory)
+        error.findings = gate.of_failure(inputs, settings, directory, photo, ground)
         raise
     except np.linalg.LinAlgError as error:
         msg = f"the data contradict themselves so much that an equation cannot be solved ({str(error).lower()})"
         unsolvable = GeometryError(msg, code="singular")
-        unsolvable.findings = gate.of_failure(inputs, settings, directory)
+        unsolvable.findings = gate.of_failure(inputs, settings, directory, photo, ground)
         raise unsolvable from error
     return replace(result, findings=gate.of_result(result, directory))
 
 
-def _walk(inputs: Inputs, settings: Settings, directory: Path | None) -> Result:
+def _walk(inputs: Inputs, settings: Settings, ground: GroundFrames, photo: PhotoCoordinates) -> Result:
     """Every stage takes what the stages before it found."""
-    require_runnable(inputs, settings)
-    ground = tie_ground_frames(inputs, settings, directory)
-    require_whole(inputs, ground.control)
-
-    # 1 interior orientation, lens distortion, refraction
-    photo = orient_interior(inputs, settings)
+    # 1 lens distortion, refraction
     refined = correct(photo, inputs, settings, ground)
     control = measured_control(inputs.control, refined.observations)
 

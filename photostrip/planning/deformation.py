@@ -83,19 +83,6 @@ def rigorous_constants(xy: ArrayLike, focal: float, width: float, base: float) -
 # ---------------------------------------------------------------------------------------------------- paraboloid
 
 
-def paraboloid(elements: ArrayLike, scale: float, focal: float, base: float) -> Floats:
-    """Return the surface into which errors of the elements bend the heights of a model.
-
-    Returns (5,), E0, A, B, C, D of dZ = E0 + A x + B y + C x y + D x²; dZ in ground mm for x, y in mm. E0, A and B go
-        into the absolute orientation; C is twist, D is bending along the base.
-    """
-    al1, ka1, al2, om2, ka2 = np.asarray(elements, float)
-    m, b = scale, base
-    return np.array(
-        [-m * b * al2, 2 * m * al2, m * om2 + m * focal / b * (ka2 - ka1), -m * om2 / b, -m * (al2 - al1) / b]
-    )
-
-
 @dataclass(frozen=True, eq=False)
 class Paraboloid:
     """A deformation paraboloid fitted to height residuals."""

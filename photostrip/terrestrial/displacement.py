@@ -39,24 +39,6 @@ def displacements(first: Floats, second: Floats, principal_distance: float, base
     return np.column_stack([dx, dy, dz])
 
 
-def standard_errors(second: Floats, sigma: float, principal_distance: float, base: float) -> Floats:
-    """Give m_dX, m_dY, m_dZ, metres, for pseudo-parallaxes of equal accuracy, z of the right photo not measured.
-
-    second: (n, 4), coordinates of the second epoch in mm.
-    sigma: standard deviation of each pseudo-parallax in mm.
-    """
-    x, z, p = second[:, 0], second[:, 1], second[:, 0] - second[:, 2]
-    depth = base * principal_distance / p
-    across = depth / principal_distance * sigma
-    return np.column_stack(
-        [
-            across * np.hypot(1 - x / p, x / p),
-            depth**2 / (base * principal_distance) * sigma * np.sqrt(2.0),
-            across * np.sqrt(1 + 2 * (z / p) ** 2),
-        ]
-    )
-
-
 def statistic(displacement: Floats, covariance: Floats) -> Floats:
     """Test value d^T C^-1 d of displacements: chi-square with three degrees of freedom where nothing moved.
 

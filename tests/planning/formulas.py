@@ -129,3 +129,16 @@ def orientation_parameters(control: ModelControl, misclosures: ArrayLike) -> Arr
     turn = (x @ in_plan[:, 1] - y @ in_plan[:, 0]) / size
     tilts = np.linalg.solve(level.T @ level, level.T @ in_height)
     return np.array([*in_plan.mean(axis=0), in_height.mean(), scale, turn, *tilts])
+
+
+def paraboloid(elements: ArrayLike, scale: float, focal: float, base: float) -> Array:
+    """Return the surface into which errors of the elements bend the heights of a model.
+
+    Returns (5,), E0, A, B, C, D of dZ = E0 + A x + B y + C x y + D x²; dZ in ground mm for x, y in mm. E0, A and B go
+        into the absolute orientation; C is twist, D is bending along the base.
+    """
+    al1, ka1, al2, om2, ka2 = np.asarray(elements, float)
+    m, b = scale, base
+    return np.array(
+        [-m * b * al2, 2 * m * al2, m * om2 + m * focal / b * (ka2 - ka1), -m * om2 / b, -m * (al2 - al1) / b]
+    )

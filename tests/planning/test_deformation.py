@@ -17,13 +17,12 @@ from photostrip.planning.deformation import (
     SIDE,
     determines_paraboloid,
     fit_paraboloid,
-    paraboloid,
     paraboloid_rows,
     parallax_error,
     rigorous_constants,
     rigorous_factors,
 )
-from tests.planning.formulas import ground_errors, relative_differentials, source_constants
+from tests.planning.formulas import ground_errors, paraboloid, relative_differentials, source_constants
 from tests.vectors import cases
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from photostrip.simulate.draws import Draws, Purpose
-from photostrip.terrestrial.displacement import displacements, ellipses, limit, standard_errors, statistic
+from photostrip.terrestrial.displacement import displacements, ellipses, limit, statistic
 from photostrip.terrestrial.normal_case import intersect
 from tests.vectors import cases
 
@@ -28,6 +28,24 @@ def epochs(given_: dict[str, float]) -> tuple[Floats, Floats]:
     first = np.array([[x, z, x - p, z]])
     change = [given_["dx_left"], given_["dz_left"], given_["dx_right"], given_["dz_left"]]
     return first, first + change
+
+
+def standard_errors(second: Floats, sigma: float, principal_distance: float, base: float) -> Floats:
+    """Give m_dX, m_dY, m_dZ, metres, for pseudo-parallaxes of equal accuracy, z of the right photo not measured.
+
+    second: (n, 4), coordinates of the second epoch in mm.
+    sigma: standard deviation of each pseudo-parallax in mm.
+    """
+    x, z, p = second[:, 0], second[:, 1], second[:, 0] - second[:, 2]
+    depth = base * principal_distance / p
+    across = depth / principal_distance * sigma
+    return np.column_stack(
+        [
+            across * np.hypot(1 - x / p, x / p),
+            depth**2 / (base * principal_distance) * sigma * np.sqrt(2.0),
+            across * np.sqrt(1 + 2 * (z / p) ** 2),
+        ]
+    )
 
 
 @pytest.mark.parametrize("vector", cases("pseudo_parallax"))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geodesy.frame_spec import GROUND_AXES
-from photostrip.geometry.rotation import angle_rates
+from photostrip.geometry.rotation import angle_rates, from_angles
 from photostrip.pipeline import overruling
 from photostrip.pipeline.results import BlockProblem
 from photostrip.triangulation.bundle.observations.problem import (
@@ -53,7 +53,7 @@ def build(
     origin: Floats = np.round(np.nanmean(start.points, axis=0, dtype=np.float64), -1)
     place = {photo: number for number, photo in enumerate(start.photos)}
     photo = np.array([place[name] for name in observations.photo_ids], np.intp)
-    rows = np.flatnonzero(~_dropped(settings, observations))
+    rows = np.flatnonzero(~_named(settings.relative.drop, observations))
     images = ImageObservations(
         photo[observations.photo[rows]], observations.point[rows], observations.xy[rows], observations.sigma[rows]
     )
@@ -88,10 +88,6 @@ def _named(entries: Sequence[str], observations: PhotoPoints) -> Flags:
     flags = np.zeros(len(observations), bool)
     flags[[row for row in overruling.rows_of(entries, observations).values() if row >= 0]] = True
     return flags
-
-
-def _dropped(settings: Settings, observations: PhotoPoints) -> Flags:
-    return _named(settings.relative.drop, observations)
 
 
 def _cameras(inputs: Inputs, settings: Settings) -> BundleCameras:
@@ -208,8 +204,6 @@ def _attitudes(given: GivenOrientations | None, frame: GroundFrame | None, start
     """Observed rotations; the standard deviations of the angles become those about the photo's own axes."""
     if given is None or frame is None or not given.observed or not given.photos:
         return AttitudeObservations()
-    from photostrip.geometry.rotation import from_angles
-
     place = {photo: number for number, photo in enumerate(start.photos)}
     photo = np.array([place[name] for name in given.photos], np.intp)
     centers = frame.cartesian_from_ground(given.enu, ids=[f"of photo {name}" for name in given.photos])

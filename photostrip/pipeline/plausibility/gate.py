@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.notes import Finding
+    from photostrip.pipeline.frames import GroundFrames
     from photostrip.pipeline.inputs import Inputs, MeasuredModels, Settings, Strip
     from photostrip.pipeline.plausibility.evidence import EvidenceStrip
     from photostrip.pipeline.plausibility.image_evidence import ImageEvidence
@@ -55,9 +56,7 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     points = result.refined.observations
     photo = PhotoCoordinates(result.measured, result.interior)
     images = replace(of_images(inputs, settings, photo), observations=points)
-    # frames of the run may carry a curvature that the given coordinates do not
-    frames = () if settings.absolute.earth_curvature == "model" else result.frames
-    control = _given_control(inputs, directory, frames)
+    control = _given_control(inputs, directory, _plain_frames(settings, result.frames))
     stages = result.strips if result.bundle is None else result.bundle.start.strips  # as they were formed
     formed = [
         evidence.EvidenceStrip(each.strip, each.orientation, each.formed) for each in (s.of_photos for s in stages)
@@ -71,18 +70,26 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     return accepted(findings, settings.accept)
 
 
-def of_failure(inputs: Inputs, settings: Settings, directory: Path | None = None) -> tuple[Finding, ...]:
+def of_failure(
+    inputs: Inputs,
+    settings: Settings,
+    directory: Path | None,
+    photo: PhotoCoordinates | None,
+    ground: GroundFrames | None,
+) -> tuple[Finding, ...]:
     """Find what the data say against themselves, the adjustment having failed.
 
-    Returns by code; empty when the evidence cannot be put together either.
+    photo, ground: what the run had found before it failed.
+    Returns nothing when the evidence cannot be put together either.
     """
     try:
         if inputs.models is not None:
             return accepted(_of_models(inputs, inputs.models, settings, directory), settings.accept)
-        images = of_images(inputs, settings)
+        images = of_images(inputs, settings, photo)
         points = evidence.ideal(images.observations, images.cameras, settings)
         formed = [evidence.form(strip, points, settings) for strip in images.strips]
-        control = _given_control(inputs, directory)
+        frames = () if ground is None else _plain_frames(settings, ground.control)
+        control = _given_control(inputs, directory, frames)
         findings = [*images.findings, *_of_control(control, images, images.strips, formed)]
         whole = [each for each in formed if each is not None]
         for each in whole:
@@ -108,6 +115,11 @@ def _given_control(inputs: Inputs, directory: Path | None, frames: Sequence[Grou
     except InputError:
         return None
     return GivenControl.placed(inputs, tied, directory)
+
+
+def _plain_frames(settings: Settings, frames: Sequence[GroundFrame]) -> Sequence[GroundFrame]:
+    """Ground frames of a run; none where they carry a curvature that the given coordinates do not."""
+    return () if settings.absolute.earth_curvature == "model" else frames
 
 
 def _of_control(

@@ -10,6 +10,8 @@ from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.notes import Note
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from photostrip.arrays import Floats
     from photostrip.pipeline.inputs import ModelStrip
     from photostrip.points import ModelPoints
@@ -21,19 +23,16 @@ ANOTHER_UNIT, NOTHING = 100.0, 1e-5  # ratio of residuals to what is stated; bel
 WEAK = 12.0  # standard deviations of a coordinate by which a link moves the far end of its model
 
 
-def link_notes(strip: ModelStrip, measured: ModelPoints, formed: FormedModels) -> list[Note]:
-    """Say which links are weak, or contradict themselves, and what seems to stand in another unit.
-
-    Returns in the order of the links.
-    """
+def link_notes(strip: ModelStrip, measured: ModelPoints, formed: FormedModels) -> Iterator[Note]:
+    """Say which links are weak, or contradict themselves, and what seems to stand in another unit."""
     links, shared, models = formed.links, formed.links.shared, formed.models
-    notes = _unit_notes(strip, formed)
+    yield from _unit_notes(strip, formed)
     if links.factor > 1:
         text = (
             f"strip {strip.id}: the common points of the models differ {np.sqrt(links.factor):.1f} times as much as "
             "the standard deviations of the model coordinates allow; gross errors are searched for with larger ones"
         )
-        notes.append(Note("sigma-contradicted", text, severity="note", strip=strip.id))
+        yield Note("sigma-contradicted", text, severity="note", strip=strip.id)
     center = np.bincount(
         shared.link[links.used & (models.node[shared.before] >= models.points)], minlength=shared.count
     )
@@ -47,13 +46,13 @@ def link_notes(strip: ModelStrip, measured: ModelPoints, formed: FormedModels) -
                 f"strip {strip.id}: models {names[0]} and {names[1]} are linked weakly: the far end of the second is "
                 f"uncertain by {far[link]:.0f} times the standard deviation of a model coordinate{why}"
             )
-            notes.append(Note("weak-link", text, strip=strip.id, photos=(photo,)))
+            yield Note("weak-link", text, strip=strip.id, photos=(photo,))
         elif not center[link]:
             text = (
                 f"strip {strip.id}: models {names[0]} and {names[1]} are linked without the perspective centre of "
                 f"photo {photo}, which is not measured in both"
             )
-            notes.append(Note("link-without-center", text, severity="note", strip=strip.id, photos=(photo,)))
+            yield Note("link-without-center", text, severity="note", strip=strip.id, photos=(photo,))
     for rows in links.doubtful:
         link = int(shared.link[rows[0]])
         names = strip.models[link : link + 2]
@@ -63,13 +62,11 @@ def link_notes(strip: ModelStrip, measured: ModelPoints, formed: FormedModels) -
             f"strip {strip.id}: the common points of models {names[0]} and {names[1]} contradict each other: {what} is "
             "wrong, and it is used all the same; measure more common points"
         )
-        notes.append(Note("contradicting-link", text, strip=strip.id, points=tuple(points)))
-    return notes
+        yield Note("contradicting-link", text, strip=strip.id, points=tuple(points))
 
 
-def _unit_notes(strip: ModelStrip, formed: FormedModels) -> list[Note]:
+def _unit_notes(strip: ModelStrip, formed: FormedModels) -> Iterator[Note]:
     """Say where a model, or the standard deviations, seem to stand in another unit than they should."""
-    notes = []
     scale = formed.places.scale / np.median(formed.places.scale)
     for number in np.flatnonzero(np.abs(np.log(scale)) > np.log(ODD_SCALE)).tolist():
         times = f"{1 / scale[number]:.3g} times smaller" if scale[number] < 1 else f"{scale[number]:.3g} times larger"
@@ -77,7 +74,7 @@ def _unit_notes(strip: ModelStrip, formed: FormedModels) -> list[Note]:
             f"strip {strip.id}: the scale number of model {strip.models[number]} is {times} than that of the others: "
             "are its coordinates in another unit?"
         )
-        notes.append(Note("odd-scale", text, strip=strip.id, photos=strip.photos[number : number + 2]))
+        yield Note("odd-scale", text, strip=strip.id, photos=strip.photos[number : number + 2])
     solved = formed.links.solved
     redundancy = int(solved.redundancy.sum())
     ratio = float(np.sqrt(solved.squares.sum() / redundancy)) if redundancy else 1.0
@@ -86,8 +83,7 @@ def _unit_notes(strip: ModelStrip, formed: FormedModels) -> list[Note]:
             f"strip {strip.id}: the models fit each other with {ratio:.3g} times the standard deviations that are "
             "stated: are these in another unit?"
         )
-        notes.append(Note("sigma-unit", text, strip=strip.id, key="models.sigma"))
-    return notes
+        yield Note("sigma-unit", text, strip=strip.id, key="models.sigma")
 
 
 def far_ends(formed: FormedModels) -> Floats:

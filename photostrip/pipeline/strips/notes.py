@@ -13,7 +13,7 @@ from photostrip.triangulation.relative_orientation.orientation import CONDITION_
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from photostrip.arrays import Floats
     from photostrip.pipeline.inputs import ModelStrip, Strip
@@ -34,26 +34,23 @@ POLYNOMIAL_BANDS = 4  # bands of control below which the adjustment with the cov
 LEVEL = 0.01  # of the test of the whole
 
 
-def pair_notes(strip: Strip, oriented: Orientation) -> list[Note]:
+def pair_notes(strip: Strip, oriented: Orientation) -> Iterator[Note]:
     """Say which pairs check themselves too little."""
-    notes = []
     for number, count in enumerate(oriented.points_used):
         names = strip.photos[number : number + 2]
         if count == MINIMUM_POINTS:
             text = f"photos {names[0]} and {names[1]} are oriented on 5 points: no check"
-            notes.append(Note("no-check", text, strip=strip.id, photos=names))
+            yield Note("no-check", text, strip=strip.id, photos=names)
         if oriented.condition[number] > CONDITION_WARNING:
             text = (
                 f"photos {names[0]} and {names[1]}: weak relative orientation (condition number "
                 f"{oriented.condition[number]:.0f}); the points stand in a narrow band"
             )
-            notes.append(Note("weak-pair", text, strip=strip.id, photos=names))
-    return notes
+            yield Note("weak-pair", text, strip=strip.id, photos=names)
 
 
-def screening_notes(strip: Strip, screened: ScreenedPairs, sigma: float) -> list[Note]:
-    """Say what the search for gross errors could not settle."""
-    notes = []
+def screening_notes(strip: Strip, screened: ScreenedPairs, sigma: float) -> Iterator[Note]:
+    """Say what the search for gross errors could not decide."""
     scatter = screened.scatter
     if np.isfinite(scatter.found):
         text = (
@@ -61,20 +58,18 @@ def screening_notes(strip: Strip, screened: ScreenedPairs, sigma: float) -> list
             f"{scatter.found / np.sqrt(2.0) * 1000:.1f} µm, not the {sigma * 1000:.1f} µm stated; gross errors are "
             "searched for with the larger one"
         )
-        notes.append(Note("sigma-contradicted", text, severity="note", strip=strip.id))
+        yield Note("sigma-contradicted", text, severity="note", strip=strip.id)
     for number in np.flatnonzero(screened.masked):
         names = strip.photos[number : number + 2]
         text = (
             f"photos {names[0]} and {names[1]}: masked errors suspected: the y parallaxes are larger than their "
             "standard deviation allows, and no further point can be rejected; measure the pair again or add points"
         )
-        notes.append(Note("masked-errors", text, strip=strip.id, photos=names))
-    return notes
+        yield Note("masked-errors", text, strip=strip.id, photos=names)
 
 
-def wrong_control_notes(strip: Strip | ModelStrip, wrong: Sequence[ControlRejection]) -> list[Note]:
+def wrong_control_notes(strip: Strip | ModelStrip, wrong: Sequence[ControlRejection]) -> Iterator[Note]:
     """Name control that was not used, and what seems to be wrong with it."""
-    notes = []
     for each in wrong:
         sizes = dict(zip(GROUND_AXES, each.size, strict=True))
         parts = ", ".join(f"{axis} by about {sizes[axis]:+.2f} m" for axis in each.axes)
@@ -84,61 +79,51 @@ def wrong_control_notes(strip: Strip | ModelStrip, wrong: Sequence[ControlReject
         )
         if each.exchanged_with:
             text += f"; it fits when exchanged with {each.exchanged_with}"
-        notes.append(Note("control-rejected", text, strip=strip.id, points=(each.id,)))
-    return notes
+        yield Note("control-rejected", text, strip=strip.id, points=(each.id,))
 
 
-def junction_notes(strip: Strip, formed: FormedStrip) -> list[Note]:
+def junction_notes(strip: Strip, formed: FormedStrip) -> Iterator[Note]:
     """Say which models are joined doubtfully or weakly."""
     junctions = formed.junctions
     count = np.bincount(junctions.junction, junctions.used, len(junctions.factor))
     beyond = np.abs(np.log(junctions.ratio / junctions.factor[junctions.junction])) > junctions.limit
     doubtful = np.unique(junctions.junction[junctions.used & beyond])
-    notes = [
-        Note(
-            "contradicting-joint",
-            f"photo {strip.photos[number + 1]}: its pass points contradict each other in the scale of the models, and "
-            "which is wrong cannot be told; measure a third pass point",
-            strip=strip.id,
-            photos=(strip.photos[number + 1],),
+    for number in doubtful.tolist():
+        photo = strip.photos[number + 1]
+        text = (
+            f"photo {photo}: its pass points contradict each other in the scale of the models, and which is wrong "
+            "cannot be told; measure a third pass point"
         )
-        for number in doubtful.tolist()
-    ]
-    return notes + [
-        Note(
-            "weak-joint",
-            f"photo {strip.photos[number + 1]}: the models on either side are joined by a single pass point: its error "
-            "goes into the scale unseen",
-            strip=strip.id,
-            photos=(strip.photos[number + 1],),
+        yield Note("contradicting-joint", text, strip=strip.id, photos=(photo,))
+    for number in np.flatnonzero(count == 1):
+        photo = strip.photos[number + 1]
+        text = (
+            f"photo {photo}: the models on either side are joined by a single pass point: its error goes into the "
+            "scale unseen"
         )
-        for number in np.flatnonzero(count == 1)
-    ]
+        yield Note("weak-joint", text, strip=strip.id, photos=(photo,))
 
 
-def control_notes(strip: Strip | ModelStrip, orientation: AbsoluteOrientation) -> list[Note]:
+def control_notes(strip: Strip | ModelStrip, orientation: AbsoluteOrientation) -> Iterator[Note]:
     """Say where the control hardly checks itself, or hardly holds the strip."""
-    notes = []
     if orientation.redundancy < 3:
         text = (
             f"strip {strip.id}: the absolute orientation has a redundancy of {orientation.redundancy}: errors of the "
             "control hardly show"
         )
-        notes.append(Note("little-control", text, strip=strip.id))
+        yield Note("little-control", text, strip=strip.id)
     if orientation.condition > 1 / WEAK_LIMIT:
         text = (
             f"strip {strip.id}: the control is nearly on one line: errors of some motion of the strip are "
             f"{orientation.condition:.0f} times those of the others"
         )
-        notes.append(Note("weak-control", text, strip=strip.id))
-    return notes
+        yield Note("weak-control", text, strip=strip.id)
 
 
-def polynomial_notes(strip: Strip | ModelStrip, correction: Polynomial | None, adjusted: Floats) -> list[Note]:
+def polynomial_notes(strip: Strip | ModelStrip, correction: Polynomial | None, adjusted: Floats) -> Iterator[Note]:
     """Say which degree the control did not carry, and where the polynomial is extrapolated."""
     if correction is None:
-        return []
-    notes = []
+        return
     asked = correction.asked
     if asked != "auto" and correction.degree < int(asked):
         text = (
@@ -146,7 +131,7 @@ def polynomial_notes(strip: Strip | ModelStrip, correction: Polynomial | None, a
             f"at {correction.stations[0]} stations in plan and {correction.stations[1]} in height, carries degree "
             f"{correction.degree}"
         )
-        notes.append(Note("degree-reduced", text, strip=strip.id))
+        yield Note("degree-reduced", text, strip=strip.id)
     if correction.degree:
         low, high = correction.reach
         outside = int(((adjusted[:, 0] < low) | (adjusted[:, 0] > high)).sum())
@@ -156,28 +141,21 @@ def polynomial_notes(strip: Strip | ModelStrip, correction: Polynomial | None, a
                 f"strip {strip.id}: {outside} points lie up to {reach:.0f} m beyond the control along the strip, where "
                 f"the polynomial of degree {correction.degree} is extrapolated"
             )
-            notes.append(Note("extrapolation", text, strip=strip.id))
+            yield Note("extrapolation", text, strip=strip.id)
         if min(axis.redundancy for axis in correction.axes) < 3:
             text = f"strip {strip.id}: the polynomial has a redundancy below 3 in an axis: its residuals say little"
-            notes.append(Note("little-redundancy", text, strip=strip.id))
-    return notes
+            yield Note("little-redundancy", text, strip=strip.id)
 
 
-def photo_notes(strip: Strip, resection: Resection) -> list[Note]:
+def photo_notes(strip: Strip, resection: Resection) -> Iterator[Note]:
     """Name the photos that could not be oriented."""
-    return [
-        Note(
-            "not-resected",
-            f"photo {strip.photos[number]} could not be oriented on its adjusted points; it keeps its orientation in "
-            "the strip",
-            strip=strip.id,
-            photos=(strip.photos[number],),
-        )
-        for number in np.flatnonzero(~resection.solved)
-    ]
+    for number in np.flatnonzero(~resection.solved):
+        photo = strip.photos[number]
+        text = f"photo {photo} could not be oriented on its adjusted points; it keeps its orientation in the strip"
+        yield Note("not-resected", text, strip=strip.id, photos=(photo,))
 
 
-def covariance_proposal(strip: Strip, correction: Polynomial) -> list[Note]:
+def covariance_proposal(strip: Strip, correction: Polynomial) -> Iterator[Note]:
     """Propose the adjustment with the covariance of the strip where a polynomial does badly."""
     models = len(strip.photos) - 1
     if models > LONG_STRIP:
@@ -186,7 +164,8 @@ def covariance_proposal(strip: Strip, correction: Polynomial) -> list[Note]:
             "adjustment (errors 2.5 times larger at 30 models, 12 times at 100); use `processing.adjustment: "
             "covariance`, which does not"
         )
-        return [Note("long-strip", text, strip=strip.id)]
+        yield Note("long-strip", text, strip=strip.id)
+        return
     few = min(correction.stations) < POLYNOMIAL_BANDS
     if models > 1 and (models > POLYNOMIAL_MODELS or few):
         bands = f"on {min(correction.stations)} bands of control"
@@ -196,20 +175,18 @@ def covariance_proposal(strip: Strip, correction: Polynomial) -> list[Note]:
             f"strip {strip.id}: {what} {why} leaves more than it must; `processing.adjustment: covariance` "
             "distributes the same misclosures within 5 % of a bundle adjustment"
         )
-        return [Note("covariance-proposed", text, severity="note", strip=strip.id)]
-    return []
+        yield Note("covariance-proposed", text, severity="note", strip=strip.id)
 
 
-def covariance_notes(strip: Strip, control: ControlPoints, adjusted: CovarianceAdjustment | None) -> list[Note]:
+def covariance_notes(strip: Strip, control: ControlPoints, adjusted: CovarianceAdjustment | None) -> Iterator[Note]:
     """Say what the tests of the adjustment with the covariance of the strip found.
 
     Returns doubtful control, the worst point only: it raises the test values of its neighbours; and a failed test of
         the whole.
     """
     if adjusted is None:
-        return []
+        return
     tested = adjusted.tested
-    found = []
     worst = tested.doubtful[:1]
     for row in worst.tolist():
         name, axis = control.ids[adjusted.control.point[row]], GROUND_AXES[adjusted.control.axis[row]]
@@ -218,7 +195,7 @@ def covariance_notes(strip: Strip, control: ControlPoints, adjusted: CovarianceA
             f"{tested.size[row]:+.2f} m (test value {abs(tested.normalised[row]):.1f}, limit {tested.limit:.1f}); "
             "it was used"
         )
-        found.append(Note("control-doubtful", text, strip=strip.id, points=(name,)))
+        yield Note("control-doubtful", text, strip=strip.id, points=(name,))
     if not len(worst) and tested.probability < LEVEL:
         sigma0 = float(np.sqrt(tested.squares / tested.redundancy))
         text = (
@@ -226,5 +203,4 @@ def covariance_notes(strip: Strip, control: ControlPoints, adjusted: CovarianceA
             "coordinates and control let expect, and no single control point explains it: systematic errors of the "
             "images, or standard deviations that are too small"
         )
-        found.append(Note("strip-contradicted", text, strip=strip.id))
-    return found
+        yield Note("strip-contradicted", text, strip=strip.id)
