@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -33,7 +33,7 @@ def join_strips(
     screened: the same strips before their deformation was corrected.
     given: all given points, check points too.
     """
-    points, ties = _joined(strips, observations.point_ids, output)
+    points = _joined(strips, observations.point_ids, output)
     precision = None
     if settings.precision:
         each = [
@@ -44,7 +44,7 @@ def join_strips(
     return AdjustedStrips(
         strips=strips,
         points=points,
-        ties=ties,
+        ties=_ties(strips, output),
         observations=observations,
         precision=precision,
         notes=tuple(note for strip in strips for note in strip.notes),
@@ -61,24 +61,35 @@ def _precision_of(
     return model_precision.of_models(strip, oriented, observations, given)
 
 
-def _joined(strips: Sequence[StripResult], point_ids: Sequence[str], output: GroundFrame) -> tuple[Adjusted, Ties]:
-    """Mean of every point over the strips that hold it, and the ties between strips."""
-    strip = np.concatenate([np.full(len(s.formed.point), number) for number, s in enumerate(strips)])
-    point = np.concatenate([s.formed.point for s in strips])
-    cartesian = np.concatenate([s.cartesian for s in strips])
+class MeanPoints(NamedTuple):
+    """Points of several strips."""
+
+    number: Numbers  # (n,): as numbered in the observations, ascending
+    xyz: Floats  # (n, 3): mean over the strips that hold them, Cartesian frame, metres
+
+
+def mean_points(strips: Sequence[StripResult]) -> MeanPoints:
+    """Mean of every point over the strips that hold it."""
+    point = np.concatenate([strip.formed.point for strip in strips])
+    cartesian = np.concatenate([strip.cartesian for strip in strips])
     number, inverse = np.unique(point, return_inverse=True)
-    count = np.bincount(inverse)
-    sums = np.column_stack([np.bincount(inverse, cartesian[:, axis]) for axis in range(3)])
-    mean = sums / count[:, None]
+    sums = np.column_stack([np.bincount(inverse, column) for column in cartesian.T])
+    return MeanPoints(number, np.asarray(sums / np.bincount(inverse)[:, None], float))
+
+
+def _joined(strips: Sequence[StripResult], point_ids: Sequence[str], output: GroundFrame) -> Adjusted:
+    number, xyz = mean_points(strips)
     rays = np.zeros(len(number), np.intp)
-    for s in strips:
-        rays[np.searchsorted(number, s.formed.point)] += s.rays
+    for strip in strips:
+        rays[np.searchsorted(number, strip.formed.point)] += strip.rays
     ids = [point_ids[n] for n in number]
-    joined = Adjusted(number, mean, output.ground_from_cartesian(mean, ids=ids), rays)
-    return joined, _ties(strip, point, cartesian, output)
+    return Adjusted(number=number, cartesian=xyz, ground=output.ground_from_cartesian(xyz, ids=ids), rays=rays)
 
 
-def _ties(strip: Numbers, point: Numbers, cartesian: Floats, output: GroundFrame) -> Ties:
+def _ties(strips: Sequence[StripResult], output: GroundFrame) -> Ties:
+    strip = np.concatenate([np.full(len(each.formed.point), number) for number, each in enumerate(strips)])
+    point = np.concatenate([each.formed.point for each in strips])
+    cartesian = np.concatenate([each.cartesian for each in strips])
     order = np.lexsort((strip, point))
     strip, point, cartesian = strip[order], point[order], cartesian[order]
     second = np.flatnonzero(point[1:] == point[:-1]) + 1

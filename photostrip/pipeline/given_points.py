@@ -27,6 +27,13 @@ def measured_control(control: ControlPoints, observations: PhotoPoints) -> Contr
     return control.take(np.array(kept, np.intp))
 
 
+def rows_of_given(control: ControlPoints, numbers: Numbers, observations: PhotoPoints) -> Numbers:
+    """Row of each given point among points by their numbers in the observations; -1 for none."""
+    number = {name: n for n, name in enumerate(observations.point_ids)}
+    row_of = {int(n): row for row, n in enumerate(numbers)}
+    return np.array([row_of.get(number.get(name, -1), -1) for name in control.ids], np.intp)
+
+
 @dataclass(frozen=True, eq=False)
 class AtGivenPoints:
     """The result at control and check points."""
@@ -41,9 +48,7 @@ def compare_with_given(
     control: ControlPoints, frames: Sequence[GroundFrame], points: Adjusted, observations: PhotoPoints
 ) -> AtGivenPoints:
     """Compare adjusted with given coordinates at control and check points, each in its own ground frame."""
-    number = {name: n for n, name in enumerate(observations.point_ids)}
-    row_of = {int(n): row for row, n in enumerate(points.number)}
-    rows = np.array([row_of.get(number.get(name, -1), -1) for name in control.ids], np.intp)
+    rows = rows_of_given(control, points.number, observations)
     differences = np.full((len(control), 3), np.nan)
     for index, frame in enumerate(frames):
         inside = np.flatnonzero((control.frame == index) & (rows >= 0))

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.pipeline.common_points import mean_points
 from photostrip.pipeline.given_points import measured_control
 from photostrip.pipeline.strips.adjusting import adjust_formed
 from photostrip.pipeline.strips.forming import form_photos
 from photostrip.triangulation.image_coordinates import corrections, interior
 
 if TYPE_CHECKING:
-    from photostrip.arrays import Floats, Numbers
+    from photostrip.arrays import Floats
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.frames import GroundFrames
     from photostrip.pipeline.inputs import Inputs, Settings
@@ -51,8 +52,8 @@ def orient_interior(inputs: Inputs, settings: Settings) -> PhotoCoordinates:
 def correct(photo: PhotoCoordinates, inputs: Inputs, settings: Settings, ground: GroundFrames) -> corrections.Refined:
     """Image coordinates reduced to the principal point, free of distortion and refraction.
 
-    Refraction and Earth curvature need heights; where they are not given, the strips without these corrections tell
-    them.
+    Refraction and Earth curvature need heights; where they are not given, they are those of the strips without these
+    corrections.
     """
     if inputs.models is not None:  # there are none: the observations only name the points
         return corrections.Refined(photo.observations, {})
@@ -76,20 +77,10 @@ def heights_of(observations: PhotoPoints, inputs: Inputs, settings: Settings, gr
     else:
         formed = form_photos(inputs, observations, settings)
         strips = tuple(adjust_formed(stage, control, ground.control, settings) for stage in formed)
-        points = _means(
-            np.concatenate([strip.formed.point for strip in strips]),
-            np.concatenate([strip.cartesian for strip in strips]),
-        )
+        points = mean_points(strips).xyz
     centers = np.concatenate([strip.intermediate.cartesian_from_intermediate(strip.centers) for strip in strips])
     frame = ground.control[0] if ground.control else ground.output
     return Heights(float(_heights(centers, frame).mean()), float(_heights(points, frame).mean()))
-
-
-def _means(number: Numbers, xyz: Floats) -> Floats:
-    """Mean position of every point over its strips."""
-    _, inverse = np.unique(number, return_inverse=True)
-    sums = np.column_stack([np.bincount(inverse, column) for column in xyz.T])
-    return np.asarray(sums / np.bincount(inverse)[:, None], float)
 
 
 def _heights(points: Floats, frame: GroundFrame) -> Floats:

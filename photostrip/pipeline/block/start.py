@@ -24,6 +24,7 @@ from photostrip.pipeline.block.datum import (
     datum,
     join_waiting,
 )
+from photostrip.pipeline.common_points import mean_points
 from photostrip.pipeline.results import BlockStart
 from photostrip.pipeline.strips.adjusting import adjust_formed
 from photostrip.points import ControlPoints
@@ -180,12 +181,11 @@ def _together(
 
 def _mean_points(strips: Sequence[StripResult], count: int) -> Floats:
     """Mean of the points over the strips; NaN for points of none."""
-    number = np.concatenate([strip.formed.point for strip in strips] or [np.zeros(0, np.intp)])
-    xyz = np.concatenate([strip.cartesian for strip in strips] or [np.zeros((0, 3))])
-    times = np.bincount(number, minlength=count)
-    sums = np.column_stack([np.bincount(number, column, count) for column in xyz.T])
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.where(times[:, None] > 0, sums / times[:, None], np.nan)
+    found = np.full((count, 3), np.nan)
+    if strips:
+        number, xyz = mean_points(strips)
+        found[number] = xyz
+    return found
 
 
 def _with_control(points: Floats, observations: PhotoPoints, known: Known) -> Floats:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from photostrip.pipeline.given_points import rows_of_given
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.covariance_adjustment import prediction
 from photostrip.triangulation.error_propagation import control_errors, covariances
@@ -28,80 +29,80 @@ if TYPE_CHECKING:
 LARGEST = 100  # check points of a strip that are tested together, spread over it
 
 
-def check_points(
-    strip: StripResult, control: ControlPoints, observations: PhotoPoints
-) -> tuple[ControlPoints, Numbers]:
-    """Check points that a strip holds, and their rows in its points.
+class CheckPoints(NamedTuple):
+    """Check points that a strip holds, and their rows (c,) in ``strip.formed.point``."""
 
-    observations: image points of the project, which name its points.
-    Returns rows: (c,), their rows in ``strip.formed.point``.
-    """
-    number = {name: n for n, name in enumerate(observations.point_ids)}
-    row_of = {int(n): row for row, n in enumerate(strip.formed.point)}
-    rows = np.array([row_of.get(number.get(name, -1), -1) for name in control.ids], np.intp)
+    points: ControlPoints
+    rows: Numbers
+
+
+def check_points(strip: StripResult, control: ControlPoints, observations: PhotoPoints) -> CheckPoints:
+    """Check points of a strip among all given points; the observations name its points."""
+    rows = rows_of_given(control, strip.formed.point, observations)
     found = np.flatnonzero(control.check & (rows >= 0) & control.use.any(axis=1))
     found = found[np.argsort(strip.xyz[rows[found], 0], kind="stable")]
     if len(found) > LARGEST:
         found = found[np.linspace(0, len(found) - 1, LARGEST).round().astype(int)]
-    return control.take(found), rows[found]
-
-
-def by_fit(found: Propagation, given: Given, rows: Numbers, factor: float) -> covariances.CheckTest:
-    """Test the check points of a strip that was fitted to the control.
-
-    found: rows and operators of the strip method.
-    rows: (c,), their rows in the points of the strip.
-    factor: variance factor of the image coordinates.
-    """
-    seen = given.seen
-    by_parameters = np.einsum("wi,wit->wt", seen.direction, found.influence[rows][seen.point])
-    taken = by_parameters @ found.fit.operator
-    joint = _joint(found.errors, seen.rows, (found.control.rows, found.control.variance, taken), factor)
-    return _tested(given, joint)
-
-
-def by_covariance(own: CovarianceAdjustment, given: Given) -> covariances.CheckTest:
-    """Test the check points of a strip that was adjusted with its own covariance."""
-    wanted = own.system.conditions
-    taken = prediction.influence(own.system, given.seen.rows, np.arange(len(wanted.value)))[:, 0]
-    # the similarities of the models are unknowns of this adjustment, not errors
-    parts = (wanted.rows.without_similarity(), wanted.noise, taken)
-    return _tested(given, _joint(own.system.errors, given.seen.rows.without_similarity(), parts, own.factor))
+    return CheckPoints(control.take(found), rows[found])
 
 
 @dataclass(frozen=True, eq=False)
-class Given:
-    """What check points say."""
+class CheckDifferences:
+    """How a strip differs from its check points."""
 
-    points: int
-    seen: Misclosures
+    checks: CheckPoints
+    coordinates: Misclosures
     difference: Floats  # (w,): adjusted minus given, metres
 
 
-def given_at(
-    strip: StripResult, errors: StripErrors, checks: tuple[ControlPoints, Numbers], frames: Sequence[GroundFrame]
-) -> Given:
-    """Compare a strip with its check points.
+def compare_with_checks(
+    strip: StripResult, errors: StripErrors, checks: CheckPoints, frames: Sequence[GroundFrame]
+) -> CheckDifferences | None:
+    """Compare a strip with its check points, in the ground frames of the given points; None without any."""
+    if not len(checks.rows):
+        return None
+    xyz = strip.xyz[checks.rows]
+    targets = absolute_orientation.Targets(checks.points, frames, strip.intermediate)
+    found = control_errors.misclosures(errors.points, targets.turned(xyz), checks.rows, targets.axes(xyz))
+    return CheckDifferences(checks, found, targets.misclosures(xyz)[found.point, found.axis])
 
-    checks: the check points and their rows in the strip.
-    frames: ground frames of the given points.
+
+def by_fit(found: Propagation, compared: CheckDifferences, factor: float) -> covariances.CheckTest:
+    """Test the check points of a strip that was fitted to the control.
+
+    factor: variance factor of the image coordinates.
     """
-    points, rows = checks
-    xyz = strip.xyz[rows]
-    targets = absolute_orientation.Targets(points, frames, strip.intermediate)
-    seen = control_errors.misclosures(errors.points, targets.turned(xyz), rows, targets.axes(xyz))
-    return Given(len(points), seen, targets.misclosures(xyz)[seen.point, seen.axis])
+    at = compared.coordinates
+    by_parameters = np.einsum("wi,wit->wt", at.direction, found.influence[compared.checks.rows][at.point])
+    subtracted = _Subtracted(found.control.rows, found.control.variance, by_parameters @ found.fit.operator)
+    return _tested(compared, found.errors, at.rows, subtracted, factor)
 
 
-def _tested(given: Given, joint: Floats) -> covariances.CheckTest:
-    joint = joint + np.diag(given.seen.variance)
-    squares = float(given.difference @ np.linalg.solve(joint, given.difference))
-    return covariances.CheckTest(given.points, len(given.difference), squares)
+def by_covariance(adjusted: CovarianceAdjustment, compared: CheckDifferences) -> covariances.CheckTest:
+    """Test the check points of a strip that was adjusted with its own covariance."""
+    system, at = adjusted.system, compared.coordinates
+    wanted = system.conditions
+    operator = prediction.influence(system, at.rows, np.arange(len(wanted.value)))[:, 0]
+    # the similarities of the models are unknowns of this adjustment, not errors
+    subtracted = _Subtracted(wanted.rows.without_similarity(), wanted.noise, operator)
+    return _tested(compared, system.errors, at.rows.without_similarity(), subtracted, adjusted.factor)
 
 
-def _joint(errors: StripErrors, own: ErrorRows, by: tuple[ErrorRows, Floats, Floats], factor: float) -> Floats:
-    """Joint covariance of the errors at check coordinates: their own rows minus what is taken away by others."""
-    rows, variance, taken = by
-    operator = np.concatenate([-taken, np.eye(len(own.first))], axis=1)
-    joint = factor * covariances.sums_of(errors, ErrorRows.joined([rows, own]), operator)
-    return np.asarray(joint + (taken * variance) @ taken.T, float)
+class _Subtracted(NamedTuple):
+    """What the adjustment subtracts from check coordinates: errors with their rows and variances, times an operator."""
+
+    rows: ErrorRows
+    variance: Floats
+    operator: Floats
+
+
+def _tested(
+    compared: CheckDifferences, errors: StripErrors, rows: ErrorRows, subtracted: _Subtracted, factor: float
+) -> covariances.CheckTest:
+    """Test all differences with their covariance: that of their own rows minus what is subtracted, and of the given."""
+    operator = np.concatenate([-subtracted.operator, np.eye(len(rows.first))], axis=1)
+    covariance = factor * covariances.sums_of(errors, ErrorRows.joined([subtracted.rows, rows]), operator)
+    covariance = covariance + (subtracted.operator * subtracted.variance) @ subtracted.operator.T
+    covariance = covariance + np.diag(compared.coordinates.variance)
+    squares = float(compared.difference @ np.linalg.solve(covariance, compared.difference))
+    return covariances.CheckTest(len(compared.checks.points), len(compared.difference), squares)

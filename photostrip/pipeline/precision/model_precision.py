@@ -19,7 +19,8 @@ from photostrip.triangulation.polynomial.terms import POWERS
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from photostrip.arrays import Floats, Numbers
+    from photostrip.arrays import Floats
+    from photostrip.pipeline.precision.check_points import CheckPoints
     from photostrip.pipeline.results import StripResult
     from photostrip.pipeline.strips.absolute import OrientedStrip
     from photostrip.points import ControlPoints, PhotoPoints
@@ -29,11 +30,7 @@ if TYPE_CHECKING:
 
 
 def variance_factor(formed: FormedModels) -> tuple[float, str]:
-    """Variance factor of the model coordinates: 1 unless the links contradict what is stated.
-
-    Returns factor: variance found over variance stated, or 1.
-    Returns basis: ``"a-posteriori"`` or ``"a-priori"``.
-    """
+    """Variance of the model coordinates found over that stated, 1 unless the links contradict it; and which it is."""
     solved = formed.links.solved
     redundancy, squares = int(solved.redundancy.sum()), float(solved.squares.sum())
     if redundancy < 1:
@@ -45,19 +42,17 @@ def variance_factor(formed: FormedModels) -> tuple[float, str]:
 def of_models(
     strip: StripResult, oriented: OrientedStrip[ModelErrors], observations: PhotoPoints, given: ControlPoints
 ) -> StripPrecision:
-    """Covariances of one strip of independent models.
+    """Covariances of one strip of independent models; the rotations of the photos are not known.
 
     given: all given points; the check points among them are compared with what is found.
-    Returns covariances of points and perspective centres, test of the check points. The rotations of the photos are not
-        known, and neither are their covariances.
     """
     formed, axes = strip.of_models.formed, strip.intermediate.axes
-    found, seen, fit = oriented.errors, oriented.misclosures, _fit_to_control(strip, oriented)
+    found, control, fit = oriented.errors, oriented.misclosures, _fit_to_control(strip, oriented)
     factor, basis = variance_factor(formed)
     influence = _influence(strip, fit)
-    by_parameters = model_errors.sums(found, *model_misclosures.weights(seen, strip.control_rows, fit.operator))
+    by_parameters = model_errors.sums(found, *model_misclosures.weights(control, strip.control_rows, fit.operator))
     spread = model_errors.covariance_of_sums(found, by_parameters)
-    spread += (fit.operator * (seen.variance / factor)) @ fit.operator.T
+    spread += (fit.operator * (control.variance / factor)) @ fit.operator.T
     mixed = model_errors.with_sums(found, by_parameters) @ influence.transpose(0, 2, 1)
     nodes = model_errors.covariances(found) - mixed - mixed.transpose(0, 2, 1)
     nodes = (nodes + influence @ spread @ influence.transpose(0, 2, 1)) * factor
@@ -68,8 +63,8 @@ def of_models(
         points=nodes[:points],
         photos=_of_photos(formed, nodes),
         by_control=lambda rows, columns: axes @ influence[rows] @ fit.operator[:, columns],
-        control=np.column_stack([formed.point[strip.control_rows][seen.point], seen.axis]),
-        variance=seen.variance,
+        control=np.column_stack([formed.point[strip.control_rows][control.point], control.axis]),
+        variance=control.variance,
         sigma=sigma,
         basis=basis,
         check=_check(strip, oriented, fit, influence, check_points(strip, given, observations), factor),
@@ -123,20 +118,20 @@ def _check(
     oriented: OrientedStrip[ModelErrors],
     fit: FitOperator,
     influence: Floats,
-    checks: tuple[ControlPoints, Numbers],
+    checks: CheckPoints,
     factor: float,
 ) -> CheckTest | None:
     """Test of the check points together; None without any."""
-    found, control, (points, rows) = oriented.errors, oriented.misclosures, checks
-    if not len(rows):
+    found, control = oriented.errors, oriented.misclosures
+    if not len(checks.rows):
         return None
-    xyz = strip.xyz[rows]
-    targets = absolute_orientation.Targets(points, oriented.frames, strip.intermediate)
-    seen = model_misclosures.misclosures(targets.turned(xyz), targets.axes(xyz), xyz, found.origin)
-    difference = targets.misclosures(xyz)[seen.point, seen.axis]
-    taken = np.einsum("wi,wit->wt", seen.direction, influence[rows][seen.point]) @ fit.operator
-    own = model_errors.sums(found, *model_misclosures.weights(seen, rows))
-    own = own - model_errors.sums(found, *model_misclosures.weights(control, strip.control_rows, taken))
-    spread = model_errors.covariance_of_sums(found, own) * factor + (taken * control.variance) @ taken.T
-    squares = float(difference @ np.linalg.solve(spread + np.diag(seen.variance), difference))
-    return CheckTest(len(points), len(difference), squares)
+    xyz = strip.xyz[checks.rows]
+    targets = absolute_orientation.Targets(checks.points, oriented.frames, strip.intermediate)
+    at = model_misclosures.misclosures(targets.turned(xyz), targets.axes(xyz), xyz, found.origin)
+    difference = targets.misclosures(xyz)[at.point, at.axis]
+    by_control = np.einsum("wi,wit->wt", at.direction, influence[checks.rows][at.point]) @ fit.operator
+    sums = model_errors.sums(found, *model_misclosures.weights(at, checks.rows))
+    sums = sums - model_errors.sums(found, *model_misclosures.weights(control, strip.control_rows, by_control))
+    spread = model_errors.covariance_of_sums(found, sums) * factor + (by_control * control.variance) @ by_control.T
+    squares = float(difference @ np.linalg.solve(spread + np.diag(at.variance), difference))
+    return CheckTest(len(checks.points), len(difference), squares)

@@ -33,11 +33,7 @@ class Propagation:
 def propagation(
     strip: StripResult, oriented: OrientedStrip[strip_errors.StripErrors], observations: PhotoPoints
 ) -> Propagation:
-    """Differentiate the strip method for one strip.
-
-    oriented: the same strip before its deformation was corrected.
-    observations: ideal image coordinates of the project.
-    """
+    """Differentiate the strip method for one strip; `oriented` is the strip before its deformation was corrected."""
     errors, found = oriented.errors, oriented.misclosures
     terms = [axis.terms for axis in strip.polynomial.axes] if strip.polynomial else [(), (), ()]
     fit = control_errors.fit_operator(found, oriented.weights, oriented.at_control, terms, errors.origin)

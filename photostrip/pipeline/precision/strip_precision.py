@@ -42,8 +42,7 @@ class StripPrecision:
 def joined(strips: Sequence[StripPrecision], results: Sequence[StripResult], points: Adjusted) -> Precision:
     """Precision of all strips together; a point of several strips is their mean.
 
-    Returns covariances of points and photos. Strips have no image coordinate in common; what their points share are the
-        errors of common control.
+    Strips have no image coordinate in common; what their points share are the errors of common control.
     """
     rows = [np.searchsorted(points.number, result.formed.point) for result in results]
     count = np.bincount(np.concatenate(rows), minlength=len(points.number))
@@ -57,15 +56,15 @@ def joined(strips: Sequence[StripPrecision], results: Sequence[StripResult], poi
             continue
         for start in range(0, len(of_a), AT_A_TIME):
             part = slice(start, start + AT_A_TIME)
-            seen_a, seen_b = a.by_control(in_a, of_a[part]), b.by_control(in_b, of_b[part])
-            mixed = (seen_a * a.variance[of_a[part]]) @ seen_b.transpose(0, 2, 1)
+            by_a, by_b = a.by_control(in_a, of_a[part]), b.by_control(in_b, of_b[part])
+            mixed = (by_a * a.variance[of_a[part]]) @ by_b.transpose(0, 2, 1)
             total[shared] += mixed + mixed.transpose(0, 2, 1)
     return Precision(
-        total / (count**2)[:, None, None],
-        tuple(strip.photos for strip in strips),
-        tuple(strip.sigma for strip in strips),
-        tuple(strip.basis for strip in strips),
-        tuple(strip.check for strip in strips),
+        points=total / (count**2)[:, None, None],
+        photos=tuple(strip.photos for strip in strips),
+        sigma=tuple(strip.sigma for strip in strips),
+        basis=tuple(strip.basis for strip in strips),
+        checks=tuple(strip.check for strip in strips),
     )
 
 
