@@ -15,7 +15,7 @@ from photostrip.compare.tolerances import SETS, UNITS, Tolerances
 from photostrip.errors import Fault, InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from photostrip.arrays import Floats
 
@@ -36,20 +36,14 @@ SAME_FRAME = {
 
 
 def baseline_of(document: Document) -> Document:
-    """Return what of a result is kept as a baseline.
-
-    It is without the residuals and parallaxes of single measurements, which make two thirds of a result, and without
-    the version of the program.
-    """
+    """Return a result without the version and the residuals of single measurements, two thirds of it: a baseline."""
     return {key: value for key, value in document.items() if key not in LEFT_OUT}
 
 
 def compare_results(
     document: Document, baseline: Document, tolerances: Tolerances | None = None, files: tuple[str, str] = ("", "")
 ) -> Document:
-    """Compare a result with a baseline.
-
-    The baseline may be a short one.
+    """Compare a result with a baseline, which may be a short one.
 
     Returns ``status`` (``same``, ``different``); ``kinds``: for each kind of quantity how many were compared and how
         many differ by more than allowed, and the worst; ``differences``: all of these, worst first; ``sets``: what is
@@ -106,10 +100,10 @@ def _frame(document: Document) -> Document:
 
 
 def _common_points(document: Document, baseline: Document) -> bool:
-    ids = [
+    now, before = (
         {row.get("id") for row in each.get("points") or [] if isinstance(row, dict)} for each in (document, baseline)
-    ]
-    return bool(ids[0] & ids[1])
+    )
+    return bool(now & before)
 
 
 def _folded(value: object) -> object:
@@ -174,7 +168,6 @@ def _rank(row: Document) -> tuple[int, float, str, str]:
 
 
 def _kind(kind: str, rows: list[Document], tolerances: Tolerances) -> Document:
-    """Sum up one kind of quantity."""
     tolerance = tolerances.of(kind)
     of_kind = [row for row in rows if row["kind"] == kind]
     worst = min(of_kind, key=_rank, default=None)
@@ -203,7 +196,7 @@ Difference = tuple[str, str, str, float]  # kind, block, id, size; infinite wher
 
 def _places(block: str, document: Document, baseline: Document) -> Iterator[Difference]:
     """Compare places, in plan and in height; a photo may have no place in both."""
-    ids, now, before = _shared(document[block], baseline[block], ("x", "y", "z"))
+    ids, (now, before) = _shared(document[block], baseline[block], ("x", "y", "z"))
     known = np.flatnonzero(~(np.isnan(now) & np.isnan(before)).all(axis=1))
     sizes = plan_and_height(baseline["frame"], now[known], before[known])
     return _sizes(block, [ids[row] for row in known], sizes)
@@ -211,7 +204,7 @@ def _places(block: str, document: Document, baseline: Document) -> Iterator[Diff
 
 def _control(document: Document, baseline: Document) -> Iterator[Difference]:
     """Compare the differences at control, as far as all three are known."""
-    ids, now, before = _shared(document["control"], baseline["control"], ("dx", "dy", "dz"))
+    ids, (now, before) = _shared(document["control"], baseline["control"], ("dx", "dy", "dz"))
     places = {row["id"]: [row[axis] for axis in "xyz"] for row in baseline["points"]}
     known = [n for n, name in enumerate(ids) if name in places and not np.isnan(now[n] - before[n]).any()]
     at = np.array([places[ids[n]] for n in known], float).reshape(-1, 3)
@@ -244,21 +237,17 @@ def _pairs(now: list[Document], before: list[Document]) -> list[tuple[Document, 
     return [(row, known[row["id"]]) for row in now if row["id"] in known]
 
 
-def _shared(
-    now: list[Document], before: list[Document], keys: tuple[str, str, str]
-) -> tuple[list[str], Floats, Floats]:
-    """Return ids and three numbers of the records that stand in both lists; NaN where there is none."""
+def _shared(now: list[Document], before: list[Document], keys: Sequence[str]) -> tuple[list[str], Floats]:
+    """Return the ids in both lists, and three numbers of each, now and before (2, n, 3); NaN where there is none."""
     pairs = _pairs(now, before)
     values = [[[row[key] for key in keys] for row in pair] for pair in pairs]
-    columns = np.array(values, float).reshape(-1, 2, 3)
-    return [row["id"] for row, _ in pairs], columns[:, 0], columns[:, 1]
+    return [row["id"] for row, _ in pairs], np.array(values, float).reshape(-1, 2, 3).transpose(1, 0, 2)
 
 
 # ---------------------------------------------------------------------------------------------------------- sets
 
 
 def _set(kind: str, document: Document, baseline: Document, tolerances: Tolerances) -> Document:
-    """Compare one kind of set."""
     tolerance = tolerances.of_set(kind)
     missing, new = missing_and_new(members_of(document, kind), members_of(baseline, kind))
     too_many = len(missing) > tolerance.missing or len(new) > tolerance.new

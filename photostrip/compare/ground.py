@@ -17,18 +17,15 @@ Document = dict[str, Any]
 
 
 def plan_and_height(frame: Document, now: Floats, before: Floats) -> tuple[Floats, Floats]:
-    """Return the distance of points from where they were, in plan and in height.
+    """Return the distance of points (n, 3) from where they were, in plan and in height, metres.
 
-    frame: the block ``frame`` of a result.
-    now, before: (n, 3), coordinates in the order and the units of the frame.
-    Returns plan, height: (n,), length in plan and size of the difference in height, metres. In a geocentric frame up is
-        the normal of the ellipsoid.
+    Coordinates are in the order and the units of the frame, the block ``frame`` of a result. In a geocentric frame up
+    is the normal of the ellipsoid.
     """
     if frame["kind"] == "geocentric":
-        parts = _turned(frame, now - before, before)
-    else:
-        order = [list(frame["axes"]).index(axis) for axis in GROUND_AXES]
-        parts = _in_metres(frame, now[:, order], before[:, order])
+        return difference_in_plan_and_height(frame, now - before, before)
+    order = [list(frame["axes"]).index(axis) for axis in GROUND_AXES]
+    parts = _in_metres(frame, now[:, order], before[:, order])
     return np.hypot(parts[:, 0], parts[:, 1]), np.abs(parts[:, 2])
 
 

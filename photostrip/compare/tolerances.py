@@ -51,7 +51,7 @@ class Tolerances:
     # angle between two rotations, and elements of relative orientation, degrees
     rotation: Tolerance = Tolerance(absolute=2e-6)
     sigma0: Tolerance = Tolerance(absolute=0.02)  # standard deviation of an image coordinate of weight one, micrometres
-    scale: Tolerance = Tolerance(relative=1e-8)  # scale factors of models, joints and of the strip, ratios
+    scale: Tolerance = Tolerance(relative=1e-8)  # scale factors of models, junctions and of the strip, ratios
     precision: Tolerance = Tolerance(absolute=0.0002, relative=0.001)
     statistics: Tolerance = Tolerance(absolute=0.0002, relative=0.001, absolute_um=0.11)
     counts: Tolerance = Tolerance()

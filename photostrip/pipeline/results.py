@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.geodesy.local_frame import IntermediateFrame
@@ -216,6 +218,11 @@ class BlockStart:
     rotations: Floats
     points: Floats  # (q, 3): all points of the observations; NaN where one has no coordinates
     free: bool  # whether nothing ties the block to the ground: its frame and scale are those of the first strip
+
+    def rows_of(self, photos: Sequence[str]) -> Numbers:
+        """Rows of photos."""
+        row = {photo: number for number, photo in enumerate(self.photos)}
+        return np.array([row[photo] for photo in photos], np.intp)
 
 
 @dataclass(frozen=True, eq=False)

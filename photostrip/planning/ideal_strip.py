@@ -12,7 +12,6 @@ import numpy as np
 
 from photostrip.errors import Fault, InputError
 from photostrip.geometry.similarity import Similarity
-from photostrip.points import PhotoPoints
 from photostrip.simulate import Control, Flight, Ground, Image, Points, Spec, Terrain, simulate
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors, differentiate_strip
 from photostrip.triangulation.relative_orientation.orientation import orient_unchecked, refuse_unusable
@@ -23,6 +22,7 @@ from photostrip.triangulation.strip_formation.strip import form_from_pairs
 if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.camera import Camera
+    from photostrip.points import PhotoPoints
     from photostrip.simulate import Simulation
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.strip import FormedStrip
@@ -119,14 +119,8 @@ def ideal_strip(geometry: StripGeometry) -> IdealStrip:
         raise InputError(Fault(message, "plan-photos", key="photos", expected=f"{LEAST_PHOTOS} or more"))
     simulation = geometry.simulated()
     observed = simulation.observations
-    observations = PhotoPoints(
-        observed.photo_ids,
-        observed.point_ids,
-        observed.photo,
-        observed.point,
-        simulation.truth.image,
-        np.full(observed.sigma.shape, geometry.image_sigma),
-    )
+    sigma = np.full(observed.sigma.shape, geometry.image_sigma)
+    observations = replace(observed, xy=simulation.truth.image, sigma=sigma)
     photos = simulation.strips[0][1]
     pairs = collect_pairs(observations, photos, geometry.camera.principal_distance)
     orientation, converged = orient_unchecked(pairs)
@@ -135,24 +129,12 @@ def ideal_strip(geometry: StripGeometry) -> IdealStrip:
     middle = simulation.truth.centers.mean(axis=0)
     middle[2] = 0.0
     truth = simulation.truth.points.xyz - middle
-    return _strip(geometry, simulation, observations, orientation, formed, truth)
-
-
-def _strip(
-    geometry: StripGeometry,
-    simulation: Simulation,
-    observations: PhotoPoints,
-    orientation: Orientation,
-    formed: FormedStrip,
-    truth: Floats,
-) -> IdealStrip:
-    """Carry the formed strip to the ground and find the columns of points."""
+    # the formed strip is carried to the ground
     xyz = truth[formed.point]
     similarity = Similarity.from_points(formed.xyz, xyz)
     centers = similarity(formed.centers)
     rotations = similarity.rotation @ formed.rotations
     station, row = _columns(geometry, centers, xyz)
-    photos = simulation.strips[0][1]
     position = np.array([photos.index(photo) for photo in observations.photo_ids], np.intp)
     errors = differentiate_strip(orientation, formed, similarity, position[observations.photo], observations.sigma)
     return IdealStrip(

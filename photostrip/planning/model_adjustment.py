@@ -80,4 +80,11 @@ def adjust_model(control: ModelControl, misclosures: ArrayLike, base: float, ele
     size = np.sqrt(np.diag(normal))  # the unknowns differ by many orders of magnitude
     cofactors = np.linalg.inv(normal / np.outer(size, size)) / np.outer(size, size)
     solution = cofactors @ right
-    return AdjustedModel(control, base, solution[:first], solution[first:], cofactors, weights)
+    return AdjustedModel(
+        control=control,
+        base=base,
+        parameters=solution[:first],
+        elements=solution[first:],
+        cofactors=cofactors,
+        weights=weights,
+    )

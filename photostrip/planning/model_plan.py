@@ -132,7 +132,7 @@ def plan_model(spec: ModelSpec) -> Forecast:
     control = _control(spec)
     elements = _elements(spec)
     points = _level(places, spec.focal)
-    measured = _measured(points, spec)
+    measured = measured_covariance(points, spec.base, spec.focal, spec.image_sigma)
     expected = expected_errors(points, measured, control, spec.base, elements)
     adjusted = adjust_model(control, np.zeros((len(spec.control), 3)), spec.base, elements)
     number = np.arange(len(spec.control))
@@ -176,10 +176,6 @@ def _level(places: ArrayLike, focal: float) -> Floats:
     return np.column_stack([flat, np.full(len(flat), focal)])
 
 
-def _measured(points: Floats, spec: ModelSpec) -> Floats:
-    return measured_covariance(points, spec.base, spec.focal, spec.image_sigma)
-
-
 def _control(spec: ModelSpec) -> ModelControl:
     points = _level([point.at for point in spec.control] or np.zeros((0, 2)), spec.focal)
     given = np.diag(np.square(np.array(spec.control_sigma) / spec.ground_unit))
@@ -187,7 +183,7 @@ def _control(spec: ModelSpec) -> ModelControl:
         points,
         plan=np.array(["xy" in point.use for point in spec.control], bool),
         height=np.array(["z" in point.use for point in spec.control], bool),
-        measured=_measured(points, spec),
+        measured=measured_covariance(points, spec.base, spec.focal, spec.image_sigma),
         given=np.broadcast_to(given, (len(points), 3, 3)),
     )
 

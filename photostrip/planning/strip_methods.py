@@ -14,7 +14,7 @@ from photostrip.errors import GeometryError
 from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.local_frame import IntermediateFrame
 from photostrip.geodesy.tying import tie_frames
-from photostrip.planning.control_layout import USES, ControlLayout, Spot, numbers_of
+from photostrip.planning.control_layout import USES, ControlLayout, Spot, Triple, numbers_of
 from photostrip.points import ControlPoints
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.bundle.observations import problem as bundle
@@ -66,7 +66,7 @@ class Accuracy:
         return np.setdiff1d(np.arange(len(self.covariance)), self.control)
 
 
-def control_of(strip: IdealStrip, spots: tuple[Spot, ...], sigma: tuple[float, float, float]) -> ControlPoints:
+def control_of(strip: IdealStrip, spots: tuple[Spot, ...], sigma: Triple) -> ControlPoints:
     """Return the control points of a layout along X, Y, Z of the strip, in the order of the spots."""
     numbers = numbers_of(strip, spots)
     ids = tuple(f"{spot.photo}/{spot.row}" for spot in spots)
@@ -85,16 +85,12 @@ def accuracy(strip: IdealStrip, layout: ControlLayout, spots: tuple[Spot, ...], 
     control = control_of(strip, spots, layout.sigma)
     if method == BUNDLE:
         return _bundle(strip, layout, spots, control)
-    _require_control(control)
-    fit = _oriented(strip, np.array(numbers_of(strip, spots), np.intp), control)
-    return _predicted(strip, fit) if method == COVARIANCE else _fitted(strip, fit, method)
-
-
-def _require_control(control: ControlPoints) -> None:
     plan, height = int(control.use[:, 0].sum()), int(control.use[:, 2].sum())
     if plan < 2 or height < 3:
         message = f"{plan} control points in plan and {height} in height do not orient a strip"
         raise GeometryError(message, code="plan-control")
+    fit = _oriented(strip, np.array(numbers_of(strip, spots), np.intp), control)
+    return _predicted(strip, fit) if method == COVARIANCE else _fitted(strip, fit, method)
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +122,8 @@ def _fitted(strip: IdealStrip, ground: _Fit, method: str) -> Accuracy:
     numbers, targets, weight, xyz = ground.numbers, ground.targets, ground.weight, ground.xyz
     terms: list[tuple[str, ...]] = [(), (), ()]
     if method in DEGREES:
-        problem = correction.FitProblem(xyz[numbers], targets, weight, strip.geometry.base, _breadth(xyz))
+        breadth = max(float(np.quantile(np.abs(xyz[:, 1]), 0.95)), 1e-6)
+        problem = correction.FitProblem(xyz[numbers], targets, weight, strip.geometry.base, breadth)
         terms = [axis.terms for axis in correction.fit(problem, correction.PolynomialSettings(DEGREES[method])).axes]
     axes = targets.axes(xyz[numbers])
     found = control_errors.misclosures(strip.errors.points, ground.control, numbers, axes)
@@ -151,10 +148,6 @@ def _used(terms: list[tuple[str, ...]]) -> str:
     powers = [polynomial_terms.degree_of(each) for each in (terms[0], terms[2])]
     names = ["similarity" if power == 0 else f"degree {power}" for power in powers]
     return names[0] if names[0] == names[1] else f"{names[0]} in plan, {names[1]} in height"
-
-
-def _breadth(xyz: Floats) -> float:
-    return max(float(np.quantile(np.abs(xyz[:, 1]), 0.95)), 1e-6)
 
 
 def _precision(strip: IdealStrip) -> tuple[float, float]:
@@ -218,23 +211,23 @@ def bundle_problem(
         bundle.BundleCameras(np.zeros(count, np.intp), np.array([strip.geometry.camera.principal_distance])),
         bundle.StartValues(strip.centers, strip.rotations, strip.xyz),
         bundle.ControlObservations(numbers, strip.xyz[numbers], axes, np.where(control.use, control.sigma, np.inf)),
-        bundle.PositionObservations()
-        if layout.gnss is None
-        else _positions(strip, layout.gnss, offset=layout.gnss_offset),
+        _positions(strip, layout),
     )
 
 
-def _positions(strip: IdealStrip, sigma: tuple[float, float, float], *, offset: bool) -> bundle.PositionObservations:
-    """Return all perspective centres, with a constant offset that is free or absent."""
+def _positions(strip: IdealStrip, layout: ControlLayout) -> bundle.PositionObservations:
+    """Return all perspective centres, with a constant offset that is free or absent; none where none are measured."""
+    if layout.gnss is None:
+        return bundle.PositionObservations()
     count = len(strip.centers)
     return bundle.PositionObservations(
-        np.arange(count),
-        strip.centers,
-        np.broadcast_to(np.eye(3), (count, 3, 3)),
-        np.broadcast_to(np.array(sigma, float), (count, 3)),
-        np.zeros((count, 3)),
-        np.zeros(count, np.intp),
-        np.linspace(-1.0, 1.0, count),
-        np.array([np.inf if offset else 0.0]),
-        np.zeros(1),
+        photo=np.arange(count),
+        xyz=strip.centers,
+        axes=np.broadcast_to(np.eye(3), (count, 3, 3)),
+        sigma=np.broadcast_to(np.array(layout.gnss, float), (count, 3)),
+        lever=np.zeros((count, 3)),
+        group=np.zeros(count, np.intp),
+        time=np.linspace(-1.0, 1.0, count),
+        offset_sigma=np.array([np.inf if layout.gnss_offset else 0.0]),
+        drift_sigma=np.zeros(1),
     )

@@ -81,9 +81,9 @@ def _designed(spec: Spec, placed: Placed, rays: Numbers, order: Numbers) -> Numb
     gruber = np.flatnonzero(placed.row >= 0)
     first[placed.home[gruber], placed.row[gruber]] = gruber
     control = np.array([first[j * n + photo, row] for j in range(spec.flight.strips) for photo, row in wanted])
-    unseen = [placed.ids[i] for i in control[rays[control] < 2].tolist()]
-    if unseen:
-        message = f"control points {', '.join(unseen)} lie on fewer than two photos"
+    not_shown = [placed.ids[i] for i in control[rays[control] < 2].tolist()]
+    if not_shown:
+        message = f"control points {', '.join(not_shown)} lie on fewer than two photos"
         raise InputError(Fault(message, code="simulation-overlap", key="flight", fix="less attitude scatter or relief"))
     return control
 

@@ -57,7 +57,6 @@ def sheets(spec: Spec, count: int) -> Sheets | None:
         offset=film.offset_mm * normal[:, 4:],
         wave=number[:, None] * direction,
         phase=uniform[..., 1],
-        amplitude=film.irregular_um
-        / 1000.0
-        * np.sqrt(2.0 / len(LENGTHS)),  # sine waves of this amplitude add up to the rms
+        # sine waves of this amplitude add up to the rms
+        amplitude=film.irregular_um / 1000.0 * np.sqrt(2.0 / len(LENGTHS)),
     )

@@ -75,9 +75,7 @@ class Simulation:
     control: ControlPoints  # control and check points; ``frame`` counts in `frames`
     frames: tuple[FrameSpec, ...]  # frame of each control list; the first is that of the output
     fiducials: PhotoPoints | None  # measured fiducial marks, mm
-    gnss: (
-        Floats | None
-    )  # (m, 3), or None: measured perspective centres east, north, up in the first frame, in its units
+    gnss: Floats | None  # (m, 3): measured perspective centres east, north, up in the first frame, in its units
     truth: Truth
     # measured models, when they stand in place of image coordinates; the observations then only say what is seen
     models: ModelPoints | None = None
@@ -202,8 +200,8 @@ def _check_overlap(spec: Spec, photos: Photos, photo: Numbers, point: Numbers) -
 def _rays(spec: Spec, placed: Placed, photo: Numbers, point: Numbers) -> Numbers:
     """On how many photos of its own strip each point lies."""
     n = spec.flight.photos
-    own = photo // n == placed.home[point] // n
-    return np.bincount(point[own], minlength=len(placed.ids))
+    in_strip = photo // n == placed.home[point] // n
+    return np.bincount(point[in_strip], minlength=len(placed.ids))
 
 
 def _names(placed: Placed, chosen: Roles) -> tuple[str, ...]:
@@ -254,10 +252,7 @@ def _observations(
 
 
 def _fiducials(spec: Spec, photos: Photos, film: Sheets | None) -> PhotoPoints | None:
-    """Measure the fiducial marks of every photo.
-
-    Draws (`Purpose.FIDUCIALS`): for each photo and mark x, y.
-    """
+    """Measure the fiducial marks of every photo. Draws (`Purpose.FIDUCIALS`): for each photo and mark x, y."""
     if film is None:
         return None
     marks, n = spec.camera.fiducials, len(photos.ids)
@@ -271,10 +266,7 @@ def _fiducials(spec: Spec, photos: Photos, film: Sheets | None) -> PhotoPoints |
 
 
 def _gnss(spec: Spec, photos: Photos, output: GroundFrame) -> Floats | None:
-    """Measure the perspective centres.
-
-    Draws (`Purpose.GNSS`): for each photo east, north, up.
-    """
+    """Measure the perspective centres. Draws (`Purpose.GNSS`): for each photo east, north, up."""
     if spec.gnss is None:
         return None
     error = Draws(spec.seed, Purpose.GNSS).normal(len(photos.ids), 3) * spec.gnss.sigma

@@ -27,15 +27,7 @@ LARGEST_ARC = 0.5  # radians of the body that strips may cover
 
 def faults_of(spec: Spec) -> list[Fault]:
     """Everything in a specification that cannot be simulated, with the paths of the keys."""
-    found = [
-        *_camera(spec),
-        *_flight(spec),
-        *_terrain(spec),
-        *_points(spec),
-        *_control(spec),
-        *_image(spec),
-        *_models(spec),
-    ]
+    found = [fault for part in (_camera, _flight, _terrain, _points, _control, _image, _models) for fault in part(spec)]
     return [*found, *_errors(spec), *(() if found else _together(spec))]
 
 
@@ -43,9 +35,9 @@ def _fault(key: str, message: str, expected: str = "", fix: str = "") -> Fault:
     return Fault(message, code="simulation-spec", key=key, expected=expected, fix=fix)
 
 
-def _range(key: str, value: float, low: float, high: float, unit: str = "") -> Iterator[Fault]:
-    """Refuse a number outside [low, high], or one that is no number."""
-    if not low <= value <= high:
+def _range(key: str, value: float | None, low: float, high: float, unit: str = "") -> Iterator[Fault]:
+    """Refuse a number outside [low, high], or one that is no number; None is sound."""
+    if value is not None and not low <= value <= high:
         unit = f" {unit}" if unit else ""
         yield _fault(key, f"{value:g}{unit} is out of range", f"{low:g} to {high:g}{unit}")
 
@@ -62,8 +54,7 @@ def _models(spec: Spec) -> Iterator[Fault]:
         return
     yield from _each("models.sigma_um", models.sigma_um, 0.0, 10_000.0, "um")
     yield from _each("models.center_sigma_um", models.center_sigma_um, 0.0, 10_000.0, "um")
-    if models.scale is not None:
-        yield from _range("models.scale", models.scale, 1.0, 1e7)
+    yield from _range("models.scale", models.scale, 1.0, 1e7)
     for key, word, words in (("axes", models.axes, MODEL_AXES), ("hand", models.hand, HANDS)):
         if word not in words:
             yield _fault(f"models.{key}", f"`{word}` is not known", " or ".join(words))
@@ -81,8 +72,7 @@ def _camera(spec: Spec) -> Iterator[Fault]:
     yield from _each("camera.format", camera.format, 1.0, 2_000.0, "mm")
     for fault in lens_distortion.faults(camera):
         yield replace(fault, key="camera.distortion")
-    if camera.pixel_size is not None:
-        yield from _range("camera.pixel_size", camera.pixel_size, 1e-5, 1.0, "mm")
+    yield from _range("camera.pixel_size", camera.pixel_size, 1e-5, 1.0, "mm")
 
 
 def _flight(spec: Spec) -> Iterator[Fault]:
@@ -104,9 +94,8 @@ def _flight(spec: Spec) -> Iterator[Fault]:
     yield from _range("flight.side_lap_percent", flight.side_lap_percent, 0.0, LARGEST_SIDE_LAP, "%")
     if flight.scale is not None and flight.flying_height is not None:
         yield _fault("flight.scale", "scale and flying_height are both given", "one of them")
-    yield from _each("flight.scale", (flight.scale,) if flight.scale is not None else None, 1.0, 1e7, "")
-    height = None if flight.flying_height is None else (flight.flying_height,)
-    yield from _each("flight.flying_height", height, 0.1, 1e6, "m")
+    yield from _range("flight.scale", flight.scale, 1.0, 1e7)
+    yield from _range("flight.flying_height", flight.flying_height, 0.1, 1e6, "m")
     yield from _range("flight.heading_deg", flight.heading_deg, -360.0, 360.0, "degrees")
     yield from _range("flight.photo_rotation_deg", flight.photo_rotation_deg, -360.0, 360.0, "degrees")
     yield from _each("flight.attitude_sigma_deg", flight.attitude_sigma_deg, 0.0, LARGEST_TILT_DEG, "degrees")
@@ -117,8 +106,7 @@ def _terrain(spec: Spec) -> Iterator[Fault]:
     terrain = spec.terrain
     yield from _range("terrain.height", terrain.height, -1e5, 1e5, "m")
     yield from _range("terrain.relief", terrain.relief, 0.0, 1e5, "m")
-    if terrain.wavelength is not None:
-        yield from _range("terrain.wavelength", terrain.wavelength, 1e-3, 1e9, "m")
+    yield from _range("terrain.wavelength", terrain.wavelength, 1e-3, 1e9, "m")
     yield from _each("terrain.slope_percent", terrain.slope_percent, -50.0, 50.0, "%")
 
 
@@ -140,11 +128,10 @@ def _control(spec: Spec) -> Iterator[Fault]:
     if control.layout == "bands":
         yield from _range("control.bands", control.bands, 1, max(last + 1, 2))
         yield from _range("control.per_band", control.per_band, 1, spec.points.rows)
-        if control.every is not None:
-            yield from _range("control.every", control.every, 1, max(last, 1), "models")
+        yield from _range("control.every", control.every, 1, max(last, 1), "models")
     if control.layout == "random":
         yield from _range("control.count", control.count, 1, MOST_POINTS)
-    yield from _each("control.check", (control.check or 0,), 0, MOST_POINTS, "")
+    yield from _range("control.check", control.check, 0, MOST_POINTS)
     for name, share in control.use.items():
         if name not in USES:
             yield _fault(f"control.use.{name}", f"{name!r} is no set of coordinates", " | ".join(USES))
@@ -158,10 +145,9 @@ def _control(spec: Spec) -> Iterator[Fault]:
 
 def _boundary(spec: Spec) -> Iterator[Fault]:
     control = spec.control
-    if control.boundary_longitude_deg is not None:
-        if control.second_crs is None:
-            yield _fault("control.boundary_longitude_deg", "a boundary needs a second frame", fix="add second_crs")
-        yield from _range("control.boundary_longitude_deg", control.boundary_longitude_deg, -360.0, 360.0, "degrees")
+    if control.boundary_longitude_deg is not None and control.second_crs is None:
+        yield _fault("control.boundary_longitude_deg", "a boundary needs a second frame", fix="add second_crs")
+    yield from _range("control.boundary_longitude_deg", control.boundary_longitude_deg, -360.0, 360.0, "degrees")
     if control.second_crs is not None and "local" in {control.second_crs, spec.ground.crs}:
         yield _fault("control.second_crs", "nobody knows where `local` lies", "two frames on the Earth")
 
@@ -212,11 +198,7 @@ def _together(spec: Spec) -> Iterator[Fault]:
         message = (
             f"the terrain rises to {highest:.0f} m above its mean height, the camera is at {spec.flying_height:.0f} m"
         )
-        yield _fault(
-            "terrain.relief",
-            message,
-            fix="less relief or slope, a shorter strip or a higher flight",
-        )
+        yield _fault("terrain.relief", message, fix="less relief or slope, a shorter strip or a higher flight")
     lon, lat = spec.ground.center_deg
     if not (abs(lon) <= LARGEST_LON and abs(lat) < LARGEST_LAT):
         yield _fault("ground.center_deg", f"{lon:g}, {lat:g} is no place", "longitude and latitude in degrees")

@@ -72,10 +72,7 @@ def as_printed(xz: ArrayLike, principal_distance: float, sigma: float) -> Printe
 def supported(
     xz: ArrayLike, principal_distance: float, horizontal: float, vertical: float, rotation: ArrayLike
 ) -> Floats:
-    """Image accuracy that directions of a given accuracy can vouch for, shape (..., 2), mm.
-
-    Smallest standard error of image coordinates for which the horizontal and the vertical direction, with the standard
-    errors given, are accurate enough.
+    """Smallest standard errors (..., 2) of image coordinates, mm, for which directions are accurate enough.
 
     Source: derived; ``required`` solved for m.
     """
@@ -96,8 +93,7 @@ def rounds_for(sigma: float, wanted: float) -> int:
 def grid(photo_format: tuple[float, float], step: float, *, level: bool = True) -> tuple[Floats, Floats]:
     """Coordinates x and z over the photo, mm, at which accuracy is tabulated: multiples of the step, and the edge.
 
-    photo_format: width and height of the photo in mm.
-    level: whether one quarter of the photo stands for the others.
+    With a level camera one quarter of the photo stands for the others.
     """
     axes = []
     for size in photo_format:
@@ -156,12 +152,12 @@ def worked(example: Example) -> WorkedExample:
     printed = as_printed([x, z], f, m)
     factor = 1.0 + (x / f) ** 2
     return WorkedExample(
-        example,
-        float(exact.horizontal) * ARCSECONDS,
-        float(m * ARCSECONDS / np.sqrt(f**2 + z**2 * example.factor)),
-        float(printed.vertical_eq5) * ARCSECONDS,
-        float(printed.vertical_eq6) * ARCSECONDS,
-        factor,
-        float(exact.vertical) * ARCSECONDS,
-        z * factor,  # tan(beta) = z sec/f, and eq. 2 multiplies by f sec again
+        example=example,
+        horizontal=float(exact.horizontal) * ARCSECONDS,
+        printed_factor=float(m * ARCSECONDS / np.sqrt(f**2 + z**2 * example.factor)),
+        eq5=float(printed.vertical_eq5) * ARCSECONDS,
+        eq6=float(printed.vertical_eq6) * ARCSECONDS,
+        factor=factor,
+        vertical=float(exact.vertical) * ARCSECONDS,
+        returned_z=z * factor,  # tan(beta) = z sec/f, and eq. 2 multiplies by f sec again
     )

@@ -82,11 +82,11 @@ class Turn:
 
     def predict(self, number: int) -> tuple[Floats, Floats] | None:
         """Fit the turn without one point; None when the other points do not determine it."""
-        own = self.design[number] * self.weights[number][:, None]
-        normal = self.normal - own.T @ self.design[number]
+        weighted = self.design[number] * self.weights[number][:, None]
+        normal = self.normal - weighted.T @ self.design[number]
         if not determined(normal):
             return None
-        shift = np.linalg.solve(normal, own.T @ np.nan_to_num(self.residuals[number]))
+        shift = np.linalg.solve(normal, weighted.T @ np.nan_to_num(self.residuals[number]))
         return self.values - shift, normal
 
 
@@ -126,15 +126,11 @@ def fit(pair: ImagePair, used: Flags) -> Turn | None:
             return None
         residuals = pair.after - predicted
         step = np.linalg.solve(normal, np.einsum("mij,mi,mi->j", design, weights, np.nan_to_num(residuals)))
-        values = _composed(values, step)
+        # turned first by `values`, then by the step in the new axes
+        values = alpha_omega_kappa(small_turn(values) @ small_turn(step))
         if np.abs(step).max() < CONVERGED_RAD:
-            return Turn(values, normal, design, weights, residuals)
+            return Turn(values=values, normal=normal, design=design, weights=weights, residuals=residuals)
     return None
-
-
-def _composed(turn: Floats, step: Floats) -> Floats:
-    """Turn of a camera that turned first by `turn`, then by `step` in its new axes."""
-    return alpha_omega_kappa(small_turn(turn) @ small_turn(step))
 
 
 def determined(normal: Floats) -> bool:

@@ -253,8 +253,8 @@ def _from_turns(series: Series, epochs: list[_Epoch], one: int, two: int) -> Flo
 
 def _position_covariance(series: Series, epochs: list[_Epoch], number: int) -> Floats:
     each = epochs[number]
-    own = _sandwich(each.by_measured, series.shared + series.own[number], each.by_measured)
-    whole: Floats = own + (_from_turns(series, epochs, number, number) if number else 0.0)
+    measured = _sandwich(each.by_measured, series.shared + series.own[number], each.by_measured)
+    whole: Floats = measured + (_from_turns(series, epochs, number, number) if number else 0.0)
     whole[~each.turns.known] = np.nan
     return whole
 

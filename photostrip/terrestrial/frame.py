@@ -52,8 +52,7 @@ def small_turn(turn: ArrayLike) -> Floats:
 
     It takes rays after the turn to the camera before it; ``rotation @ small_turn(turn)`` is the rotation after it.
     """
-    alpha, omega, kappa = np.moveaxis(np.asarray(turn, float), -1, 0)
-    return from_alpha_omega_kappa(alpha, omega, kappa)
+    return from_alpha_omega_kappa(*np.moveaxis(np.asarray(turn, float), -1, 0))
 
 
 def rays(xz: ArrayLike, principal_distance: ArrayLike) -> Floats:

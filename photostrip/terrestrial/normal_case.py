@@ -118,12 +118,12 @@ def to_normal(measured: Floats, variances: Floats, pair: StereoPair, rotations: 
     by_measured[without, :, 3] = 0.0
     onto = np.eye(4) - way[:, :, None] * CONDITION / (way @ CONDITION)[:, None, None]
     return Normal(
-        np.einsum("nij,nj->ni", onto, raw),
-        onto @ by_measured,
-        onto @ by_turn,
-        np.where(without, np.nan, parallax),
-        CONDITION @ by_measured,
-        CONDITION @ by_turn,
+        coordinates=np.einsum("nij,nj->ni", onto, raw),
+        by_measured=onto @ by_measured,
+        by_turn=onto @ by_turn,
+        parallax=np.where(without, np.nan, parallax),
+        parallax_by_measured=CONDITION @ by_measured,
+        parallax_by_turn=CONDITION @ by_turn,
     )
 
 
@@ -155,10 +155,9 @@ def _blocks(parts: Floats) -> Floats:
 
 
 def intersect(coordinates: Floats, principal_distance: float, base: float) -> tuple[Floats, Floats]:
-    """Points of the normal case.
+    """Points (n, 3) from the left station, metres, NaN where the parallax is too small, and derivatives (n, 3, 4).
 
-    Returns xyz: (n, 3), coordinates from the left station, metres; NaN where the parallax is too small.
-    Returns by_coordinates: (n, 3, 4), their derivatives by x, z of the left and of the right photo, m/mm.
+    The derivatives are by x, z of the left and of the right photo, m/mm.
     """
     x, z, x_right = coordinates[:, 0], coordinates[:, 1], coordinates[:, 2]
     p = x - x_right

@@ -155,7 +155,7 @@ def orient(
     names = (*ANGLES, *(name for key, keys in FREE.items() if key in chosen.free for name in keys))
     interior = np.array([principal_distance, *principal_point])
     used = np.asarray(sightings.measured.any(axis=1), bool)
-    _enough(sightings, used, names)
+    _refuse_too_few(sightings, used, names)
     solution = _solve(sightings, used, names, interior)
     rejected: list[PointRejection] = []
     while chosen.screening != "none":
@@ -170,8 +170,7 @@ def orient(
     return replace(solution, rejected=tuple(rejected))
 
 
-def _enough(sightings: Sightings, used: Flags, names: Sequence[str]) -> None:
-    """Refuse a photo with too few directions."""
+def _refuse_too_few(sightings: Sightings, used: Flags, names: Sequence[str]) -> None:
     number = int(sightings.measured[used].sum())
     points = int(used.sum())
     if points < LEAST_POINTS or number < len(names):
@@ -226,8 +225,9 @@ def _linearised(sightings: Sightings, values: Floats, active: Numbers) -> _Syste
     ground = ray @ turn.T
     gradient = direction_gradient(ground)
     # the roll turns the ray about the photo's third axis, the elevation about the ground's x axis before the azimuth
+    about_vertical = ground_from_photo(alpha) @ GROUND_FROM_HOUSE.T  # adds alpha to every azimuth
     roll = np.cross([0.0, 0.0, 1.0], ray) @ turn.T
-    tilt = np.cross([1.0, 0.0, 0.0], ray @ ground_from_photo(0.0, omega, kappa).T) @ _about_vertical(alpha).T
+    tilt = np.cross([1.0, 0.0, 0.0], ray @ ground_from_photo(0.0, omega, kappa).T) @ about_vertical.T
     by_photo = gradient @ turn
     design = np.empty((len(ray), 2, 6))
     design[:, :, 0] = [1.0, 0.0]  # alpha is added to every azimuth
@@ -240,19 +240,13 @@ def _linearised(sightings: Sightings, values: Floats, active: Numbers) -> _Syste
     return _System(design[:, :, active], miss, _weights(sightings, by_photo[:, :, :2]))
 
 
-def _about_vertical(alpha: float) -> Floats:
-    """Rotation of the ground that adds alpha to every azimuth."""
-    return np.asarray(ground_from_photo(alpha) @ GROUND_FROM_HOUSE.T, float)
-
-
 def _weights(sightings: Sightings, by_xz: Floats) -> Floats:
     """Inverse covariance of the misclosures of each point; zero where a direction was not measured."""
     covariance = np.einsum("nij,nj,nkj->nik", by_xz, sightings.sigma_xz**2, by_xz)
     covariance[:, [0, 1], [0, 1]] += sightings.sigma_directions**2
     there = sightings.measured
-    missing = ~there
-    covariance[missing[:, 0] | missing[:, 1], 0, 1] = 0.0
-    covariance[missing[:, 0] | missing[:, 1], 1, 0] = 0.0
+    partial = ~there.all(axis=1)
+    covariance[partial, 0, 1] = covariance[partial, 1, 0] = 0.0
     covariance[:, [0, 1], [0, 1]] = np.where(there, covariance[:, [0, 1], [0, 1]], 1.0)
     return np.asarray(np.linalg.inv(covariance) * (there[:, :, None] & there[:, None, :]), float)
 
@@ -285,12 +279,7 @@ def _undetermined(lost: Sequence[str], sightings: Sightings) -> GeometryError:
 
 
 def _result(
-    sightings: Sightings,
-    used: Flags,
-    names: tuple[str, ...],
-    values: Floats,
-    active: Numbers,
-    condition: float,
+    sightings: Sightings, used: Flags, names: tuple[str, ...], values: Floats, active: Numbers, condition: float
 ) -> PhotoOrientation:
     system = _linearised(sightings, values, active)
     normal, _ = _normal(system, used)

@@ -12,9 +12,10 @@ from photostrip.terrestrial.frame import ARCSECONDS
 from photostrip.terrestrial.monitoring import MEASURED, REASONS
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterator
 
-    from photostrip.terrestrial.monitoring import CameraState, Monitoring
+    from photostrip.terrestrial.camera_motion import Turn
+    from photostrip.terrestrial.monitoring import Monitoring
 
 
 SURE = 0.99  # probability below which a misfit may be chance
@@ -31,7 +32,7 @@ def remarks(result: Monitoring) -> Iterator[Note]:
 
 
 def _cameras(result: Monitoring) -> Iterator[Note]:
-    """Tell which cameras turned, and which nobody can know of."""
+    """Which cameras turned, and which nobody can know of."""
     if not result.series.stable.any():
         message = "no stable points are given: a camera that turned between the epochs shows as displacements"
         yield Note("no-stable-points", message)
@@ -44,18 +45,18 @@ def _cameras(result: Monitoring) -> Iterator[Note]:
         elif state.moved:
             done = "its turn is taken out" if state.removed else "its turn is left in the displacements"
             severity = "note" if state.removed else "warning"
-            yield Note("camera-turned", f"{where} turned by {_turn(state)}; {done}", severity, photos=(state.side,))
+            yield Note(
+                "camera-turned", f"{where} turned by {_turned_by(state.turn)}; {done}", severity, photos=(state.side,)
+            )
 
 
-def _turn(state: CameraState) -> str:
-    assert state.turn is not None  # noqa: S101
-    values = state.turn.values * ARCSECONDS
+def _turned_by(turn: Turn) -> str:
     words = ("to the right", "up", "counter-clockwise")
-    return ", ".join(f"{value:+.0f}″ {word}" for value, word in zip(values, words, strict=True))
+    return ", ".join(f"{value:+.0f}″ {word}" for value, word in zip(turn.values * ARCSECONDS, words, strict=True))
 
 
 def _stable_points(result: Monitoring) -> Iterator[Note]:
-    """Tell which stable points moved, and where they do not fit together."""
+    """Which stable points moved, and where they do not fit together."""
     for number, name in result.rejected:
         epoch = result.series.epochs[number]
         message = (
@@ -76,7 +77,7 @@ def _stable_points(result: Monitoring) -> Iterator[Note]:
 
 
 def _parallaxes(result: Monitoring) -> Iterator[Note]:
-    """Tell where rays of a point do not meet as they should."""
+    """Where rays of a point do not meet as they should."""
     yield from _misorientation(result)
     for number in range(1, len(result.series.epochs)):
         ratio = np.abs(result.parallax_change[number] / result.parallax_change_sigma[number])
@@ -130,8 +131,7 @@ def _missing(result: Monitoring) -> Iterator[Note]:
         yield Note("not-tested", message, "note", points=tuple(untested))
 
 
-def _listed(names: Iterable[str]) -> str:
-    given = list(names)
-    head = ", ".join(given[:NAMED])
-    word = "point" if len(given) == 1 else "points"
-    return f"{word} {head}" if len(given) <= NAMED else f"{word} {head} and {len(given) - NAMED} more"
+def _listed(names: list[str]) -> str:
+    head = ", ".join(names[:NAMED])
+    word = "point" if len(names) == 1 else "points"
+    return f"{word} {head}" if len(names) <= NAMED else f"{word} {head} and {len(names) - NAMED} more"

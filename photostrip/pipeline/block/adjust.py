@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -56,21 +56,21 @@ def adjust_block(
     start = block_start.start(inputs, settings, formed, observations, known)
     block = block_problem.build(inputs, settings, observations, control, ground, start)
     try:
-        block = _settled(block, control, ground.control)
+        block = _refilled(block, control, ground.control)
         screened = snooping.screen_bundle(block.problem, block.begin, settings.bundle, block.kept)
     except GeometryError as error:
         _name_undetermined(block, error)
         raise
     sigma0 = reliability.sigma0_test(screened.solution)
-    components: tuple[variance_components.Component, ...] = ()
+    estimated = _Estimated(block, screened)
     if settings.bundle.variance_components:
-        block, screened, components = _components(block, screened, settings)
-    bundle = _bundle(inputs, settings, start, block, screened, sigma0, components)
+        estimated = _with_components(block, screened, settings)
+    bundle = _bundle(inputs, settings, start, estimated, sigma0)
     adjusted = block_result.adjusted_strips(inputs, observations, ground.output, bundle)
     return adjusted if settings.precision else replace(adjusted, precision=None)
 
 
-def _settled(block: BlockProblem, control: ControlPoints, frames: Sequence[GroundFrame]) -> BlockProblem:
+def _refilled(block: BlockProblem, control: ControlPoints, frames: Sequence[GroundFrame]) -> BlockProblem:
     """Adjust once beforehand where plan or height points need present positions."""
     if not len(block.control) or control.use[block.control].all():
         return block
@@ -118,9 +118,15 @@ def _name_undetermined(block: BlockProblem, error: GeometryError) -> None:
     raise GeometryError(message, code="not-determinable") from error
 
 
-def _components(
-    block: BlockProblem, screened: ScreenedBundle, settings: Settings
-) -> tuple[BlockProblem, ScreenedBundle, tuple[variance_components.Component, ...]]:
+class _Estimated(NamedTuple):
+    """The adjustment with the standard deviations that it ends with."""
+
+    block: BlockProblem
+    screened: ScreenedBundle
+    components: tuple[variance_components.Component, ...] = ()
+
+
+def _with_components(block: BlockProblem, screened: ScreenedBundle, settings: Settings) -> _Estimated:
     """Estimate variance components, then search for gross errors once more with the standard deviations found."""
     found: tuple[variance_components.Component, ...] = ()
     problem, level = block.problem, block.level
@@ -139,36 +145,37 @@ def _components(
     before = {(each.kind, each.row): each for each in screened.rejections}
     log = tuple(each for each in screened.rejections if each not in final.rejections)
     again = tuple(each for each in final.rejections if (each.kind, each.row) not in before)
-    return block, replace(final, rejections=(*log, *again)), found
+    return _Estimated(block, replace(final, rejections=(*log, *again)), found)
 
 
 def _bundle(
-    inputs: Inputs,
-    settings: Settings,
-    start: BlockStart,
-    block: BlockProblem,
-    screened: ScreenedBundle,
-    sigma0: reliability.Sigma0Test,
-    components: tuple[variance_components.Component, ...],
+    inputs: Inputs, settings: Settings, start: BlockStart, estimated: _Estimated, sigma0: reliability.Sigma0Test
 ) -> Bundle:
-    """Collect what is told of the adjustment."""
+    """Collect the results of the adjustment."""
+    block, screened, components = estimated
     problem, solution, precision = screened.problem, screened.solution, screened.precision
     parameters = self_calibration.parameters_of(problem, solution, precision)
     correlations = _correlations(solution, precision)
     _refuse_inseparable(correlations, set(problem.common_names()))
     unit = solution.sigma0 if settings.bundle.test == "tau" and solution.redundancy > 0 else 1.0
-    number = {photo: row for row, photo in enumerate(start.photos)}
-    singles = tuple(
-        SinglePhoto(strip, solution.centers[row] + block.origin, solution.rotations[row])
-        for strip in inputs.strips
-        if len(strip.photos) == 1
-        for row in (number[strip.photos[0]],)
-    )
-    groups = reliability.groups_of(problem, solution, precision)
+    single = [strip for strip in inputs.strips if len(strip.photos) == 1]
+    rows = start.rows_of([strip.photos[0] for strip in single]).tolist()
     return Bundle(
-        start, block, screened, groups, sigma0, components, parameters, correlations, singles,
-        precision.photos * unit**2, unit,
-    )  # fmt: skip
+        start=start,
+        block=block,
+        screened=screened,
+        groups=reliability.groups_of(problem, solution, precision),
+        sigma0=sigma0,
+        components=components,
+        parameters=parameters,
+        correlations=correlations,
+        singles=tuple(
+            SinglePhoto(strip, solution.centers[row] + block.origin, solution.rotations[row])
+            for strip, row in zip(single, rows, strict=True)
+        ),
+        photo_covariances=precision.photos * unit**2,
+        unit=unit,
+    )
 
 
 def _correlations(solution: BundleSolution, cofactors: Cofactors) -> tuple[Correlation, ...]:

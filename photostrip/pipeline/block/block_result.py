@@ -29,7 +29,8 @@ def adjusted_strips(inputs: Inputs, observations: PhotoPoints, output: GroundFra
     number = np.flatnonzero(rays)
     cartesian = solution.points[number] + block.origin
     ids = [observations.point_ids[n] for n in number]
-    points = Adjusted(number, cartesian, output.ground_from_cartesian(cartesian, ids=ids), rays[number])
+    ground = output.ground_from_cartesian(cartesian, ids=ids)
+    points = Adjusted(number=number, cartesian=cartesian, ground=ground, rays=rays[number])
     calibrated = _calibrated(observations, bundle)
     count = [len(strip.photos) for strip in inputs.strips]
     first = np.cumsum([0, *count])
@@ -59,8 +60,7 @@ def _calibrated(observations: PhotoPoints, bundle: Bundle) -> PhotoPoints:
     problem = bundle.block.problem
     if not len(bundle.screened.solution.common):
         return observations
-    place = {photo: number for number, photo in enumerate(bundle.start.photos)}
-    photo = np.array([place[name] for name in observations.photo_ids], np.intp)[observations.photo]
+    photo = bundle.start.rows_of(observations.photo_ids)[observations.photo]
     shift = self_calibration.image_shift(problem, bundle.screened.solution.common, observations.xy, photo)
     return replace(observations, xy=observations.xy + shift)
 
@@ -77,9 +77,9 @@ def _strip(
     position = strip.of_photos.strip.positions(observations)
     rows = used[position[used] >= 0]
     rows = rows[np.argsort(position[rows], kind="stable")]
-    seen = np.zeros(len(observations.point_ids), bool)
-    seen[observations.point[position >= 0]] = True
-    inside = seen[points.number]
+    measured = np.zeros(len(observations.point_ids), bool)
+    measured[observations.point[position >= 0]] = True
+    inside = measured[points.number]
     number, cartesian = points.number[inside], points.cartesian[inside]
     xyz = frame.intermediate_from_cartesian(cartesian)
     formed = strip.of_photos.formed

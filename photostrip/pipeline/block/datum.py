@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -63,7 +63,14 @@ def known_of(inputs: Inputs, control: ControlPoints, ground: GroundFrames) -> Kn
         )
         rotations = dict(zip(orientations.photos, turned, strict=True))
         centers |= dict(zip(orientations.photos, found, strict=True))
-    return Known(control, ground.control, ground.output, centers, rotations, lever)
+    return Known(
+        control=control,
+        frames=ground.control,
+        output=ground.output,
+        centers=centers,
+        rotations=rotations,
+        lever=lever,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,17 +115,17 @@ def datum(
     names = tuple(photo for number in group.members for photo in stages[number].strip.photos)
     number_of = {name: number for number, name in enumerate(observations.point_ids)}
     rows = np.array([number_of.get(name, -1) for name in known.control.ids], np.intp)
-    here = (rows >= 0) & np.isfinite(group.points[rows, 0]) if len(rows) else np.zeros(0, bool)
-    control = known.control.take(here)
+    inside = (rows >= 0) & np.isfinite(group.points[rows, 0]) if len(rows) else np.zeros(0, bool)
+    control, rows = known.control.take(inside), rows[inside]
     cameras = [name for name in names if name in known.centers]
     refusal: GeometryError | None = None
     if len(control):
         try:
-            return _by_control(group.points[rows[here]], group.points, control, known), False
+            return _by_control(group.points[rows], group.points, control, known), False
         except GeometryError as error:
             refusal = error
     if len(cameras) >= 2:
-        return _by_cameras(stages, group, (control, rows[here]), known), False
+        return _by_cameras(stages, group, (control, rows), known), False
     if refusal is not None or not alone or known.centers:
         what = (
             f"strip {stages[group.members[0]].strip.id}" if len(group.members) == 1 else f"{len(group.members)} strips"
@@ -139,15 +146,22 @@ def _by_control(xyz: Floats, every: Floats, control: ControlPoints, known: Known
     return Similarity(inner.scale, frame.axes @ inner.rotation, frame.cartesian_from_intermediate(inner.shift))
 
 
-def _oriented(stages: Sequence[FormedPhotos], group: JoinedStrips) -> tuple[tuple[str, ...], Floats, Floats]:
-    """Photos of a block with their orientations in its frame."""
+class _OrientedPhotos(NamedTuple):
+    """Photos with their orientations in the frame of a block."""
+
+    names: tuple[str, ...]
+    centers: Floats
+    rotations: Floats
+
+
+def _oriented(stages: Sequence[FormedPhotos], group: JoinedStrips) -> _OrientedPhotos:
     names: list[str] = []
     centers, rotations = [], []
     for number in group.members:
         names += stages[number].strip.photos
         centers.append(group.joined[number](stages[number].formed.centers))
         rotations.append(group.joined[number].rotation @ stages[number].formed.rotations)
-    return tuple(names), np.concatenate(centers), np.concatenate(rotations)
+    return _OrientedPhotos(tuple(names), np.concatenate(centers), np.concatenate(rotations))
 
 
 def _by_cameras(

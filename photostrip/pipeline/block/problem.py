@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -51,8 +51,7 @@ def build(
     """Collect everything that is observed."""
     # whole numbers: nothing is lost when the origin is added back
     origin: Floats = np.round(np.nanmean(start.points, axis=0, dtype=np.float64), -1)
-    place = {photo: number for number, photo in enumerate(start.photos)}
-    photo = np.array([place[name] for name in observations.photo_ids], np.intp)
+    photo = start.rows_of(observations.photo_ids)
     rows = np.flatnonzero(~_named(settings.relative.drop, observations))
     images = ImageObservations(
         photo[observations.photo[rows]], observations.point[rows], observations.xy[rows], observations.sigma[rows]
@@ -80,7 +79,9 @@ def build(
     }
     begin = _begin(problem, rows, control, control_rows, start)
     kept = _named(settings.relative.keep, observations)[rows]
-    return BlockProblem(problem, origin, begin, kept, rows, control_rows, level)
+    return BlockProblem(
+        problem=problem, origin=origin, begin=begin, kept=kept, rows=rows, control=control_rows, level=level
+    )
 
 
 def _named(entries: Sequence[str], observations: PhotoPoints) -> Flags:
@@ -103,22 +104,26 @@ def _cameras(inputs: Inputs, settings: Settings) -> BundleCameras:
 # ----------------------------------------------------------------------------------------------- on the ground
 
 
+class GivenPositions(NamedTuple):
+    """Given coordinates as ``ControlObservations`` has them."""
+
+    xyz: Floats  # (n, 3)
+    axes: Floats  # (n, 3, 3)
+    sigma: Floats  # (n, 3)
+
+
 def given_positions(
     enu: Floats, use: Flags, sigma: Floats, frame: GroundFrame, near: Floats, ids: Sequence[str]
-) -> tuple[Floats, Floats, Floats]:
+) -> GivenPositions:
     """Given coordinates as observations in the Cartesian frame.
 
-    enu: (n, 3), given coordinates in the frame's own units, internal order.
-    use: (n, 3), which count.
-    sigma: (n, 3), standard deviations, metres.
-    frame: their frame.
+    enu, use, sigma: (n, 3), coordinates in the units of their frame, internal order; which count; their precision, m.
     near: (n, 3), present positions, Cartesian: they stand in for what does not count.
-    Returns xyz, axes, sigma: (n, 3), (n, 3, 3), (n, 3), as ``problem.Control`` has them.
     """
     if not use.all():
         enu = np.where(use, enu, frame.ground_from_cartesian(near, ids=ids))
     xyz = frame.cartesian_from_ground(enu, ids=ids)
-    return xyz, frame.axes_at(xyz), np.where(use, sigma, np.inf)
+    return GivenPositions(xyz, frame.axes_at(xyz), np.where(use, sigma, np.inf))
 
 
 def _control(
@@ -131,11 +136,11 @@ def _control(
     rows = np.flatnonzero(known)
     xyz, axes, sigma = np.empty((len(rows), 3)), np.empty((len(rows), 3, 3)), np.empty((len(rows), 3))
     for index, frame in enumerate(frames):
-        here = control.frame[rows] == index
-        chosen = rows[here]
+        inside = control.frame[rows] == index
+        chosen = rows[inside]
         if len(chosen):
             ids = [control.ids[row] for row in chosen]
-            xyz[here], axes[here], sigma[here] = given_positions(
+            xyz[inside], axes[inside], sigma[inside] = given_positions(
                 control.enu[chosen], control.use[chosen], control.sigma[chosen], frame, start.points[point[chosen]], ids
             )
     return ControlObservations(point[rows], xyz - origin, axes, sigma), rows
@@ -146,12 +151,11 @@ def _positions(
 ) -> PositionObservations:
     """Camera positions, and the centres of observed orientations, as observations."""
     parts: list[PositionObservations] = []
-    place = {photo: number for number, photo in enumerate(start.photos)}
     if inputs.positions is not None and frame is not None and len(inputs.positions.photos):
         parts.append(_measured(inputs, inputs.positions, frame, start, origin))
     orientations = inputs.orientations
     if orientations is not None and of_orientations is not None and orientations.observed and orientations.photos:
-        photo = np.array([place[name] for name in orientations.photos], np.intp)
+        photo = start.rows_of(orientations.photos)
         use = np.ones((len(photo), 3), bool)
         xyz, axes, sigma = given_positions(
             orientations.enu, use, orientations.sigma, of_orientations, start.centers[photo], orientations.photos
@@ -171,8 +175,7 @@ def _measured(
     inputs: Inputs, positions: CameraPositions, frame: GroundFrame, start: BlockStart, origin: Floats
 ) -> PositionObservations:
     """Measured positions with lever arm, offset and drift of each strip."""
-    place = {photo: number for number, photo in enumerate(start.photos)}
-    photo = np.array([place[name] for name in positions.photos], np.intp)
+    photo = start.rows_of(positions.photos)
     lever = np.broadcast_to(np.array(positions.lever_arm, float), (len(photo), 3))
     near = start.centers[photo] + np.einsum("nij,nj->ni", start.rotations[photo], lever)
     ids = [f"of photo {name}" for name in positions.photos]
@@ -204,36 +207,33 @@ def _attitudes(given: GivenOrientations | None, frame: GroundFrame | None, start
     """Observed rotations; the standard deviations of the angles become those about the photo's own axes."""
     if given is None or frame is None or not given.observed or not given.photos:
         return AttitudeObservations()
-    place = {photo: number for number, photo in enumerate(start.photos)}
-    photo = np.array([place[name] for name in given.photos], np.intp)
+    photo = start.rows_of(given.photos)
     centers = frame.cartesian_from_ground(given.enu, ids=[f"of photo {name}" for name in given.photos])
-    own = from_angles(given.angles, given.system)
-    rates = own.transpose(0, 2, 1) @ angle_rates(given.angles, given.system)
+    rotations = from_angles(given.angles, given.system)
+    rates = rotations.transpose(0, 2, 1) @ angle_rates(given.angles, given.system)
     sigma = np.sqrt(np.einsum("nij,nj->ni", rates**2, given.sigma_angles**2))
-    return AttitudeObservations(photo, frame.axes_at(centers).transpose(0, 2, 1) @ own, sigma)
+    return AttitudeObservations(photo, frame.axes_at(centers).transpose(0, 2, 1) @ rotations, sigma)
 
 
 def refilled(
     block: BlockProblem, control: ControlPoints, frames: Sequence[GroundFrame], points: Floats
 ) -> tuple[BlockProblem, float]:
-    """Put present positions in where a control point is given in plan or height only.
+    """Put present positions (q, 3) in where a control point is given in plan or height only.
 
-    What stands in for a coordinate that is not given moves the given ones a little on a curved Earth.
-
-    points: (q, 3), present positions of all points, in the frame of the problem.
-    Returns the largest change of a given coordinate, metres.
+    What stands in for a coordinate that is not given moves the given ones a little on a curved Earth: the largest such
+    change, metres, is returned too.
     """
     given = block.problem.control
     xyz = given.xyz.copy()
     partial = ~control.use[block.control].all(axis=1) if len(block.control) else np.zeros(0, bool)
     for index, frame in enumerate(frames):
-        here = np.flatnonzero(partial & (control.frame[block.control] == index))
-        if len(here):
-            chosen = block.control[here]
-            near = points[given.point[here]] + block.origin
+        rows = np.flatnonzero(partial & (control.frame[block.control] == index))
+        if len(rows):
+            chosen = block.control[rows]
+            near = points[given.point[rows]] + block.origin
             ids = [control.ids[row] for row in chosen]
             made = given_positions(control.enu[chosen], control.use[chosen], control.sigma[chosen], frame, near, ids)
-            xyz[here] = made[0] - block.origin
+            xyz[rows] = made.xyz - block.origin
     moved = np.abs(np.einsum("nij,nj->ni", given.axes, xyz - given.xyz))[np.isfinite(given.sigma)]
     changed = replace(block.problem, control=replace(given, xyz=xyz))
     return replace(block, problem=changed), float(moved.max(initial=0.0))
@@ -251,8 +251,8 @@ def _begin(
     paired = np.zeros(len(used), bool)
     for strip in start.strips:
         used[strip.of_photos.rows[strip.of_photos.rows < len(used)]] = True
-        seen = np.unique(strip.of_photos.orientation.rows)
-        paired[seen[seen < len(used)]] = True
+        in_pairs = np.unique(strip.of_photos.orientation.rows)
+        paired[in_pairs[in_pairs < len(used)]] = True
     inside = used[rows]
     free = ~paired[rows]
     focal = problem.cameras.focal[problem.cameras.of_photo]

@@ -64,9 +64,7 @@ def start(
         free = block.place(stages, group) or free
         waiting = block.tie(stages, [number for number in waiting if number not in group.members])
     strips = tuple(block.done[number] for number in range(len(stages)))
-    centers, rotations, points = _together(inputs, strips, observations, known)
-    photos = tuple(photo for strip in inputs.strips for photo in strip.photos)
-    return BlockStart(strips, photos, centers, rotations, points, free)
+    return _together(inputs, strips, observations, known, free=free)
 
 
 class _Block:
@@ -155,8 +153,8 @@ class _Block:
 
 
 def _together(
-    inputs: Inputs, strips: Sequence[StripResult], observations: PhotoPoints, known: Known
-) -> tuple[Floats, Floats, Floats]:
+    inputs: Inputs, strips: tuple[StripResult, ...], observations: PhotoPoints, known: Known, *, free: bool
+) -> BlockStart:
     """Orientations of all photos, single ones included, and all points."""
     points = _mean_points(strips, len(observations.point_ids))
     oriented: dict[str, tuple[Floats, Floats]] = {}
@@ -169,14 +167,11 @@ def _together(
         with_control = _with_control(points, observations, known)
         for photo, focal in singles.items():
             oriented[photo] = _single(photo, focal, with_control, observations, known)
-    names = [photo for strip in inputs.strips for photo in strip.photos]
+    names = tuple(photo for strip in inputs.strips for photo in strip.photos)
     centers = np.array([oriented[name][0] for name in names])
     rotations = np.array([oriented[name][1] for name in names])
-    return (
-        centers,
-        rotations,
-        _rest(inputs, observations, (centers, rotations), _with_control(points, observations, known)),
-    )
+    points = _rest(inputs, observations, (centers, rotations), _with_control(points, observations, known))
+    return BlockStart(strips=strips, photos=names, centers=centers, rotations=rotations, points=points, free=free)
 
 
 def _mean_points(strips: Sequence[StripResult], count: int) -> Floats:
