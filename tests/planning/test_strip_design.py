@@ -321,3 +321,9 @@ def test_a_whole_design() -> None:
     assert [each.method for each in report.needed] == [SIMILARITY, BUNDLE]
     assert report.placed is not None
     assert len(report.placed.spots) == 1
+
+
+def test_three_photos_are_the_shortest_strip() -> None:
+    assert len(strip_of(3).centers) == 3
+    with pytest.raises(InputError, match="2 photos are no strip"):
+        strip_of(2)

@@ -281,3 +281,21 @@ def test_check_tells_links_that_cannot_be(tmp_path: Path, models: str, code: str
         text = PROJECT
     sample(tmp_path, {**FILES, P: text, M: models})
     assert code in {fault.code for fault in check_project(tmp_path / P).faults}
+
+
+def test_a_check_tells_rows_with_and_without_standard_deviations_of_their_own(tmp_path: Path) -> None:
+    rows = MODELS.splitlines()
+    own = [f"{row},0.02,0.02,0.03" if number in {1, 4, 5} else f"{row},,," for number, row in enumerate(rows)]
+    own[0] = "model,point,x,y,z,sx,sy,sz"
+    sample(tmp_path, FILES | {M: "\n".join(own) + "\n"})
+    told = check_project(tmp_path / P).document["model_sigma"]
+    assert (told["rows_with_own"], told["rows_with_default"]) == (3, len(rows) - 1 - 3)
+
+
+@pytest.mark.parametrize(("height_only", "enough"), [("C1", True), ("", False)])
+def test_two_points_in_plan_and_three_in_height_are_enough(tmp_path: Path, *, height_only: str, enough: bool) -> None:
+    rows = [f"{row},xyz" for row in CONTROL.splitlines() if row[:2] in {"A1", "C3"}]
+    rows += [f"{row},z" for row in CONTROL.splitlines() if row[:2] == height_only]
+    sample(tmp_path, FILES | {C: "\n".join(["point,x,y,z,use", *rows]) + "\n"})
+    codes = {fault.code for fault in check_project(tmp_path / P).faults}
+    assert ("too-little-control" not in codes) is enough

@@ -14,6 +14,7 @@ from photostrip.pipeline import Settings
 from photostrip.result.columns import photos_csv, points_csv, rejected_csv, reliability_csv
 from photostrip.result.quantities import Quantity, described, quantity_at
 from photostrip.simulate import Models, simulate
+from tests.loops import nonempty
 from tests.renew_golden import SAMPLES, baseline
 from tests.results import case, solved, spec
 from tests.source_tree import ROOT
@@ -111,3 +112,12 @@ def test_columns_of_tables_have_a_unit_and_a_meaning() -> None:
     by_name = {column.name: column.quantity for column in photos_csv(angles)}
     assert by_name["omega_gon"] == replace(by_name["sigma_omega_gon"], meaning=by_name["omega_gon"].meaning)
     assert by_name["omega_gon"].unit == "gon"
+
+
+def test_ratios_of_given_points_have_two_decimals() -> None:
+    """That of one point, those of the summary that are compared with a limit of 5."""
+    document = case("local").document
+    ratios = [row["normalised"] for row in document["control"] if row["normalised"] is not None]
+    summary = [document["summary"][role]["normalised"] for role in ("control", "check")]
+    for values in (ratios, [each for each in summary if each is not None]):
+        assert [round(value, 2) for value in nonempty(values)] == values

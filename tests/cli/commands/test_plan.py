@@ -12,6 +12,7 @@ import pytest
 
 from photostrip.cli.main import main
 from photostrip.planning.model_plan import ModelSpec, control_layout, plan_model
+from photostrip.report.pictures.plan_strip import strip_figure
 from tests.loops import nonempty
 
 if TYPE_CHECKING:
@@ -232,6 +233,7 @@ def test_the_report_of_a_strip(capsys: pytest.CaptureFixture[str], tmp_path: Pat
         ("--set=methods=[cubic]", 2, "`cubic` is not known"),
         ("--set=place={points: 2, into: nowhere}", 2, "no layout `nowhere`"),
         ("--models=1", 2, "1 is out of range"),
+        ("--set=points.extra_per_model=201", 2, "201 is out of range; expected 0 to 200 points"),
         ("--overlap=30", 2, "error: --overlap: an end lap of 30 %"),
         ("--control=bunds", 2, "error: --control: `bunds` is not known"),
         ("--control=bands=12", 2, "error: --control: 12 bands do not fit 11 photos"),
@@ -301,3 +303,11 @@ def test_schemas_of_plans_know_every_key(kind: str, capsys: pytest.CaptureFixtur
     assert schema["title"] == f"photostrip plan {kind}"
     assert f"photostrip_plan_{kind}s" in schema["properties"] or f"photostrip_plan_{kind}" in schema["properties"]
     assert all("description" in each for each in nonempty(schema["properties"].values()))
+
+
+def test_the_picture_of_a_strip_has_one_legend(capsys: pytest.CaptureFixture[str]) -> None:
+    document = json.loads(
+        answer(capsys, "plan", "strip", "--models", "3", "--methods", "similarity", "--format", "json")
+    )
+    figure = strip_figure(document)
+    assert [axes.get_legend() is not None for axes in figure.axes[:2]] == [False, True]

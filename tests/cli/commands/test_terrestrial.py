@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from photostrip.cli.commands import terrestrial_directions
 from photostrip.cli.main import main
 from photostrip.terrestrial.epochs import monitor
 from tests.loops import nonempty
@@ -588,3 +589,13 @@ def test_every_command_has_help_with_an_example(
     assert f"Usage: photostrip terrestrial {' '.join(command)}" in out
     if command != ("directions",):
         assert f"photostrip terrestrial {' '.join(command)}" in out.partition("Example")[2]
+
+
+@pytest.mark.parametrize(("most", "code"), [(20, 0), (19, 2)])
+def test_a_table_over_the_photo_has_a_largest_size(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, most: int, code: int
+) -> None:
+    monkeypatch.setattr(terrestrial_directions, "MOST_POINTS", most)
+    words = "directions accuracy --principal-distance 100 --photo-format 100,80 --step 20"
+    assert main(["terrestrial", *words.split()]) == code
+    assert ("gives more than 19 points" in capsys.readouterr().err) is (code == 2)

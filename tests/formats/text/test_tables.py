@@ -208,3 +208,8 @@ def test_ids_in_a_sentence() -> None:
     assert listed(["a", "b"]) == "a, b"
     assert listed(map(str, range(11))) == "0, 1, 2, 3, 4, 5, 6, 7 and 3 more"
     assert (counted(1, "row"), counted(2, "row"), counted(0, "is", "are")) == ("1 row", "2 rows", "0 are")
+
+
+def test_semicolons_are_named_though_a_head_has_a_comma(tmp_path: Path) -> None:
+    (fault,) = faults(write(tmp_path / "o.csv", "photo;point;x, mm;y\n1;P;2;3\n"))
+    assert "fields are separated by semicolons" in fault

@@ -141,3 +141,16 @@ def test_a_fault_below_what_exists_stands_at_what_exists() -> None:
     assert root is not None
     fault = fault_at(root, ("list", 1, "second", 9), "no such photo", "code", expected="ten", fix="add it")
     assert str(fault) == "f.yaml:6:13: list[1].second[9]: no such photo; expected ten; add it"
+
+
+@pytest.mark.usefixtures("_loader")
+def test_what_is_missed_after_the_last_line_is_told_at_its_begin() -> None:
+    _, findings = read("x: 1\ny:\n  [")
+    (fault,) = findings.faults
+    assert fault.line == 3
+
+
+def test_a_bracket_at_the_end_of_the_text_is_told_with_its_column() -> None:
+    _, findings = read("[")
+    (fault,) = findings.faults
+    assert (fault.line, fault.column) == (1, 1)

@@ -12,7 +12,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from photostrip.cli.main import main
-from photostrip.report.commands.trace import trace_sections, trace_title
+from photostrip.report.commands.trace import _left_over, trace_sections, trace_title
 from photostrip.report.page.text import to_text
 from photostrip.result.trace.trace import SYMBOLS, trace_of
 from photostrip.simulate.spec import GrossError
@@ -214,3 +214,16 @@ def test_an_ending_that_is_not_known_is_refused_before_the_run(
     assert main(["run", str(project), "-o", str(tmp_path / "out"), "--trace", str(tmp_path / "t.pdf")]) == 2
     assert "--trace" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_rotations_are_written_with_ten_decimals() -> None:
+    """A cosine is right to half a unit of the tenth decimal: 1e-10 rad, 0.2 µm on the ground from 2 km."""
+    elements = [value for strip in trace("projected")["strips"] for photo in strip["chain"] for value in photo["A"]]
+    assert [round(value, 10) for value in nonempty(elements)] == elements
+    assert [round(value, 9) for value in elements] != elements
+
+
+@pytest.mark.parametrize("place", range(3))
+def test_what_is_left_of_control_is_strip_minus_given(place: int) -> None:
+    row = {"oriented": [5.0, 7.0, 11.0], "given": [4.0, 9.0, 8.0]}
+    assert _left_over(place)(row) == [1.0, -2.0, 3.0][place]

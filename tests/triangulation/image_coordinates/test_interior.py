@@ -16,7 +16,8 @@ from photostrip.camera import Camera
 from photostrip.errors import InputError
 from photostrip.points import PhotoPoints
 from photostrip.triangulation.image_coordinates import interior
-from photostrip.triangulation.image_coordinates.fiducial_marks import WRONG_PATTERN
+from photostrip.triangulation.image_coordinates.fiducial_marks import WRONG_PATTERN, right_pattern
+from photostrip.triangulation.image_coordinates.fiducial_marks import Marks as MarksOfPhotos
 from photostrip.triangulation.image_coordinates.interior import InteriorSettings
 from photostrip.triangulation.image_coordinates.mark_fit import InteriorOrientation, linear_shape
 from tests.loops import nonempty
@@ -510,3 +511,15 @@ def test_results_cannot_be_changed() -> None:
     with pytest.raises(ValueError, match="read-only"):
         found.photo_from_measured.coefficients[0, 0, 0] = 1
     assert replace(found, notes=()).photo_ids == ("a",)
+
+
+@pytest.mark.parametrize(("percent", "right"), [(4.5, True), (5.5, False)])
+def test_a_pattern_may_be_wrong_by_a_twentieth_of_its_radius(percent: float, *, right: bool) -> None:
+    """A corner off its place by d towards the middle leaves d / 2 to a similarity of four: lever 1/4 + 1/4."""
+    truth = np.array(list(CORNERS.fiducials.values()))
+    measured = np.repeat(truth[None], 3, axis=0)
+    measured[1, 0] *= 1.0 - 2.0 * percent / 100.0
+    marks = MarksOfPhotos(CORNERS, ("1", "2", "3"), tuple(CORNERS.fiducials), truth, measured, np.ones((3, 4)))
+    kept, _, faults = right_pattern(marks)
+    assert kept.photos == (("1", "2", "3") if right else ("1", "3"))
+    assert len(faults) == (not right)

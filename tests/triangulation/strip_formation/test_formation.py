@@ -18,6 +18,7 @@ from photostrip.geometry.similarity import Similarity
 from photostrip.points import PhotoPoints
 from photostrip.triangulation.relative_orientation.orientation import Orientation, orient_again, orient_pairs
 from photostrip.triangulation.relative_orientation.pairs import collect_pairs
+from photostrip.triangulation.strip_formation.scale_ratios import screen
 from photostrip.triangulation.strip_formation.scale_transfer import (
     SCALE_TRANSFERS,
     StripFormationSettings,
@@ -446,3 +447,11 @@ def test_the_steep_base_is_named() -> None:
         _refuse_vertical_base(upright, ("1", "2", "3"))
     assert caught.value.code == "vertical-base"
     assert caught.value.photos == ("2", "3")
+
+
+def test_ratios_of_a_junction_stay_out_though_one_only_is_left() -> None:
+    """The junction of three ratios that contradict each other keeps the one that the mean of its own lies at."""
+    ratio, weight = np.array([1.0106, 1.0001, 0.9854]), np.array([0.0032, 0.075, 0.034])
+    spread = np.array([0.0031, 0.00052, 0.00015]), np.array([0.00055, 0.00045, 0.0027])
+    used, _ = screen(ratio, weight, spread, np.zeros(3, int), 1)
+    assert used.sum() == 1

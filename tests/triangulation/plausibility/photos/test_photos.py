@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from typing import TYPE_CHECKING
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 import pytest
@@ -215,3 +216,13 @@ def test_units_without_a_format_are_seen_by_the_principal_distance() -> None:
     assert units.find_wrong_units(made.observations, cameras)[0] == []
     wrong = replace(made.observations, xy=made.observations.xy * 1e3)
     assert [each.code for each in units.find_wrong_units(wrong, cameras)[0]] == ["P101"]
+
+
+def test_the_way_to_the_next_photo_is_known_on_the_first_and_last_too() -> None:
+    """Four photos, one base apart along x, listed in the order 2, 0, 3, 1; photo 4 is not in the list."""
+    links = SimpleNamespace(
+        photo=np.array([[2, 0], [0, 3], [3, 1], [4, 2]]),
+        bases=(np.array([1.0, 1.0, 1.0, 5.0]) + 0j, -np.array([1.0, 1.0, 1.0, 5.0]) + 0j),
+        count=np.array([6, 6, 6, 6]),
+    )
+    assert flight_order._steps(cast("mosaic.PhotoLinks", links), [2, 0, 3, 1]) == pytest.approx([1.0] * 4)

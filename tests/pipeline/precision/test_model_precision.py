@@ -1,0 +1,36 @@
+"""The variance factor of linked models."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from photostrip.pipeline.precision.model_precision import variance_factor
+from photostrip.triangulation.error_propagation.covariances import A_POSTERIORI, A_PRIORI, LEVEL
+
+if TYPE_CHECKING:
+    from photostrip.triangulation.independent_models.formation import FormedModels
+
+
+@pytest.mark.parametrize("redundancy", [1, 2, 30])
+def test_the_stated_precision_counts_until_chi_square_contradicts_it(redundancy: int) -> None:
+    limit = chi2.ppf(1 - LEVEL / 2, redundancy)
+    for squares, factor, basis in (
+        (0.999 * limit, 1.0, A_PRIORI),
+        (1.001 * limit, 1.001 * limit / redundancy, A_POSTERIORI),
+    ):
+        solved = SimpleNamespace(redundancy=np.array([redundancy, 0]), squares=np.array([squares, 0.0]))
+        formed = cast("FormedModels", SimpleNamespace(links=SimpleNamespace(solved=solved)))
+        found = variance_factor(formed)
+        assert found[0] == pytest.approx(factor)
+        assert found[1] == basis
+
+
+def test_without_redundancy_nothing_contradicts_it() -> None:
+    solved = SimpleNamespace(redundancy=np.array([0]), squares=np.array([0.0]))
+    formed = cast("FormedModels", SimpleNamespace(links=SimpleNamespace(solved=solved)))
+    assert variance_factor(formed) == (1.0, A_PRIORI)
