@@ -520,6 +520,6 @@ def test_a_pattern_may_be_wrong_by_a_twentieth_of_its_radius(percent: float, *, 
     measured = np.repeat(truth[None], 3, axis=0)
     measured[1, 0] *= 1.0 - 2.0 * percent / 100.0
     marks = MarksOfPhotos(CORNERS, ("1", "2", "3"), tuple(CORNERS.fiducials), truth, measured, np.ones((3, 4)))
-    kept, _, faults = right_pattern(marks)
+    kept, faults = right_pattern(marks)
     assert kept.photos == (("1", "2", "3") if right else ("1", "3"))
     assert len(faults) == (not right)
