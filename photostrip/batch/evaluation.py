@@ -15,8 +15,7 @@ from photostrip.batch.tasks import Answer
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.output.result_files import result_files
 from photostrip.formats.text.source import Source, digest, reading_from
-from photostrip.pipeline import triangulate
-from photostrip.project.loading import load_project
+from photostrip.project.loading import adjust_project, load_project
 from photostrip.report.page.messages import result_findings
 from photostrip.result.document import document_of
 
@@ -60,9 +59,7 @@ def _computed(task: Task, source: Source) -> Answer:
     """Read, adjust and render a project."""
     with reading_from(source):
         project = load_project(Path(task.project), task.overrides)
-        with project.places():
-            result = triangulate(project.inputs, project.settings, directory=project.grid_folder)
-        document = document_of(result, project.remarks)
+        document = document_of(adjust_project(project), project.remarks)
         files = result_files(document, project.resolved)
     outcome = outcome_of(document, result_findings(document))
     return Answer(task.number, outcome, files, _inputs(project, source))

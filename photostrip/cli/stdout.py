@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
@@ -124,8 +123,6 @@ def trace_text(result: Result, form: Format) -> str:
     from photostrip.report.page import layout, text
     from photostrip.result.trace.trace import trace_of
 
-    if result.bundle is not None:  # what has stages to be traced is the strip method that started it
-        result = replace(result, strips=result.bundle.start.strips, frames=(*result.frames, result.output))
     document = trace_of(result)
     if form is Format.JSON:
         from photostrip.formats.output.result_json import to_json

@@ -14,7 +14,7 @@ from photostrip.errors import GeometryError, InputError
 from photostrip.formats.text.source import current, seen_from
 from photostrip.geodesy.crs import grid_names
 from photostrip.geodesy.tying import tie_frames
-from photostrip.pipeline import Inputs, ModelStrip, Settings
+from photostrip.pipeline import Inputs, ModelStrip, Settings, triangulate
 from photostrip.project.conversion import (
     ImageSystem,
     camera_positions,
@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     from photostrip.pipeline import MeasuredModels, Result
     from photostrip.points import PhotoPoints
 
-__all__ = ["Project", "json_schema", "load_project"]
+__all__ = ["Project", "adjust_project", "json_schema", "load_project"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,6 +110,12 @@ class Project:
         except GeometryError as error:
             error.findings = self.placed(error.findings)
             raise
+
+
+def adjust_project(project: Project) -> Result:
+    """Adjust a project; what is refused has its place in the project file."""
+    with project.places():
+        return triangulate(project.inputs, project.settings, directory=project.grid_folder)
 
 
 def load_project(path: Path, overrides: Sequence[str] = ()) -> Project:

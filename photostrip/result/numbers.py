@@ -25,6 +25,7 @@ RADIANS = 9
 ROTATION = 12  # decimals of direction cosines
 SIGNIFICANT = 4  # digits of what has no natural size
 EXACT = 12  # digits of what others compute with
+PER_RADIAN = {"deg": 180 / np.pi, "gon": 200 / np.pi, "rad": 1.0}  # units of angles
 DIGITS = re.compile("([0-9]+)")
 
 

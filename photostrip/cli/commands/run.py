@@ -48,8 +48,7 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
     from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE
     from photostrip.formats.output.result_files import result_files
     from photostrip.formats.text.writing import make_rule, write_files, write_text
-    from photostrip.pipeline import triangulate
-    from photostrip.project.loading import load_project
+    from photostrip.project.loading import adjust_project, load_project
     from photostrip.report.html import check_html, to_html
     from photostrip.report.page.progress import progress
     from photostrip.result.document import document_of
@@ -65,8 +64,7 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
         loaded = load_project(project, assignments or [])
         messages.step(f"read {len(loaded.files)} files, {len(loaded.inputs.observations)} image points")
         waiting.at(f"adjusting {sum(len(strip.photos) for strip in loaded.inputs.strips)} photos")
-        with loaded.places():
-            result = loaded.result(triangulate(loaded.inputs, loaded.settings, directory=loaded.directory))
+        result = loaded.result(adjust_project(loaded))
         messages.step(f"adjusted {len(result.points.number)} points")
         document = document_of(result, loaded.remarks)
         waiting.at("writing the result")

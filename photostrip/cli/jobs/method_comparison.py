@@ -11,8 +11,8 @@ from photostrip.cli.stdout import Format, print_json, print_sections
 from photostrip.errors import EXIT_DONE, GeometryError, InputError
 from photostrip.formats.output.result_files import result_files
 from photostrip.formats.text.writing import write_files
-from photostrip.pipeline import ADJUSTMENTS, triangulate
-from photostrip.project.loading import load_project
+from photostrip.pipeline import ADJUSTMENTS
+from photostrip.project.loading import adjust_project, load_project
 from photostrip.report.commands.methods import methods_sections
 from photostrip.report.page.progress import progress
 from photostrip.result.document import document_of
@@ -49,8 +49,7 @@ def compare_methods(
             loaded = load_project(project, [*assignments, f"processing.adjustment={adjustment}"])
             name = loaded.inputs.name
             try:
-                with loaded.places():
-                    result = loaded.result(triangulate(loaded.inputs, loaded.settings, directory=loaded.directory))
+                result = loaded.result(adjust_project(loaded))
             except (GeometryError, InputError) as error:
                 found[adjustment] = error
                 continue

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.result.numbers import rms
 from photostrip.result.quantities import record
 from photostrip.triangulation.bundle.quality import reliability
@@ -35,7 +36,6 @@ class Kind(NamedTuple):
     factor: float  # of the unit in the unit of the adjustment
 
 
-GROUND_AXES = ("east", "north", "up")
 KINDS = {
     reliability.IMAGE: Kind(("x", "y"), "um", MICROMETRES),
     reliability.CONTROL: Kind(GROUND_AXES, "m", 1.0),

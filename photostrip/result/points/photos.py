@@ -9,9 +9,9 @@ import numpy as np
 
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import angles
-from photostrip.result.numbers import Plain, rounded
+from photostrip.result.numbers import PER_RADIAN, Plain, rounded
 from photostrip.result.points.ground import coordinates
-from photostrip.result.points.precision import UNITS, centre_columns, photo_columns
+from photostrip.result.points.precision import centre_columns, photo_columns
 from photostrip.result.quantities import angle_decimals, grouped, records
 from photostrip.triangulation.resection.collinearity import project
 
@@ -180,7 +180,7 @@ def _turned(result: Result, rotations: Floats) -> Document:
 def _angles(rotations: Floats, system: str, unit: str) -> list[Plain]:
     """Angles in the unit of the output; None for a photo whose outer two angles cannot be separated."""
     try:
-        found: list[Plain] = rounded(angles(rotations, system) * UNITS[unit], angle_decimals(unit))
+        found: list[Plain] = rounded(angles(rotations, system) * PER_RADIAN[unit], angle_decimals(unit))
     except GeometryError:
         if len(rotations) == 1:
             return [None]

@@ -8,7 +8,7 @@ import numpy as np
 
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import angle_rates, angles
-from photostrip.result.numbers import rms
+from photostrip.result.numbers import PER_RADIAN, rms
 from photostrip.result.quantities import record, records
 from photostrip.statistics import chi2_quantile, normal_quantile
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from photostrip.result.numbers import Document
 
 
-UNITS = {"deg": 180 / np.pi, "gon": 200 / np.pi, "rad": 1.0}
 UPPER = np.triu_indices(6)
 INSIDE = {"plan": float(np.sqrt(chi2_quantile(0.95, 2))), "height": normal_quantile(0.975)}
 
@@ -93,7 +92,7 @@ def photo_columns(result: Result, place: Floats, rotations: Floats, given: Float
     axes = result.output.axes_at(place)
     turn = np.zeros((len(place), 6, 6))
     turn[:, :3, :3] = axes[:, list(result.output.order)]
-    turn[:, 3:, 3:] = _rates(rotations, result.settings.angle_system) @ axes * UNITS[result.settings.angle_unit]
+    turn[:, 3:, 3:] = _rates(rotations, result.settings.angle_system) @ axes * PER_RADIAN[result.settings.angle_unit]
     covariances = turn @ given @ turn.transpose(0, 2, 1)
     with np.errstate(invalid="ignore"):
         sigma = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))

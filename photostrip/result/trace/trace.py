@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import compress
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.geometry.rotation import alpha_omega_kappa
-from photostrip.result.numbers import EXACT, rounded, significant
+from photostrip.result.numbers import EXACT, PER_RADIAN, rounded, significant
 from photostrip.result.quantities import as_records
 from photostrip.result.trace.replay import pair_rounds, similarity_steps
 from photostrip.triangulation import absolute_orientation
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
 
 
 SCHEMA = 1
-UNITS = {"deg": 180 / np.pi, "gon": 200 / np.pi, "rad": 1.0}
 ANGLE, STEP, SQUARES, MILLIMETRES, MODEL, COSINE, METRES = 9, 6, 6, 5, 9, 10, 4  # decimals, digits of steps and squares
 SYMBOLS = {
     "x1, y1, x2, y2": "image coordinates of the left and right photo, mm from the principal point, corrected",
@@ -48,14 +48,19 @@ SYMBOLS = {
 
 
 def trace_of(result: Result) -> Document:
-    """Return every stage of a run, iteration by iteration; angles in the unit of the output."""
+    """Return every stage of a run, iteration by iteration; angles in the unit of the output.
+
+    Of a bundle adjustment these are the stages of the strip method that started it.
+    """
+    if result.bundle is not None:
+        result = replace(result, strips=result.bundle.start.strips, frames=(*result.frames, result.output))
     unit = result.settings.angle_unit
     return {
         "photostrip_trace": SCHEMA,
         "name": result.inputs.name,
         "angles": unit,
         "symbols": SYMBOLS,
-        "strips": [_strip(result, strip, UNITS[unit]) for strip in result.strips],
+        "strips": [_strip(result, strip, PER_RADIAN[unit]) for strip in result.strips],
     }
 
 

@@ -1,14 +1,36 @@
-"""``photostrip man``: the manual pages, written from the commands themselves."""
+"""``photostrip completion`` and ``photostrip man``: what a shell is given to complete commands and to explain them."""
 
 from __future__ import annotations
 
 import sys
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from photostrip.cli.jobs.completion import answer
 from photostrip.cli.options import Silent
+
+
+class Shell(StrEnum):
+    """Shells that typer has a script for."""
+
+    BASH = "bash"
+    ZSH = "zsh"
+    FISH = "fish"
+    POWERSHELL = "powershell"
+
+
+def completion(
+    shell: Annotated[Shell, typer.Argument(metavar="SHELL", help="bash, zsh, fish or powershell.")],
+) -> int:
+    """Print the script that makes a shell complete commands, options and keys of the project.
+
+    For bash put `eval "$(photostrip completion bash)"` into ~/.bashrc, for zsh the same with zsh into ~/.zshrc; for
+    fish write the script to ~/.config/fish/completions/photostrip.fish.
+    """
+    return answer(f"source_{shell}")
 
 
 def man(
