@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike
 
-    from photostrip.arrays import Floats
 
 INSTALL = "pip install photostrip[report]"
 
@@ -73,7 +73,7 @@ def as_png(figure: Figure) -> bytes:
     return stream.getvalue()
 
 
-def isolines(axes: Axes, x: Floats, y: Floats, surface: Floats, *, filled: bool) -> None:
+def isolines(axes: Axes, x: ArrayLike, y: ArrayLike, surface: ArrayLike, *, filled: bool) -> None:
     """Draw lines of equal value with their numbers; none on a plane.
 
     The surface has a row for each y. Filled areas are dark where the value is small.
