@@ -31,7 +31,11 @@ def compute(task: Task, limits: Limits, work: str = WORK) -> tuple[Answer, dict[
     key = limits, work
     with _lock:
         waiting = _idle.setdefault(key, [])
-        pool = waiting.pop() if waiting else _new(limits, work)
+        if waiting:
+            pool = waiting.pop()
+        else:
+            megabytes = limits.megabytes or share_of_memory(os.cpu_count() or 1)
+            pool = LocalPool(1, Limits(limits.seconds, megabytes), work)
     try:
         answers = list(pool.answers(iter([task]), lambda: False))
     except BaseException:
@@ -42,8 +46,3 @@ def compute(task: Task, limits: Limits, work: str = WORK) -> tuple[Answer, dict[
     if len(answers) != 1:  # cannot be: a pool answers every task once
         raise PhotostripError(f"{len(answers)} answers to one task")
     return answers[0], program()
-
-
-def _new(limits: Limits, work: str) -> LocalPool:
-    megabytes = limits.megabytes or share_of_memory(os.cpu_count() or 1)
-    return LocalPool(1, Limits(limits.seconds, megabytes), work)

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-import time
 import traceback
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,11 +25,6 @@ if TYPE_CHECKING:
 
 def evaluate(task: Task) -> Answer:
     """Compute a project: its result, or why there is none; nothing is raised."""
-    start = time.perf_counter()
-    return replace(_answer(task), seconds=time.perf_counter() - start)
-
-
-def _answer(task: Task) -> Answer:
     try:
         return _from_parcel(task, task.parcel) if task.parcel is not None else _computed(task, Source())
     except InputError as error:
@@ -56,7 +49,6 @@ def _from_parcel(task: Task, parcel: Parcel) -> Answer:
 
 
 def _computed(task: Task, source: Source) -> Answer:
-    """Read, adjust and render a project."""
     with reading_from(source):
         project = load_project(Path(task.project), task.overrides)
         document = document_of(adjust_project(project), project.remarks)

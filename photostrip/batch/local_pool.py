@@ -144,7 +144,7 @@ class LocalPool:
             self._dismiss(worker)
             if task is not None:
                 fault = Fault(f"took longer than {limit:g} s", "timeout", fix="give it more time with --timeout")
-                yield self._gave_up(task, TIMEOUT, fault, limit)
+                yield self._gave_up(task, TIMEOUT, fault)
 
     def _of_dead_worker(self, worker: WorkerProcess) -> Iterator[Answer]:
         """Say what a worker died of, or let its project be tried once more."""
@@ -166,9 +166,9 @@ class LocalPool:
             fault = Fault(message, "worker-died", fix="`photostrip run PROJECT` shows whether it does so alone")
             yield self._gave_up(task, BROKEN, fault, trace=worker.last_words)
 
-    def _gave_up(self, task: Task, status: str, fault: Fault, seconds: float = 0.0, trace: str = "") -> Answer:
+    def _gave_up(self, task: Task, status: str, fault: Fault, trace: str = "") -> Answer:
         self._tries.pop(task.number, None)
-        return Answer(task.number, failure(status, fault), seconds=seconds, trace=trace)
+        return Answer(task.number, failure(status, fault), trace=trace)
 
     def _dismiss(self, worker: WorkerProcess) -> None:
         worker.end()

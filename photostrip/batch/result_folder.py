@@ -99,7 +99,8 @@ class ResultFolder:
         """Write a result, the record last; when that fails, what was there before is as it was."""
         folder = os.path.split(chosen.project)[0]
         place = self.path / chosen.output
-        inputs = {_short(name, folder): content for name, content in answer.inputs.items()}
+        above = f"{folder}{os.sep}" if folder else ""
+        inputs = {name.removeprefix(above): content for name, content in answer.inputs.items()}
         record: Document = {
             "photostrip_batch_record": SCHEMA,
             "program": program(),
@@ -111,10 +112,6 @@ class ResultFolder:
         }
         _sweep(place)
         write_files(place, {**answer.files, RECORD: record_text(record)})
-
-    def write_summaries(self, texts: dict[str, str]) -> None:
-        """Write the files of the summary."""
-        write_files(self.path, texts)
 
     def forget_summaries(self) -> None:
         """Remove the summary of an earlier batch, which would not be true while this one runs, or if it is killed."""
@@ -171,11 +168,6 @@ def _is(file: Path, content: str | None) -> bool:
         return content is None
     except OSError:
         return False
-
-
-def _short(name: str, folder: str) -> str:
-    """Path of a file that a project names, without the folder of the project."""
-    return name.removeprefix(f"{folder}{os.sep}") if folder else name
 
 
 def _back(name: str, folder: str) -> str:

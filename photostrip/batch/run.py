@@ -70,7 +70,6 @@ class Batch:
     # the line of the summary of each project, in the order in which the user named them
     outcomes: list[Document] = field(default_factory=list)
     unchanged: int = 0
-    seconds: float = 0.0
 
     @property
     def exit_code(self) -> int:
@@ -134,10 +133,8 @@ class Run:
         return None if refused is None else failure(FAULTY, refused)
 
     def _write(self, answer: Answer, listener: Listener, stop: Stop) -> None:
-        """Write a result and its line of the summary."""
         chosen = self.projects[answer.number]
         outcome = answer.outcome
-        self.batch.seconds += answer.seconds
         if answer.files and self.folder is not None:
             try:
                 self.folder.write(chosen, answer)

@@ -52,7 +52,6 @@ def choose(arguments: Sequence[str]) -> list[ChosenProject]:
 
 
 def _listed(arguments: Iterable[str], faults: list[Fault]) -> Iterator[str]:
-    """Replace lists by their lines."""
     for argument in arguments:
         if not argument.startswith(LIST):
             yield argument
@@ -70,7 +69,6 @@ def _listed(arguments: Iterable[str], faults: list[Fault]) -> Iterator[str]:
 
 
 def _projects(argument: str, faults: list[Fault]) -> list[str]:
-    """Return the project files that one argument means."""
     path = Path(argument)
     if path.is_dir():
         found = _below(path)
@@ -80,15 +78,13 @@ def _projects(argument: str, faults: list[Fault]) -> list[str]:
         return found
     if glob.has_magic(argument) and not path.exists():
         matches = [Path(each) for each in sorted(glob.glob(argument, recursive=True))]  # noqa: PTH207 (takes any path)
-        found = [name for each in matches for name in (_below(each) if each.is_dir() else _project(each))]
+        found = []
+        for each in matches:
+            found += _below(each) if each.is_dir() else [str(each)] * (each.suffix in ENDINGS)
         if not found:
             faults.append(Fault("no project fits this pattern", "no-project", argument))
         return found
     return [str(path)]  # a file that is not there is reported as the fault of that project, among the others
-
-
-def _project(path: Path) -> list[str]:
-    return [str(path)] if path.suffix in ENDINGS else []
 
 
 def _below(folder: Path) -> list[str]:

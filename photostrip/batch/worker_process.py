@@ -59,7 +59,7 @@ class WorkerProcess:
         self.connection, theirs = Pipe()
         handle = theirs.fileno()
         command = [sys.executable, "-c", START, "\n".join(sys.path), str(handle), str(megabytes), work]
-        self._process = subprocess.Popen(  # noqa: S603 (our own interpreter and our own module)
+        self.process = subprocess.Popen(  # noqa: S603 (our own interpreter and our own module)
             command,
             pass_fds=(handle,),
             stdin=subprocess.DEVNULL,
@@ -68,11 +68,6 @@ class WorkerProcess:
             env={**os.environ, **dict.fromkeys(THREAD_VARIABLES, "1")},
         )
         theirs.close()
-
-    @property
-    def pid(self) -> int:
-        """Number of its process."""
-        return self._process.pid
 
     def give(self, task: Task) -> None:
         """Hand it a task; it counts as begun now."""
@@ -87,8 +82,8 @@ class WorkerProcess:
     def end(self) -> int:
         """End it, if it still lives, and give its exit code; negative after a signal, NO_MEMORY for want of memory."""
         self.connection.close()
-        self._process.kill()
-        code = self._process.wait()
+        self.process.kill()
+        code = self.process.wait()
         with self._stderr:
             self._stderr.seek(0)
             written = self._stderr.read().decode(errors="replace")
@@ -98,7 +93,7 @@ class WorkerProcess:
     def fate(self) -> int:
         """Return the exit code of a worker whose connection broke: it is dead, or about to be."""
         with suppress(subprocess.TimeoutExpired):
-            self._process.wait(timeout=1.0)
+            self.process.wait(timeout=1.0)
         return self.end()
 
 

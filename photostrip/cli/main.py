@@ -39,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _take_flag(arguments: list[str], flag: str) -> bool:
-    """Remove `flag` wherever it stands before ``--`` and tell whether it was there."""
+    """Remove `flag` wherever it stands before ``--`` and say whether it was there."""
     end = arguments.index("--") if "--" in arguments else len(arguments)
     kept = [argument for argument in arguments[:end] if argument != flag]
     arguments[:end] = kept
@@ -108,19 +108,14 @@ def _call(name: str, arguments: list[str]) -> int:
     except typer.Exit as stop:
         return stop.exit_code
     except usage_error as error:
-        _complain(f"{_message(error)} 'photostrip {name} --help' shows how it is called.")
+        text: str = getattr(error, "format_message", error.__str__)()
+        end = "" if text.endswith((".", "?", "!")) else "."
+        _complain(f"{text}{end} 'photostrip {name} --help' shows how it is called.")
         return EXIT_USAGE
     return code if isinstance(code, int) else 0
 
 
-def _message(error: BaseException) -> str:
-    """Return the sentence of a usage error."""
-    text: str = getattr(error, "format_message", error.__str__)()
-    return text if text.endswith((".", "?", "!")) else f"{text}."
-
-
 def _complain(message: str) -> None:
-    """Write one fault on stderr."""
     sys.stderr.write(f"error: {message}\n")
 
 

@@ -10,7 +10,6 @@ from photostrip.cli.stdout import Format
 
 
 def _keys(incomplete: str) -> list[str]:
-    """Complete the key of an assignment."""
     from photostrip.cli.jobs.completion import keys
 
     return keys(incomplete)

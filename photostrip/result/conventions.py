@@ -11,7 +11,6 @@ from photostrip.result.numbers import rms
 from photostrip.result.quantities import record
 
 if TYPE_CHECKING:
-    from photostrip.camera import Camera
     from photostrip.pipeline import Result
     from photostrip.result.numbers import Document
 
@@ -75,19 +74,17 @@ def settings_of(result: Result) -> Document:
 def cameras_of(result: Result) -> list[Document]:
     """Return the list ``cameras``, in the order of the strips."""
     cameras = {strip.camera.name: strip.camera for strip in result.inputs.strips}
-    return [_camera(camera) for camera in cameras.values()]
-
-
-def _camera(camera: Camera) -> Document:
-    distortion = camera.distortion
-    return {
-        "id": camera.name,
-        "principal_distance_mm": camera.principal_distance,
-        "principal_point_mm": list(camera.principal_point),
-        "format_mm": None if camera.format is None else list(camera.format),
-        "fiducials": len(camera.fiducials),
-        "distortion": None if distortion is None else f"{distortion.model}, {distortion.direction}",
-    }
+    return [
+        {
+            "id": name,
+            "principal_distance_mm": camera.principal_distance,
+            "principal_point_mm": list(camera.principal_point),
+            "format_mm": None if camera.format is None else list(camera.format),
+            "fiducials": len(camera.fiducials),
+            "distortion": camera.distortion and f"{camera.distortion.model}, {camera.distortion.direction}",
+        }
+        for name, camera in cameras.items()
+    ]
 
 
 def corrections_of(result: Result) -> Document:
@@ -101,7 +98,6 @@ def corrections_of(result: Result) -> Document:
 
 
 def _interior(result: Result) -> Document | None:
-    """Sum up the interior orientation; None without fiducial marks."""
     found = result.interior
     if found is None:
         return None

@@ -84,16 +84,15 @@ def _finding(finding: Finding) -> Document:
         "accepted": finding.accepted,
         "message": finding.message,
         "fix": finding.fix,
-        "evidence": {name: _six_digits(value) for name, value in sorted(finding.evidence.items())},
+        "evidence": {
+            name: float(f"{value:.6g}") if isinstance(value, float) else value
+            for name, value in sorted(finding.evidence.items())
+        },
         "strips": list(finding.strips),
         "photos": list(finding.photos),
         "points": list(finding.points),
         **_cause(finding),
     }
-
-
-def _six_digits(value: float | str) -> float | str:
-    return float(f"{value:.6g}") if isinstance(value, float) else value
 
 
 def _note(note: Note) -> Document:

@@ -53,6 +53,5 @@ def _method(adjustment: str, found: Document | PhotostripError) -> Document:
 
 
 def _best(rows: list[Document], part: str) -> str | None:
-    """Find the adjustment with the smallest rms at check points."""
     known = [row for row in rows if row["status"] != "refused" and row["check"][part]["rms"] is not None]
     return min(known, key=lambda row: float(row["check"][part]["rms"]))["adjustment"] if known else None

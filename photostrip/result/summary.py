@@ -104,7 +104,6 @@ def summary_of(result: Result, found: Differences) -> Document:
 
 
 def _of_photos(result: Result) -> Document:
-    """Say how good the image coordinates are, and how large the photos."""
     strips = [strip.of_photos for strip in result.photo_strips]
     sums = [Parallaxes.of(strip) for strip in result.photo_strips]
     redundancy = np.concatenate([each.redundancy for each in sums])
@@ -124,7 +123,6 @@ def _of_photos(result: Result) -> Document:
 
 
 def _of_models(result: Result) -> Document:
-    """Say how good the model coordinates are, and how large the models."""
     strips = result.model_strips
     redundancy = np.array([strip.of_models.formed.links.solved.redundancy.sum() for strip in strips])
     share = redundancy / max(int(redundancy.sum()), 1)
@@ -143,7 +141,6 @@ def _of_models(result: Result) -> Document:
 
 
 def _mean_of_strips(result: Result, values: list[float]) -> float:
-    """Return a mean over the photos, or over the models."""
     size = [len(strip.strip.photos) - bool(result.model_strips) for strip in result.strips]
     return float(np.average(values, weights=size))
 
@@ -191,12 +188,12 @@ def tolerances_of(result: Result, summary: Document) -> list[Document]:
     A tolerance without a value, as that of check points where there are none, counts as failed: what cannot be shown
     to be kept is not kept.
     """
-    return [_tolerance(name, limit, summary) for name, limit in sorted(result.settings.tolerances.items())]
-
-
-def _tolerance(name: str, limit: float, summary: Document) -> Document:
-    path, unit = TOLERANCES[name]
-    value: Plain = summary
-    for key in path:
-        value = value[key]
-    return {"name": name, "value": value, "limit": limit, "unit": unit, "passed": value is not None and value <= limit}
+    found = []
+    for name, limit in sorted(result.settings.tolerances.items()):
+        path, unit = TOLERANCES[name]
+        value: Plain = summary
+        for key in path:
+            value = value[key]
+        passed = value is not None and value <= limit
+        found.append({"name": name, "value": value, "limit": limit, "unit": unit, "passed": passed})
+    return found

@@ -50,7 +50,7 @@ def test_every_fault_takes_only_its_own_project_along(tmp_path: Path) -> None:
     tasks = tasks_of(tmp_path, names)
     with LocalPool(2, Limits(seconds=8.0, megabytes=500.0), WORK) as pool:
         answers = list(pool.answers(iter(tasks), never))
-        assert len({worker.pid for worker in pool.workers}) == len(pool.workers) <= 2
+        assert len({worker.process.pid for worker in pool.workers}) == len(pool.workers) <= 2
     assert sorted(answer.number for answer in answers) == list(range(len(tasks)))  # one for each, none twice
     outcomes = {names[answer.number]: answer for answer in answers}
     for name, answer in nonempty(outcomes.items()):
@@ -67,7 +67,7 @@ def test_every_fault_takes_only_its_own_project_along(tmp_path: Path) -> None:
 def test_a_worker_that_has_grown_is_replaced(tmp_path: Path) -> None:
     tasks = tasks_of(tmp_path, ["good1", "grow", "good2"])
     seen = []
-    with LocalPool(1, Limits(megabytes=400.0), WORK, begun=lambda _: seen.append(pool.workers[0].pid)) as pool:
+    with LocalPool(1, Limits(megabytes=400.0), WORK, begun=lambda _: seen.append(pool.workers[0].process.pid)) as pool:
         answers = list(pool.answers(iter(tasks), never))
     assert [answer.outcome["status"] for answer in answers] == ["good"] * 3
     assert seen[0] == seen[1] != seen[2]
@@ -79,7 +79,7 @@ def test_workers_are_gone_when_the_pool_is(tmp_path: Path) -> None:
     stop: list[bool] = []
     with LocalPool(1, work=WORK, begun=lambda _: stop.append(True)) as pool:
         assert list(pool.answers(iter([task]), lambda: bool(stop))) == []
-        pids = [worker.pid for worker in pool.workers]
+        pids = [worker.process.pid for worker in pool.workers]
         assert all(_alive(pid) for pid in nonempty(pids))
     assert pids
     assert not any(_alive(pid) for pid in pids)
@@ -119,7 +119,7 @@ def test_workers_compute_with_one_thread(tmp_path: Path) -> None:
     worker = WorkerProcess(1000.0)
     try:
         assert worker.hear() == "ready"
-        environ = (f"/proc/{worker.pid}/environ", "rb")
+        environ = (f"/proc/{worker.process.pid}/environ", "rb")
         with open(*environ) as stream:  # noqa: PTH123 (a file of the system)
             variables = stream.read().split(b"\0")
         assert b"OPENBLAS_NUM_THREADS=1" in variables

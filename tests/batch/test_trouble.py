@@ -16,6 +16,7 @@ from photostrip.batch.result_folder import opened
 from photostrip.cli.jobs import batch as batch_job
 from photostrip.cli.main import main
 from photostrip.errors import InputError
+from photostrip.formats.text.writing import write_files
 from tests.batch.projects import Alone, command, environment, tree, write_projects
 
 if TYPE_CHECKING:
@@ -149,7 +150,7 @@ def test_a_second_batch_on_the_same_folder_is_refused(here: Path, capsys: pytest
     with opened(Path("elsewhere")):
         assert main(["batch", "strips", "-o", "out", "-q"]) == 0
     with opened(Path("out")) as folder:
-        folder.write_summaries({name: content.decode() for name, content in before.items() if "/" not in name})
+        write_files(folder.path, {name: content.decode() for name, content in before.items() if "/" not in name})
         assert main(["batch", "strips", "-o", "out"]) == 2
         assert tree(here / "out") == before  # nothing touched, the summary of the first one neither
     assert "error: out: another batch is writing into this folder" in capsys.readouterr().err

@@ -58,7 +58,6 @@ def compare(
 def _print(
     found: dict[str, Any], place: Path, form: CompareFormat, width: int | None, *, quiet: bool, verbose: bool
 ) -> None:
-    """Print a comparison on stdout."""
     from photostrip.formats.output.result_lines import line_finder
     from photostrip.report.commands.compare import compare_sections, compare_title
     from photostrip.report.commands.compare_findings import compare_cases, compare_findings

@@ -16,7 +16,7 @@ from photostrip.cli.failures import as_fault, failures_as
 from photostrip.cli.stdout import BatchFormat, Format, ascii_only, print_sections
 from photostrip.errors import InputError, PhotostripError
 from photostrip.formats.output import batch as formats
-from photostrip.formats.text.writing import make_rule, write_text
+from photostrip.formats.text.writing import make_rule, write_files, write_text
 from photostrip.report.commands.batch import batch_junit, batch_sections, outcome_line
 from photostrip.report.page import messages, text
 from photostrip.report.page.numbers import counted
@@ -132,13 +132,14 @@ class BatchMessages:
 def write_summaries(batch: Batch, code: int, folder: ResultFolder) -> list[InputError]:
     """Write the files of the summary; give what went wrong, which must not hide what became of the projects."""
     try:
-        folder.write_summaries(
+        write_files(
+            folder.path,
             {
                 "summary.txt": text.to_text("", batch_sections(batch.outcomes, everything=True)),
                 "summary.csv": formats.summary_csv(batch.outcomes),
                 "junit.xml": batch_junit(batch.outcomes),
                 "summary.json": formats.summary_json(batch.outcomes, code),
-            }
+            },
         )
     except InputError as error:
         return [error]

@@ -57,7 +57,6 @@ def document_of(found: Sequence[Checked]) -> dict[str, Any]:
 
 
 def _print_one(checked: Checked, form: Format, width: int | None, *, quiet: bool, verbose: bool) -> None:
-    """Print the verdict of one project, its findings line by line, and what was decoded."""
     findings = findings_of(checked)
     head = verdict(checked.path, checked.wrong, checked.remarks)
     lines = [messages.line_of(each) for each in findings]

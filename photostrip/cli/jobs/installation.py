@@ -35,7 +35,7 @@ FORMATS = {
         "manual pages: photostrip man; completion of shells: photostrip completion",
     ],
 }
-OWN = ("test", "dev", "peer")  # extras for those who work on photostrip itself
+FOR_DEVELOPMENT = ("test", "dev", "peer")  # extras for those who work on photostrip itself
 
 
 def installation() -> dict[str, Any]:
@@ -48,7 +48,7 @@ def installation() -> dict[str, Any]:
         "libraries": {name: _version(name) for name in required},
         "threads": {name: os.environ.get(name, "") for name in THREAD_VARIABLES},
         "formats": FORMATS,
-        "extras": {name: _extra(name, libraries) for name, libraries in extras.items() if name not in OWN},
+        "extras": {name: _extra(name, libraries) for name, libraries in extras.items() if name not in FOR_DEVELOPMENT},
     }
 
 
@@ -69,7 +69,6 @@ def _requirements() -> tuple[list[str], dict[str, list[str]]]:
 
 
 def _version(name: str) -> str:
-    """Return the version of a library; empty when it is not installed."""
     try:
         return metadata.version(name)
     except metadata.PackageNotFoundError:

@@ -39,7 +39,6 @@ def manual_pages() -> dict[str, str]:
 
 
 def _pages_of(name: str, command: Any) -> dict[str, str]:  # noqa: ANN401 (typer does not export its classes)
-    """Return the pages of a command and of those below it."""
     below: dict[str, Any] = getattr(command, "commands", {})
     pages = {f"photostrip-{name.replace(' ', '-')}.1": _command_page(name, command)}
     for inner, each in below.items():
@@ -57,7 +56,6 @@ def _main_page(root: Any) -> str:  # noqa: ANN401
 
 
 def _command_page(name: str, command: Any) -> str:  # noqa: ANN401
-    """Write the page of one command."""
     text = (command.help or "").partition("\f")[0].strip()
     first, _, rest = text.partition("\n\n")
     top = name.partition(" ")[0]
@@ -67,7 +65,11 @@ def _command_page(name: str, command: Any) -> str:  # noqa: ANN401
     below = getattr(command, "commands", {})
     if below:
         pages = (
-            (f"photostrip-{name.replace(' ', '-')}-{inner}(1)", _first_line(each)) for inner, each in below.items()
+            (
+                f"photostrip-{name.replace(' ', '-')}-{inner}(1)",
+                " ".join((each.help or "").partition("\n\n")[0].split()),
+            )
+            for inner, each in below.items()
         )
         lines += [".SH COMMANDS", *_entries(pages)]
     arguments = list(_records(command, "argument"))
@@ -77,10 +79,6 @@ def _command_page(name: str, command: Any) -> str:  # noqa: ANN401
     if name in COMMANDS:
         lines += [".SH EXAMPLE", ".nf", _safe(COMMANDS[name].example), ".fi"]
     return _ended([*lines, *_tail(["photostrip", *([f"photostrip-{top}"] if top != name else [])])])
-
-
-def _first_line(command: Any) -> str:  # noqa: ANN401
-    return " ".join((command.help or "").partition("\n\n")[0].split())
 
 
 def _head(page: str, about: str) -> list[str]:

@@ -58,7 +58,6 @@ def _table(outcomes: Sequence[Document], *, everything: bool) -> Table:
 
 
 def _messages(wrong: Sequence[Document], *, everything: bool) -> list[Words]:
-    """Return the messages of the projects that are not as they should be."""
     shown = wrong if everything else wrong[:ROWS]
     found = []
     for each in shown:

@@ -38,29 +38,23 @@ def verdict(path: str, faults: int, notes: int) -> str:
 def _contents(document: Document) -> Section:
     counts = document["counts"]
     control = "control {control_plan} in plan, {control_height} in height; check {check_plan} in plan, {check_height}"
+    models = document.get("model_sigma")
     rows = [
         ("project", document["name"]),
         ("photos", f"{counts['photos']} in {counted(counts['strips'], 'strip')}"),
         _measured(counts),
         ("given and measured", f"{control.format(**counts)} in height"),
-        _sigma(document),
+        ("model sigma" if models else "image sigma", _image_sigma(models or document["image_sigma"])),
     ]
     return Section("Contents", (Facts(tuple(rows)),))
 
 
 def _measured(counts: Document) -> tuple[str, str]:
-    """Say how much was measured, on photos or in models."""
     points = f"of {counted(counts['points'], 'point')}, {counts['new']} new"
     if "models" not in counts:
         return "image points", f"{counts['image_points']} {points}"
     models, centers = counted(counts["models"], "model"), counted(counts["model_centers"], "perspective center")
     return "model points", f"{counts['model_points']} {points}, in {models}; {centers}"
-
-
-def _sigma(document: Document) -> tuple[str, str]:
-    """Say what standard deviations the measurements get."""
-    models = document.get("model_sigma")
-    return ("model sigma", _image_sigma(models)) if models else ("image sigma", _image_sigma(document["image_sigma"]))
 
 
 def _image_sigma(sigma: Document) -> str:
@@ -135,7 +129,6 @@ def _sigmas(control: Sequence[Document], *, everything: bool) -> Section:
 
 
 def _sources(each: Document) -> str:
-    """Say where the standard deviations of a point stand."""
     return "; ".join(dict.fromkeys(_source(source) for source in each["sigma_from"] if source)) or DASH
 
 
@@ -147,7 +140,6 @@ def _source(place: Document) -> str:
 
 
 def _rows(rows: Sequence[Document], *, everything: bool) -> Section:
-    """List what became of the rows of the tables."""
     parts: list[Words] = []
     for table in rows:
         head = f"{table['file']}: {table['used']} of {counted(table['rows'], 'row')} used"

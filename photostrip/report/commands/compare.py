@@ -59,12 +59,12 @@ def headline(document: Document) -> str:
         return f"SAME: {counted(compared, 'number')} of {names} agree within the tolerances."
     numbers = len(document["differences"])
     parts = [f"{counted(numbers, 'number')} beyond tolerance"] if numbers else []
-    parts += [_set_words(each) for each in document["sets"] if each["differs"]]
+    parts += [
+        f"{NAMES[each['kind']]}: {len(each['missing'])} missing, {len(each['new'])} new"
+        for each in document["sets"]
+        if each["differs"]
+    ]
     return f"DIFFERENT: {names} differ: {'; '.join(parts)}."
-
-
-def _set_words(each: Document) -> str:
-    return f"{NAMES[each['kind']]}: {len(each['missing'])} missing, {len(each['new'])} new"
 
 
 def allowed_words(kind: Document) -> str:
@@ -87,7 +87,6 @@ def place(row: Document) -> str:
 
 
 def _size(row: Document) -> str:
-    """Return the size of a difference."""
     if row["difference"] is None:
         return "new" if row["before"] is None and row["now"] is not None else "gone"
     return short(row["difference"], 3)
@@ -131,7 +130,6 @@ def _differences(rows: Sequence[Document], *, everything: bool) -> Section:
 
 
 def _sets(sets: Sequence[Document], *, everything: bool) -> list[Section]:
-    """List what is missing and what is new, of sets that differ."""
     parts: list[Part] = []
     for each in sets:
         if not (each["missing"] or each["new"]):

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from photostrip.report.commands.compare import NAMES, allowed_words, what
 from photostrip.report.page.junit import Case
+from photostrip.report.page.messages import EMPTY
 from photostrip.report.page.numbers import short, unit
 
 if TYPE_CHECKING:
@@ -41,17 +42,8 @@ def _findings(document: Document, line_of: Callable[[str, str], int]) -> Iterato
 
 
 def _finding(document: Document, line: int, message: str) -> Document:
-    places = {"file": document["baseline"], "line": line, "column": 0, "key": ""}
-    return {
-        "severity": "error",
-        "code": "different",
-        **places,
-        "message": message,
-        "expected": "",
-        "fix": "",
-        "photos": [],
-        "points": [],
-    }
+    place = {"file": document["baseline"], "line": line}
+    return EMPTY | place | {"severity": "error", "code": "different", "message": message}
 
 
 def sentence(row: Document) -> str:

@@ -24,7 +24,6 @@ def methods_sections(document: Document) -> tuple[Section, ...]:
 
 
 def _table(rows: list[Document], role: str) -> Table:
-    """Tabulate what is left at the points of one role."""
     left_over = [
         column
         for part in ("plan", "height")

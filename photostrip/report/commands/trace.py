@@ -132,7 +132,6 @@ def _junction(junction: Document) -> Section:
 
 
 def _absolute(strip: Document, unit: str) -> Section:
-    """Frame, steps and control of the absolute orientation."""
     found = strip["absolute"]
     origin = ", ".join(fixed(value, 4) for value in found["origin"])
     axes = "; ".join(" ".join(fixed(value, 9) for value in found["M"][row : row + 3]) for row in (0, 3, 6))
@@ -194,7 +193,6 @@ POLYNOMIAL_CONTROL = (
 
 
 def _polynomial(strip: Document) -> Section:
-    """Evidence, coefficients and control of the polynomials."""
     found, keys = strip["polynomial"], ("terms", "coefficients", "sigmas")
     terms = [
         {"axis": axis, **dict(zip(keys, values, strict=True))}

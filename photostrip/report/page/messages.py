@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 LEVELS = {"error": "error", "warning": "warning", "note": "notice"}  # ours, and those of GitHub
 SCHEMA = 1
 ACCEPTED = "accepted: "
+EMPTY: Document = {
+    "file": "", "line": 0, "column": 0, "key": "", "expected": "", "fix": "", "photos": [], "points": []
+}  # fmt: skip
 
 
 def finding_of(source: Fault | Note | Finding) -> Document:
@@ -66,10 +69,9 @@ def findings_of(error: InputError | GeometryError) -> list[Document]:
 
 def result_findings(document: Document) -> list[Document]:
     """Return tolerances that are not kept, as errors, then the findings and notes of a result."""
-    empty = {"file": "", "line": 0, "column": 0, "key": "", "expected": "", "fix": "", "photos": [], "points": []}
     found = [
         {
-            **empty,
+            **EMPTY,
             "severity": "error",
             "code": "tolerance",
             "key": f"tolerances.{each['name']}",
@@ -78,18 +80,10 @@ def result_findings(document: Document) -> list[Document]:
         for each in document["tolerances"]
         if not each["passed"]
     ]
-    return (
-        found
-        + [_of_result(empty, each) for each in document.get("findings", [])]
-        + [empty | note for note in document["notes"]]
-    )
-
-
-def _of_result(empty: Document, finding: Document) -> Document:
-    """Return a finding of a result's document in the form of the others."""
-    if not finding["accepted"]:
-        return empty | finding
-    return empty | finding | {"severity": "note", "message": ACCEPTED + finding["message"], "fix": ""}
+    for each in document.get("findings", []):
+        as_note = {"severity": "note", "message": ACCEPTED + each["message"], "fix": ""}
+        found.append(EMPTY | each | (as_note if each["accepted"] else {}))
+    return found + [EMPTY | note for note in document["notes"]]
 
 
 def as_document(findings: Sequence[Document], exit_code: int) -> Document:

@@ -35,7 +35,6 @@ def strip_figure(document: Document) -> Figure:
 
 
 def _curves(axes: Axes, document: Document, name: str) -> None:
-    """One curve for each layout and method."""
     colour = {layout["name"]: SERIES[k % len(SERIES)] for k, layout in enumerate(document["layouts"])}
     for row in document["accuracy"]:
         if row["used"] is None:

@@ -70,7 +70,6 @@ def _sheet(spots: Sequence[Spot], longest: float) -> Sheet:
 
 
 def _plan_picture(document: Document, plan: Plan) -> Picture:
-    """Draw photos, points, residual vectors and ellipses from above."""
     everything = [*plan.spots, *(spot for strip in plan.strips for spot in strip)]
     longest = max(_longest(plan), 1e-9)
     bar = svg.nice(longest / 2)
@@ -91,11 +90,10 @@ def _plan_picture(document: Document, plan: Plan) -> Picture:
     )
     counts = counted(len(plan.strips), "strip"), counted(len(plan.spots), "point")
     words = f"{', '.join(counts)}; the tables of control and check points have the numbers."
-    return svg.picture("plan", (WIDTH, sheet.height), (f"Plan of {document['name']}", caption, words), drawn)
+    return svg.picture("plan", (WIDTH, sheet.height), svg.Texts(f"Plan of {document['name']}", caption, words), drawn)
 
 
 def _longest(plan: Plan) -> float:
-    """Return the longest vector or half axis."""
     vectors = [math.hypot(*spot.shift) for spot in plan.spots if spot.shift is not None]
     return max([*vectors, *(spot.ellipse[0] for spot in plan.spots if spot.ellipse is not None)], default=0.0)
 
@@ -204,7 +202,7 @@ def _height_picture(document: Document, plan: Plan) -> Picture:
     )
     largest = max(spots, key=lambda spot: abs(spot.up or 0.0))
     words = f"{len(spots)} given heights; the largest difference is {largest.up:+.3f} m at {largest.id}."
-    return svg.picture("heights", (WIDTH, height), ("Heights along the strip", caption, words), drawn)
+    return svg.picture("heights", (WIDTH, height), svg.Texts("Heights along the strip", caption, words), drawn)
 
 
 CURVES = (
@@ -240,4 +238,6 @@ def _precision_picture(document: Document) -> Picture:
     points = document["precision"]["points"]
     worst = [f"{name} {short(points[name]['max'], 3)} m at {points[name]['worst']}" for name in ("plan", "height")
              if points[name]["max"] is not None]  # fmt: skip
-    return svg.picture("precision", (WIDTH, height), ("Precision along the strip", caption, "; ".join(worst)), drawn)
+    return svg.picture(
+        "precision", (WIDTH, height), svg.Texts("Precision along the strip", caption, "; ".join(worst)), drawn
+    )

@@ -39,6 +39,14 @@ class Picture(NamedTuple):
     svg: str  # the picture; its title and description are those for readers who cannot see it
 
 
+class Texts(NamedTuple):
+    """The words of a picture."""
+
+    title: str
+    caption: str
+    description: str  # for readers who cannot see it
+
+
 class Axis(NamedTuple):
     """A scale from numbers to places on the picture."""
 
@@ -114,11 +122,10 @@ def mark(place: Point, shape: str, kind: str, hint: str, size: float = 5.0) -> s
     return element("polygon", title, points=place_of, kind=kind)
 
 
-def picture(name: str, size: Point, words: tuple[str, str, str], content: Iterable[str]) -> Picture:
-    """Put a picture together; the words are title, caption, and a description for readers who cannot see it."""
-    title, caption, description = words
-    head = element("title", escape(title), id=f"picture-{name}-title") + element(
-        "desc", escape(description), id=f"picture-{name}-desc"
+def picture(name: str, size: Point, texts: Texts, content: Iterable[str]) -> Picture:
+    """Put a picture together."""
+    head = element("title", escape(texts.title), id=f"picture-{name}-title") + element(
+        "desc", escape(texts.description), id=f"picture-{name}-desc"
     )
     svg = element(
         "svg",
@@ -128,7 +135,7 @@ def picture(name: str, size: Point, words: tuple[str, str, str], content: Iterab
         role="img",
         aria_labelledby=f"picture-{name}-title picture-{name}-desc",
     )
-    return Picture(name, title, caption, svg)
+    return Picture(name, texts.title, texts.caption, svg)
 
 
 def frame(x: Axis, y: Axis, labels: tuple[str, str]) -> list[str]:

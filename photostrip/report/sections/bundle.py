@@ -31,7 +31,6 @@ def bundle_sections(document: Document) -> list[Section]:
 
 
 def _adjustment(block: Document) -> Section:
-    """Observations, unknowns, sigma0, convergence."""
     test, screening, unknowns = block["sigma0_test"], block["screening"], block["unknowns"]
     observed = ", ".join(f"{number} of {NAMES[kind]}" for kind, number in block["observations"].items())
     parts = f"{sum(unknowns.values())}: {unknowns['photos']} of photos, {unknowns['points']} of points"
@@ -81,7 +80,6 @@ def _screening(screening: Document) -> str:
 
 
 def _reliability(block: Document) -> Section:
-    """How well the observations check each other."""
     reliable = block["reliability"]
     columns = (
         words("observations", _name),
@@ -107,12 +105,10 @@ def _reliability(block: Document) -> Section:
 
 
 def _name(row: Document) -> str:
-    """Name the kind of observations of a row."""
     return NAMES[row.get("group") or row["kind"]]
 
 
 def _named(title: str, rows: Sequence[Document]) -> list[Part]:
-    """Observations by their names."""
     if not rows:
         return []
     columns = (
@@ -130,7 +126,6 @@ def _named(title: str, rows: Sequence[Document]) -> list[Part]:
 
 
 def _components(rows: Sequence[Document]) -> Section:
-    """Show the standard deviations found by group."""
     columns = (
         words("group", "group"),
         number("observations", "observations"),

@@ -54,7 +54,6 @@ def _degree(block: Document) -> str:
 
 
 def _step(row: Document) -> str:
-    """Name an accepted degree with its test."""
     if row["f"] is None or row["p"] is None:
         return f"degree {row['degree']}"
     probability = f"p = {row['p']:.3f}" if row["p"] >= LEAST_PROBABILITY else f"p below {LEAST_PROBABILITY:g}"

@@ -21,19 +21,13 @@ def findings_sections(document: Document) -> tuple[Section, ...]:
 
 
 def _paragraphs(finding: Document) -> Iterator[Part]:
-    """Write one finding in up to three paragraphs."""
     place = before(finding["file"], finding["line"], finding["column"])
     word = "accepted" if finding["accepted"] else finding["severity"]
     colour = "" if finding["accepted"] else "failed" if finding["severity"] == "error" else "look"
     yield Words(f"{finding['code']} {finding['title']} ({word}): {place}{finding['message']}.", colour, "-")
     if finding["evidence"]:
-        numbers = ", ".join(f"{_name(name)} {value}" for name, value in finding["evidence"].items())
+        numbers = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in finding["evidence"].items())
         yield Words(f"Evidence: {numbers}.", "", " ")
     if finding["fix"] and not finding["accepted"]:
         cure = finding["fix"]
         yield Words(f"To put it right: {cure}{'' if cure.endswith('?') else '.'}", "", " ")
-
-
-def _name(name: str) -> str:
-    """Write the name of a number as words."""
-    return name.replace("_", " ")

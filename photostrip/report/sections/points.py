@@ -93,7 +93,6 @@ def _given(document: Document, given: Sequence[Document], role: str, *, everythi
 
 
 def _sigma(place: int) -> Callable[[Document], float | None]:
-    """Return what reads the standard deviation of a coordinate."""
     return lambda row: row["sigma"][place]
 
 
@@ -144,17 +143,20 @@ def ties_section(document: Document, *, everything: bool) -> Section:
         number("plan", "plan_um", 1, "µm"),
         number("height", "height_um", 1, "µm"),
     )
-    foot = (("rms", "", *(metres(_rms(ties, key)) for key in DIFFERENCES), *_rms_um(ties)),)
+    foot = (
+        (
+            "rms",
+            "",
+            *(metres(_rms(ties, key)) for key in DIFFERENCES),
+            *(micrometres(_rms(ties, key)) for key in ("plan_um", "height_um")),
+        ),
+    )
     below = "second strip minus first; the result has their mean"
     return Section("Ties between strips", (tabulated(shown, columns, foot, joined(note, below)),))
 
 
 def _rms(rows: Sequence[Document], key: str) -> float:
     return float((sum(row[key] ** 2 for row in rows) / len(rows)) ** 0.5)
-
-
-def _rms_um(rows: Sequence[Document]) -> tuple[str, str]:
-    return micrometres(_rms(rows, "plan_um")), micrometres(_rms(rows, "height_um"))
 
 
 def image_section(document: Document) -> Section:

@@ -87,7 +87,6 @@ def _worst(document: Document) -> Table:
 
 
 def _along(document: Document, rows: Sequence[Document], *, everything: bool) -> Table:
-    """How the precision changes along the strips."""
     several = len(document["strips"]) > 1
     shown, left_out = list(rows), 0
     if not everything and len(rows) > ALL_SHOWN:

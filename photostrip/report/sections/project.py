@@ -26,7 +26,6 @@ def project_section(document: Document) -> Section:
 
 
 def _of_photos(settings: Document) -> list[tuple[str, str]]:
-    """Say how photos are made a strip."""
     transfer = settings["formation"]["scale_transfer"].replace("_", " ")
     return [("screening", _screening(settings["relative"])), ("scale transfer", transfer)]
 
@@ -50,7 +49,12 @@ def _camera(camera: Document) -> str:
 
 def _corrections(corrections: Document) -> list[tuple[str, str]]:
     effects = (("principal_point", "principal point"), ("distortion", "lens distortion"), ("refraction", "refraction"))
-    image = [f"{name} {_effect(corrections[key])}" for key, name in effects]
+    image = [
+        f"{name} up to {micrometres(corrections[key]['largest_um'])} µm"
+        if corrections[key]["applied"]
+        else f"{name} none"
+        for key, name in effects
+    ]
     curvature = corrections["earth_curvature"]
     size = f", up to {metres(curvature['largest'])} m in height" if curvature["largest"] else ""
     if "largest_um" in curvature:
@@ -58,10 +62,6 @@ def _corrections(corrections: Document) -> list[tuple[str, str]]:
     interior = corrections["interior"]
     rows = [("image corrections", ", ".join(image)), ("Earth curvature", f"{curvature['treatment']}{size}")]
     return [*([("fiducial marks", _interior(interior))] if interior else []), *rows]
-
-
-def _effect(effect: Document) -> str:
-    return f"up to {micrometres(effect['largest_um'])} µm" if effect["applied"] else "none"
 
 
 def _interior(interior: Document) -> str:

@@ -79,7 +79,6 @@ PAIRS = (
 
 
 def _largest_sigma(model: Document) -> float | None:
-    """Return the largest standard deviation of the five elements."""
     return max((model["sigmas"][key] for key, _ in ELEMENTS if model["sigmas"][key] is not None), default=None)
 
 
@@ -198,8 +197,6 @@ def _leverage(document: Document, block: Document) -> str:
 
 
 def _by_strip(blocks: Sequence[Document]) -> Table:
-    """Return one line for each of many strips."""
-
     def degree(axis: str) -> Callable[[Document], int]:
         return lambda block: _degree(block["terms"][axis])
 
@@ -220,7 +217,6 @@ def _by_strip(blocks: Sequence[Document]) -> Table:
 
 
 def _choice(document: Document, block: Document) -> str:
-    """Say which degree was chosen and on what control."""
     how = "decided by the evidence below" if block["asked"] == "auto" else f"degree {block['asked']} was asked for"
     plan, height = (_degree(block["terms"][axis]) for axis in ("x", "z"))
     what = "no polynomial" if not block["degree"] else f"degree {plan} in plan and {height} in height"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from photostrip.result.numbers import Document
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.settings import BundleSettings
-    from photostrip.triangulation.bundle.solution import BundleSolution
 
 
 SHOWN = 10  # observations named as the weakest and as the worst
@@ -65,7 +65,16 @@ def bundle_of(result: Result) -> Document:
         },
         "iterations": len(solution.steps),
         "adjustments": screened.rounds,
-        "convergence": _convergence(solution),
+        "convergence": [
+            {
+                "chi_square": step.chi_square,
+                "length": step.length,
+                "damping": step.damping,
+                "shift": step.shift,
+                "turn_deg": np.degrees(step.turn),
+            }
+            for step in solution.steps
+        ],
         "screening": _screening(found, settings),
         "reliability": {
             "power": settings.power,
@@ -76,9 +85,7 @@ def bundle_of(result: Result) -> Document:
         },
         "variance_components": _components(found),
         "calibration": _calibration(found),
-        "correlations": [
-            {"first": each.first, "second": each.second, "value": each.value} for each in found.correlations
-        ],
+        "correlations": [asdict(each) for each in found.correlations],
         "given": [
             _observed(found, group, (row, axis), shift)
             for group in found.groups
@@ -103,21 +110,7 @@ def _sigma0(found: Bundle) -> Document:
     }
 
 
-def _convergence(solution: BundleSolution) -> list[Document]:
-    return [
-        {
-            "chi_square": step.chi_square,
-            "length": step.length,
-            "damping": step.damping,
-            "shift": step.shift,
-            "turn_deg": np.degrees(step.turn),
-        }
-        for step in solution.steps
-    ]
-
-
 def _screening(found: Bundle, settings: BundleSettings) -> Document:
-    """Sum up the search for gross errors."""
     screened = found.screened
     out = [each for each in screened.rejections if not each.readmitted]
     return {

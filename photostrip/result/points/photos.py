@@ -148,7 +148,6 @@ def _photos_of_strip(result: Result, number: int, strip: StripResult, image: Ima
 
 
 def _single_photos(result: Result, images: Sequence[ImageResiduals]) -> list[Document]:
-    """Return the entries of photos that are strips of their own."""
     if result.bundle is None or not images:
         return []
     singles = result.bundle.singles
@@ -171,7 +170,6 @@ def _single_photos(result: Result, images: Sequence[ImageResiduals]) -> list[Doc
 
 
 def _turned(result: Result, rotations: Floats) -> Document:
-    """Return the columns of rotations and angles."""
     system, unit = result.settings.angle_system, result.settings.angle_unit
     values = _angles(rotations, system, unit)
     return {"rotation": rotations.reshape(-1, 9), "angles": {"system": system, "unit": unit, "values": values}}

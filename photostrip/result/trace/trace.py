@@ -172,7 +172,6 @@ def _chain(strip: StripResult, factor: float) -> list[Document]:
 
 
 def _angles(rotation: Floats, factor: float) -> list[float]:
-    """Return alpha, omega, kappa of a rotation in the unit of the output."""
     values: list[float] = rounded(alpha_omega_kappa(rotation).ravel() * factor, ANGLE)
     return values
 
@@ -209,7 +208,6 @@ def _scale_transfer(result: Result, strip: StripResult) -> list[Document]:
 
 
 def _absolute(result: Result, strip: StripResult, factor: float) -> Document:
-    """Absolute orientation: the frame, the control in it, the steps, the similarity."""
     similarity, frame = strip.absolute.similarity, strip.intermediate
     points = strip.formed.xyz[strip.control_rows]
     moved = similarity(points)
@@ -254,7 +252,6 @@ def _similarity(found: Similarity, factor: float) -> Document:
 
 
 def _polynomial(result: Result, strip: StripResult) -> Document | None:
-    """Polynomials of a strip: coefficients by term, free terms and residuals at the control."""
     found = strip.polynomial
     if found is None:
         return None
