@@ -39,7 +39,8 @@ def verdict_of(document: Document) -> Document:
         *failed,
         *_findings(document, "warning"),
         *_control(document),
-        *_check(document),
+        *_odd(document, "control"),
+        *_odd(document, "check"),
         *_sigma0(document),
         *_pairs(document),
         *_photos(document),
@@ -82,8 +83,6 @@ def _control(document: Document) -> Iterator[str]:
             f"the control points fit {ratio:.1f} times worse than their standard deviations and the precision of one "
             "model let expect: control that is not as good as stated, or a deformation of the strip that is left"
         )
-    rows = [row for row in document["control"] if row["role"] == "control"]
-    yield from _odd([_without_rejected(row) for row in rows], "control")
 
 
 def _without_rejected(row: Document) -> Document:
@@ -93,13 +92,9 @@ def _without_rejected(row: Document) -> Document:
     return row | {"plan": plan, "height": None if "z" in out else row["height"]}
 
 
-def _check(document: Document) -> Iterator[str]:
-    rows = [row for row in document["control"] if row["role"] == "check"]
-    yield from _odd(rows, "check")
-
-
-def _odd(rows: list[Document], role: str) -> Iterator[str]:
+def _odd(document: Document, role: str) -> Iterator[str]:
     """Name the point that does not go with the others, in plan and in height."""
+    rows = [_without_rejected(row) for row in document["control"] if row["role"] == role]
     for name in ("plan", "height"):
         known = sorted((row for row in rows if row[name] is not None), key=lambda row: abs(row[name]), reverse=True)
         if len(known) < FEW:

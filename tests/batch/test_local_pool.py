@@ -156,7 +156,7 @@ def test_an_internal_error_is_told_with_its_place(tmp_path: Path, monkeypatch: p
         raise ZeroDivisionError("by zero")
 
     (task,) = tasks_of(tmp_path, ["good1"])
-    monkeypatch.setattr("photostrip.batch.evaluation.triangulate", broken)
+    monkeypatch.setattr("photostrip.batch.evaluation.adjust_project", broken)
     answer = evaluate(task)
     assert answer.outcome["status"] == "crashed"
     assert answer.outcome["exit_code"] == 70

@@ -59,7 +59,7 @@ def _print(
     found: dict[str, Any], place: Path, form: CompareFormat, width: int | None, *, quiet: bool, verbose: bool
 ) -> None:
     from photostrip.formats.output.result_lines import line_finder
-    from photostrip.report.commands.compare import compare_sections, compare_title
+    from photostrip.report.commands.compare import compare_sections
     from photostrip.report.commands.compare_findings import compare_cases, compare_findings
     from photostrip.report.page.junit import to_junit
     from photostrip.report.page.messages import annotated
@@ -74,5 +74,5 @@ def _print(
             sys.stdout.write(annotated(compare_findings(found, lines)))
         case CompareFormat.TEXT | CompareFormat.MD:
             sections = compare_sections(found, quiet=quiet, everything=verbose)
-            title = "" if quiet else compare_title(found)
+            title = "" if quiet else f"Comparison: {found['name']}"
             print_sections(title, sections, width, markdown=form is CompareFormat.MD)

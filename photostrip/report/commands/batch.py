@@ -13,17 +13,12 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 
-def known(count: int | None) -> str:
-    """Write a number that a project without a result does not have."""
-    return DASH if count is None else str(count)
-
-
 COLUMNS = (
     words("project", "project"),
     words("status", "status"),
-    number("photos", "photos", known, rank=1),
-    number("points", "points", known, rank=2),
-    number("rejected", "rejected", known, rank=2),
+    number("photos", "photos", 0, rank=1),
+    number("points", "points", 0, rank=2),
+    number("rejected", "rejected", 0, rank=2),
     number("σ0", "sigma0_um", 1, "µm", rank=1),
     words("at", lambda outcome: outcome["rms_at"] or DASH, rank=1),
     number("plan", "rms_plan_m", 3, "m"),

@@ -31,11 +31,6 @@ NAMES = {
 ONE = {"photos": "photo", "points": "point", "models": "model", "strips": "strip", "junctions": "joint at"}
 
 
-def compare_title(document: Document) -> str:
-    """Return the title of a comparison."""
-    return f"Comparison: {document['name']}"
-
-
 def compare_sections(document: Document, *, quiet: bool = False, everything: bool = False) -> tuple[Section, ...]:
     """Return the sections of a comparison."""
     same = document["status"] == "same"

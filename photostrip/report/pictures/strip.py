@@ -124,9 +124,9 @@ def _spot(spot: Spot, sheet: Sheet, share: float) -> str:
     return svg.mark(sheet.place(spot), SHAPES[spot.role], f"mark {spot.role}", hint, size)
 
 
-def _legend(roles: Iterable[str], y: float, x: float = LEFT) -> list[str]:
+def _legend(roles: Iterable[str], y: float) -> list[str]:
     """Give marks with their meaning in a row."""
-    found = []
+    found, x = [], LEFT
     for role in roles:
         found += [svg.mark((x, y), SHAPES[role], f"mark {role}", "", 5.0), svg.text((x + 12.0, y + 4.5), WORDS[role])]
         x += 24.0 + 7.5 * len(WORDS[role])

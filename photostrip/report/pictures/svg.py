@@ -1,19 +1,7 @@
 """Elements of SVG for the pictures in a page, whose style sheet gives them their colours.
 
-matplotlib draws all pictures in files of their own. For those in a page it was tried and left, by these numbers
-(seconds of one core for a whole ``run --html``, kilobytes of the pictures; strips of 20, 100 and 1000 photos):
-
-==============================================  ==================  ==================
-what                                            this module         matplotlib
-==============================================  ==================  ==================
-``run --html``                                  1.3, 1.5, 4.0       2.1, 2.3, 5.0
-pictures                                        51, 116, 1105       127, 220, 1838
-hint with id and numbers at each mark           an element          the written SVG rewritten: marks have no words
-colours of a dark screen and of paper           the style sheet     every colour replaced in the written SVG
-ids that are unique on the page                 none are needed     every id and reference rewritten
-==============================================  ==================  ==================
-
-What would change it: pictures of which this module has no elements, as isolines.
+matplotlib draws all pictures in files of their own; docs/design.md says why not those in a page. Hints at marks,
+colours of a dark screen and ids that are unique on the page would have to be written into its SVG afterwards.
 """
 
 from __future__ import annotations
