@@ -119,7 +119,7 @@ def _report(document: Document, *, quiet: bool, verbose: bool) -> tuple[str, tup
 
 def trace_text(result: Result, form: Format) -> str:
     """Return the trace of a run: every stage and iteration."""
-    from photostrip.report.commands.trace import trace_sections
+    from photostrip.report.commands.trace import trace_sections, trace_title
     from photostrip.report.page import layout, text
     from photostrip.result.trace.trace import trace_of
 
@@ -128,7 +128,7 @@ def trace_text(result: Result, form: Format) -> str:
         from photostrip.formats.output.result_json import to_json
 
         return to_json(document)
-    title, sections = f"Trace: {document['name']}", trace_sections(document)
+    title, sections = trace_title(document), trace_sections(document)
     if form is Format.MD:
         return text.to_markdown(title, sections)
     return text.to_text(title, sections, layout.WIDEST)

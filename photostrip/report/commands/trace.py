@@ -23,6 +23,11 @@ SOURCE = {
 }
 
 
+def trace_title(document: Document) -> str:
+    """Return the title of a trace."""
+    return f"Trace: {document['name']}"
+
+
 def trace_sections(document: Document) -> tuple[Section, ...]:
     """Return symbols, then for each strip its pairs, the chain, junctions, absolute orientation and polynomials."""
     unit = document["angles"]

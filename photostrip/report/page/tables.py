@@ -25,10 +25,10 @@ class Shown(NamedTuple):
     cell: Callable[[Row], str]
 
 
-def words(name: str, value: Value, *, rank: int = 0) -> Shown:
+def words(name: str, value: Value, unit: str = "", *, rank: int = 0) -> Shown:
     """Return a column of words."""
     read = _reader(value)
-    return Shown(Column(name, left=True, rank=rank), lambda row: str(read(row)))
+    return Shown(Column(name, unit, left=True, rank=rank), lambda row: str(read(row)))
 
 
 def number(name: str, value: Value, form: int | Callable[[Any], str] = str, unit: str = "", *, rank: int = 0) -> Shown:
