@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from photostrip.planning.closed_form import ORDER, control_sums
 from photostrip.planning.element_errors import ELEMENTS, influence
 from photostrip.planning.single_model import ModelControl, orientation_operator
-from tests.planning.closed_form import ORDER, control_sums
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

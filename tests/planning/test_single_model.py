@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_alpha_omega_kappa
+from photostrip.planning.closed_form import ORDER, coefficients, control_sums
 from photostrip.planning.element_errors import (
     ELEMENTS,
     FREE,
@@ -29,7 +30,6 @@ from photostrip.planning.single_model import (
     parameter_rows,
 )
 from photostrip.triangulation.relative_orientation import six_points
-from tests.planning.closed_form import ORDER, coefficients, control_sums
 from tests.planning.formulas import orientation_parameters, six_point_variances
 from tests.vectors import cases
 
