@@ -12,12 +12,13 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 CODE = re.compile(r"[a-z]+(-[a-z0-9]+)*")
-# What is called, and which of its positional arguments is the code; as a keyword it is always `code`.
-FUNCTIONS: dict[str, int | None] = {
-    "Fault": 1, "GeometryError": None, "Note": 0, "Refusal": None, "_note": 0, "_refuse": 2, "fault": 0, "fault_at": 3,
-    "refuse": 1, "wrong": None,
+# What is called, and which of its positional arguments is the code, the likeliest first; as a keyword it is `code`.
+FUNCTIONS: dict[str, tuple[int, ...]] = {
+    "Fault": (1,), "GeometryError": (), "Note": (0,), "Refusal": (), "_note": (0,), "_refuse": (2,), "fault": (0,),
+    "fault_at": (3,), "refuse": (1,), "wrong": (),
 }  # fmt: skip
-METHODS: dict[str, int | None] = {"_add": 3, "_refuse": 2, "fault": 3}
+# A place in the project file knows where it stands; a table takes row and column before message and code.
+METHODS: dict[str, tuple[int, ...]] = {"_add": (3,), "_refuse": (2,), "fault": (3, 1), "note": (0, 1), "refuse": (2, 1)}
 UNNAMED = {"input", "geometry", "tolerance"}  # what has no code of its own
 
 
@@ -49,10 +50,9 @@ def _candidates(node: ast.AST) -> Iterator[ast.expr]:
         return
     if name not in known:
         return
-    place = known[name]
     yield from (each.value for each in node.keywords if each.arg == "code")
-    if place is not None and len(node.args) > place:
-        yield node.args[place]
+    given = [node.args[place] for place in known[name] if len(node.args) > place]
+    yield from [argument for argument in given if any(_texts(argument))][:1]
 
 
 def _texts(expression: ast.expr) -> Iterator[str]:

@@ -26,7 +26,7 @@ def test_points_beyond_the_control_are_told_with_how_far(begin: float, end: floa
         SimpleNamespace(asked="auto", degree=2, reach=(-500.0, 5000.0), axes=[SimpleNamespace(redundancy=9)]),
     )
     adjusted = np.array([[begin, 0.0, 0.0], [2000.0, 0.0, 0.0], [end, 0.0, 0.0]])
-    notes = polynomial_notes(cast("Strip", SimpleNamespace(id="A")), correction, adjusted)
+    notes = list(polynomial_notes(cast("Strip", SimpleNamespace(id="A")), correction, adjusted))
     assert [note.code for note in notes] == ([] if beyond is None else ["extrapolation"])
     words = "" if beyond is None else f"points lie up to {beyond} m beyond the control"
     assert words in " ".join(note.message for note in notes)
