@@ -213,10 +213,18 @@ def strength(kind: str, points: ArrayLike, weights: ArrayLike | None = None) -> 
     return _reciprocal_condition(terms[..., LINEAR] if kind == "affine" else terms, w)
 
 
-def _arrays(source: ArrayLike, target: ArrayLike, weights: ArrayLike | None) -> tuple[Floats, Floats, Floats]:
+class _Corresponding(NamedTuple):
+    """Points to fit, broadcast to one shape."""
+
+    source: Floats
+    target: Floats
+    weights: Floats
+
+
+def _arrays(source: ArrayLike, target: ArrayLike, weights: ArrayLike | None) -> _Corresponding:
     a, b = np.broadcast_arrays(np.asarray(source, float), np.asarray(target, float))
     w = np.ones(()) if weights is None else np.asarray(weights, float)
-    return a, b, np.broadcast_to(w, np.broadcast_shapes(w.shape, a.shape[:-1]))
+    return _Corresponding(a, b, np.broadcast_to(w, np.broadcast_shapes(w.shape, a.shape[:-1])))
 
 
 def _center_and_size(points: Floats, weights: Floats) -> tuple[Floats, Floats]:

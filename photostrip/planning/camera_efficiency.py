@@ -57,7 +57,9 @@ def compare(first: ComparedCamera, second: ComparedCamera) -> Comparison:
     area = base * width * scale**2
     # at equal area the scales are as 1 / sqrt(b l)
     height_error = coefficient / base / (base * width) ** 0.5
-    return Comparison(scale, height_error, base * width * scale, area, 1 / area)
+    return Comparison(
+        scale=scale, height_error=height_error, printed_area=base * width * scale, area=area, photos=1 / area
+    )
 
 
 class PrintedRow(NamedTuple):
@@ -74,17 +76,20 @@ class PrintedRow(NamedTuple):
 PRINTED_BASE = 60.0  # mm: the base that the printed H / m_h belong to
 # [004b], the table; the last heading is misprinted
 PRINTED_TABLE = (
-    PrintedRow(70.0, 0.017, 1.2, 3500.0, 1.8),
-    PrintedRow(100.0, 0.015, 1.5, 4000.0, 1.45),
-    PrintedRow(140.0, 0.0125, 1.75, 4800.0, 1.25),
-    PrintedRow(200.0, 0.011, 2.2, 5000.0, 1.0),
+    PrintedRow(focal=70.0, sigma=0.017, coefficient=1.2, height_ratio=3500.0, area=1.8),
+    PrintedRow(focal=100.0, sigma=0.015, coefficient=1.5, height_ratio=4000.0, area=1.45),
+    PrintedRow(focal=140.0, sigma=0.0125, coefficient=1.75, height_ratio=4800.0, area=1.25),
+    PrintedRow(focal=200.0, sigma=0.011, coefficient=2.2, height_ratio=5000.0, area=1.0),
 )
 
 
 def source_cameras() -> tuple[ComparedCamera, ...]:
     """Return the four cameras of the source's table, all with the base of 60 mm and one format."""
     return tuple(
-        ComparedCamera(f"f {row.focal:g} mm", row.focal, row.sigma, PRINTED_BASE, PRINTED_BASE) for row in PRINTED_TABLE
+        ComparedCamera(
+            name=f"f {row.focal:g} mm", focal=row.focal, sigma=row.sigma, base=PRINTED_BASE, width=PRINTED_BASE
+        )
+        for row in PRINTED_TABLE
     )
 
 

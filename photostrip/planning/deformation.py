@@ -159,4 +159,6 @@ def fit_paraboloid(xy: ArrayLike, residuals: ArrayLike, sigmas: ArrayLike) -> Pa
     redundancy = len(height) - len(TERMS)
     sigma0 = float(np.sqrt(left @ left / redundancy)) if redundancy else float("nan")
     scale = sigma0 if redundancy >= LEAST_REDUNDANCY else 1.0
-    return Paraboloid(found / size, scale * np.sqrt(np.diag(inverse)), redundancy, sigma0)
+    return Paraboloid(
+        coefficients=found / size, sigmas=scale * np.sqrt(np.diag(inverse)), redundancy=redundancy, sigma0=sigma0
+    )

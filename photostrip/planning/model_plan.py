@@ -162,7 +162,7 @@ def simple_accuracy(spec: ModelSpec) -> list[SimpleAccuracy]:
     for (name, at), exact in zip(places.items(), rigorous, strict=True):
         printed = deformation.PRINTED[deformation.SIDE if name.startswith("side") else deformation.CENTRAL]
         both = [deformation.Constants(c.plan * unit, c.height * f / b * unit) for c in (printed, exact)]
-        found.append(SimpleAccuracy(name, at, *both))
+        found.append(SimpleAccuracy(place=name, at=at, source=both[0], rigorous=both[1]))
     return found
 
 

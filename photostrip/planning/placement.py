@@ -136,7 +136,9 @@ def best_places(strip: IdealStrip, layout: ControlLayout, placement: Placement, 
         if (photo, row) not in fixed_places
     ]
     asked = required.plan is not None or required.height is not None
-    search = _Search(look, (1.0, 1.0), asked, ("xy" in placement.use, "z" in placement.use), {})
+    search = _Search(
+        look=look, scale=(1.0, 1.0), required=asked, counts=("xy" in placement.use, "z" in placement.use), tried={}
+    )
     ways = [way for way in equal_ways(placement, photos, rows) if not {(s.photo, s.row) for s in way} & fixed_places]
     ways = ways or [frozenset(free[: placement.points])]
     reference = search.worst(min(ways, key=lambda way: max(search.worst(way))))

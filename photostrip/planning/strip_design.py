@@ -85,7 +85,7 @@ def plan_strip(design: Design) -> DesignReport:
     if design.placement is not None:
         into = next(layout for layout in design.layouts if layout.name == design.placement.into)
         placed = best_places(strip, into, design.placement, design.required)
-    return DesignReport(design, strip, outcomes, needed, placed)
+    return DesignReport(design=design, strip=strip, outcomes=outcomes, needed=needed, placed=placed)
 
 
 def _require_places(design: Design) -> None:
@@ -110,9 +110,9 @@ def outcome(strip: IdealStrip, layout: ControlLayout, method: str) -> Outcome:
     """Adjust one layout by one method; where the control does not determine the strip, say why."""
     spots = spots_of(layout, strip.geometry.photos, strip.geometry.points.rows)
     try:
-        return Outcome(layout, spots, method, accuracy(strip, layout, spots, method))
+        return Outcome(layout=layout, spots=spots, method=method, accuracy=accuracy(strip, layout, spots, method))
     except GeometryError as error:
-        return Outcome(layout, spots, method, None, str(error))
+        return Outcome(layout=layout, spots=spots, method=method, accuracy=None, reason=str(error))
 
 
 def along_the_strip(strip: IdealStrip, expected: Accuracy) -> Floats:
@@ -139,10 +139,10 @@ def bands_needed(strip: IdealStrip, layout: ControlLayout, method: str, required
         if required.met(tried):
             between = ((each, _with_bands(strip, layout, method, each)) for each in range(failed + 1, bands))
             least, found = next(((n, found) for n, found in between if required.met(found)), (bands, tried))
-            return Needed(method, least, least * layout.per_band, found)
+            return Needed(method=method, bands=least, points=least * layout.per_band, worst=found)
         last = tried if np.isfinite(tried).all() else last
         failed = bands
-    return Needed(method, None, None, last)
+    return Needed(method=method, bands=None, points=None, worst=last)
 
 
 def _steps(photos: int) -> Iterator[int]:

@@ -72,7 +72,9 @@ def control_of(strip: IdealStrip, spots: tuple[Spot, ...], sigma: Triple) -> Con
     ids = tuple(f"{spot.photo}/{spot.row}" for spot in spots)
     use = np.array([USES[spot.use] for spot in spots], bool).reshape(-1, 3)
     given = np.broadcast_to(np.array(sigma, float), use.shape)
-    return ControlPoints(ids, np.where(use, strip.xyz[numbers], np.nan), use, np.zeros(len(ids), bool), given)
+    return ControlPoints(
+        ids=ids, enu=np.where(use, strip.xyz[numbers], np.nan), use=use, check=np.zeros(len(ids), bool), sigma=given
+    )
 
 
 def accuracy(strip: IdealStrip, layout: ControlLayout, spots: tuple[Spot, ...], method: str) -> Accuracy:
@@ -111,7 +113,13 @@ def _oriented(strip: IdealStrip, numbers: Numbers, control: ControlPoints) -> _F
     targets = absolute_orientation.Targets(control, frames, intermediate)
     weight = absolute_orientation.weights(control, _precision(strip))
     absolute_orientation.orient(strip.formed.xyz[numbers], targets, weight, strip.formed.xyz)
-    return _Fit(numbers, control, targets, weight, intermediate.intermediate_from_cartesian(strip.xyz))
+    return _Fit(
+        numbers=numbers,
+        control=control,
+        targets=targets,
+        weight=weight,
+        xyz=intermediate.intermediate_from_cartesian(strip.xyz),
+    )
 
 
 # --------------------------------------------------------------------------------------- similarity, polynomials
@@ -123,7 +131,9 @@ def _fitted(strip: IdealStrip, ground: _Fit, method: str) -> Accuracy:
     terms: list[tuple[str, ...]] = [(), (), ()]
     if method in DEGREES:
         breadth = max(float(np.quantile(np.abs(xyz[:, 1]), 0.95)), 1e-6)
-        problem = correction.FitProblem(xyz[numbers], targets, weight, strip.geometry.base, breadth)
+        problem = correction.FitProblem(
+            xyz=xyz[numbers], targets=targets, weight=weight, spacing=strip.geometry.base, breadth=breadth
+        )
         terms = [axis.terms for axis in correction.fit(problem, correction.PolynomialSettings(DEGREES[method])).axes]
     axes = targets.axes(xyz[numbers])
     found = control_errors.misclosures(strip.errors.points, ground.control, numbers, axes)
@@ -140,7 +150,13 @@ def _fitted(strip: IdealStrip, ground: _Fit, method: str) -> Accuracy:
     with np.errstate(divide="ignore", invalid="ignore"):
         size = np.where(free > TINY, DETECTABLE * np.sqrt(np.maximum(residual, 0.0)) / free, np.inf)
     detectable[found.point, found.axis] = size
-    return Accuracy(method, _used(terms) if method in DEGREES else method, covariance, numbers, detectable)
+    return Accuracy(
+        method=method,
+        used=_used(terms) if method in DEGREES else method,
+        covariance=covariance,
+        control=numbers,
+        detectable=detectable,
+    )
 
 
 def _used(terms: list[tuple[str, ...]]) -> str:
@@ -176,7 +192,9 @@ def _predicted(strip: IdealStrip, ground: _Fit) -> Accuracy:
     detectable = np.full((len(numbers), 3), np.nan)
     source = wanted.source[rows]
     detectable[found.point[source], found.axis[source]] = size
-    return Accuracy(COVARIANCE, COVARIANCE, points.covariance, numbers, detectable)
+    return Accuracy(
+        method=COVARIANCE, used=COVARIANCE, covariance=points.covariance, control=numbers, detectable=detectable
+    )
 
 
 # -------------------------------------------------------------------------------------------------------- bundle
@@ -191,7 +209,13 @@ def _bundle(strip: IdealStrip, layout: ControlLayout, spots: tuple[Spot, ...], c
     redundant = np.diagonal(found.control_residuals, axis1=1, axis2=2) / given**2
     with np.errstate(divide="ignore", invalid="ignore"):
         detectable = np.where(redundant > TINY, DETECTABLE * given / np.sqrt(redundant), np.inf)
-    return Accuracy(BUNDLE, BUNDLE, found.points, numbers, np.where(control.use, detectable, np.nan))
+    return Accuracy(
+        method=BUNDLE,
+        used=BUNDLE,
+        covariance=found.points,
+        control=numbers,
+        detectable=np.where(control.use, detectable, np.nan),
+    )
 
 
 def bundle_problem(
@@ -207,11 +231,15 @@ def bundle_problem(
     axes = np.broadcast_to(np.eye(3), (len(numbers), 3, 3))
     count = len(strip.centers)
     return bundle.BundleProblem(
-        bundle.ImageObservations(photo, point[observed.point[rows]], observed.xy[rows], observed.sigma[rows]),
-        bundle.BundleCameras(np.zeros(count, np.intp), np.array([strip.geometry.camera.principal_distance])),
-        bundle.StartValues(strip.centers, strip.rotations, strip.xyz),
-        bundle.ControlObservations(numbers, strip.xyz[numbers], axes, np.where(control.use, control.sigma, np.inf)),
-        _positions(strip, layout),
+        images=bundle.ImageObservations(
+            photo=photo, point=point[observed.point[rows]], xy=observed.xy[rows], sigma=observed.sigma[rows]
+        ),
+        cameras=bundle.BundleCameras(np.zeros(count, np.intp), np.array([strip.geometry.camera.principal_distance])),
+        start=bundle.StartValues(strip.centers, strip.rotations, strip.xyz),
+        control=bundle.ControlObservations(
+            point=numbers, xyz=strip.xyz[numbers], axes=axes, sigma=np.where(control.use, control.sigma, np.inf)
+        ),
+        positions=_positions(strip, layout),
     )
 
 

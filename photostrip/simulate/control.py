@@ -136,12 +136,12 @@ def given_coordinates(
         enu[number == k] = frame.ground_from_cartesian(moved[number == k])
     use = np.concatenate([chosen.use, np.ones((n - given, 3), dtype=bool)])
     return ControlPoints(
-        tuple(points.ids[i] for i in rows.tolist()),
-        np.where(use, enu, np.nan),
-        use,
-        np.arange(n) >= given,
-        np.broadcast_to(np.asarray(spec.control.sigma), (n, 3)),
-        number,
+        ids=tuple(points.ids[i] for i in rows.tolist()),
+        enu=np.where(use, enu, np.nan),
+        use=use,
+        check=np.arange(n) >= given,
+        sigma=np.broadcast_to(np.asarray(spec.control.sigma), (n, 3)),
+        frame=number,
     )
 
 

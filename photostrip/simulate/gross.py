@@ -101,7 +101,9 @@ def spoil_images(spec: Spec, observations: PhotoPoints) -> tuple[PhotoPoints, tu
             named = entry.photo is not None and entry.point is not None
             size = entry.size_um / 1000.0 * (1.0 if named or sign < HALF else -1.0)
             xy[row, column] += size
-            errors.append(InjectedError("image", str(point[row]), str(photo[row]), AXES[column], size))
+            errors.append(
+                InjectedError(kind="image", point=str(point[row]), photo=str(photo[row]), axis=AXES[column], size=size)
+            )
     return replace(observations, xy=xy), tuple(errors)
 
 

@@ -67,13 +67,13 @@ def plotted(
         node += nodes
         xyz.append(scale * ground @ rotation.T + ORIGIN_SIGMA * systems[k, 4:])
     rows = ModelPoints(
-        tuple(f"M{k + 1}" for k in range(len(pairs))),
-        observations.point_ids,
-        truth.photo_ids,
-        np.array(model, np.intp),
-        np.array(node, np.intp),
-        np.concatenate(xyz),
-        np.zeros((len(node), 3)),
+        model_ids=tuple(f"M{k + 1}" for k in range(len(pairs))),
+        point_ids=observations.point_ids,
+        photo_ids=truth.photo_ids,
+        model=np.array(model, np.intp),
+        node=np.array(node, np.intp),
+        xyz=np.concatenate(xyz),
+        sigma=np.zeros((len(node), 3)),
     )
     return _measured(spec, wanted, rows)
 

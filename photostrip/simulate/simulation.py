@@ -111,7 +111,7 @@ def simulate(spec: Spec) -> Simulation:
     every = PointTable(names, placed.xyz, Frame.CARTESIAN)
     points = PointTable(observations.point_ids, placed.xyz[keep], Frame.CARTESIAN)
     truth = _truth(output, points, photos, image, image_errors + control_errors)
-    places = TruePlaces(photos.ids, points.xyz, photos.centers, truth.rotations)
+    places = TruePlaces(photo_ids=photos.ids, points=points.xyz, centers=photos.centers, rotations=truth.rotations)
     return Simulation(
         spec=spec,
         strips=photos.strips,
@@ -129,9 +129,13 @@ def simulate(spec: Spec) -> Simulation:
 def frame_specs(spec: Spec) -> list[FrameSpec]:
     """Frames of the control lists: one, or two when there is a second CRS."""
     g = spec.ground
-    frames = [FrameSpec(g.crs, g.axes, g.height, g.geoid_undulation, g.ellipsoid)]
+    frames = [
+        FrameSpec(crs=g.crs, axes=g.axes, height=g.height, geoid_undulation=g.geoid_undulation, ellipsoid=g.ellipsoid)
+    ]
     if spec.control.second_crs is not None:
-        frames.append(FrameSpec(spec.control.second_crs, g.axes, g.height, g.geoid_undulation))
+        frames.append(
+            FrameSpec(crs=spec.control.second_crs, axes=g.axes, height=g.height, geoid_undulation=g.geoid_undulation)
+        )
     return frames
 
 
@@ -241,12 +245,12 @@ def _observations(
     sigma = spec.image.sigma_um / 1000.0
     noise = Draws(spec.seed, Purpose.IMAGE).normal(len(point), 2)
     observations = PhotoPoints(
-        photos.ids,
-        tuple(names[i] for i in keep.tolist()),
-        photo,
-        rank[inverse.ravel()],
-        image + sigma * noise,
-        np.full(image.shape, sigma or STATED_SIGMA),
+        photo_ids=photos.ids,
+        point_ids=tuple(names[i] for i in keep.tolist()),
+        photo=photo,
+        point=rank[inverse.ravel()],
+        xy=image + sigma * noise,
+        sigma=np.full(image.shape, sigma or STATED_SIGMA),
     )
     return observations, keep
 
@@ -261,7 +265,12 @@ def _fiducials(spec: Spec, photos: Photos, film: Sheets | None) -> PhotoPoints |
     sigma = spec.image.sigma_um / 1000.0
     noise = Draws(spec.seed, Purpose.FIDUCIALS).normal(len(mark), 2)
     return PhotoPoints(
-        photos.ids, tuple(marks), photo, mark, true + sigma * noise, np.full(true.shape, sigma or STATED_SIGMA)
+        photo_ids=photos.ids,
+        point_ids=tuple(marks),
+        photo=photo,
+        point=mark,
+        xy=true + sigma * noise,
+        sigma=np.full(true.shape, sigma or STATED_SIGMA),
     )
 
 

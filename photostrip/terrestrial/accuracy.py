@@ -125,8 +125,8 @@ class Example:
 
 # Source: [002], the two examples at its end.
 EXAMPLES = (
-    Example("Photheo 19/1318", 190.0, 80.0, 60.0, 0.005, 3.5, 5.0, 1.18),
-    Example("UMK 10/1318", 100.0, 80.0, 60.0, 0.005, 6.0, 8.5, 1.18),
+    Example(camera="Photheo 19/1318", f=190.0, x=80.0, z=60.0, sigma=0.005, horizontal=3.5, vertical=5.0, factor=1.18),
+    Example(camera="UMK 10/1318", f=100.0, x=80.0, z=60.0, sigma=0.005, horizontal=6.0, vertical=8.5, factor=1.18),
 )
 
 

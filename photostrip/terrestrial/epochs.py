@@ -145,7 +145,12 @@ def _motion(series: Series, pair: StereoPair, number: int) -> Motion | None:
     after = series.coordinates[number, rows]
     variances = series.own[0, rows] + series.own[number, rows]
     left, right = (
-        ImagePair(before[:, columns], after[:, columns], variances[:, columns], focal)
+        ImagePair(
+            before=before[:, columns],
+            after=after[:, columns],
+            variances=variances[:, columns],
+            principal_distance=focal,
+        )
         for columns, focal in zip(COLUMNS, pair.principal_distances, strict=True)
     )
     return find_motion(left, right)
@@ -158,14 +163,19 @@ def _states(number: int, motion: Motion | None, settings: MonitoringSettings) ->
         turn = motion.turns[camera] if motion is not None else None
         moved = turn is not None and turn.statistic > critical
         wanted = settings.moved_camera == "always" or (moved and settings.moved_camera == "auto")
-        states.append(CameraState(number, side, turn, moved, turn is not None and wanted))
+        states.append(CameraState(epoch=number, side=side, turn=turn, moved=moved, removed=turn is not None and wanted))
     return states
 
 
 def _no_turns(series: Series) -> _Turns:
     points, stable = len(series.points), int(series.stable.sum())
     shape = (6, stable, 4)
-    return _Turns(np.zeros((points, 6)), np.zeros(shape), np.zeros((stable, *shape)), np.ones(points, bool))
+    return _Turns(
+        values=np.zeros((points, 6)),
+        common=np.zeros(shape),
+        stable=np.zeros((stable, *shape)),
+        known=np.ones(points, bool),
+    )
 
 
 def _turns(series: Series, motion: Motion | None, removed: tuple[bool, ...]) -> _Turns:
@@ -205,7 +215,13 @@ def _epoch(series: Series, pair: StereoPair, number: int, turns: _Turns) -> _Epo
     normal = to_normal(series.coordinates[number], weights, pair, rotations)
     xyz, jacobian = intersect(normal.coordinates, pair.principal_distances[0], pair.base)
     on_ground = pair.ground_from_normal() @ jacobian
-    return _Epoch(normal, xyz, on_ground @ normal.by_measured, on_ground @ normal.by_turn, turns)
+    return _Epoch(
+        normal=normal,
+        xyz=xyz,
+        by_measured=on_ground @ normal.by_measured,
+        by_turn=on_ground @ normal.by_turn,
+        turns=turns,
+    )
 
 
 def _reasons(series: Series, epochs: list[_Epoch]) -> Numbers:

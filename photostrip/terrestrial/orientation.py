@@ -330,7 +330,13 @@ def _worst(solution: PhotoOrientation, sightings: Sightings, settings: Orientati
         worst = int(np.argmax(ratio))
         if ratio[worst] <= 1:
             return None
-        return PointRejection(int(rows[worst]), "stated", float(drop[worst]), float(limits[worst]), (np.nan, np.nan))
+        return PointRejection(
+            point=int(rows[worst]),
+            test="stated",
+            value=float(drop[worst]),
+            limit=float(limits[worst]),
+            residual=(np.nan, np.nan),
+        )
     p_values = np.ones(len(rows))
     for number in np.flatnonzero(testable):
         rest = max((solution.weighted_sum - drop[number]) / left[number], np.finfo(float).tiny)
@@ -338,7 +344,9 @@ def _worst(solution: PhotoOrientation, sightings: Sightings, settings: Orientati
     worst = int(np.lexsort([-drop, p_values])[0])  # of p values that are all zero the largest drop
     if p_values[worst] >= level:
         return None
-    return PointRejection(int(rows[worst]), "deletion", float(p_values[worst]), level, (np.nan, np.nan))
+    return PointRejection(
+        point=int(rows[worst]), test="deletion", value=float(p_values[worst]), limit=level, residual=(np.nan, np.nan)
+    )
 
 
 def _drops(solution: PhotoOrientation, sightings: Sightings, rows: Numbers) -> tuple[Floats, Numbers]:

@@ -183,7 +183,14 @@ def orient(
     redundancy = int(targets.control.use.sum()) - PARAMETERS
     squares = float((weight * misclosures**2).sum())
     sigma0 = float(np.sqrt(squares / redundancy)) if redundancy > 0 else float("nan")
-    return AbsoluteOrientation(similarity, misclosures, sigma0, redundancy, float(values[0] / values[-1]), iteration)
+    return AbsoluteOrientation(
+        similarity=similarity,
+        misclosures=misclosures,
+        sigma0=sigma0,
+        redundancy=redundancy,
+        condition=float(values[0] / values[-1]),
+        iterations=iteration,
+    )
 
 
 def _refuse_too_few(control: ControlPoints) -> None:

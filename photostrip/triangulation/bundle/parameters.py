@@ -80,7 +80,9 @@ def prepare(problem: BundleProblem) -> PreparedProblem:
     calibrated = calibration.parameters(problem.cameras)
     drifts = (problem.positions.offset_sigma, problem.positions.drift_sigma)
     sigmas = [calibrated.sigma, *(np.repeat(sigma[sigma > 0.0], 3) for sigma in drifts)]
-    return PreparedProblem(problem, band_structure(problem), calibrated, np.concatenate(sigmas))
+    return PreparedProblem(
+        problem=problem, structure=band_structure(problem), calibrated=calibrated, prior=np.concatenate(sigmas)
+    )
 
 
 def parameters_from(
@@ -88,4 +90,6 @@ def parameters_from(
 ) -> Parameters:
     """Lay values of all parameters out for a prepared problem."""
     xyz = tuple(np.ascontiguousarray(points[batch.point].T) for batch in prepared.structure.batches)
-    return Parameters(np.asarray(centers, float), np.asarray(rotations, float), xyz, common)
+    return Parameters(
+        centers=np.asarray(centers, float), rotations=np.asarray(rotations, float), xyz=xyz, common=common
+    )

@@ -31,8 +31,12 @@ class Selection:
     @classmethod
     def everything(cls, problem: BundleProblem) -> Selection:
         """Return the selection of all observations that are given."""
-        given = (np.isfinite(each.sigma) for each in (problem.control, problem.positions, problem.attitudes))
-        return cls(np.ones(len(problem.images), bool), *given)
+        return cls(
+            images=np.ones(len(problem.images), bool),
+            control=np.isfinite(problem.control.sigma),
+            positions=np.isfinite(problem.positions.sigma),
+            attitudes=np.isfinite(problem.attitudes.sigma),
+        )
 
     def without(self, kind: str, row: int, axis: int) -> Selection:
         """Take one ray or one coordinate out."""
@@ -65,17 +69,17 @@ def supported(problem: BundleProblem, selection: Selection) -> Selection:
 def selected(problem: BundleProblem, selection: Selection) -> BundleProblem:
     """Leave the observations that take part: other rays go, other coordinates get infinite standard deviations."""
     images, rows = problem.images, selection.images
-    chosen = ImageObservations(images.photo[rows], images.point[rows], images.xy[rows], images.sigma[rows])
-    given = (problem.control.sigma, problem.positions.sigma, problem.attitudes.sigma)
-    flags = (selection.control, selection.positions, selection.attitudes)
-    sigma = [np.where(yes, each, np.inf) for each, yes in zip(given, flags, strict=True)]
+    chosen = ImageObservations(
+        photo=images.photo[rows], point=images.point[rows], xy=images.xy[rows], sigma=images.sigma[rows]
+    )
+    control, positions, attitudes = problem.control, problem.positions, problem.attitudes
     return replace(
         problem,
         images=chosen,
         start=replace(problem.start, points=np.nan_to_num(problem.start.points)),
-        control=replace(problem.control, sigma=sigma[0]),
-        positions=replace(problem.positions, sigma=sigma[1]),
-        attitudes=replace(problem.attitudes, sigma=sigma[2]),
+        control=replace(control, sigma=np.where(selection.control, control.sigma, np.inf)),
+        positions=replace(positions, sigma=np.where(selection.positions, positions.sigma, np.inf)),
+        attitudes=replace(attitudes, sigma=np.where(selection.attitudes, attitudes.sigma, np.inf)),
     )
 
 

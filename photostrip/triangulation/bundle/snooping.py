@@ -68,7 +68,14 @@ def screen_bundle(
     if settings.screening == "none":
         chosen = supported(problem, Selection.everything(problem))
         done = _Adjusted.of(problem, chosen)
-        return ScreenedBundle(done.problem, chosen, done.solution, done.precision, (), 1)
+        return ScreenedBundle(
+            problem=done.problem,
+            selection=chosen,
+            solution=done.solution,
+            precision=done.precision,
+            rejections=(),
+            rounds=1,
+        )
     search = _Search(problem, settings, keep)
     chosen = supported(problem, begin)
     if settings.screening == "robust":
@@ -80,7 +87,14 @@ def screen_bundle(
             break
         done = search.clean(more)
     log = tuple(search.log(done, begin))
-    return ScreenedBundle(done.problem, done.selection, done.solution, done.precision, log, search.rounds)
+    return ScreenedBundle(
+        problem=done.problem,
+        selection=done.selection,
+        solution=done.solution,
+        precision=done.precision,
+        rejections=log,
+        rounds=search.rounds,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +110,7 @@ class _Adjusted:
     def of(cls, problem: BundleProblem, selection: Selection) -> _Adjusted:
         chosen = selected(problem, selection)
         solution = solve(chosen)
-        return cls(chosen, selection, solution, precision_of(solution))
+        return cls(problem=chosen, selection=selection, solution=solution, precision=precision_of(solution))
 
     def rows(self, kind: str) -> Numbers:
         """Rows of the whole problem that the observations of a kind have."""
@@ -132,7 +146,9 @@ class _Search:
         images = selection.images.copy()
         images[rows] = False
         for row in rows.tolist():
-            each = BundleRejection(reliability.IMAGE, row, 0, "robust", value=unknown, limit=unknown, size=unknown)
+            each = BundleRejection(
+                kind=reliability.IMAGE, row=row, axis=0, test="robust", value=unknown, limit=unknown, size=unknown
+            )
             self.out[reliability.IMAGE, row, 0] = each
         return supported(self.problem, replace(selection, images=images))
 
@@ -171,7 +187,15 @@ class _Search:
                 size = float(group.gross[row, column])
                 test = self.settings.test
                 beyond.append(
-                    BundleRejection(group.kind, int(rows[row]), column, test, float(value[row, column]), limit, size)
+                    BundleRejection(
+                        kind=group.kind,
+                        row=int(rows[row]),
+                        axis=column,
+                        test=test,
+                        value=float(value[row, column]),
+                        limit=limit,
+                        size=size,
+                    )
                 )
         beyond.sort(key=lambda each: (-each.value, each.kind, each.row))
         touched: set[tuple[str, int]] = set()
@@ -247,11 +271,21 @@ class _Search:
         known = {row for kind, row, _ in self.out if kind == reliability.IMAGE}
         for row in outside[~begin.images[outside]].tolist():
             if row not in known:
-                yield BundleRejection(reliability.IMAGE, row, 0, "start", float(value[row]), limit, float(size[row]))
+                yield BundleRejection(
+                    kind=reliability.IMAGE,
+                    row=row,
+                    axis=0,
+                    test="start",
+                    value=float(value[row]),
+                    limit=limit,
+                    size=float(size[row]),
+                )
         for row, axis in np.argwhere(~begin.control & np.isfinite(self.problem.control.sigma)).tolist():
             if not done.selection.control[row, axis]:
                 error = -float(done.solution.control_residuals[row, axis])
-                yield BundleRejection(reliability.CONTROL, row, axis, "start", np.nan, limit, error)
+                yield BundleRejection(
+                    kind=reliability.CONTROL, row=row, axis=axis, test="start", value=np.nan, limit=limit, size=error
+                )
 
 
 def predicted(

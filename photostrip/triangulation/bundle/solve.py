@@ -124,7 +124,7 @@ def _move(
         _shift(batch, eliminated, photos, common[: len(prepared.calibrated)])
         for batch, eliminated in zip(prepared.structure.batches, reduced.points, strict=True)
     )
-    move = ParameterStep(photos, common, points, float(np.sqrt(max(square, 0.0))))
+    move = ParameterStep(photos=photos, common=common, points=points, length=float(np.sqrt(max(square, 0.0))))
     return datum.centred(prepared, state, move) if free else move
 
 
@@ -148,17 +148,17 @@ def _shift(batch: Batch, eliminated: Eliminated, photos: Floats, common: Floats)
 def _moved(prepared: PreparedProblem, state: Parameters, move: ParameterStep) -> Parameters:
     moves = (move.photos * SIGNS)[prepared.structure.rank]
     return Parameters(
-        state.centers + np.einsum("nij,nj->ni", state.rotations, moves[:, :3]),
-        state.rotations @ from_vector(moves[:, 3:]),
-        tuple(xyz + shift for xyz, shift in zip(state.xyz, move.points, strict=True)),
-        state.common + move.common,
+        centers=state.centers + np.einsum("nij,nj->ni", state.rotations, moves[:, :3]),
+        rotations=state.rotations @ from_vector(moves[:, 3:]),
+        xyz=tuple(xyz + shift for xyz, shift in zip(state.xyz, move.points, strict=True)),
+        common=state.common + move.common,
     )
 
 
 def _recorded(reduced: Reduced, move: ParameterStep, damping: float) -> IterationStep:
     shift = max(float(np.abs(part).max(initial=0.0)) for part in (move.photos[:, :3], *move.points))
     turn = float(np.abs(move.photos[:, 3:]).max(initial=0.0))
-    return IterationStep(reduced.chi_square, move.length, damping, shift, turn)
+    return IterationStep(chi_square=reduced.chi_square, length=move.length, damping=damping, shift=shift, turn=turn)
 
 
 def _solution(

@@ -210,7 +210,14 @@ def system(errors: StripErrors, wanted: Conditions, factor: float) -> System:
     blocks, places = layout.empty()
     matrix.diagonal[blocks, places, places] = 1.0
     factors = block_tridiagonal.eliminate(matrix.diagonal, matrix.beside)
-    return System(errors, wanted, layout, padded, factors, _solution(layout, factors, wanted.value))
+    return System(
+        errors=errors,
+        conditions=wanted,
+        layout=layout,
+        padded=padded,
+        factors=factors,
+        solution=_solution(layout, factors, wanted.value),
+    )
 
 
 def solved_for(found: System, wanted: Conditions) -> System:

@@ -94,12 +94,12 @@ def fit_operator(
     size = np.where(size > 0, size, 1.0)
     similarity = np.linalg.pinv(design / size * share[:, None]) * share / size[:, None]
     reach, breadth = (max(float(np.abs(xyz[:, k]).max()), 1e-6) for k in (0, 1))
-    result = FitOperator(similarity, tuple(terms), reach, breadth, origin)
+    result = FitOperator(operator=similarity, terms=tuple(terms), reach=reach, breadth=breadth, origin=origin)
     if not any(terms):
         return result
     after = _polynomials(found, weight, xyz, result)  # by misclosures that the similarity has left
     operator = np.concatenate([similarity, after - after @ design @ similarity])
-    return FitOperator(operator, result.terms, reach, breadth, origin)
+    return FitOperator(operator=operator, terms=result.terms, reach=reach, breadth=breadth, origin=origin)
 
 
 def _polynomials(found: Misclosures, weight: Floats, xyz: Floats, fit: FitOperator) -> Floats:

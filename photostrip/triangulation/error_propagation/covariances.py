@@ -110,7 +110,12 @@ def of_parameters(
     similarities = np.zeros((errors.models + 1, SIMILARITY_PARAMETERS, len(operator)))
     similarities[1:] = np.cumsum(errors.steps @ sums.with_components, axis=0)
     parameters = sums.products(with_images[sums.image]) + (operator * (found.variance / factor)) @ operator.T
-    return ParameterCovariances(similarities, sums.with_components, with_images, (parameters + parameters.T) / 2)
+    return ParameterCovariances(
+        similarities=similarities,
+        components=sums.with_components,
+        images=with_images,
+        parameters=(parameters + parameters.T) / 2,
+    )
 
 
 def sums_of(errors: StripErrors, rows: ErrorRows, operator: Floats) -> Floats:
@@ -153,7 +158,7 @@ def _sums(errors: StripErrors, rows: ErrorRows, operator: Floats) -> _Sums:
         model = images.photo[image] - REACH + slot
         inside = (model >= 0) & (model < errors.models)
         np.add.at(with_components, model[inside], images.components[image[inside], slot] @ by_image[inside])
-    return _Sums(by_component, with_components, image, by_image)
+    return _Sums(by_component=by_component, with_components=with_components, image=image, by_image=by_image)
 
 
 def _summed_components(errors: StripErrors, rows: ErrorRows, weights: Floats) -> Floats:

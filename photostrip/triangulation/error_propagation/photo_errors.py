@@ -31,7 +31,9 @@ class Sightings:
 
     def take(self, rows: Numbers | Flags) -> Sightings:
         """Select some."""
-        return Sightings(self.photo[rows], self.point[rows], self.image[rows], self.xyz[rows], self.focal)
+        return Sightings(
+            photo=self.photo[rows], point=self.point[rows], image=self.image[rows], xyz=self.xyz[rows], focal=self.focal
+        )
 
 
 @dataclass(frozen=True, eq=False)

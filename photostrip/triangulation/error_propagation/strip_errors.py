@@ -89,7 +89,14 @@ def differentiate_strip(
     if len(formed.bridging):
         points = with_bridges(points, strip)
     covariances = _component_covariances(strip.images, len(strip.steps))
-    return StripErrors(strip.images, strip.steps, covariances, points, pairs, origin)
+    return StripErrors(
+        images=strip.images,
+        steps=strip.steps,
+        component_covariances=covariances,
+        points=points,
+        pairs=pairs,
+        origin=origin,
+    )
 
 
 def scale_shares(orientation: Orientation, formed: FormedStrip, pairs: PairErrors) -> tuple[Floats, Floats]:
@@ -120,7 +127,7 @@ def _image_points(
     row = np.unique(orientation.rows)
     row = row[np.argsort(position[row], kind="stable")]
     components = np.zeros((len(row), SPAN, COMPONENTS, 2))
-    images = ImagePoints(row, position[row], sigma[row], components)
+    images = ImagePoints(row=row, photo=position[row], sigma=sigma[row], components=components)
     place = images.rows_of(orientation.rows)
     components[place[:, 0], 2, ELEMENTS] = pairs.elements_by_image[:, :, :2]
     components[place[:, 1], 1, ELEMENTS] = pairs.elements_by_image[:, :, 2:]

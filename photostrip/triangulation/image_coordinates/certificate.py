@@ -78,7 +78,7 @@ def solve(
     redundancy = len(given) - (2 * len(names) - 3)
     sigma0 = float(np.sqrt((residuals**2).sum() / redundancy)) if redundancy else float("nan")
     marks = {name: (float(x), float(y)) for name, (x, y) in zip(names, xy, strict=True)}
-    return Certificate(marks, residuals, sigma0, redundancy)
+    return Certificate(marks=marks, residuals=residuals, sigma0=sigma0, redundancy=redundancy)
 
 
 def _distances(distances: Sequence[tuple[str, str, float]], names: list[str]) -> tuple[Numbers, Floats]:

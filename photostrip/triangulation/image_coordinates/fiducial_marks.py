@@ -92,7 +92,9 @@ def gather(fiducials: PhotoPoints, camera: Camera, photos: tuple[str, ...]) -> t
     weights[place] = 1 / (fiducials.sigma[good] ** 2).mean(1)
     weights *= (times.sum(1) / np.where(times.any(1), weights.sum(1), 1.0))[:, None]
     calibrated = np.array(list(camera.fiducials.values()), float).reshape(-1, 2)
-    return Marks(camera, photos, names, calibrated, measured, weights), faults
+    return Marks(
+        camera=camera, photos=photos, names=names, calibrated=calibrated, measured=measured, weights=weights
+    ), faults
 
 
 def enough(marks: Marks, kind: str) -> tuple[Marks, list[Fault]]:

@@ -149,7 +149,10 @@ def linear_shape(jacobian: Floats) -> LinearShape:
     along = cos * second[..., 0] + sin * second[..., 1]
     across = hand * (cos * second[..., 1] - sin * second[..., 0])
     return LinearShape(
-        np.hypot(*np.moveaxis(first, -1, 0)), np.hypot(along, across), rotation, np.arctan2(-along, across)
+        scale_x=np.hypot(*np.moveaxis(first, -1, 0)),
+        scale_y=np.hypot(along, across),
+        rotation=rotation,
+        shear=np.arctan2(-along, across),
     )
 
 

@@ -102,7 +102,9 @@ def common(models: StripModels) -> CommonPoints:
     before, after = order[both], order[both + 1]
     link = models.model[before]
     by_link = np.argsort(link, kind="stable")
-    return CommonPoints(link[by_link], before[by_link], after[by_link], max(models.count - 1, 0))
+    return CommonPoints(
+        link=link[by_link], before=before[by_link], after=after[by_link], count=max(models.count - 1, 0)
+    )
 
 
 def closed_form(shared: CommonPoints, models: StripModels, share: Floats) -> tuple[Similarities, Floats]:

@@ -24,8 +24,17 @@ def misclosures(control: ControlPoints, axes: Floats, xyz: Floats, origin: Float
     direction = axes[point, axis]
     frame = direction[:, None] @ similarity_derivatives(xyz[point], origin)
     nothing = np.zeros(0, np.intp)
-    rows = ErrorRows(nothing, frame, np.zeros((len(point), 0, 1, 0)), nothing, nothing, np.zeros((0, 1, 2)))
-    return control_errors.Misclosures(point, axis, direction, control.sigma[point, axis] ** 2, rows)
+    rows = ErrorRows(
+        first=nothing,
+        by_similarity=frame,
+        by_component=np.zeros((len(point), 0, 1, 0)),
+        item=nothing,
+        image=nothing,
+        by_image=np.zeros((0, 1, 2)),
+    )
+    return control_errors.Misclosures(
+        point=point, axis=axis, direction=direction, variance=control.sigma[point, axis] ** 2, rows=rows
+    )
 
 
 def weights(found: Misclosures, rows: Numbers, operator: Floats | None = None) -> tuple[Numbers, Floats]:

@@ -71,8 +71,18 @@ def found(
 ) -> Finding:
     """Make a finding of a known kind, with its title and severity."""
     kind = KINDS[code]
-    names = (tuple(photos), tuple(points), tuple(strips))
-    return Finding(code, kind.title, kind.severity, message, fix, dict(evidence or {}), *names, key)
+    return Finding(
+        code=code,
+        title=kind.title,
+        severity=kind.severity,
+        message=message,
+        fix=fix,
+        evidence=dict(evidence or {}),
+        photos=tuple(photos),
+        points=tuple(points),
+        strips=tuple(strips),
+        key=key,
+    )
 
 
 def accepted(findings: Iterable[Finding], entries: Sequence[str]) -> tuple[Finding, ...]:

@@ -44,7 +44,9 @@ def orient_six_points(parallax: ArrayLike, focal: float, width: float, base: flo
     kappa1, kappa2 = ((tilted - total / 3) / base for total in (q2 + q4 + q6, q1 + q3 + q5))
     closing = float(SHARES @ q)
     elements = np.array([alpha1, kappa1, alpha2, omega2, kappa2])
-    return SixPoints(elements, closing, abs(closing) / np.sqrt(12.0), SHARES * closing / 12)
+    return SixPoints(
+        elements=elements, closing_error=closing, sigma=abs(closing) / np.sqrt(12.0), residuals=SHARES * closing / 12
+    )
 
 
 def cofactors(focal: float, width: float, base: float) -> Floats:

@@ -63,7 +63,14 @@ def space_resection(xy: Floats, sigma: Floats, points: Floats, focal: float) -> 
     redundancy = 2 * len(xy) - 6
     squares = float(((found.residuals / sigma) ** 2).sum())
     sigma0 = float(np.sqrt(squares / redundancy)) if redundancy > 0 else float("nan")
-    return OrientedPhoto(found.centers[0], found.rotations[0], covariance, found.residuals, sigma0, redundancy)
+    return OrientedPhoto(
+        center=found.centers[0],
+        rotation=found.rotations[0],
+        covariance=covariance,
+        residuals=found.residuals,
+        sigma0=sigma0,
+        redundancy=redundancy,
+    )
 
 
 def _inverse(design: Floats) -> Floats:

@@ -72,7 +72,7 @@ def intersect_points(
     xyz[~sound], covariance[~sound] = np.nan, np.nan
     with np.errstate(invalid="ignore"):
         residuals = xy - project(xyz[point], centers, rotations, photo, focal)
-    return Intersected(xyz, covariance, residuals, rays)
+    return Intersected(xyz=xyz, covariance=covariance, residuals=residuals, rays=rays)
 
 
 def _summed(values: Floats, point: Numbers, count: int) -> Floats:

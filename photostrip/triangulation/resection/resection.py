@@ -44,7 +44,7 @@ def with_residuals(
     residuals = xy - project(points, centers, rotations, photo, focal)
     squares = np.bincount(photo, (residuals**2).sum(axis=1), count)
     rms = np.sqrt(squares / np.maximum(2 * np.bincount(photo, minlength=count), 1))
-    return Resection(centers, rotations, residuals, rms, np.ones(count, bool))
+    return Resection(centers=centers, rotations=rotations, residuals=residuals, rms=rms, solved=np.ones(count, bool))
 
 
 def resect(xy: Floats, points: Floats, photo: Numbers, focal: Floats, start: tuple[Floats, Floats]) -> Resection:

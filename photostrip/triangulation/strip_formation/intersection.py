@@ -45,4 +45,4 @@ def intersect(base: Floats, left: Floats, right: Floats, focal: float) -> Inters
         sound = (np.abs(parallax) > PARALLEL * focal) & (n1 > 0) & (n2 > 0) & (left[2] < 0) & (right[2] < 0)
         xyz = np.column_stack([n1 * x1, (y_left + y_right) / 2, -n1 * focal])
     xyz[~sound] = np.nan
-    return Intersection(xyz, n1, y_left - y_right, sound)
+    return Intersection(xyz=xyz, ray_factor=n1, gap=y_left - y_right, sound=sound)

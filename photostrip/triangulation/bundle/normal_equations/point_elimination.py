@@ -120,7 +120,7 @@ class PointFactors(NamedTuple):
             l32 = (n32 - l21 * l31) * r2
             r3 = 1.0 / np.sqrt(n33 - l31 * l31 - l32 * l32)
             strength = 1.0 / (np.maximum(np.maximum(r1, r2), r3) ** 2 * (n11 + n22 + n33))
-        return cls(r1, r2, r3, l21, l31, l32), strength
+        return cls(r1=r1, r2=r2, r3=r3, l21=l21, l31=l31, l32=l32), strength
 
     def forward(self, columns: Floats) -> None:
         """Multiply columns (3, ..., S) with L^-1, in place."""

@@ -67,7 +67,7 @@ def reduce(prepared: PreparedProblem, state: Parameters, damping: float = 0.0) -
         chi_square = np.inf  # a step too far: rays that do not meet
     chi_square += _add_given(prepared, state, blocks, border, corner)
     chi_square += control_squares(prepared, state)
-    return Reduced(blocks, border, corner, chi_square, tuple(points))
+    return Reduced(blocks=blocks, border=border, corner=corner, chi_square=chi_square, points=tuple(points))
 
 
 def _add_given(prepared: PreparedProblem, state: Parameters, blocks: Floats, border: Floats, corner: Floats) -> float:

@@ -55,7 +55,7 @@ def view(batch: Batch, xyz: Floats, photos: Floats) -> Rays:
     pull = batch.weight * focal
     misfit = batch.xy * batch.weight
     misfit -= ratio * pull
-    return Rays(turn, ratio, depth, pull, misfit)
+    return Rays(turn=turn, ratio=ratio, depth=depth, pull=pull, misfit=misfit)
 
 
 def by_point(rays: Rays) -> Floats:

@@ -67,7 +67,9 @@ def positions_at(
         for axis in range(3):
             by_common[rows, axis, column[rows] + axis] = -factor[rows]
     residual += by_common @ common
-    return LinearisedOrientations(positions.photo, residual, by_photo, by_common, 1.0 / positions.sigma)
+    return LinearisedOrientations(
+        photo=positions.photo, residual=residual, by_photo=by_photo, by_common=by_common, weight=1.0 / positions.sigma
+    )
 
 
 def attitudes_at(attitudes: AttitudeObservations, rotations: Floats, common: int) -> LinearisedOrientations:
@@ -76,11 +78,11 @@ def attitudes_at(attitudes: AttitudeObservations, rotations: Floats, common: int
     by_photo = np.zeros((len(attitudes), 3, PHOTO))
     by_photo[:, :, 3:] = _vector_by_turn(turn)
     return LinearisedOrientations(
-        attitudes.photo,
-        turn,
-        by_photo * SIGNS,
-        np.zeros((len(attitudes), 3, common)),
-        1.0 / attitudes.sigma,
+        photo=attitudes.photo,
+        residual=turn,
+        by_photo=by_photo * SIGNS,
+        by_common=np.zeros((len(attitudes), 3, common)),
+        weight=1.0 / attitudes.sigma,
     )
 
 

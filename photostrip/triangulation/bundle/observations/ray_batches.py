@@ -60,7 +60,9 @@ def sort_rays(images: ImageObservations, points: int, rank: Numbers) -> SortedRa
     """Sort rays by point, then photo, whose places in the band are ``rank`` (m,)."""
     photo = rank[images.photo]
     row = np.argsort(images.point * np.intp(len(rank)) + photo)
-    return SortedRays(row, photo[row], images.point[row], np.bincount(images.point, minlength=points))
+    return SortedRays(
+        row=row, photo=photo[row], point=images.point[row], counts=np.bincount(images.point, minlength=points)
+    )
 
 
 def arrange(images: ImageObservations, rays: SortedRays, photos: int) -> tuple[Batch, ...]:

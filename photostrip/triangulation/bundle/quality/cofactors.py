@@ -112,7 +112,7 @@ def _inverse(reduced: Reduced, band: Factor) -> Inverse:
     cross = band.solve(border) if p else np.zeros_like(border)
     common = np.linalg.inv(reduced.corner[:p, :p] - border.T @ cross)
     cross = cross.reshape(len(reduced.border), PHOTO, p)
-    return Inverse(band.inverse(), cross, 0.5 * (common + common.T), band)
+    return Inverse(band=band.inverse(), cross=cross, common=0.5 * (common + common.T), factor=band)
 
 
 def _batch(

@@ -81,7 +81,7 @@ def _group(kind: str, error: Floats, sigma: Floats, cofactors: Floats) -> Group:
     given = np.isfinite(sigma)
     known = np.where(given, sigma, np.nan)
     redundancy = np.diagonal(cofactors, axis1=1, axis2=2) / known**2
-    return Group(kind, np.where(given, error, np.nan), known, redundancy)
+    return Group(kind=kind, error=np.where(given, error, np.nan), sigma=known, redundancy=redundancy)
 
 
 def noncentrality(alpha: float, power: float) -> float:
@@ -126,7 +126,7 @@ def sigma0_test(solution: BundleSolution) -> Sigma0Test:
     """Test sigma0 against 1: chi-square, both sides."""
     f = solution.redundancy
     if f < 1:
-        return Sigma0Test(solution.sigma0, f, float("nan"), float("nan"))
+        return Sigma0Test(sigma0=solution.sigma0, redundancy=f, lower=float("nan"), upper=float("nan"))
     ends = (chi2_quantile(p, f) for p in (SIGMA0_LEVEL / 2, 1 - SIGMA0_LEVEL / 2))
     lower, upper = (float(np.sqrt(end / f)) for end in ends)
-    return Sigma0Test(solution.sigma0, f, lower, upper)
+    return Sigma0Test(sigma0=solution.sigma0, redundancy=f, lower=lower, upper=upper)

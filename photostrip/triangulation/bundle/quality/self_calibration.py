@@ -124,5 +124,16 @@ def parameters_of(problem: BundleProblem, solution: BundleSolution, precision: C
         share = float(precision.common_residuals[number]) / prior**2 if np.isfinite(prior) else float("nan")
         camera_id = problem.camera_ids[camera] if problem.camera_ids else str(camera)
         title = TITLES.get(name, name)
-        found.append(Parameter(camera_id, title, UNITS.get(name, "1"), value, deviation, p, prior, share))
+        found.append(
+            Parameter(
+                camera=camera_id,
+                name=title,
+                unit=UNITS.get(name, "1"),
+                value=value,
+                sigma=deviation,
+                p=p,
+                prior=prior,
+                redundancy=share,
+            )
+        )
     return tuple(found)

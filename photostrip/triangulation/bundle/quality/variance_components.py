@@ -79,7 +79,9 @@ def _component(name: str, group: reliability.Group, given: Flags) -> Component:
     estimated = redundancy >= LEAST_REDUNDANCY
     factor = float(np.clip(np.sqrt(squares / redundancy), SMALLEST, LARGEST)) if estimated else 1.0
     sigma = float(1 / np.sqrt(2 * redundancy)) if estimated else float("nan")
-    return Component(name, int(given.sum()), redundancy, factor, sigma, estimated)
+    return Component(
+        name=name, observations=int(given.sum()), redundancy=redundancy, factor=factor, sigma=sigma, estimated=estimated
+    )
 
 
 def scaled(problem: BundleProblem, found: Sequence[Component], level: Mapping[str, Sequence[bool]]) -> BundleProblem:

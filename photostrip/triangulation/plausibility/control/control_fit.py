@@ -130,7 +130,7 @@ def _refined(z: Complex, plan: Complex, turn: complex, shift: complex, *, mirror
         turn = complex((np.conj(d) * t).sum() / squares)
         shift = complex(plan[good].mean() - turn * z[good].mean())
     size = np.abs(turn * z + shift - plan)
-    return PlanSimilarity(turn, shift, mirrored, float(_median(size, PLAN_UNKNOWNS)))
+    return PlanSimilarity(turn=turn, shift=shift, mirrored=mirrored, median=float(_median(size, PLAN_UNKNOWNS)))
 
 
 def _least_median(columns: NDArray[Any], values: NDArray[Any], rows: Numbers) -> Floats | None:
@@ -222,4 +222,12 @@ def fit_robustly(columns: NDArray[Any], values: NDArray[Any], in_fit: Flags, flo
     lever = np.einsum("ni,ij,nj->n", scaled, inverse, scaled.conj()).real
     sigma = np.sqrt(np.maximum(np.diag(inverse).real, 0.0)) * (sigma0 if freedom > 0 else np.inf)
     spread = np.sqrt(1.0 + np.maximum(lever, 0.0)) * (sigma0 if freedom > 0 else np.inf)
-    return RobustFit(residual, spread, used, coefficient / size, sigma / size, freedom, sigma0)
+    return RobustFit(
+        residual=residual,
+        spread=spread,
+        used=used,
+        coefficient=coefficient / size,
+        sigma=sigma / size,
+        freedom=freedom,
+        sigma0=sigma0,
+    )

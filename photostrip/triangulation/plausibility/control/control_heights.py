@@ -81,7 +81,9 @@ def compare_heights(given: GivenPoints, fitted: StraightenedStrip, consistent: F
     base, _ = fit_simplest([deviation, *whole], 4, value, in_fit, fitted.floor[1])
     base = base[:, 1:]
     scaled = fit_robustly(np.column_stack([base, deviation]), value, in_fit, fitted.floor[1])
-    return HeightComparison(usable, in_fit, value, base, whole, deviation, scaled)
+    return HeightComparison(
+        usable=usable, in_fit=in_fit, value=value, columns=base, whole=whole, deviation=deviation, scaled=scaled
+    )
 
 
 class HeightStretch(NamedTuple):
@@ -102,7 +104,9 @@ def height_stretch(given: GivenPoints, on_strip: StripPoints) -> HeightStretch |
     laid = fit_similarity(w[in_fit], given.plan[in_fit])
     if laid is None:
         return None
-    level = turn_level(given, LevelStrip(w, s[:, 2], laid, turn, on_strip.depth), on_strip.floor[1], in_fit)
+    level = turn_level(
+        given, LevelStrip(w=w, z=s[:, 2], similarity=laid, turn=turn, depth=on_strip.depth), on_strip.floor[1], in_fit
+    )
     fitted = straighten(given, level, on_strip.floor, in_fit)
     heights = compare_heights(given, fitted, np.ones(len(w), bool))
     if heights is None or heights.in_fit.sum() < LEAST_POINTS + LEAST_REDUNDANCY:

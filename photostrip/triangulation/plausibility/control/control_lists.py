@@ -72,7 +72,7 @@ def _on_one_list(given: GivenPoints, level: LevelStrip, rows: Flags) -> PlanSimi
     w, plan = level.w[rows], given.plan[rows]
     if len(w) == 2 and min(abs(w[1] - w[0]), abs(plan[1] - plan[0])) > 0:
         turn = complex(abs(plan[1] - plan[0]) / abs(w[1] - w[0]))
-        return PlanSimilarity(turn, 0j, level.similarity.mirrored, 0.0)
+        return PlanSimilarity(turn=turn, shift=0j, mirrored=level.similarity.mirrored, median=0.0)
     return fit_similarity(w, plan, mirrored=level.similarity.mirrored)
 
 

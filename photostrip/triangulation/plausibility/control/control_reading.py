@@ -77,7 +77,9 @@ def find_wrong_readings(
         findings.append(_mirror(on_strip, normal, mirror, extent, axes_are_right=axes_are_right))
     elif normal.median > FIT_SHARE * extent:
         return _columns(given, exchanged(), on_strip, w, in_fit, normal)
-    level = turn_level(given, LevelStrip(w, s[:, 2], best, turn, on_strip.depth), on_strip.floor[1], in_fit)
+    level = turn_level(
+        given, LevelStrip(w=w, z=s[:, 2], similarity=best, turn=turn, depth=on_strip.depth), on_strip.floor[1], in_fit
+    )
     wrong_lists, lists = control_lists.find_foreign_lists(given, on_strip, level, in_fit)
     findings += lists
     if wrong_lists:
@@ -93,7 +95,7 @@ def find_wrong_readings(
         left = Misclosures(fitted.plan, height=None, usable=np.zeros(len(consistent), bool), consistent=consistent)
         return [*findings, *control_slips.find_plan_slips(given, on_strip, fitted, left)]
     fit = fit_robustly(heights.columns, heights.value, heights.in_fit, fitted.floor[1])
-    left = Misclosures(fitted.plan, fit, heights.usable, consistent)
+    left = Misclosures(plan=fitted.plan, height=fit, usable=heights.usable, consistent=consistent)
     findings += control_slips.find_plan_slips(given, on_strip, fitted, left)
     whole = list(control_heights.find_wrong_heights(given, on_strip, heights, fit, fitted.floor[1]))
     return findings + (whole or list(control_slips.find_height_slips(given, on_strip, fitted, left)))

@@ -94,7 +94,9 @@ class Rays:
         return image - self.xy, jacobian
 
 
-NO_RAYS = Rays(np.zeros((0, 2)), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3, 3)), 1.0)
+NO_RAYS = Rays(
+    xy=np.zeros((0, 2)), sigma=np.zeros(0), centers=np.zeros((0, 3)), rotations=np.zeros((0, 3, 3)), focal=1.0
+)
 
 
 @dataclass(frozen=True, eq=False)

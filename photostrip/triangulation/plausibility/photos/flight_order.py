@@ -69,7 +69,9 @@ def find_wrong_order(
     findings += _gaps(links, order, strip, photos)
     mirrored = frozenset(photos[number] for number in np.flatnonzero(plane.mirrored).tolist())
     size = {photos[number]: float(plane.size[number]) for number in _other_size(plane)}
-    return findings, PhotoOrder(tuple(photos[number] for number in order), _steps(links, order), mirrored, size)
+    return findings, PhotoOrder(
+        photos=tuple(photos[number] for number in order), steps=_steps(links, order), mirrored=mirrored, size=size
+    )
 
 
 def find_other_scale(observations: PhotoPoints, strip: str, photos: Sequence[str]) -> Iterator[Finding]:

@@ -89,7 +89,13 @@ def link(observations: PhotoPoints, photos: Sequence[str]) -> PhotoLinks:
     if not len(pairs):
         none, nowhere = np.zeros(0), np.zeros(0, complex)
         return PhotoLinks(
-            np.zeros((0, 2), np.intp), np.zeros(0, np.intp), nowhere, nowhere, none, none, np.zeros(0, bool)
+            photo=np.zeros((0, 2), np.intp),
+            count=np.zeros(0, np.intp),
+            turn=nowhere,
+            shift=nowhere,
+            misfit=none,
+            spread=none,
+            mirrored=np.zeros(0, bool),
         )
     starts = np.concatenate([[0], np.cumsum(count)[:-1]])
     plain, mirror = _similar(z_a, z_b, starts, count), _similar(np.conj(z_a), z_b, starts, count)
