@@ -4,36 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats
-
-
-class Operation(Protocol):
-    """A conversion of coordinates: a projection, a geoid, a change of datum."""
-
-    @property
-    def idle(self) -> bool:
-        """Whether coordinates pass unchanged."""
-
-    @property
-    def accuracy(self) -> float | None:
-        """Stated accuracy, metres; None when it is not known."""
-
-    @property
-    def grids(self) -> tuple[str, ...]:
-        """Paths of the grid files that are read."""
-
-    def apply(self, columns: Floats, *, inverse: bool = False) -> Floats:
-        """Transform rows of coordinates; what lies outside the domain becomes infinite."""
+    from photostrip.geodesy.proj_operation import ProjOperation
 
 
 @dataclass(frozen=True, eq=False)
 class DatumShift:
     """Longitude, latitude (radians) and height of one datum into those of another, and back."""
 
-    operation: Operation
+    operation: ProjOperation
     source_unit: float  # radians per unit of the geographic CRS
     target_unit: float
 

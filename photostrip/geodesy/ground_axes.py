@@ -46,5 +46,4 @@ def axes_along_north(east: Floats, north: Floats) -> Floats:
 
 
 def _unit(vectors: Floats) -> Floats:
-    """Bring vectors to unit length."""
     return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))

@@ -17,7 +17,7 @@ import numpy as np
 
 from photostrip.errors import GeometryError, PhotostripError
 from photostrip.geodesy.curvature import curvature_correction, meridian_radius, prime_vertical_radius
-from photostrip.geodesy.datum_shift import DatumShift, Operation, wrapped_longitude
+from photostrip.geodesy.datum_shift import DatumShift, wrapped_longitude
 from photostrip.geodesy.domain import finite_rows, named_rows, require_reached, require_rows
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec, Kind
 from photostrip.geodesy.ground_axes import axes_along_north, axes_between, true_axes
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats
     from photostrip.geodesy.curvature import Ellipsoid
+    from photostrip.geodesy.proj_operation import ProjOperation
 
 
 WGS84: Ellipsoid = (6378137.0, 6356752.314245179)
@@ -58,8 +59,8 @@ class GroundFrame:
     # point of tangency (east, north) of the curvature correction of a local frame, metres
     origin: tuple[float, float] | None = None
     _angle: float = 1.0  # radians per unit of what the projection gives
-    _plane: Operation | None = None  # grid -> longitude, latitude of the same datum
-    _vertical: Operation | None = None  # heights above the geoid -> above the ellipsoid
+    _plane: ProjOperation | None = None  # grid -> longitude, latitude of the same datum
+    _vertical: ProjOperation | None = None  # heights above the geoid -> above the ellipsoid
     _geoid: str = ""  # what these heights refer to
     _shift: DatumShift | None = None  # own datum -> datum of the Cartesian frame
     _cartesian: Ellipsoid = WGS84  # ellipsoid of the Cartesian frame
@@ -104,7 +105,7 @@ class GroundFrame:
             xyz = points * self.plan_factor
             if self._shift is None:
                 return xyz
-            return self._cartesian_from_geodetic(self._own_geodetic_from_geocentric(xyz), ids)
+            return self._cartesian_from_geodetic(geodetic_from_geocentric(xyz, self._datum_ellipsoid), ids)
         plan = self._lonlat(points[:, :2], ids)
         height = self._ellipsoidal(points, ids)
         return self._cartesian_from_geodetic(np.column_stack([plan, height]), ids)
@@ -125,7 +126,7 @@ class GroundFrame:
             return points / self.plan_factor
         geodetic = self.geodetic(points)
         if self.kind == "geocentric":
-            return self._own_geocentric(geodetic) / self.plan_factor
+            return geocentric_from_geodetic(geodetic, self._datum_ellipsoid) / self.plan_factor
         plan = geodetic[:, :2] / self._angle
         if self._plane is not None:
             plan = self._plane.apply(plan, inverse=True)
@@ -203,9 +204,8 @@ class GroundFrame:
             return delta
         lat = (a[:, 1] + b[:, 1]) / 2.0 * self.plan_factor
         height = (a[:, 2] + b[:, 2]) / 2.0 * self.height_factor
-        delta[:, 0] = (
-            wrapped_longitude(delta[:, 0]) * (prime_vertical_radius(lat, self.ellipsoid) + height) * np.cos(lat)
-        )
+        across = prime_vertical_radius(lat, self.ellipsoid) + height
+        delta[:, 0] = wrapped_longitude(delta[:, 0]) * across * np.cos(lat)
         delta[:, 1] *= meridian_radius(lat, self.ellipsoid) + height
         return delta
 
@@ -243,6 +243,10 @@ class GroundFrame:
         if self._shift is not None and self.datum_accuracy != 0.0:
             text += f"; datum shift: {self.datum_shift}"
         return text
+
+    @property
+    def _datum_ellipsoid(self) -> Ellipsoid:
+        return self.ellipsoid or WGS84
 
     def _bent(self, points: Floats, sign: float) -> Floats:
         """Heights of a local frame from (+1) or to (-1) the tangent plane, where a radius is given."""
@@ -298,14 +302,6 @@ class GroundFrame:
             require_rows(finite_rows(geodetic), f"no datum shift from {self.spec.name} is known there", ids)
         return geocentric_from_geodetic(geodetic, self._cartesian)
 
-    def _own_geocentric(self, geodetic: Floats) -> Floats:
-        """Geocentric coordinates on the frame's own datum."""
-        return geocentric_from_geodetic(geodetic, self.ellipsoid or WGS84)
-
-    def _own_geodetic_from_geocentric(self, xyz: Floats) -> Floats:
-        """Longitude, latitude, height on the frame's own datum."""
-        return geodetic_from_geocentric(xyz, self.ellipsoid or WGS84)
-
     def _grid_axes(self, geodetic: Floats) -> Floats:
         """Rows grid east, grid north, normal in the geocentric frame of the own datum.
 
@@ -322,18 +318,19 @@ class GroundFrame:
         around = lonlat.reshape(8, n, 2).transpose(1, 0, 2).reshape(n, 16)
         require_reached(finite_rows(around), f"outside, or at the edge of, the domain of {self.spec.name}", None)
         # On the ellipsoid: with the height of the point, two lines that cross at right angles there would not here.
-        xyz = self._own_geocentric(np.column_stack([lonlat, np.zeros(len(lonlat))])).reshape(2, 4, n, 3)
+        on_ellipsoid = np.column_stack([lonlat, np.zeros(len(lonlat))])
+        xyz = geocentric_from_geodetic(on_ellipsoid, self.ellipsoid).reshape(2, 4, n, 3)
         weights = np.array([-1.0, 8.0, -8.0, 1.0])
         return axes_between(*np.einsum("k,aknc->anc", weights, xyz))
 
     def _shifted_axes(self, geodetic: Floats, axes: Floats) -> Floats:
         """Axes of the own datum, carried into the Cartesian frame through the datum shift."""
-        step = _DERIVATIVE_STEP * (self.ellipsoid or WGS84)[0]
-        centre = self._own_geocentric(geodetic)
+        step = _DERIVATIVE_STEP * self._datum_ellipsoid[0]
+        centre = geocentric_from_geodetic(geodetic, self._datum_ellipsoid)
         ends = []
         for sign in (1.0, -1.0):
             moved = centre[:, None, :] + sign * step * axes
-            there = self._own_geodetic_from_geocentric(moved.reshape(-1, 3))
+            there = geodetic_from_geocentric(moved.reshape(-1, 3), self._datum_ellipsoid)
             ends.append(self._cartesian_from_geodetic(there, None).reshape(-1, 3, 3))
         east, north, _ = np.moveaxis(ends[0] - ends[1], 1, 0)
         return axes_along_north(east, north)

@@ -81,17 +81,15 @@ class ProjOperation:
         steps = self.transformer.operations or ()
         named = re.findall(r"\bgrids=(\S+)", self.transformer.definition)
         paths = [name for names in named for name in names.split(",") if Path(name).is_file()]
-        return tuple(
-            dict.fromkeys([*paths, *(grid.full_name for step in steps for grid in step.grids if grid.available)])
-        )
+        paths += [grid.full_name for step in steps for grid in step.grids if grid.available]
+        return tuple(dict.fromkeys(paths))
 
     def __str__(self) -> str:
         if not self.idle and self._decided_by is None:
             return "chosen by PROJ at the first point"
         steps = [step for step in self.transformer.description.split(" + ") if not step.startswith("axis order change")]
-        return " + ".join(steps) + (
-            ", accuracy not known" if self.accuracy is None else f", accuracy {self.accuracy:g} m"
-        )
+        accuracy = "accuracy not known" if self.accuracy is None else f"accuracy {self.accuracy:g} m"
+        return f"{' + '.join(steps)}, {accuracy}"
 
 
 def _run(transformer: Transformer, columns: Floats, *, inverse: bool) -> Any:  # noqa: ANN401 (arrays or numbers)

@@ -124,7 +124,6 @@ def _build_all(
 def _frame(
     spec: FrameSpec, crs: CrsParts, vertical: ProjOperation | None, shift: DatumShift | None, cartesian: Ellipsoid
 ) -> GroundFrame:
-    """Put one frame together."""
     plane = ProjOperation(crs.core, crs.geographic) if crs.kind == "projected" and crs.core is not None else None
     return GroundFrame(
         spec=spec,

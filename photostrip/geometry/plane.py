@@ -44,14 +44,12 @@ class PlaneTransform:
     coefficients: Floats  # (..., 3, 4): rows: target x, target y, denominator
 
     def __post_init__(self) -> None:
-        """Freeze the array."""
         object.__setattr__(self, "coefficients", frozen(self.coefficients))
 
     def __call__(self, points: ArrayLike) -> Floats:
         """Transform points (..., n, 2)."""
         values = _terms(np.asarray(points, float)) @ self.coefficients.swapaxes(-1, -2)
-        target: Floats = values[..., :2] / values[..., 2:]
-        return target
+        return values[..., :2] / values[..., 2:]
 
     @property
     def inverse(self) -> PlaneTransform | PlaneInverse:
@@ -62,8 +60,7 @@ class PlaneTransform:
 
     def residuals(self, source: ArrayLike, target: ArrayLike) -> Floats:
         """Subtract the target from the transformed source."""
-        differences: Floats = self(source) - np.asarray(target, float)
-        return differences
+        return np.asarray(self(source) - np.asarray(target, float), float)
 
     def jacobian(self, points: ArrayLike) -> Floats:
         """Differentiate the target by the source at points: (..., n, 2, 2), rows target x, y."""
@@ -72,8 +69,7 @@ class PlaneTransform:
         values = _terms(p) @ c.swapaxes(-1, -2)
         slopes = c[..., None, :, :2] + c[..., None, :, 2:3] * p[..., None, ::-1]
         top, bottom = values[..., :2, None], values[..., 2:, None]
-        derivatives: Floats = (slopes[..., :2, :] - top / bottom * slopes[..., 2:, :]) / bottom
-        return derivatives
+        return np.asarray((slopes[..., :2, :] - top / bottom * slopes[..., 2:, :]) / bottom, float)
 
     def take(self, rows: ArrayLike) -> PlaneTransform:
         """Give some transformations of an array of them, by their numbers along the first axis."""
@@ -272,8 +268,7 @@ def _solve(design: Floats, values: Floats, weights: Floats) -> Floats:
     u, s, vt = np.linalg.svd(root * design, full_matrices=False)
     if not (s[..., -1] > SINGULAR * s[..., 0]).all():
         raise singular
-    solution: Floats = vt.swapaxes(-1, -2) @ ((u.swapaxes(-1, -2) @ (root * values)) / s[..., None])
-    return solution
+    return np.asarray(vt.swapaxes(-1, -2) @ ((u.swapaxes(-1, -2) @ (root * values)) / s[..., None]), float)
 
 
 def _reciprocal_condition(design: Floats, weights: Floats) -> Floats:
@@ -281,8 +276,7 @@ def _reciprocal_condition(design: Floats, weights: Floats) -> Floats:
         return np.zeros(design.shape[:-2])
     values = np.linalg.svd(np.sqrt(weights)[..., None] * design, compute_uv=False)
     largest = values[..., 0]
-    ratio: Floats = values[..., -1] / np.where(largest > 0, largest, 1.0)
-    return ratio
+    return values[..., -1] / np.where(largest > 0, largest, 1.0)
 
 
 def _terms(points: Floats) -> Floats:

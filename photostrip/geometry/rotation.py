@@ -148,8 +148,7 @@ def from_vector(vector: ArrayLike) -> Floats:
     safe = np.where(angle < 1e-9, 1.0, angle)  # noqa: PLR2004  below it the series' first terms are exact
     first = np.where(angle < 1e-9, 1.0, np.sin(safe) / safe)  # noqa: PLR2004
     second = np.where(angle < 1e-9, 0.5, (1 - np.cos(safe)) / safe**2)  # noqa: PLR2004
-    matrix: Floats = np.eye(3) + first * k + second * (k @ k)
-    return matrix
+    return np.eye(3) + first * k + second * (k @ k)
 
 
 def cross_matrix(vector: ArrayLike) -> Floats:
@@ -175,5 +174,4 @@ def to_vector(matrix: ArrayLike) -> Floats:
     angle = np.arctan2(length, 0.5 * (np.trace(a, axis1=-2, axis2=-1) - 1.0))
     small = length < 1e-9  # noqa: PLR2004  there the vector and its sines are the same
     factor = np.where(small, 1.0, angle / np.where(small, 1.0, length))
-    vector: Floats = sine * factor[..., None]
-    return vector
+    return sine * factor[..., None]

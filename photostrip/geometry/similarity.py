@@ -28,14 +28,12 @@ class Similarity:
     shift: Floats  # (3,): shift in the unit of the target
 
     def __post_init__(self) -> None:
-        """Freeze the arrays."""
         object.__setattr__(self, "rotation", frozen(self.rotation, shape=(3, 3)))
         object.__setattr__(self, "shift", frozen(self.shift, shape=(3,)))
 
     def __call__(self, points: ArrayLike) -> Floats:
         """Transform points (n, 3)."""
-        moved: Floats = self.scale * np.asarray(points, float) @ self.rotation.T + self.shift
-        return moved
+        return self.scale * np.asarray(points, float) @ self.rotation.T + self.shift
 
     @property
     def inverse(self) -> Similarity:
@@ -45,8 +43,7 @@ class Similarity:
 
     def residuals(self, source: ArrayLike, target: ArrayLike) -> Floats:
         """Subtract the target from the transformed source."""
-        difference: Floats = self(source) - np.asarray(target, float)
-        return difference
+        return np.asarray(self(source) - np.asarray(target, float), float)
 
     @classmethod
     def from_points(cls, source: ArrayLike, target: ArrayLike, weights: ArrayLike | None = None) -> Self:

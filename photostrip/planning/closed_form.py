@@ -45,17 +45,8 @@ def _reduced(points: ArrayLike, control: ArrayLike) -> dict[str, Floats]:
     """Return the differences [g] = g of the point less the mean of g over the control."""
     found = {}
     (x, y), (u, v) = np.asarray(points, float).T, np.asarray(control, float).T
-    powers = {
-        "x": (1, 0),
-        "y": (0, 1),
-        "xx": (2, 0),
-        "xy": (1, 1),
-        "yy": (0, 2),
-        "xxx": (3, 0),
-        "xxy": (2, 1),
-        "xyy": (1, 2),
-    }
-    for name, (p, q) in powers.items():
+    for name in ("x", "y", "xx", "xy", "yy", "xxx", "xxy", "xyy"):
+        p, q = name.count("x"), name.count("y")
         found[name] = x**p * y**q - (u**p * v**q).mean()
     return found
 

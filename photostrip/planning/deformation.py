@@ -41,8 +41,7 @@ def parallax_error(xy: ArrayLike, elements: ArrayLike, focal: float, base: float
     al1, ka1, al2, om2, ka2 = np.moveaxis(np.asarray(elements, float), -1, 0)
     right = x - base
     turned = (right**2 * al2 - x**2 * al1 + right * y * om2) / focal
-    found: Floats = turned - y * (ka2 - ka1) - np.asarray(measured, float)
-    return found
+    return np.asarray(turned - y * (ka2 - ka1) - np.asarray(measured, float), float)
 
 
 # ----------------------------------------------------------------------------------------------------- constants
@@ -68,8 +67,7 @@ def rigorous_factors(xy: ArrayLike, focal: float, width: float, base: float) -> 
     """
     place = np.asarray(xy, float)
     rows = np.stack([parallax_error(place, unit, focal, base) for unit in np.eye(5)], axis=-1)
-    found: Floats = np.einsum("...i,ij,...j->...", rows, six_points.cofactors(focal, width, base), rows) + 2
-    return found
+    return np.asarray(np.einsum("...i,ij,...j->...", rows, six_points.cofactors(focal, width, base), rows) + 2, float)
 
 
 def rigorous_constants(xy: ArrayLike, focal: float, width: float, base: float) -> list[Constants]:

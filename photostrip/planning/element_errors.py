@@ -58,8 +58,7 @@ def free_covariance(dependent: ArrayLike, base: float) -> Floats:
     take = np.zeros((4, 5))
     take[0, 2] = take[1, 1] = take[2, 3] = take[3, 4] = 1.0
     take[2, 1] = -1.0 / base
-    found: Floats = take @ np.asarray(dependent, float) @ take.T
-    return found
+    return np.asarray(take @ np.asarray(dependent, float) @ take.T, float)
 
 
 def element_covariance(points: ArrayLike, base: float, sigma: float) -> Floats:
@@ -104,5 +103,4 @@ def measured_covariance(points: ArrayLike, base: float, focal: float, sigma: flo
         axis=-2,
     )
     rows *= (z / focal * sigma)[:, None, None]
-    found: Floats = rows @ np.swapaxes(rows, -1, -2)
-    return found
+    return np.asarray(rows @ np.swapaxes(rows, -1, -2), float)

@@ -14,7 +14,7 @@ from photostrip.errors import Fault, InputError
 from photostrip.geometry.similarity import Similarity
 from photostrip.simulate import Control, Flight, Ground, Image, Points, Spec, Terrain, simulate
 from photostrip.triangulation.error_propagation.strip_errors import StripErrors, differentiate_strip
-from photostrip.triangulation.relative_orientation.orientation import orient_unchecked, refuse_unusable
+from photostrip.triangulation.relative_orientation.orientation import orient_pairs
 from photostrip.triangulation.relative_orientation.pairs import collect_pairs
 from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
 from photostrip.triangulation.strip_formation.strip import form_from_pairs
@@ -123,8 +123,7 @@ def ideal_strip(geometry: StripGeometry) -> IdealStrip:
     observations = replace(observed, xy=simulation.truth.image, sigma=sigma)
     photos = simulation.strips[0][1]
     pairs = collect_pairs(observations, photos, geometry.camera.principal_distance)
-    orientation, converged = orient_unchecked(pairs)
-    refuse_unusable(orientation, converged, photos)
+    orientation = orient_pairs(pairs, photos)
     formed = form_from_pairs(orientation, StripFormationSettings(), photos)
     middle = simulation.truth.centers.mean(axis=0)
     middle[2] = 0.0

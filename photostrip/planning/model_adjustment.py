@@ -37,8 +37,7 @@ class AdjustedModel:
 
     def correction(self, points: ArrayLike) -> Floats:
         """Return what is to be subtracted from model points (q, 3): absolute orientation and deformation together."""
-        found: Floats = self._rows(points) @ np.concatenate([self.parameters, self.elements])
-        return found
+        return np.asarray(self._rows(points) @ np.concatenate([self.parameters, self.elements]), float)
 
     def covariance(self, points: ArrayLike, measured: ArrayLike, row: Numbers | None = None) -> Floats:
         """Covariance (q, 3, 3) of corrected points; the arguments are those of ``single_model.expected_errors``."""

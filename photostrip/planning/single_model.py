@@ -186,5 +186,4 @@ def expected_errors(
 
 def _through(operator: Floats, covariance: Floats) -> Floats:
     """Carry independent covariances of the control through the operator."""
-    found: Floats = np.einsum("qanb,nbc,qdnc->qad", operator, covariance, operator, optimize=True)
-    return found
+    return np.asarray(np.einsum("qanb,nbc,qdnc->qad", operator, covariance, operator, optimize=True), float)

@@ -108,12 +108,10 @@ def spoil_images(spec: Spec, observations: PhotoPoints) -> tuple[PhotoPoints, tu
 
 
 def _entries(spec: Spec, kinds: set[str]) -> list[tuple[int, GrossError]]:
-    """Entries of some kinds with their numbers in the list."""
     return [(number, entry) for number, entry in enumerate(spec.gross_errors) if entry.kind in kinds]
 
 
 def _take(rows: Numbers, number: int, entry: GrossError) -> list[int]:
-    """Return the first rows, as many as are asked for."""
     if len(rows) < entry.count:
         raise _too_many(number, entry)
     return [int(row) for row in rows[: entry.count]]

@@ -93,8 +93,7 @@ class Turn:
 def turned(before: Floats, principal_distance: float, turn: Floats) -> Floats:
     """Where points (m, 2), mm from the principal point, stand in the photo after the camera turned."""
     ray = rays(before, principal_distance) @ small_turn(turn)
-    after: Floats = -principal_distance * ray[:, :2] / ray[:, 2:]
-    return after
+    return -principal_distance * ray[:, :2] / ray[:, 2:]
 
 
 def turn_gradient(points: Floats, principal_distance: float) -> Floats:

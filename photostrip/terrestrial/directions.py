@@ -55,8 +55,7 @@ def photo_from_directions(directions: ArrayLike, principal_distance: float, rota
     """
     ray = vectors_of(directions) @ np.asarray(rotation, float)
     depth = np.where(-ray[..., 2] > BEHIND, -ray[..., 2], np.nan)
-    xz: Floats = principal_distance * ray[..., :2] / depth[..., None]
-    return xz
+    return np.asarray(principal_distance * ray[..., :2] / depth[..., None], float)
 
 
 def partials(xz: ArrayLike, principal_distance: float, rotation: ArrayLike) -> Partials:

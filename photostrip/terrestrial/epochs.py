@@ -208,7 +208,6 @@ def _turns(series: Series, motion: Motion | None, removed: tuple[bool, ...]) -> 
 
 
 def _epoch(series: Series, pair: StereoPair, number: int, turns: _Turns) -> _Epoch:
-    """Intersect the points of an epoch."""
     angles = turns.values.reshape(-1, 2, 3)
     rotations = pair.rotations @ small_turn(angles)
     weights = series.shared + series.own[0]
@@ -225,7 +224,6 @@ def _epoch(series: Series, pair: StereoPair, number: int, turns: _Turns) -> _Epo
 
 
 def _reasons(series: Series, epochs: list[_Epoch]) -> Numbers:
-    """Say why points have no coordinates."""
     found = np.full((len(epochs), len(series.points)), MEASURED)
     for number, each in enumerate(epochs):
         found[number, np.isnan(each.xyz[:, 0])] = SMALL_PARALLAX

@@ -38,8 +38,7 @@ def ground_from_photo(alpha: ArrayLike, omega: ArrayLike = 0.0, kappa: ArrayLike
 
     Source: [002] eq. 1 and 2 for omega = kappa = 0; the angles of the general form are not defined there, derived.
     """
-    matrix: Floats = GROUND_FROM_HOUSE @ from_alpha_omega_kappa(alpha, omega, kappa)
-    return matrix
+    return GROUND_FROM_HOUSE @ from_alpha_omega_kappa(alpha, omega, kappa)
 
 
 def angles_of(rotation: ArrayLike) -> Floats:

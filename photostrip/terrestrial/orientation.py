@@ -80,7 +80,7 @@ class PointRejection:
     value: float
     limit: float
     # misclosure of its directions against the orientation without it, radians; NaN where not measured
-    residual: tuple[float, float]
+    residual: tuple[float, float] = (np.nan, np.nan)
 
 
 @dataclass(frozen=True, eq=False)
@@ -335,7 +335,6 @@ def _worst(solution: PhotoOrientation, sightings: Sightings, settings: Orientati
             test="stated",
             value=float(drop[worst]),
             limit=float(limits[worst]),
-            residual=(np.nan, np.nan),
         )
     p_values = np.ones(len(rows))
     for number in np.flatnonzero(testable):
@@ -344,9 +343,7 @@ def _worst(solution: PhotoOrientation, sightings: Sightings, settings: Orientati
     worst = int(np.lexsort([-drop, p_values])[0])  # of p values that are all zero the largest drop
     if p_values[worst] >= level:
         return None
-    return PointRejection(
-        point=int(rows[worst]), test="deletion", value=float(p_values[worst]), limit=level, residual=(np.nan, np.nan)
-    )
+    return PointRejection(point=int(rows[worst]), test="deletion", value=float(p_values[worst]), limit=level)
 
 
 def _drops(solution: PhotoOrientation, sightings: Sightings, rows: Numbers) -> tuple[Floats, Numbers]:

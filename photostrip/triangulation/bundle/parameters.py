@@ -57,11 +57,8 @@ class PreparedProblem:
         partials = calibration.partials(self.calibrated, batch.xy, rays.ratio, camera)
         partials *= batch.weight
         bends = self.calibrated.kind != calibration.PRINCIPAL_DISTANCE
-        np.subtract(
-            rays.misfit,
-            np.einsum("p,pakr->akr", common[: len(bends)][bends], partials[bends]),
-            out=rays.misfit,
-        )
+        bent = np.einsum("p,pakr->akr", common[: len(bends)][bends], partials[bends])
+        np.subtract(rays.misfit, bent, out=rays.misfit)
         return rays, partials
 
 

@@ -52,8 +52,21 @@ class ScreenedBundle:
     selection: Selection  # which those are
     solution: BundleSolution
     precision: Cofactors
-    rejections: tuple[BundleRejection, ...]  # what was taken out, in order; re-admitted ones are marked
-    rounds: int
+    rejections: tuple[BundleRejection, ...] = ()  # what was taken out, in order; re-admitted ones are marked
+    rounds: int = 1
+
+    @classmethod
+    def of(cls, problem: BundleProblem, selection: Selection) -> ScreenedBundle:
+        """Adjust a selection."""
+        chosen = selected(problem, selection)
+        solution = solve(chosen)
+        return cls(problem=chosen, selection=selection, solution=solution, precision=precision_of(solution))
+
+    def rows(self, kind: str) -> Numbers:
+        """Rows of the whole problem that the observations of a kind have."""
+        if kind == reliability.IMAGE:
+            return np.flatnonzero(self.selection.images)
+        return np.arange(len(getattr(self.selection, FIELDS[kind])))
 
 
 def screen_bundle(
@@ -66,16 +79,7 @@ def screen_bundle(
     """
     keep = np.zeros(len(problem.images), bool) if kept is None else kept
     if settings.screening == "none":
-        chosen = supported(problem, Selection.everything(problem))
-        done = _Adjusted.of(problem, chosen)
-        return ScreenedBundle(
-            problem=done.problem,
-            selection=chosen,
-            solution=done.solution,
-            precision=done.precision,
-            rejections=(),
-            rounds=1,
-        )
+        return ScreenedBundle.of(problem, supported(problem, Selection.everything(problem)))
     search = _Search(problem, settings, keep)
     chosen = supported(problem, begin)
     if settings.screening == "robust":
@@ -86,37 +90,7 @@ def screen_bundle(
         if more is None:
             break
         done = search.clean(more)
-    log = tuple(search.log(done, begin))
-    return ScreenedBundle(
-        problem=done.problem,
-        selection=done.selection,
-        solution=done.solution,
-        precision=done.precision,
-        rejections=log,
-        rounds=search.rounds,
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class _Adjusted:
-    """One adjustment on the way."""
-
-    problem: BundleProblem
-    selection: Selection
-    solution: BundleSolution
-    precision: Cofactors
-
-    @classmethod
-    def of(cls, problem: BundleProblem, selection: Selection) -> _Adjusted:
-        chosen = selected(problem, selection)
-        solution = solve(chosen)
-        return cls(problem=chosen, selection=selection, solution=solution, precision=precision_of(solution))
-
-    def rows(self, kind: str) -> Numbers:
-        """Rows of the whole problem that the observations of a kind have."""
-        if kind == reliability.IMAGE:
-            return np.flatnonzero(self.selection.images)
-        return np.arange(len(getattr(self.selection, FIELDS[kind])))
+    return replace(done, rejections=tuple(search.log(done, begin)), rounds=search.rounds)
 
 
 class _Search:
@@ -128,9 +102,9 @@ class _Search:
         self.back: set[int] = set()
         self.rounds = 0
 
-    def adjust(self, selection: Selection) -> _Adjusted:
+    def adjust(self, selection: Selection) -> ScreenedBundle:
         """Adjust a selection, and start from there the next time."""
-        done = _Adjusted.of(self.problem, selection)
+        done = ScreenedBundle.of(self.problem, selection)
         self.problem = restarted(self.problem, done.solution)
         self.rounds += 1
         return done
@@ -152,7 +126,7 @@ class _Search:
             self.out[reliability.IMAGE, row, 0] = each
         return supported(self.problem, replace(selection, images=images))
 
-    def clean(self, selection: Selection) -> _Adjusted:
+    def clean(self, selection: Selection) -> ScreenedBundle:
         """Test and take out until nothing is beyond the limit."""
         for _ in range(SEARCH_ROUNDS):
             done = self.adjust(selection)
@@ -172,7 +146,7 @@ class _Search:
         unit = max(solution.sigma0, 1.0) if self.settings.test == "tau" and solution.redundancy > 0 else 1.0
         return limit, unit
 
-    def _worst(self, done: _Adjusted) -> Iterator[BundleRejection]:
+    def _worst(self, done: ScreenedBundle) -> Iterator[BundleRejection]:
         """Return the worst observations beyond the limit, no two of which share a point or a photo."""
         limit, unit = self._limit(done.solution)
         beyond = []
@@ -184,17 +158,15 @@ class _Search:
                 if group.kind == reliability.IMAGE and self.kept[rows[row]]:
                     continue
                 column = int(axis[row])
-                size = float(group.gross[row, column])
-                test = self.settings.test
                 beyond.append(
                     BundleRejection(
                         kind=group.kind,
                         row=int(rows[row]),
                         axis=column,
-                        test=test,
+                        test=self.settings.test,
                         value=float(value[row, column]),
                         limit=limit,
-                        size=size,
+                        size=float(group.gross[row, column]),
                     )
                 )
         beyond.sort(key=lambda each: (-each.value, each.kind, each.row))
@@ -216,7 +188,7 @@ class _Search:
         part = problem.positions if each.kind == reliability.POSITION else problem.attitudes
         return {("photo", int(part.photo[each.row])), ("control", 0)}
 
-    def fitting(self, done: _Adjusted) -> Selection | None:
+    def fitting(self, done: ScreenedBundle) -> Selection | None:
         """Put back the rays that fit the adjusted photos and points; None when there is no new one."""
         limit, unit = self._limit(done.solution)
         value = predicted(self.problem, done.selection, (done.solution, done.precision))[0] / unit
@@ -231,7 +203,7 @@ class _Search:
         chosen = supported(self.problem, chosen)
         return None if (chosen.images == done.selection.images).all() and not control.any() else chosen
 
-    def _given(self, done: _Adjusted, limit: float) -> Flags:
+    def _given(self, done: ScreenedBundle, limit: float) -> Flags:
         """Control coordinates that were left out from the start and fit."""
         control = self.problem.control
         error = np.abs(done.solution.control_residuals)
@@ -244,7 +216,7 @@ class _Search:
                 tested[row, axis] = True
         return fits & np.isfinite(control.sigma) & ~done.selection.control & ~tested
 
-    def _place_points(self, done: _Adjusted, fits: Flags) -> None:
+    def _place_points(self, done: ScreenedBundle, fits: Flags) -> None:
         """Give points that come back as a whole the place where their rays meet."""
         images, solution = self.problem.images, done.solution
         active = np.zeros(self.problem.points, bool)
@@ -256,7 +228,7 @@ class _Search:
             points[numbers] = found
             self.problem = replace(self.problem, start=replace(self.problem.start, points=points))
 
-    def log(self, done: _Adjusted, begin: Selection) -> Iterator[BundleRejection]:
+    def log(self, done: ScreenedBundle, begin: Selection) -> Iterator[BundleRejection]:
         """Return every observation that was out at some time."""
         limit, unit = self._limit(done.solution)
         outside = np.flatnonzero(~done.selection.images)

@@ -60,7 +60,6 @@ def solve(problem: BundleProblem) -> BundleSolution:
 
 
 def _iterate(prepared: PreparedProblem, *, free: bool) -> tuple[Parameters, tuple[IterationStep, ...]]:
-    """Step until a step is short."""
     start = prepared.problem.start
     state = parameters_from(prepared, start.centers, start.rotations, start.points, np.zeros(len(prepared.prior)))
     damping, steps = 0.0, []
@@ -164,7 +163,6 @@ def _recorded(reduced: Reduced, move: ParameterStep, damping: float) -> Iteratio
 def _solution(
     prepared: PreparedProblem, state: Parameters, steps: tuple[IterationStep, ...], *, free: bool
 ) -> BundleSolution:
-    """Collect estimate and residuals."""
     problem, structure = prepared.problem, prepared.structure
     residuals = np.zeros((len(problem.images), 2))
     table, chi_square = prepared.table(state), 0.0
@@ -196,7 +194,6 @@ def _solution(
 
 
 def _redundancy(prepared: PreparedProblem, *, free: bool) -> int:
-    """Observations minus parameters."""
     problem = prepared.problem
     observed = np.zeros(problem.points, bool)
     observed[problem.images.point] = True

@@ -153,7 +153,6 @@ class ControlNormals(NamedTuple):
 
 
 def _with_control(batch: Batch, control: ControlNormals) -> Batch:
-    """Give a batch the control of its points."""
     if not len(control.normal):
         return batch
     slots = batch.real[control.where[batch.point[batch.real]] >= 0]

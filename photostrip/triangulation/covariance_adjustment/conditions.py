@@ -133,16 +133,12 @@ def _junctions(errors: StripErrors, local: LocalSimilarities) -> Conditions:
     count = junctions * SIMILARITY_PARAMETERS
     carried = -local.from_common[1:] @ local.to_common[:-1]
     by_component = -local.from_common[1:] @ errors.steps[:-1]
-    none = np.zeros(0, np.intp)
     number = np.repeat(np.arange(junctions), SIMILARITY_PARAMETERS)
     return Conditions(
-        rows=ErrorRows(
-            first=number,
-            by_similarity=carried.reshape(count, 1, SIMILARITY_PARAMETERS),
-            by_component=by_component.reshape(count, 1, 1, COMPONENTS),
-            item=none,
-            image=none,
-            by_image=np.zeros((0, 1, 2)),
+        rows=ErrorRows.without_images(
+            number,
+            carried.reshape(count, 1, SIMILARITY_PARAMETERS),
+            by_component.reshape(count, 1, 1, COMPONENTS),
         ),
         following=np.tile(np.eye(SIMILARITY_PARAMETERS), (junctions, 1)),
         value=np.zeros(count),

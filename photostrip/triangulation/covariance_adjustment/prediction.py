@@ -136,15 +136,7 @@ def photo_rows(errors: StripErrors) -> ErrorRows:
     by_component = np.zeros((models + 1, 1, 6, COMPONENTS))
     by_component[-1, 0, :3, ELEMENTS] = errors.pairs.base_by_elements[-1]
     by_component[-1, 0, 3:, ELEMENTS] = errors.pairs.rotation_by_elements[-1]
-    none = np.zeros(0, np.intp)
-    return ErrorRows(
-        first=np.append(np.arange(models), models - 1),
-        by_similarity=by_similarity,
-        by_component=by_component,
-        item=none,
-        image=none,
-        by_image=np.zeros((0, 6, 2)),
-    )
+    return ErrorRows.without_images(np.append(np.arange(models), models - 1), by_similarity, by_component)
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +151,6 @@ class _Columns:
 
     @classmethod
     def of(cls, found: System, rows: ErrorRows) -> Self:
-        """Prepare rows."""
         rank = rank_in_model(rows.first, found.errors.models)
         shared = same_images(rows, found.conditions.rows)
         order = np.argsort(shared.first, kind="stable")

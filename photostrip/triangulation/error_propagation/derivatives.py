@@ -59,6 +59,20 @@ class ErrorRows:
     by_image: Floats  # (e, d, 2)
 
     @classmethod
+    def without_images(cls, first: Numbers, by_similarity: Floats, by_component: Floats) -> Self:
+        """Rows that no image point enters directly."""
+        none = np.zeros(0, np.intp)
+        by_image = np.zeros((0, by_similarity.shape[1], 2))
+        return cls(
+            first=first,
+            by_similarity=by_similarity,
+            by_component=by_component,
+            item=none,
+            image=none,
+            by_image=by_image,
+        )
+
+    @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
         """Rows of several tables one after the other."""
         slots = max(part.by_component.shape[1] for part in parts)
@@ -78,7 +92,14 @@ class ErrorRows:
 
     def take(self, rows: Numbers) -> Self:
         """Select rows, in any order."""
-        item, entry = ranges(*self.entries(rows))
+        return self._selected(rows, *ranges(*self.entries(rows)))
+
+    def part(self, start: int, stop: int) -> Self:
+        """Rows from start to stop, without copying."""
+        low, high = np.searchsorted(self.item, [start, stop])
+        return self._selected(slice(start, stop), self.item[low:high] - start, slice(low, high))
+
+    def _selected(self, rows: Numbers | slice, item: Numbers, entry: Numbers | slice) -> Self:
         return replace(
             self,
             first=self.first[rows],
@@ -87,19 +108,6 @@ class ErrorRows:
             item=item,
             image=self.image[entry],
             by_image=self.by_image[entry],
-        )
-
-    def part(self, start: int, stop: int) -> Self:
-        """Rows from start to stop, without copying."""
-        low, high = np.searchsorted(self.item, [start, stop])
-        return replace(
-            self,
-            first=self.first[start:stop],
-            by_similarity=self.by_similarity[start:stop],
-            by_component=self.by_component[start:stop],
-            item=self.item[low:high] - start,
-            image=self.image[low:high],
-            by_image=self.by_image[low:high],
         )
 
     def along(self, direction: Floats) -> Self:

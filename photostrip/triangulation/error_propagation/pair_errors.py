@@ -119,8 +119,7 @@ def _parallax_by_image(elements: Floats, pairs: Pairs, left: _Turns, right: _Tur
 def _levelled(ray: Floats, change: Floats, focal: float) -> Floats:
     """Change of the image coordinates of a ray brought to a level photo, shape (m, 2, k), by that of the ray."""
     slope = ray[:2] / ray[2]
-    found: Floats = -focal * (change[:, :2] - slope.T[:, :, None] * change[:, 2:]) / ray[2][:, None, None]
-    return found
+    return np.asarray(-focal * (change[:, :2] - slope.T[:, :, None] * change[:, 2:]) / ray[2][:, None, None], float)
 
 
 def _points(orientation: Orientation, left: _Turns, right: _Turns) -> _Points:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from photostrip.points import take_rows
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ErrorRows, add_by_item, ranges
 from photostrip.triangulation.resection.collinearity import partials
 
@@ -31,9 +32,7 @@ class Sightings:
 
     def take(self, rows: Numbers | Flags) -> Sightings:
         """Select some."""
-        return Sightings(
-            photo=self.photo[rows], point=self.point[rows], image=self.image[rows], xyz=self.xyz[rows], focal=self.focal
-        )
+        return take_rows(self, rows, ("photo", "point", "image", "xyz"))
 
 
 @dataclass(frozen=True, eq=False)

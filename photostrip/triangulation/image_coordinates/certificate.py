@@ -44,7 +44,6 @@ class Certificate:
     redundancy: int  # distances more than the figure needs
 
     def __post_init__(self) -> None:
-        """Freeze the array."""
         object.__setattr__(self, "residuals", frozen(self.residuals))
 
 

@@ -71,7 +71,6 @@ class Bending:
     curvature: float = 0.0  # constant of ``curvature_constant``; 0: none
 
     def __bool__(self) -> bool:
-        """Whether there is anything to correct."""
         return bool(self.refraction or self.curvature)
 
 
@@ -109,11 +108,9 @@ def refine(
     cameras = {camera_of_photo[photo].name: camera_of_photo[photo] for photo in observations.photo_ids}
     cameras = {name: settings.applied_to(camera) for name, camera in cameras.items()}
     number = {name: row for row, name in enumerate(cameras)}
-    camera_of_row = np.array([number[camera_of_photo[photo].name] for photo in observations.photo_ids], np.intp)[
-        observations.photo
-    ]
+    camera_of = np.array([number[camera_of_photo[photo].name] for photo in observations.photo_ids], np.intp)
     bending = _bending(settings, flying_height, ground_height)
-    rows_of = {name: np.flatnonzero(camera_of_row == row) for name, row in number.items()}
+    rows_of = {name: np.flatnonzero(camera_of[observations.photo] == row) for name, row in number.items()}
     _refuse_distortion(observations, cameras, rows_of)
     xy = observations.xy
     largest: dict[str, float] = {}

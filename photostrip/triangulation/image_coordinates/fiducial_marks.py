@@ -162,7 +162,6 @@ def _pattern(measured: Floats, weights: Floats, calibrated: Floats, *, mirrored:
 
 
 def _wrong_numbers(marks: Marks, row: int, usual: float, *, mirrored: bool, off: float, alone: bool) -> Fault:
-    """Say what seems wrong with the marks of one photo."""
     photo, camera = marks.photos[row], marks.camera.name
     begin = f"photo {photo}: the fiducial marks "
     if alone:

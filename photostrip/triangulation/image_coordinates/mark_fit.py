@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from photostrip.points import frozen
 from photostrip.triangulation.image_coordinates.fiducial_marks import Marks, fault
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from photostrip.triangulation.image_coordinates.film_deformation import Deformation
 
 
+SHAPE = ("scale_x", "scale_y", "rotation", "shear")
+BY_PHOTO = ("photo_ids", "transforms", "marks", "residuals", "sigma0", "redundancy", *SHAPE, "mirrored")
 WEAK = 0.01  # strength of a transformation below which marks count as lying on one line
 
 
@@ -52,8 +54,7 @@ class InteriorOrientation:
     film: Deformation | None = None  # deformation beyond the transformations, when it is interpolated
 
     def __post_init__(self) -> None:
-        """Freeze the arrays."""
-        for name in ("sigma0", "scale_x", "scale_y", "rotation", "shear"):
+        for name in ("sigma0", *SHAPE):
             object.__setattr__(self, name, frozen(getattr(self, name)))
         object.__setattr__(self, "redundancy", frozen(self.redundancy, dtype=np.intp))
         object.__setattr__(self, "mirrored", frozen(self.mirrored, dtype=np.bool_))
@@ -98,8 +99,7 @@ def _kinds(marks: Marks, kind: str) -> tuple[NDArray[np.str_], list[Fault]]:
 
 
 def _weak(kind: str, marks: Marks) -> Flags:
-    weak: Flags = plane.strength(kind, marks.measured, marks.weights) < WEAK
-    return weak
+    return plane.strength(kind, marks.measured, marks.weights) < WEAK
 
 
 def _described(marks: Marks, kinds: tuple[str, ...], photo_from_measured: plane.PlaneTransform) -> InteriorOrientation:
@@ -119,10 +119,7 @@ def _described(marks: Marks, kinds: tuple[str, ...], photo_from_measured: plane.
         residuals=tuple(residuals[row, used[row]] for row in range(len(marks.photos))),
         sigma0=sigma0,
         redundancy=redundancy,
-        scale_x=linear.scale_x,
-        scale_y=linear.scale_y,
-        rotation=linear.rotation,
-        shear=linear.shear,
+        **linear._asdict(),
         mirrored=np.full(len(marks.photos), marks.mirrored),
     )
 
@@ -163,27 +160,10 @@ def joined_cameras(
     photos = [photo for part in parts for photo in part.photo_ids]
     place = {photo: number for number, photo in enumerate(order)}
     rows = sorted(range(len(photos)), key=lambda row: place[photos[row]])
-    transforms = [kind for part in parts for kind in part.transforms]
-    marks = [names for part in parts for names in part.marks]
-    residuals = [each for part in parts for each in part.residuals]
-
-    def column(arrays: Iterable[NDArray[np.generic]]) -> Floats:
-        return np.concatenate([np.zeros(0), *arrays])[rows]
-
+    columns: dict[str, Any] = {}
+    for name in BY_PHOTO:
+        column = [each for part in parts for each in getattr(part, name)]
+        columns[name] = tuple(column[row] for row in rows)
     coefficients = [part.photo_from_measured.coefficients for part in parts]
-    return InteriorOrientation(
-        photo_ids=tuple(photos[row] for row in rows),
-        transforms=tuple(transforms[row] for row in rows),
-        photo_from_measured=plane.PlaneTransform(np.concatenate([np.zeros((0, 3, 4)), *coefficients])[rows]),
-        marks=tuple(marks[row] for row in rows),
-        residuals=tuple(residuals[row] for row in rows),
-        sigma0=column(part.sigma0 for part in parts),
-        redundancy=column(part.redundancy for part in parts).astype(np.intp),
-        scale_x=column(part.scale_x for part in parts),
-        scale_y=column(part.scale_y for part in parts),
-        rotation=column(part.rotation for part in parts),
-        shear=column(part.shear for part in parts),
-        mirrored=column(part.mirrored for part in parts).astype(bool),
-        without_marks=digital,
-        notes=notes,
-    )
+    transforms = plane.PlaneTransform(np.concatenate([np.zeros((0, 3, 4)), *coefficients])[rows])
+    return InteriorOrientation(photo_from_measured=transforms, without_marks=digital, notes=notes, **columns)

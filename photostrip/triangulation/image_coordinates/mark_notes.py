@@ -36,10 +36,8 @@ def notes_on_marks(part: InteriorOrientation, camera: Camera) -> list[Note]:
     scale = np.sqrt(part.scale_x * part.scale_y)
     odd = np.abs(np.log(scale)) > ODD_SCALE
     if odd.any():
-        text = (
-            f"a measured millimetre is {np.median(scale[odd]):.5g} mm on {_photos(part, odd)}: unit or pixel size of "
-        )
-        text += "the measurements is not as stated; the transformation puts it right"
+        text = f"a measured millimetre is {np.median(scale[odd]):.5g} mm on {_photos(part, odd)}: unit or pixel size "
+        text += "of the measurements is not as stated; the transformation puts it right"
         notes.append(_note("measured-scale", text, part, odd, severity="note"))
     affinity = np.abs(np.log(part.scale_x / part.scale_y))
     strong = (affinity > STRONG_AFFINITY) | (np.abs(part.shear) > STRONG_SHEAR)
@@ -91,10 +89,9 @@ def _fewer(part: InteriorOrientation, camera: Camera) -> list[Note]:
         notes.append(_note("marks-unchecked", text, part, unchecked))
     conformal = np.array([kind == "conformal" for kind in part.transforms], bool) & ~unchecked
     if conformal.any() and not conformal.all():
-        text = (
-            f"{_photos(part, conformal)}: conformal instead of affine, because not all of the {len(camera.fiducials)} "
-        )
-        text += f"marks of camera {camera.name} were measured: film deformation stays in the coordinates"
+        text = f"{_photos(part, conformal)}: conformal instead of affine, because not all of the "
+        text += f"{len(camera.fiducials)} marks of camera {camera.name} were measured: film deformation stays in the "
+        text += "coordinates"
         notes.append(_note("fewer-marks", text, part, conformal))
     return notes
 

@@ -192,16 +192,9 @@ def detectable(shared: CommonPoints, screened: ScreenedLinks) -> Floats:
     In the direction in which the link checks the point least; infinite where it does not, NaN for rows not used.
     """
     solved = screened.solved
-    reduced = (
-        solved.weight
-        - solved.weight
-        @ solved.design
-        @ solved.cofactors[shared.link]
-        @ solved.design.transpose(0, 2, 1)
-        @ solved.weight
-    )
+    weight, design = solved.weight, solved.design
+    reduced = weight - weight @ design @ solved.cofactors[shared.link] @ design.transpose(0, 2, 1) @ weight
     least = np.linalg.eigvalsh((reduced + reduced.transpose(0, 2, 1)) / 2)[:, 0]
-    size = np.where(
-        least > linking.HELD * np.trace(solved.weight, axis1=1, axis2=2), 1 / np.maximum(least, 1e-300), np.inf
-    )
+    checked = least > linking.HELD * np.trace(weight, axis1=1, axis2=2)
+    size = np.where(checked, 1 / np.maximum(least, 1e-300), np.inf)
     return np.where(screened.used, np.sqrt(POWER * screened.factor * size), np.nan)

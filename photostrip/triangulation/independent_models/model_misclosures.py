@@ -20,21 +20,10 @@ if TYPE_CHECKING:
 
 def misclosures(control: ControlPoints, axes: Floats, xyz: Floats, origin: Floats) -> Misclosures:
     """Control coordinates that count, with their derivatives by a similarity of the strip."""
-    point, axis = np.nonzero(control.use)
-    direction = axes[point, axis]
-    frame = direction[:, None] @ similarity_derivatives(xyz[point], origin)
-    nothing = np.zeros(0, np.intp)
-    rows = ErrorRows(
-        first=nothing,
-        by_similarity=frame,
-        by_component=np.zeros((len(point), 0, 1, 0)),
-        item=nothing,
-        image=nothing,
-        by_image=np.zeros((0, 1, 2)),
-    )
-    return control_errors.Misclosures(
-        point=point, axis=axis, direction=direction, variance=control.sigma[point, axis] ** 2, rows=rows
-    )
+    number = np.arange(len(xyz))
+    no_components = np.zeros((len(xyz), 0, 3, 0))
+    points = ErrorRows.without_images(number, similarity_derivatives(xyz, origin), no_components)
+    return control_errors.misclosures(points, control, number, axes)
 
 
 def weights(found: Misclosures, rows: Numbers, operator: Floats | None = None) -> tuple[Numbers, Floats]:

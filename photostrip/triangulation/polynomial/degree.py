@@ -117,13 +117,11 @@ def _expected(problem: FitProblem) -> Floats:
     weight = problem.by_axis
     with np.errstate(divide="ignore", invalid="ignore"):
         variance = np.where(weight > 0, 1 / weight, 0.0).sum(axis=0) / (weight > 0).sum(axis=0)
-    expected: Floats = np.sqrt(np.nan_to_num(variance))
-    return expected
+    return np.asarray(np.sqrt(np.nan_to_num(variance)), float)
 
 
 def _counted(problem: FitProblem, axis: int) -> Flags:
-    result: Flags = problem.by_axis[:, axis] > 0
-    return result
+    return problem.by_axis[:, axis] > 0
 
 
 def _rms(values: Floats) -> float:

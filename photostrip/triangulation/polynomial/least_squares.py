@@ -40,8 +40,7 @@ class AxisFit:
     @property
     def leverage(self) -> Floats:
         """Share of each control coordinate in its own fit, 0 to 1."""
-        share: Floats = (self.basis**2).sum(axis=1)
-        return share
+        return np.asarray((self.basis**2).sum(axis=1), float)
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,8 +117,7 @@ class Design:
 
     def correction(self, misclosure: Floats) -> Floats:
         """Correct all points, those that do not count too."""
-        result: Floats = self.columns @ self.effects(misclosure)
-        return result
+        return self.columns @ self.effects(misclosure)
 
     def fit(self, misclosure: Floats) -> AxisFit:
         """Fit, with residuals and standard deviations."""

@@ -209,8 +209,7 @@ def _mean_parallaxes(result: Orientation, left: Floats, right: Floats) -> Floats
     (lx, _, lz), (rx, _, rz) = left, right
     with np.errstate(all="ignore"):
         size = np.where(result.used, np.abs(lx / lz - rx / rz), 0.0) * result.pairs.focal
-    mean: Floats = np.nan_to_num(result.pairs.sums(size)) / np.maximum(result.points_used, 1)
-    return mean
+    return np.nan_to_num(result.pairs.sums(size)) / np.maximum(result.points_used, 1)
 
 
 def refuse_unusable(result: Orientation, converged: Flags, photos: Sequence[str]) -> None:

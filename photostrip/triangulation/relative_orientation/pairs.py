@@ -63,8 +63,7 @@ class Pairs:
 
     def sums(self, values: Floats) -> Floats:
         """Sum columns over each pair: values by row, shape (..., m), become sums by pair, shape (..., p)."""
-        total: Floats = np.add.reduceat(values, self.starts, axis=-1)
-        return total
+        return np.add.reduceat(values, self.starts, axis=-1)
 
 
 def collect_pairs(observations: PhotoPoints, photos: Sequence[str], focal: float) -> Pairs:

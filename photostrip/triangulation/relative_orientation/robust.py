@@ -141,5 +141,4 @@ def _best_set(design: Floats, residual: Floats) -> Floats:
     if not len(steps):
         return np.zeros(5)
     left = np.sort(np.abs(residual + steps @ design.T), axis=1)
-    best: Floats = steps[left[:, int(SHARE_OF_SET * (n - 1))].argmin()]
-    return best
+    return np.asarray(steps[left[:, int(SHARE_OF_SET * (n - 1))].argmin()], float)

@@ -64,8 +64,7 @@ def base_rays(elements: Floats, pairs: Pairs) -> tuple[Floats, Floats]:
 def y_parallaxes(elements: Floats, pairs: Pairs) -> Floats:
     """Residual y parallaxes q = y1 - y2 of the photos turned into the base frame, mm at photo scale, shape (m,)."""
     left, right = base_rays(elements, pairs)
-    q: Floats = -pairs.focal * (left[1] / left[2] - right[1] / right[2])
-    return q
+    return np.asarray(-pairs.focal * (left[1] / left[2] - right[1] / right[2]), float)
 
 
 def linearised_parallaxes(elements: Floats, pairs: Pairs) -> Linearised:

@@ -38,8 +38,7 @@ def project(points: Floats, centers: Floats, rotations: Floats, photo: Numbers, 
     focal: (n,), principal distances in mm.
     """
     ray = np.einsum("mi,mij->mj", points - centers[photo], rotations[photo])
-    xy: Floats = -focal[photo, None] * ray[:, :2] / ray[:, 2:]
-    return xy
+    return np.asarray(-focal[photo, None] * ray[:, :2] / ray[:, 2:], float)
 
 
 def derivatives(

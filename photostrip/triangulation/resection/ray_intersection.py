@@ -76,7 +76,6 @@ def intersect_points(
 
 
 def _summed(values: Floats, point: Numbers, count: int) -> Floats:
-    """Sum rows by point."""
     flat = values.reshape(len(values), -1)
     sums = np.column_stack([np.bincount(point, column, count) for column in flat.T])
     return np.asarray(sums.reshape(count, *values.shape[1:]), np.float64)

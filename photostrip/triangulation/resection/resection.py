@@ -73,10 +73,8 @@ def resect(xy: Floats, points: Floats, photo: Numbers, focal: Floats, start: tup
         if converged.all():
             break
     solved = converged & enough
-    centers, rotations = (
-        np.where(solved[:, None], centers, start[0]),
-        np.where(solved[:, None, None], rotations, start[1]),
-    )
+    centers = np.where(solved[:, None], centers, start[0])
+    rotations = np.where(solved[:, None, None], rotations, start[1])
     return replace(with_residuals(xy, points, photo, focal, centers, rotations), solved=solved)
 
 

@@ -151,16 +151,13 @@ def screen(
     """
     size = np.hypot(*spread)
     count = np.bincount(junction, minlength=junctions)
-    level = np.array([normal_quantile(1 - ALPHA / (2 * max(n, 1))) for n in range(int(count.max(initial=0)) + 1)])[
-        count
-    ]
+    levels = [normal_quantile(1 - ALPHA / (2 * max(n, 1))) for n in range(int(count.max(initial=0)) + 1)]
     value = np.log(ratio)
     center = _weighted_medians(value, weight, junction, junctions)
-    scatter = SIGMA_FROM_MEDIAN * _weighted_medians(
-        np.abs(value - center[junction]) / size, np.ones(len(value)), junction, junctions
-    )
+    off = np.abs(value - center[junction]) / size
+    scatter = SIGMA_FROM_MEDIAN * _weighted_medians(off, np.ones(len(value)), junction, junctions)
     scale = np.maximum(1.0, scatter / (1 + PROOF * MEDIAN_SCATTER / np.sqrt(np.maximum(count, 1))))
-    limit = (level * scale)[junction] * size
+    limit = (np.array(levels)[count] * scale)[junction] * size
     few = (count < FEWEST)[junction]
     used = few | (np.abs(value - center[junction]) <= limit)
     for _ in range(ROUNDS):

@@ -157,8 +157,7 @@ def _weights(orientation: Orientation, vectors: Floats, joined: PassPoints, sett
     depth_before = scale_ratios.depths(vectors[before], base[junction])
     depth_after = scale_ratios.depths(vectors[after], base[junction + 1])
     quality = np.minimum(orientation.pairs.weight[before], orientation.pairs.weight[after])
-    weight: Floats = quality / (depth_before**2 + depth_after**2)
-    return weight
+    return quality / (depth_before**2 + depth_after**2)
 
 
 def mean_ratios(ratio: Floats, weight: Floats, junction: Numbers, junctions: int) -> tuple[Floats, Floats]:

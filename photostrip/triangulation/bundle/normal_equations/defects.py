@@ -124,7 +124,6 @@ def _parts(prepared: PreparedProblem) -> list[Numbers]:
 
 
 def _held(prepared: PreparedProblem, state: Parameters, photos: Numbers) -> Held:
-    """Sum up how one part is held."""
     problem = prepared.problem
     inside = np.zeros(problem.photos, bool)
     inside[photos] = True
@@ -162,7 +161,6 @@ def _information(linear: LinearisedOrientations, moves: Floats, inside: Flags, p
 
 
 def _moves(state: Parameters, held: Held, loose: Floats) -> str:
-    """Name the movements that are not determined."""
     flight, across, up = _flight_axes(state, held.photos)
     line = _line(held.control)
     zero = np.zeros(3)
@@ -204,7 +202,6 @@ def _line(control: Floats) -> Floats | None:
 
 
 def _reason(held: Held) -> str:
-    """Say why."""
     if not len(held.control):
         return "no control and no camera positions"
     if len(np.unique(held.control, axis=0)) == 1:

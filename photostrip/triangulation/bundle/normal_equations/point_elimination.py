@@ -185,7 +185,6 @@ def _small_squares(run: tuple[Floats, Floats], to: tuple[Floats, Floats], count:
 
 
 def _large_squares(run: tuple[Floats, Floats], to: tuple[Floats, Floats], count: int, size: int) -> None:
-    """Multiply where the numbers are."""
     p, _, k, _ = run[0].shape
     singles = run[0].reshape(p, 2, k, count, size).transpose(1, 2, 3, 0, 4)
     both = singles @ singles[..., :-1, :].swapaxes(-1, -2)

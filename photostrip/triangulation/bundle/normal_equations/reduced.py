@@ -10,12 +10,13 @@ import numpy as np
 from photostrip.triangulation.bundle.normal_equations.band import Band
 from photostrip.triangulation.bundle.normal_equations.point_elimination import blocks_of, eliminate, squares
 from photostrip.triangulation.bundle.normal_equations.sparse import Sparse
-from photostrip.triangulation.bundle.observations import given_orientations
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO, by_photo
+from photostrip.triangulation.bundle.observations.given_orientations import attitudes_at, positions_at
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats
     from photostrip.triangulation.bundle.normal_equations.point_elimination import Eliminated
+    from photostrip.triangulation.bundle.observations.given_orientations import LinearisedOrientations
     from photostrip.triangulation.bundle.parameters import Parameters, PreparedProblem
 
 
@@ -89,17 +90,11 @@ def _add_given(prepared: PreparedProblem, state: Parameters, blocks: Floats, bor
     return total + float((weight * state.common**2).sum())
 
 
-def given_at(
-    prepared: PreparedProblem, state: Parameters
-) -> tuple[given_orientations.LinearisedOrientations, given_orientations.LinearisedOrientations]:
+def given_at(prepared: PreparedProblem, state: Parameters) -> tuple[LinearisedOrientations, LinearisedOrientations]:
     """Linearise camera positions and attitudes at a state."""
-    problem = prepared.problem
-    return (
-        given_orientations.positions_at(
-            problem.positions, state.centers, state.rotations, state.common, len(prepared.calibrated)
-        ),
-        given_orientations.attitudes_at(problem.attitudes, state.rotations, len(state.common)),
-    )
+    problem, calibrated = prepared.problem, len(prepared.calibrated)
+    positions = positions_at(problem.positions, state.centers, state.rotations, state.common, calibrated)
+    return positions, attitudes_at(problem.attitudes, state.rotations, len(state.common))
 
 
 def points_of(prepared: PreparedProblem, state: Parameters) -> Floats:

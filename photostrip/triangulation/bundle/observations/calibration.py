@@ -27,7 +27,6 @@ class Calibrated:
     sigma: Floats  # (c,): a-priori standard deviations; infinite: free
 
     def __len__(self) -> int:
-        """Count the parameters."""
         return len(self.kind)
 
 

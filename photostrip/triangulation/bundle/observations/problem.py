@@ -52,7 +52,6 @@ class ImageObservations:
     sigma: Floats  # (n, 2): their standard deviations in mm
 
     def __len__(self) -> int:
-        """Count the rays."""
         return len(self.photo)
 
 
@@ -71,7 +70,6 @@ class ControlObservations:
     sigma: Floats = field(default_factory=lambda: _no_rows(3))
 
     def __len__(self) -> int:
-        """Count the rows."""
         return len(self.point)
 
 
@@ -101,7 +99,6 @@ class PositionObservations:
     drift_sigma: Floats = field(default_factory=_no_rows)
 
     def __len__(self) -> int:
-        """Count the rows."""
         return len(self.photo)
 
 
@@ -116,7 +113,6 @@ class AttitudeObservations:
     sigma: Floats = field(default_factory=lambda: _no_rows(3))
 
     def __len__(self) -> int:
-        """Count the rows."""
         return len(self.photo)
 
 

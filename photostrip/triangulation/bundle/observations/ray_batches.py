@@ -109,8 +109,6 @@ class _Groups(NamedTuple):
 
 
 class _Pieces(NamedTuple):
-    """Groups of a batch."""
-
     begin: Numbers  # first place in the order of the points
     length: Numbers  # number of points
     slots: Numbers  # number of slots

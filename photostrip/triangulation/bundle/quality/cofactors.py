@@ -106,7 +106,6 @@ def cofactors_of(solution: BundleSolution) -> Cofactors:
 
 
 def _inverse(reduced: Reduced, band: Factor) -> Inverse:
-    """Invert photos and common parameters."""
     p = len(reduced.corner) - 1
     border = reduced.border.reshape(-1, p + 1)[:, :p]
     cross = band.solve(border) if p else np.zeros_like(border)

@@ -158,7 +158,6 @@ def _significant(value: float, sigma: float, freedom: int, least: float) -> bool
 
 
 def _other_scale(on_strip: StripPoints, ratio: float, sigma: float, in_fit: Flags) -> Finding:
-    """Say why heights are stretched against the plan."""
     evidence: Evidence = {
         "heights_given_over_strip": ratio,
         "its_standard_deviation": sigma,

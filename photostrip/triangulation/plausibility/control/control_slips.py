@@ -22,9 +22,8 @@ if TYPE_CHECKING:
 SCALE_CHANGE = 3e-4  # of a large error: the scale of a map is not the same where the point came to lie
 LEAST_RAYS = 2
 CLEARER_SIGMAS = 6.0  # times as large as otherwise a slip must be where a wrong image coordinate explains it as well
-NEAR_SIGMAS = (
-    3.5  # standard deviations within which the slip must fit where a wrong image coordinate explains it as well
-)
+# standard deviations within which the slip must fit where a wrong image coordinate explains it as well
+NEAR_SIGMAS = 3.5
 SOUND_SIGMAS = 4.5  # within which the other coordinates of a point with a slip of the pen lie
 RIDGE_SHARE = 1e-9  # of a variance: no computer knows them better
 UNKNOWN_HEIGHT_SIGMAS = 1e3  # standard deviations in plan: that of a height that is not given

@@ -71,7 +71,6 @@ class Rays:
     focal: float  # principal distance, mm
 
     def __len__(self) -> int:
-        """Count the photos."""
         return len(self.xy)
 
     def shown(self, xyz: Floats) -> bool:
@@ -168,9 +167,8 @@ def turn_level(given: GivenPoints, level: LevelStrip, floor: float, in_fit: Flag
         return level
     mean = float(height[usable].mean())
     columns = [np.ones(len(place)), place.real, place.imag]
-    columns += (
-        [height - mean] if usable.sum() >= LEAST_POINTS + 2 * LEAST_REDUNDANCY else []
-    )  # a wrong unit of the heights is no tilt
+    if usable.sum() >= LEAST_POINTS + 2 * LEAST_REDUNDANCY:
+        columns.append(height - mean)  # a wrong unit of the heights is no tilt
     design = np.where(usable[:, None], np.column_stack(columns), 0.0)
     value = np.where(usable, given.xyz[:, 2] - height, 0.0)
     depth = level.depth * level.scale

@@ -65,9 +65,7 @@ def find_weak_control(
 
 def _on_a_line(plan: Floats, half_breadth: float, ids: Sequence[str], strip: str) -> Iterator[Finding]:
     """Tell control that stands on one line: nothing holds the rotation about it."""
-    if (
-        len(ids) <= LEAST_POINTS or half_breadth <= 0
-    ):  # points measured along one line only: there is nothing to compare with
+    if len(ids) <= LEAST_POINTS or half_breadth <= 0:  # points measured along one line only have no breadth
         return
     values = np.linalg.svd(plan - plan.mean(axis=0), compute_uv=False)
     breadth = float(values[-1] / np.sqrt(len(ids) - LEAST_POINTS) / half_breadth)

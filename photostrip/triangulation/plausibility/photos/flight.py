@@ -52,7 +52,6 @@ def find_odd_centers(
 
 
 def _below(photos: Sequence[str], depth: Floats, below: Numbers, names: tuple[str, ...]) -> Finding:
-    """Say which perspective centres lie below the ground."""
     message = (
         f"the perspective centre of photo {photos[0]} lies below the points that it shows"
         if len(photos) == 1

@@ -219,16 +219,10 @@ def _order(links: mosaic.PhotoLinks, plane: mosaic.Mosaic, listed: list[int], co
     if not against or len(listed) < LEAST_PHOTOS:
         return listed
     order: list[int] = []
-    for part in range(int(plane.part.max()) + 1):
-        inside = [number for number in listed if plane.part[number] == part]
-        order += _along(plane, inside)
-    order.sort(key=lambda number: listed.index(_first_of(plane, listed, number)))  # parts as they are listed
+    for part in dict.fromkeys(plane.part[listed].tolist()):  # as they are listed
+        order += _along(plane, [number for number in listed if plane.part[number] == part])
     left = len(contradictions(order)) + _unlinked(links, order)
     return order if left < against else listed
-
-
-def _first_of(plane: mosaic.Mosaic, listed: Sequence[int], number: int) -> int:
-    return next(other for other in listed if plane.part[other] == plane.part[number])
 
 
 def _along(plane: mosaic.Mosaic, inside: list[int]) -> list[int]:

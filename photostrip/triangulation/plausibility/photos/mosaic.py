@@ -49,10 +49,6 @@ class PhotoLinks:
     spread: Floats  # (l,): rms distance of the common points from their centre, on the second photo
     mirrored: Flags  # (l,): whether one of the two is a mirror image of the other
 
-    def __len__(self) -> int:
-        """Return the number of links."""
-        return len(self.count)
-
     @cached_property
     def bases(self) -> tuple[Complex, Complex]:
         """Centre of the second photo as it would lie on the first, and of the first on the second."""
