@@ -30,7 +30,7 @@ lint: $(VENV)/dev.installed
 	$(BIN)/ruff format --check $(SOURCES)
 
 types: $(VENV)/dev.installed
-	$(BIN)/mypy $(SOURCES)
+	$(BIN)/mypy --num-workers $(WORKERS) $(SOURCES)
 
 lowest: ## all tests on exactly the lower bounds of pyproject.toml, in a venv of their own
 	rm -rf .venv-lowest

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import os
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import settings
 
 from photostrip.threads import limit_threads
+from tests.forked import Forks
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
 
 limit_threads()  # before a test imports numpy
 
@@ -23,3 +29,10 @@ def _plain_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NO_COLOR", "1")
     for forcing in ("FORCE_COLOR", "CLICOLOR_FORCE", "PY_COLORS"):
         monkeypatch.delenv(forcing, raising=False)
+
+
+@pytest.fixture(scope="session")
+def forked() -> Iterator[Path]:
+    """Give a ``photostrip`` command that need not load the libraries each time."""
+    with Forks() as forks:
+        yield forks.command

@@ -132,7 +132,8 @@ def matches(expected: tuple[str, ...], actual: tuple[str, ...]) -> bool:
 class Scratch:
     """A folder with what a user has, in which the blocks of one page run one after the other."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, command: Path | None = None) -> None:
+        """`command` is the ``photostrip`` to take; without it, the one that is installed."""
         self.folder = folder / "project"
         self.folder.mkdir()
         for name in COPIED:
@@ -140,7 +141,9 @@ class Scratch:
                 shutil.copytree(ROOT / name, self.folder / name)
         self.environment = os.environ | {"COLUMNS": "100", "NO_COLOR": "1", "PYTHONUTF8": "1"}
         path = [str(Path(sys.executable).parent), os.environ.get("PATH", os.defpath)]
-        if not (Path(sys.executable).parent / "photostrip").exists():
+        if command is not None:
+            path.insert(0, str(command.parent))
+        elif not (Path(sys.executable).parent / "photostrip").exists():
             self.environment["PYTHONPATH"] = str(ROOT)
             path.insert(0, str(self._stand_in(folder / "bin")))
         self.environment["PATH"] = os.pathsep.join(path)
@@ -170,9 +173,9 @@ class Scratch:
         return self.run(["bash", "-c", command])
 
 
-def faults_of_page(page: Path, folder: Path) -> list[str]:
+def faults_of_page(page: Path, folder: Path, command: Path | None = None) -> list[str]:
     """Run every block of `page` and give what does not do what the page says."""
-    scratch = Scratch(folder)
+    scratch = Scratch(folder, command)
     found = []
     for block in blocks(page):
         if name := block.option("file"):

@@ -42,8 +42,8 @@ def test_the_workflow_installs_this_version() -> None:
 
 
 @pytest.mark.slow
-def test_the_steps_of_the_workflow_run_and_annotate(tmp_path: Path) -> None:
-    scratch = Scratch(tmp_path)
+def test_the_steps_of_the_workflow_run_and_annotate(tmp_path: Path, forked: Path) -> None:
+    scratch = Scratch(tmp_path, forked)
     shutil.copy(ROOT / "configs/ci/regress.sh", scratch.folder)
     for name in ("line-07", "line-08"):
         write_project(scratch.folder / "strips" / name, spec())

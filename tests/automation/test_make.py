@@ -93,20 +93,20 @@ def test_a_grid_that_is_far_away_is_listed_by_its_path(tmp_path: Path, monkeypat
 
 
 class Folder:
-    """A folder of strips with the example Makefile."""
+    """A folder of strips with the example Makefile; `command` is the ``photostrip`` that it calls."""
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    def __init__(self, path: Path, command: object = f"{sys.executable} -m photostrip") -> None:
+        self.path, self.command = path, command
         shutil.copy(ROOT / "configs/Makefile.example", path / "Makefile")
 
     def make(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         """Run make, as a user would type it."""
         flags = dict.fromkeys(("MAKEFLAGS", "MFLAGS", "MAKELEVEL"), "")
         environment = os.environ | flags | {"PYTHONPATH": str(ROOT)}
-        command = f"PHOTOSTRIP={sys.executable} -m photostrip"
         return subprocess.run(
-            ["make", command, *arguments], cwd=self.path, env=environment, capture_output=True, text=True, check=False
-        )
+            ["make", f"PHOTOSTRIP={self.command}", *arguments],
+            cwd=self.path, env=environment, capture_output=True, text=True, check=False,
+        )  # fmt: skip
 
     def times(self) -> dict[str, int]:
         """Give the time of each result."""
@@ -127,9 +127,9 @@ class Folder:
 
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
-def test_make_adjusts_what_changed_and_nothing_else(tmp_path: Path) -> None:
+def test_make_adjusts_what_changed_and_nothing_else(tmp_path: Path, forked: Path) -> None:
     two_strips(tmp_path)
-    folder = Folder(tmp_path)
+    folder = Folder(tmp_path, forked)
     assert folder.renewed("-j2") == {"a", "b"}
     assert folder.renewed("-j2") == set()
     for touched, expected in (
@@ -167,9 +167,9 @@ def test_make_names_a_table_that_is_gone_and_keeps_the_result(tmp_path: Path) ->
 
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
-def test_make_check_compares_and_watches_tolerances(tmp_path: Path) -> None:
+def test_make_check_compares_and_watches_tolerances(tmp_path: Path, forked: Path) -> None:
     two_strips(tmp_path)
-    folder = Folder(tmp_path)
+    folder = Folder(tmp_path, forked)
     first = folder.make("-j2", "check")
     assert first.returncode == 0
     assert first.stdout.count("no baseline.json") == 2
