@@ -54,7 +54,7 @@ def _computed(task: Task, source: Source) -> Answer:
         document = document_of(adjust_project(project), project.remarks)
         files = result_files(document, project.resolved)
     outcome = outcome_of(document, result_findings(document))
-    return Answer(task.number, outcome, files, _inputs(project, source))
+    return Answer(number=task.number, outcome=outcome, files=files, inputs=_inputs(project, source))
 
 
 def _inputs(project: Project, source: Source) -> dict[str, str | None]:

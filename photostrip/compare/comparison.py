@@ -84,11 +84,33 @@ def _require_comparable(document: Document, baseline: Document, files: tuple[str
         if _folded(now) != _folded(before):
             message = f"cannot be compared with {files[1] or 'the baseline'}: {words} is {_shown(now)}"
             fix = "write both in one frame (`output` in the project), or renew the baseline with --update"
-            faults.append(Fault(message, "not-comparable", files[0], 0, 0, f"frame.{key}", _shown(before), fix))
+            faults.append(
+                Fault(
+                    message=message,
+                    code="not-comparable",
+                    file=files[0],
+                    line=0,
+                    column=0,
+                    key=f"frame.{key}",
+                    expected=_shown(before),
+                    fix=fix,
+                )
+            )
     if not faults and not _common_points(document, baseline):
         message = f"cannot be compared with {files[1] or 'the baseline'}: no point is in both"
         fix = "is it the baseline of another strip?"
-        faults.append(Fault(message, "not-comparable", files[0], 0, 0, "points", "the same strip", fix))
+        faults.append(
+            Fault(
+                message=message,
+                code="not-comparable",
+                file=files[0],
+                line=0,
+                column=0,
+                key="points",
+                expected="the same strip",
+                fix=fix,
+            )
+        )
     if faults:
         raise InputError(faults)
 
@@ -139,7 +161,7 @@ def _compared(document: Document, baseline: Document, tolerances: Tolerances) ->
         *_control(document, baseline),
         *_rotations(document, baseline),
     ):
-        quantity = Quantity(kind, block, name, kind, UNITS[kind], None)
+        quantity = Quantity(kind=kind, block=block, id=name, name=kind, unit=UNITS[kind], value=None)
         yield _row(quantity, None, size, tolerances.of(kind).absolute, tolerances)
 
 

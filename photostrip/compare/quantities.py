@@ -72,7 +72,7 @@ def quantities_of(document: Document) -> Iterator[Quantity]:
                 yield from _precisions(name, "sigma", row["sigma"])
             elif block == "points":
                 for key in ("sigma_x", "sigma_y", "sigma_z"):
-                    yield Quantity("precision", "points", name, key, "m", row[key])
+                    yield Quantity(kind="precision", block="points", id=name, name=key, unit="m", value=row[key])
 
 
 def name_of(block: str, row: Document) -> str:
@@ -87,7 +87,7 @@ def _numbers(block: str, name: str, value: object, path: str = "") -> Iterator[Q
             yield from _numbers(block, name, each, f"{path}.{key}" if path else key)
     elif _is_number(value):
         kind, unit = _kind_and_unit(block, path, value)
-        yield Quantity(kind, block, name, path, unit, value)
+        yield Quantity(kind=kind, block=block, id=name, name=path, unit=unit, value=value)
 
 
 def _is_number(value: object) -> TypeGuard[Number]:
@@ -111,7 +111,9 @@ def _effects(name: str, block: Document) -> Iterator[Quantity]:
     """Return the size of each term at the end of the control's range, in metres, rather than its coefficient."""
     for axis, effects in block["effects"].items():
         for term, effect in zip(block["terms"][axis], effects, strict=True):
-            yield Quantity("statistics", "polynomials", name, f"effect {axis} {term}", "m", effect)
+            yield Quantity(
+                kind="statistics", block="polynomials", id=name, name=f"effect {axis} {term}", unit="m", value=effect
+            )
 
 
 def _elements(name: str, model: Document) -> Iterator[Quantity]:
@@ -119,7 +121,14 @@ def _elements(name: str, model: Document) -> Iterator[Quantity]:
     elements = model["elements"]
     for element in ELEMENTS if elements is not None else ():
         value, unit = elements[element], DEGREES[elements["unit"]]
-        yield Quantity("rotation", "models", name, element, "deg", None if value is None else value * unit)
+        yield Quantity(
+            kind="rotation",
+            block="models",
+            id=name,
+            name=element,
+            unit="deg",
+            value=None if value is None else value * unit,
+        )
 
 
 def _precisions(name: str, path: str, value: object) -> Iterator[Quantity]:
@@ -128,7 +137,7 @@ def _precisions(name: str, path: str, value: object) -> Iterator[Quantity]:
         for key, each in value.items() if isinstance(value, dict) else enumerate(value):
             yield from _precisions(name, f"{path}.{key}" if isinstance(value, dict) else f"{path}[{key}]", each)
     elif _is_number(value):
-        yield Quantity("precision", "photos", name, path, "", value)
+        yield Quantity(kind="precision", block="photos", id=name, name=path, unit="", value=value)
 
 
 SPECIAL = {"polynomials": _effects, "models": _elements}

@@ -59,7 +59,9 @@ def tie_ground_frames(inputs: Inputs, settings: Settings, directory: Path | None
         tied, target = [frame.with_origin(origin) for frame in tied], target.with_origin(origin)
     found = dict(zip(named, tied, strict=True))
     control = tuple(found[f"control[{number}]"] for number in range(len(inputs.frames)))
-    return GroundFrames(control, target, found.get(CAMERAS[0]), found.get(CAMERAS[1]))
+    return GroundFrames(
+        control=control, output=target, positions=found.get(CAMERAS[0]), orientations=found.get(CAMERAS[1])
+    )
 
 
 def _nothing_given(inputs: Inputs) -> bool:

@@ -97,10 +97,10 @@ def strips(project: ProjectFile, known: Mapping[str, camera.Camera]) -> tuple[St
     usual = project.processing.bundle.self_calibration
     return tuple(
         Strip(
-            str(each.id),
-            known[each.camera],
-            tuple(map(str, each.photos)),
-            tuple(
+            id=str(each.id),
+            camera=known[each.camera],
+            photos=tuple(map(str, each.photos)),
+            calibrate=tuple(
                 dict.fromkeys(usual if (wanted := project.cameras[each.camera].self_calibration) is None else wanted)
             ),
         )

@@ -225,7 +225,9 @@ def _observations(project: ProjectFile, tables: Tables, photos: dict[str, Camera
     given = project.observations
     if given is None or tables.observations is None:
         raise InputError("a table of the project is missing")
-    system = ImageSystem(given.unit, given.y_axis or "up", given.origin or "center", given.sigma)
+    system = ImageSystem(
+        unit=given.unit, y_axis=given.y_axis or "up", origin=given.origin or "center", sigma=given.sigma
+    )
     return photo_points(tables.observations, system, photos)
 
 
@@ -246,5 +248,5 @@ def _fiducials(project: ProjectFile, tables: Tables, photos: dict[str, Camera]) 
     if given is None or tables.fiducials is None:
         return None
     unit = given.unit or (project.observations.unit if project.observations is not None else "mm")
-    system = ImageSystem(unit, given.y_axis or "up", "center", given.sigma)
+    system = ImageSystem(unit=unit, y_axis=given.y_axis or "up", origin="center", sigma=given.sigma)
     return photo_points(tables.fiducials, system, photos)

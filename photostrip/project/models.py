@@ -222,10 +222,19 @@ def _rows(read: ModelTable, rows: Numbers, wanted: Sequence[str], default: Seque
     if default is not None:
         sigma = np.where(np.isnan(sigma), default, sigma)
     models = [read.model_ids[code] for code in read.models[rows]]
-    return _Rows(models, [read.target_ids[code] for code in read.targets[rows]], read.xyz[rows], sigma)
+    return _Rows(
+        models=models, targets=[read.target_ids[code] for code in read.targets[rows]], xyz=read.xyz[rows], sigma=sigma
+    )
 
 
 def named_points(models: MeasuredModels) -> PhotoPoints:
     """Return a table of image points that holds none and only names the points of the models."""
     nothing = np.zeros(0, np.intp)
-    return PhotoPoints((), models.points.point_ids, nothing, nothing, np.zeros((0, 2)), np.zeros((0, 2)))
+    return PhotoPoints(
+        photo_ids=(),
+        point_ids=models.points.point_ids,
+        photo=nothing,
+        point=nothing,
+        xy=np.zeros((0, 2)),
+        sigma=np.zeros((0, 2)),
+    )

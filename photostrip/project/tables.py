@@ -75,7 +75,14 @@ def read_tables(reading: Reading) -> Tables:
     for path, findings in reading.named(("models", "centers", "file")):
         centers = read_model_points(path, root, findings, centers=True)
     models = model_tables(points, centers, root)
-    return Tables(observations, fiducials, control, positions, orientations, models)
+    return Tables(
+        observations=observations,
+        fiducials=fiducials,
+        control=control,
+        positions=positions,
+        orientations=orientations,
+        models=models,
+    )
 
 
 def _manner(root: Node, section: str, photos: frozenset[str]) -> Manner:
@@ -88,7 +95,14 @@ def _manner(root: Node, section: str, photos: frozenset[str]) -> Manner:
         sigma = None if source is None else read_number(source.text)
     except NotANumber:  # which the schema refuses
         sigma = None
-    return Manner(marks, source is not None, sigma, node.word("repeated"), _columns(node), photos)
+    return Manner(
+        marks=marks,
+        has_sigma=source is not None,
+        sigma=sigma,
+        repeated=node.word("repeated"),
+        columns=_columns(node),
+        photos=photos,
+    )
 
 
 def _columns(node: Node) -> dict[str, str]:

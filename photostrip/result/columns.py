@@ -54,8 +54,8 @@ def photos_csv(angles: Document) -> list[Column]:
     """List the columns of photos.csv for a system and a unit of angles; the keys are those of flat records."""
     decimals, unit = angle_decimals(angles["unit"]), angles["unit"]
     names = [f"{name}_{unit}" for name in angles["system"].split("-")]
-    angle = Quantity("angle of the photo", "number", unit, decimals)
-    sigma = Quantity("standard deviation of the angle", "number", unit, decimals)
+    angle = Quantity(meaning="angle of the photo", kind="number", unit=unit, decimals=decimals)
+    sigma = Quantity(meaning="standard deviation of the angle", kind="number", unit=unit, decimals=decimals)
     return [
         *columns("photos", "photo=id strip x y z"),
         *(Column(name, name, angle) for name in names),

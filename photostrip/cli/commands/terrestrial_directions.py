@@ -318,7 +318,9 @@ def orient(  # noqa: PLR0913 (an argument for each option)
             options.free_elements(free), screening, within("--significance", significance, SIGNIFICANCE)
         )
         measured = options.theodolite_sigmas(sigma_arcsec, vertical_arcsec, rounds)
-        given = options.SightingOptions(unit, angles, options.image_sigma(sigma_um), measured)
+        given = options.SightingOptions(
+            unit=unit, angles=angles, sigma=options.image_sigma(sigma_um), theodolite=measured
+        )
         sightings, notes = options.read_sightings(table, given)
         say(notes, quiet=quiet)
         found = orientation.orient(sightings, chosen.principal_distance, chosen.principal_point, settings)

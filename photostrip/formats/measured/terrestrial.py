@@ -92,7 +92,13 @@ def read_coordinates(file: str, findings: Findings) -> EpochTable | None:
     table = read_table(file, COORDINATES, findings)
     if table is None:
         return None
-    read = EpochTable(table, table.ids["epoch"], table.ids["point"], table.codes["epoch"], table.codes["point"])
+    read = EpochTable(
+        table=table,
+        epochs=table.ids["epoch"],
+        points=table.ids["point"],
+        epoch=table.codes["epoch"],
+        point=table.codes["point"],
+    )
     if not findings.number(file):
         key = (read.epoch * len(SIDES) + read.side) * len(read.points) + read.point
         _refuse_repeated(table, key, " for the same photo and epoch", findings)
@@ -111,7 +117,13 @@ def read_pseudo_parallaxes(file: str, findings: Findings) -> EpochTable | None:
         return None
     named = "epoch" in table.codes
     epoch = table.codes["epoch"] if named else np.zeros(len(table), np.intp)
-    read = EpochTable(table, table.ids["epoch"] if named else (), table.ids["point"], epoch, table.codes["point"])
+    read = EpochTable(
+        table=table,
+        epochs=table.ids["epoch"] if named else (),
+        points=table.ids["point"],
+        epoch=epoch,
+        point=table.codes["point"],
+    )
     if not findings.number(file):
         where = " for the same epoch" if named else ""
         _refuse_repeated(table, read.epoch * len(read.points) + read.point, where, findings)

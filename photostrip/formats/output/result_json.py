@@ -53,7 +53,9 @@ def read_result(file: str) -> Document:
     except json.JSONDecodeError as error:
         message = f"is not JSON: {error.msg[:1].lower()}{error.msg[1:]}"
         fix = "a result.json that was not written to its end? run the project again"
-        raise InputError(Fault(message, "result-json", file, error.lineno, error.colno, fix=fix)) from None
+        raise InputError(
+            Fault(message=message, code="result-json", file=file, line=error.lineno, column=error.colno, fix=fix)
+        ) from None
     except RecursionError:
         refuse(file, "result-json", "is nested too deeply", expected="a result.json of photostrip")
     if not isinstance(document, dict) or "photostrip_result" not in document:

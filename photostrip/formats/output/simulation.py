@@ -34,11 +34,11 @@ def inputs_of(simulation: Simulation) -> Inputs:
     if simulation.models is not None:
         return _inputs_of_models(simulation, simulation.models)
     return Inputs(
-        simulation.spec.name,
-        tuple(Strip(name, simulation.camera, photos) for name, photos in simulation.strips),
-        simulation.observations,
-        simulation.control,
-        simulation.frames,
+        name=simulation.spec.name,
+        strips=tuple(Strip(name, simulation.camera, photos) for name, photos in simulation.strips),
+        observations=simulation.observations,
+        control=simulation.control,
+        frames=simulation.frames,
         fiducials=simulation.fiducials,
     )
 
@@ -54,11 +54,18 @@ def _inputs_of_models(simulation: Simulation, points: ModelPoints) -> Inputs:
         first += count
     nothing = np.zeros(0, np.intp)
     return Inputs(
-        simulation.spec.name,
-        (),
-        PhotoPoints((), points.point_ids, nothing, nothing, np.zeros((0, 2)), np.zeros((0, 2))),
-        simulation.control,
-        simulation.frames,
+        name=simulation.spec.name,
+        strips=(),
+        observations=PhotoPoints(
+            photo_ids=(),
+            point_ids=points.point_ids,
+            photo=nothing,
+            point=nothing,
+            xy=np.zeros((0, 2)),
+            sigma=np.zeros((0, 2)),
+        ),
+        control=simulation.control,
+        frames=simulation.frames,
         models=MeasuredModels(tuple(flights), points),
     )
 

@@ -136,5 +136,13 @@ def decode(file: str, data: bytes) -> tuple[str, bool]:
         line = head.count(b"\n") + 1
         column = len(head[head.rfind(b"\n") + 1 :].decode()) + 1
         message = f"byte 0x{body[error.start]:02x} is not UTF-8 text"
-        fault = Fault(message, "encoding", file, line, column, expected="UTF-8", fix="save the file as UTF-8")
+        fault = Fault(
+            message=message,
+            code="encoding",
+            file=file,
+            line=line,
+            column=column,
+            expected="UTF-8",
+            fix="save the file as UTF-8",
+        )
         raise InputError(fault) from None

@@ -112,7 +112,7 @@ class _Reader:
             if not column.number:
                 parts = [np.zeros(0, np.intp), *self.codes[column.name]]
                 codes[column.name], ids[column.name] = self._clean(column, np.concatenate(parts), places)
-        return Table(self.source.file, places, numbers, codes, ids, self.source)
+        return Table(file=self.source.file, lines=places, numbers=numbers, codes=codes, ids=ids, _source=self.source)
 
     def _add(self, line: int, column: str, message: str, code: str, *, expected: str = "", fix: str = "") -> None:
         if self.findings.full(self.source.file):

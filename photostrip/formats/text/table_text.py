@@ -37,13 +37,15 @@ class TableText:
         places, header = dict(self.where), dict(self.header)
         if where in places:
             places[column], header[column] = places[where], header[where]
-        return TableText(self.file, self.data, places, header)
+        return TableText(file=self.file, data=self.data, where=places, header=header)
 
     def fault(self, line: int, column: str, message: str, code: str, *, expected: str = "", fix: str = "") -> Fault:
         """Make a fault at the character where a cell begins; without a column at the line."""
         position = self._position(line, self.where[column]) if column in self.where else 0
         name = self.header.get(column, column)
-        return Fault(message, code, self.file, line, position, name, expected, fix)
+        return Fault(
+            message=message, code=code, file=self.file, line=line, column=position, key=name, expected=expected, fix=fix
+        )
 
     def _position(self, line: int, wanted: int) -> int:
         """Character, counted from 1, at which a field of a line begins; 0 when the line has not so many."""

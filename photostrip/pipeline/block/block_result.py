@@ -43,7 +43,7 @@ def adjusted_strips(inputs: Inputs, observations: PhotoPoints, output: GroundFra
     covariances = bundle.screened.precision.points[number] * bundle.unit**2
     photos = tuple(bundle.photo_covariances[begin : begin + count[n]] for n, begin in places)
     basis = "a-priori" if bundle.unit == 1.0 else "a-posteriori"
-    precision = Precision(covariances, photos, (sigma,) * len(strips), (basis,) * len(strips))
+    precision = Precision(points=covariances, photos=photos, sigma=(sigma,) * len(strips), basis=(basis,) * len(strips))
     return AdjustedStrips(
         strips=strips,
         points=points,

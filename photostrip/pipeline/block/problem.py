@@ -54,22 +54,25 @@ def build(
     photo = start.rows_of(observations.photo_ids)
     rows = np.flatnonzero(~_named(settings.relative.drop, observations))
     images = ImageObservations(
-        photo[observations.photo[rows]], observations.point[rows], observations.xy[rows], observations.sigma[rows]
+        photo=photo[observations.photo[rows]],
+        point=observations.point[rows],
+        xy=observations.xy[rows],
+        sigma=observations.sigma[rows],
     )
     given, control_rows = _control(control, ground.control, observations, start, origin)
     positions = _positions(inputs, ground.positions, ground.orientations, start, origin)
     attitudes = _attitudes(inputs.orientations, ground.orientations, start)
     problem = BundleProblem(
-        images,
-        _cameras(inputs, settings),
-        StartValues(start.centers - origin, start.rotations, start.points - origin),
-        given,
-        positions,
-        attitudes,
-        start.photos,
-        observations.point_ids,
-        tuple(dict.fromkeys(strip.camera.name for strip in inputs.strips)),
-        tuple(strip.id for strip in inputs.strips),
+        images=images,
+        cameras=_cameras(inputs, settings),
+        start=StartValues(start.centers - origin, start.rotations, start.points - origin),
+        control=given,
+        positions=positions,
+        attitudes=attitudes,
+        photo_ids=start.photos,
+        point_ids=observations.point_ids,
+        camera_ids=tuple(dict.fromkeys(strip.camera.name for strip in inputs.strips)),
+        group_ids=tuple(strip.id for strip in inputs.strips),
     )
     level = {
         "control": tuple(
@@ -143,7 +146,7 @@ def _control(
             xyz[inside], axes[inside], sigma[inside] = given_positions(
                 control.enu[chosen], control.use[chosen], control.sigma[chosen], frame, start.points[point[chosen]], ids
             )
-    return ControlObservations(point[rows], xyz - origin, axes, sigma), rows
+    return ControlObservations(point=point[rows], xyz=xyz - origin, axes=axes, sigma=sigma), rows
 
 
 def _positions(
@@ -162,7 +165,15 @@ def _positions(
         )
         none = np.zeros((len(photo), 3))
         parts.append(
-            PositionObservations(photo, xyz - origin, axes, sigma, none, np.full(len(photo), -1), np.zeros(len(photo)))
+            PositionObservations(
+                photo=photo,
+                xyz=xyz - origin,
+                axes=axes,
+                sigma=sigma,
+                lever=none,
+                group=np.full(len(photo), -1),
+                time=np.zeros(len(photo)),
+            )
         )
     if len(parts) < 2:
         return parts[0] if parts else PositionObservations()
@@ -188,7 +199,17 @@ def _measured(
     wanted = np.where((members > 0) & (positions.correction != NO_CORRECTION), np.inf, 0.0)
     drift = np.where((members > 1) & (positions.correction == DRIFT), np.inf, 0.0)
     group = strip if positions.correction != NO_CORRECTION else np.full(len(photo), -1)
-    return PositionObservations(photo, xyz - origin, axes, sigma, lever, group, time - mean[strip], wanted, drift)
+    return PositionObservations(
+        photo=photo,
+        xyz=xyz - origin,
+        axes=axes,
+        sigma=sigma,
+        lever=lever,
+        group=group,
+        time=time - mean[strip],
+        offset_sigma=wanted,
+        drift_sigma=drift,
+    )
 
 
 def _level_positions(

@@ -132,12 +132,12 @@ class _Block:
         sigma = max(1e-3, 1e-5 * float(scale * np.linalg.norm(np.ptp(stage.formed.xyz, axis=0))))
         count = len(chosen)
         control = ControlPoints(
-            (*own.ids, *ids),
-            np.concatenate([own.enu, ground]),
-            np.concatenate([own.use, np.ones((count, 3), bool)]),
-            np.concatenate([own.check, np.zeros(count, bool)]),
-            np.concatenate([own.sigma, np.full((count, 3), sigma)]),
-            np.concatenate([own.frame, np.full(count, len(known.frames), np.intp)]),
+            ids=(*own.ids, *ids),
+            enu=np.concatenate([own.enu, ground]),
+            use=np.concatenate([own.use, np.ones((count, 3), bool)]),
+            check=np.concatenate([own.check, np.zeros(count, bool)]),
+            sigma=np.concatenate([own.sigma, np.full((count, 3), sigma)]),
+            frame=np.concatenate([own.frame, np.full(count, len(known.frames), np.intp)]),
         )
         return adjust_formed(stage, control, (*known.frames, known.output), self.tied)
 

@@ -88,11 +88,11 @@ def _given_centers(inputs: Inputs) -> Iterator[GivenCenters]:
     if positions is not None:
         whole = np.flatnonzero(positions.use.all(axis=1))
         photos = tuple(positions.photos[row] for row in whole)
-        yield GivenCenters("camera_positions", positions.frame, photos, positions.enu[whole])
+        yield GivenCenters(key="camera_positions", frame=positions.frame, photos=photos, enu=positions.enu[whole])
     if orientations is not None:
         whole = np.flatnonzero(np.isfinite(orientations.enu).all(axis=1))
         photos = tuple(orientations.photos[row] for row in whole)
-        yield GivenCenters("orientations", orientations.frame, photos, orientations.enu[whole])
+        yield GivenCenters(key="orientations", frame=orientations.frame, photos=photos, enu=orientations.enu[whole])
 
 
 def _cartesian(control: ControlPoints, frames: Sequence[GroundFrame]) -> Floats:
@@ -115,7 +115,7 @@ def _level_plan(
     if target.kind != "local":  # the Earth falls away from a plane
         level[:, 2] = target.geodetic(together)[:, 2]
     count = len(given.photos)
-    return LevelPlan(given.key, given.photos, level[:count], control.ids, level[count:])
+    return LevelPlan(key=given.key, photos=given.photos, centers=level[:count], ids=control.ids, control=level[count:])
 
 
 def _of_strip(strip: Strip, plan: LevelPlan, observations: PhotoPoints) -> Iterator[Finding]:

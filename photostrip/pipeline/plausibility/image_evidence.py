@@ -59,12 +59,12 @@ def of_images(inputs: Inputs, settings: Settings, photo: PhotoCoordinates | None
         for name, step in zip(order.photos, order.steps, strict=True)
     }
     return ImageEvidence(
-        tuple(findings),
-        _put_right(observations, factor, mirrored),
-        cameras,
-        tuple(replace(strip, photos=order.photos) for strip, order in zip(inputs.strips, orders, strict=True)),
-        steps,
-        settings,
+        findings=tuple(findings),
+        observations=_put_right(observations, factor, mirrored),
+        cameras=cameras,
+        strips=tuple(replace(strip, photos=order.photos) for strip, order in zip(inputs.strips, orders, strict=True)),
+        steps=steps,
+        settings=settings,
     )
 
 

@@ -58,4 +58,4 @@ def sightings(strip: StripResult, observations: PhotoPoints) -> photo_errors.Sig
     point = np.searchsorted(strip.formed.point, observations.point[rows])
     photo = strip.of_photos.strip.positions(observations)[rows]
     focal = strip.of_photos.strip.camera.principal_distance
-    return photo_errors.Sightings(photo, point, rows, strip.xyz[point], focal)
+    return photo_errors.Sightings(photo=photo, point=point, image=rows, xyz=strip.xyz[point], focal=focal)

@@ -162,13 +162,15 @@ def reject_wrong_control(oriented: OrientedStrip[Errors], settings: Settings) ->
     stage, control = oriented.stage, oriented.control
     if not stage.screens_control(settings):
         return ScreenedStrip(oriented)
+    spacing, breadth = oriented.extent
     place = StripAtControl(
-        stage.formed.xyz[oriented.control_rows],
-        oriented.frames,
-        oriented.intermediate,
-        oriented.precision,
-        *oriented.extent,
-        stage.misclosure_covariance(oriented),
+        xyz=stage.formed.xyz[oriented.control_rows],
+        frames=oriented.frames,
+        intermediate=oriented.intermediate,
+        precision=oriented.precision,
+        spacing=spacing,
+        breadth=breadth,
+        covariance=stage.misclosure_covariance(oriented),
     )
     kept, wrong = control_screening.screen_control(control, place)
     judged = place.tests_by_covariance(control, kept)

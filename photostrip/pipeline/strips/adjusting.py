@@ -38,5 +38,8 @@ def adjust_formed(
 
 
 def _polynomial(oriented: OrientedStrip[Errors], settings: Settings) -> polynomial.Polynomial:
-    problem = polynomial.FitProblem(oriented.at_control, oriented.targets, oriented.weights, *oriented.extent)
+    spacing, breadth = oriented.extent
+    problem = polynomial.FitProblem(
+        xyz=oriented.at_control, targets=oriented.targets, weight=oriented.weights, spacing=spacing, breadth=breadth
+    )
     return polynomial.fit(problem, settings.polynomial)

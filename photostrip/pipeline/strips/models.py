@@ -91,7 +91,9 @@ class LinkedModels:
         covariance = model_misclosures.covariance(errors, found, oriented.control_rows, factor)
         moved = similarity_derivatives(oriented.at_control[found.point], errors.origin)
         design = np.einsum("wi,wij->wj", found.direction, moved)
-        return control_significance.ControlCovariance(found.point, found.axis, design, covariance)
+        return control_significance.ControlCovariance(
+            point=found.point, axis=found.axis, design=design, covariance=covariance
+        )
 
     def screens_control(self, settings: Settings) -> bool:
         """Whether wrong control is looked for."""
@@ -194,17 +196,23 @@ def models_of(strip: ModelStrip, measured: ModelPoints, settings: link_screening
     rows = np.flatnonzero(place >= 0)
     rows = rows[np.lexsort((measured.node[rows], place[rows]))]
     whole = linking.StripModels(
-        len(strip.models),
-        len(measured.point_ids),
-        rows,
-        place[rows],
-        measured.node[rows],
-        measured.xyz[rows],
-        measured.sigma[rows],
+        count=len(strip.models),
+        points=len(measured.point_ids),
+        row=rows,
+        model=place[rows],
+        node=measured.node[rows],
+        xyz=measured.xyz[rows],
+        sigma=measured.sigma[rows],
     )
     left = ~_named(settings.drop, strip, measured, whole)
     return linking.StripModels(
-        whole.count, whole.points, rows[left], whole.model[left], whole.node[left], whole.xyz[left], whole.sigma[left]
+        count=whole.count,
+        points=whole.points,
+        row=rows[left],
+        model=whole.model[left],
+        node=whole.node[left],
+        xyz=whole.xyz[left],
+        sigma=whole.sigma[left],
     )
 
 

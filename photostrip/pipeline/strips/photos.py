@@ -103,7 +103,9 @@ class FormedPhotos:
         covariance = covariances.of_parameters(errors, found, np.eye(len(found.point)), factor).parameters * factor
         moved = similarity_derivatives(oriented.at_control[found.point], errors.origin)
         design = np.einsum("wi,wij->wj", found.direction, moved)
-        return control_significance.ControlCovariance(found.point, found.axis, design, covariance)
+        return control_significance.ControlCovariance(
+            point=found.point, axis=found.axis, design=design, covariance=covariance
+        )
 
     def screens_control(self, settings: Settings) -> bool:
         """Whether wrong control is looked for."""
@@ -245,7 +247,9 @@ def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> F
         formed = form_from_pairs(oriented, settings.formation, strip.photos, scatter)
     else:  # the strip decides what its pairs could not
         named = overruling.rows(settings.relative.keep, observations)
-        measured = screened_formation.Measurements(observations, strip.photos, pairs.weight, scatter, sigma, named)
+        measured = screened_formation.Measurements(
+            observations=observations, photos=strip.photos, weight=pairs.weight, sigma=scatter, stated=sigma, kept=named
+        )
         readmit = settings.relative.screening in screening.SEARCHES
         oriented, formed, verdict = screened_formation.form_screened(
             oriented, measured, settings.formation, readmit=readmit

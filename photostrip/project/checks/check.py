@@ -80,7 +80,7 @@ def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
     try:
         project = load_project(path, overrides)
     except InputError as error:
-        return Checked(str(path), error.faults, (), (), {})
+        return Checked(path=str(path), faults=error.faults, findings=(), notes=(), document={})
     inputs, models = project.inputs, project.inputs.models
     faults = _refused(project, partial(overruling.require, project.settings.relative, inputs.observations))
     if models is not None:
@@ -106,7 +106,13 @@ def check_project(path: Path, overrides: Sequence[str] = ()) -> Checked:
     }
     counted = Findings()  # of too many faults in one file they only count the rest
     counted.add(*dict.fromkeys(faults))
-    return Checked(str(path), counted.faults, _against_themselves(project), tuple(notes), document)
+    return Checked(
+        path=str(path),
+        faults=counted.faults,
+        findings=_against_themselves(project),
+        notes=tuple(notes),
+        document=document,
+    )
 
 
 def _against_themselves(project: Project) -> tuple[Finding, ...]:

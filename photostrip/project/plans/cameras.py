@@ -70,7 +70,12 @@ def load_camera_plan(path: Path, assignments: Sequence[str]) -> CameraPlan:
     given, reading = read_plan(CameraPlanFile, path, assignments)
     cameras = tuple(_plan_camera(str(name), each, given.end_lap_percent) for name, each in given.cameras.items())
     named = {camera.name: camera for camera in cameras}
-    return CameraPlan(str(given.name), cameras, named.get(str(given.reference), cameras[-1]), reading.files)
+    return CameraPlan(
+        name=str(given.name),
+        cameras=cameras,
+        reference=named.get(str(given.reference), cameras[-1]),
+        files=reading.files,
+    )
 
 
 def _plan_camera(name: str, given: PlanCamera, end_lap: float) -> camera_efficiency.ComparedCamera:
@@ -80,5 +85,5 @@ def _plan_camera(name: str, given: PlanCamera, end_lap: float) -> camera_efficie
     # without a format all cameras count as equally wide
     width = given.format[1] if given.format is not None else camera_efficiency.PRINTED_BASE
     return camera_efficiency.ComparedCamera(
-        name, given.principal_distance, given.sigma_um / 1000.0, base or np.nan, width
+        name=name, focal=given.principal_distance, sigma=given.sigma_um / 1000.0, base=base or np.nan, width=width
     )

@@ -76,7 +76,7 @@ def read_plan(kind: type[T], path: Path | None, assignments: Sequence[str]) -> t
     if path is None:
         place, number = Place(COMMAND_LINE), next(name for name in kind.model_fields if name in NUMBER_KEYS)
         root = Node({number: Node(SCHEMA_NUMBER, place)}, place, {number: place})
-        reading = Reading(COMMAND_LINE, root, Findings(), [])
+        reading = Reading(file=COMMAND_LINE, root=root, findings=Findings(), files=[])
     else:
         reading = Reading.of(str(path))
     _require_kind(kind, reading.root)

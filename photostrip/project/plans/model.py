@@ -102,4 +102,4 @@ def load_model_plan(path: Path | None, assignments: Sequence[str]) -> ModelPlan:
         control_sigma=given.control.sigma,
         grid=(given.grid.columns, given.grid.rows),
     )
-    return ModelPlan(str(given.name), camera.name, spec, reading.files)
+    return ModelPlan(name=str(given.name), camera=camera.name, spec=spec, files=reading.files)

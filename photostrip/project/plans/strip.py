@@ -191,7 +191,12 @@ def load_strip_plan(path: Path | None, assignments: Sequence[str]) -> StripPlan:
         photos=given.models + 1,
         end_lap_percent=given.end_lap_percent,
         scale=given.scale_of(camera),
-        points=Points(given.points.rows, given.points.reach_percent, 0.0, given.points.extra_per_model),
+        points=Points(
+            rows=given.points.rows,
+            reach_percent=given.points.reach_percent,
+            scatter_percent=0.0,
+            extra_per_model=given.points.extra_per_model,
+        ),
         image_sigma=given.image_sigma_um / 1000.0,
     )
     usual = {name: StripLayout.model_validate(_layout(word)) for name, word in DEFAULT_LAYOUTS.items()}
@@ -203,10 +208,16 @@ def load_strip_plan(path: Path | None, assignments: Sequence[str]) -> StripPlan:
     placement = None
     if given.place is not None:
         into = str(given.place.into) if given.place.into is not None else layouts[0].name
-        placement = Placement(given.place.points, into, str(given.place.method), str(given.place.use))
+        placement = Placement(
+            points=given.place.points, into=into, method=str(given.place.method), use=str(given.place.use)
+        )
     methods = tuple(dict.fromkeys(str(method) for method in given.methods))
     required = Required(given.required.plan, given.required.height)
-    return StripPlan(str(given.name), Design(geometry, layouts, methods, required, placement), reading)
+    return StripPlan(
+        str(given.name),
+        Design(geometry=geometry, layouts=layouts, methods=methods, required=required, placement=placement),
+        reading,
+    )
 
 
 def _of_layout(name: str, given: StripLayout, sigma: tuple[float, float, float]) -> ControlLayout:

@@ -70,7 +70,12 @@ def listed_cameras(root: Node | None, findings: Findings) -> dict[str, Phototheo
     if given is None:
         return {}
     return {
-        str(name): Phototheodolite(str(name), each.principal_distance, each.principal_point, each.format)
+        str(name): Phototheodolite(
+            name=str(name),
+            principal_distance=each.principal_distance,
+            principal_point=each.principal_point,
+            format=each.format,
+        )
         for name, each in given.cameras.items()
     }
 

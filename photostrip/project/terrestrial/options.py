@@ -167,14 +167,14 @@ def _points(file: str | None, at: Sequence[str], layout: Sequence[Column], limit
         values = np.array([pair("--at", text) for text in at])
         for each in values.ravel():
             within("--at", each, limits)
-        return Points(tuple(map(str, range(1, len(at) + 1))), values, (), None)
+        return Points(ids=tuple(map(str, range(1, len(at) + 1))), values=values, notes=(), table=None)
     findings = Findings()
     read = read_points(file, layout, findings)
     if read is None:
         raise InputError(findings.faults)
     refuse_outside(read, names, limits, findings)
     findings.stop()
-    return Points(tuple(read.cells("point")), read.columns(*names), tuple(findings.notes), read)
+    return Points(ids=tuple(read.cells("point")), values=read.columns(*names), notes=tuple(findings.notes), table=read)
 
 
 class SightingOptions(NamedTuple):

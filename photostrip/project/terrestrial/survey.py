@@ -125,10 +125,10 @@ def _camera(name: str, given: Camera, known: dict[str, Phototheodolite], reading
         return None
     base = known[given.preset] if given.preset is not None else Phototheodolite(name, given.principal_distance or 0.0)
     return Phototheodolite(
-        name,
-        given.principal_distance or base.principal_distance,
-        given.principal_point or base.principal_point,
-        given.format or base.format,
+        name=name,
+        principal_distance=given.principal_distance or base.principal_distance,
+        principal_point=given.principal_point or base.principal_point,
+        format=given.format or base.format,
     )
 
 

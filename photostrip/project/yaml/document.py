@@ -32,7 +32,16 @@ class Place:
 
     def fault(self, message: str, code: str, *, key: str = "", expected: str = "", fix: str = "") -> Fault:
         """Make a fault that stands here."""
-        return Fault(message, code, self.file, self.line, self.column, key, expected, fix)
+        return Fault(
+            message=message,
+            code=code,
+            file=self.file,
+            line=self.line,
+            column=self.column,
+            key=key,
+            expected=expected,
+            fix=fix,
+        )
 
     def note(self, code: str, message: str, severity: str = "note", *, key: str = "") -> Note:
         """Make a note that stands here."""

@@ -58,7 +58,7 @@ def parse(text: str, file: str, findings: Findings) -> Node | None:
         line = text.count("\n", 0, bad.start()) + 1
         column = bad.start() - text.rfind("\n", 0, bad.start())
         message = f"the character U+{ord(bad[0]):04X} cannot stand in YAML"
-        findings.add(Fault(message, "yaml", file, line, column, fix="remove it"))
+        findings.add(Fault(message=message, code="yaml", file=file, line=line, column=column, fix="remove it"))
         return None
     builder = _Builder(file, findings)
     try:
@@ -197,7 +197,7 @@ def _syntax(error: yaml.YAMLError, text: str, file: str) -> Fault:
     line = min(mark.line, len(lines) - 1)
     column = mark.column if line == mark.line else 0
     what, fix = _explained(problem, lines[line], column)
-    return Fault(what, "yaml", file, line + 1, column + 1, fix=fix)
+    return Fault(message=what, code="yaml", file=file, line=line + 1, column=column + 1, fix=fix)
 
 
 _PROBLEMS = (

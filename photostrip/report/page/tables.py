@@ -44,7 +44,7 @@ def tabulated(
 ) -> Table:
     """Return a table of rows; the lines of the foot are given as they are printed."""
     cells = tuple(tuple(each.cell(row) for each in columns) for row in rows)
-    return Table(tuple(each.column for each in columns), cells, foot, note)
+    return Table(columns=tuple(each.column for each in columns), rows=cells, foot=foot, note=note)
 
 
 def _reader(value: Value) -> Callable[[Row], Any]:

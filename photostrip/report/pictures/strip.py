@@ -166,8 +166,8 @@ def _axes(xs: Sequence[float], ys: Sequence[float], height: float) -> tuple[Axis
     low, high = low - room if low < 0 else 0.0, high + room
     spare = 0.02 * max(max(xs) - min(xs), 1e-6)
     return (
-        svg.Axis(min(xs) - spare, max(xs) + spare, LEFT, WIDTH - RIGHT),
-        svg.Axis(low, high, height - BOTTOM, TOP),
+        svg.Axis(low=min(xs) - spare, high=max(xs) + spare, start=LEFT, end=WIDTH - RIGHT),
+        svg.Axis(low=low, high=high, start=height - BOTTOM, end=TOP),
     )
 
 

@@ -123,7 +123,7 @@ def picture(name: str, size: Point, texts: Texts, content: Iterable[str]) -> Pic
         role="img",
         aria_labelledby=f"picture-{name}-title picture-{name}-desc",
     )
-    return Picture(name, texts.title, texts.caption, svg)
+    return Picture(name=name, title=texts.title, caption=texts.caption, svg=svg)
 
 
 def frame(x: Axis, y: Axis, labels: tuple[str, str]) -> list[str]:

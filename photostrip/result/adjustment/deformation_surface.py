@@ -94,4 +94,12 @@ def _of_model(
     sigma = np.hypot(strip.precision[1], given.sigma[:, 2])
     width = float(np.abs(xy[:, 1]).max())
     surface = fit_paraboloid(xy, residual, sigma)
-    return ModelDeformation(model, given.ids, surface, length / scale * MILLIMETRES, width, scale, float(sigma.mean()))
+    return ModelDeformation(
+        model=model,
+        points=given.ids,
+        surface=surface,
+        base=length / scale * MILLIMETRES,
+        width=width,
+        scale=scale,
+        sigma=float(sigma.mean()),
+    )

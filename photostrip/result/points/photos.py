@@ -58,7 +58,7 @@ def _of_strip(result: Result, strip: StripResult, rank: Numbers) -> ImageResidua
     focal = np.full(len(strip.strip.photos), stages.strip.camera.principal_distance)
     with np.errstate(invalid="ignore"):
         residuals = observations.xy[rows] - project(places, centers, rotations, position[rows], focal)
-    return ImageResiduals(stages.strip, rows, position[rows], residuals, used[rows])
+    return ImageResiduals(strip=stages.strip, rows=rows, photo=position[rows], residuals=residuals, used=used[rows])
 
 
 def _of_singles(result: Result, rank: Numbers) -> list[ImageResiduals]:
@@ -77,7 +77,11 @@ def _of_singles(result: Result, rank: Numbers) -> list[ImageResiduals]:
         focal = np.array([single.strip.camera.principal_distance])
         with np.errstate(invalid="ignore"):
             computed = project(places, single.center[None], single.rotation[None], photo, focal)
-        found.append(ImageResiduals(single.strip, rows, photo, observations.xy[rows] - computed, used[rows]))
+        found.append(
+            ImageResiduals(
+                strip=single.strip, rows=rows, photo=photo, residuals=observations.xy[rows] - computed, used=used[rows]
+            )
+        )
     return found
 
 
