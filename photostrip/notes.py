@@ -6,7 +6,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
+
+MOST_NAMED = 8  # ids in one message
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +36,17 @@ def before(file: str, line: int, column: int) -> str:
     """Return the place that stands before a message: ``file:line:column: ``; empty when there is none."""
     place = file + "".join(f":{number}" for number in (line, column) if file and number)
     return f"{place}: " if place else ""
+
+
+def listed(names: Sequence[str], most: int = MOST_NAMED) -> str:
+    """Name the first of many in a message, and say how many more there are."""
+    head = ", ".join(names[:most])
+    return head if len(names) <= most else f"{head} and {len(names) - most} more"
+
+
+def named(noun: str, names: Sequence[str], most: int = MOST_NAMED) -> str:
+    """Name the first of many by what they are: ``points 1, 2 and 7 more``."""
+    return f"{noun}{'s' if len(names) > 1 else ''} {listed(names, most)}"
 
 
 @dataclass(frozen=True)

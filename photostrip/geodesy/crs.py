@@ -255,7 +255,7 @@ def area_of_use(spec: FrameSpec, *, directory: Path | None = None) -> tuple[floa
     return None if area is None else (float(area.west), float(area.south), float(area.east), float(area.north))
 
 
-def missing_own_grids(parts: CrsParts) -> str:
+def missing_named_grids(parts: CrsParts) -> str:
     """Name the grids of a PROJ string that are not there: not every version of PROJ notices before it computes."""
     whole = parts.whole
     crss = [] if whole is None else [whole, *whole.sub_crs_list]

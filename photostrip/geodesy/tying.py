@@ -13,7 +13,7 @@ import math
 from typing import TYPE_CHECKING
 
 from photostrip.errors import Fault, InputError, PhotostripError
-from photostrip.geodesy.crs import CrsParts, missing_own_grids, read_crs
+from photostrip.geodesy.crs import CrsParts, missing_named_grids, read_crs
 from photostrip.geodesy.datum_shift import DatumShift
 from photostrip.geodesy.frame_spec import FrameSpec, Refusal, contradictions
 from photostrip.geodesy.ground_frame import GroundFrame
@@ -164,7 +164,7 @@ def _same_datum(one: CrsParts, other: CrsParts) -> bool:
 def _datum_shift(spec: FrameSpec, crs: CrsParts, target: FrameSpec, out: CrsParts) -> DatumShift:
     """Find the PROJ operation from one datum to that of the Cartesian frame; refused when there is no sound one."""
     operation = ProjOperation(crs.shift_end, out.shift_end)
-    trouble, missing = trouble_with(operation), missing_own_grids(crs) or missing_own_grids(out)
+    trouble, missing = trouble_with(operation), missing_named_grids(crs) or missing_named_grids(out)
     if not trouble and not missing:
         return DatumShift(operation, crs.angle, out.angle)
     message = f"there is no known way from the datum of {spec.name} to that of {target.name}"
@@ -188,7 +188,7 @@ def _vertical_operation(spec: FrameSpec, crs: CrsParts) -> ProjOperation:
     if crs.whole is None or crs.plane is None:
         raise PhotostripError(f"{spec.name} has no vertical part")
     operation = ProjOperation(crs.whole, crs.plane.to_3d())
-    trouble, missing = trouble_with(operation), missing_own_grids(crs)
+    trouble, missing = trouble_with(operation), missing_named_grids(crs)
     if not trouble and not missing:
         return operation
     message = f"the heights of {spec.name} ({crs.vertical}) cannot be brought to the ellipsoid"

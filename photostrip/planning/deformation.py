@@ -44,9 +44,6 @@ def parallax_error(xy: ArrayLike, elements: ArrayLike, focal: float, base: float
     return np.asarray(turned - y * (ka2 - ka1) - np.asarray(measured, float), float)
 
 
-# ----------------------------------------------------------------------------------------------------- constants
-
-
 class Constants(NamedTuple):
     """Factors of the standard deviation of one y parallax."""
 
@@ -76,9 +73,6 @@ def rigorous_constants(xy: ArrayLike, focal: float, width: float, base: float) -
     variance = rigorous_factors(place, focal, width, base)
     plan = np.sqrt((place**2).sum(axis=-1) / base**2 * variance + 2)
     return [Constants(float(p), float(h)) for p, h in zip(plan, np.sqrt(variance), strict=True)]
-
-
-# ---------------------------------------------------------------------------------------------------- paraboloid
 
 
 @dataclass(frozen=True, eq=False)

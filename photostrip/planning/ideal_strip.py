@@ -96,12 +96,6 @@ class IdealStrip:
     row: Numbers
     errors: StripErrors  # derivatives of the strip by the image coordinates
 
-    @property
-    def candidates(self) -> Numbers:
-        """Points that control can be placed at: those in columns at the nadirs, by station and row."""
-        found = np.flatnonzero(self.station >= 0)
-        return found[np.lexsort((self.row[found], self.station[found]))]
-
     def at(self, station: int, row: int) -> int:
         """Return the point of a row, from left to right, at the nadir of a photo, both counted from 0."""
         found = np.flatnonzero((self.station == station) & (self.row == row))

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 Place = tuple[float, float]
 LAYOUTS = ("corners", "corners+centre", "six")
-MICROMETRE = 1e-3  # mm
 METRE = 1e3  # mm
 
 

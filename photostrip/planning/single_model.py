@@ -66,9 +66,6 @@ class ExpectedErrors:
         return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
 
 
-# ------------------------------------------------------------------------------------------ absolute orientation
-
-
 def orientation_operator(points: ArrayLike, control: ModelControl) -> Floats:
     """Return what the absolute orientation gives to points, per misclosure at the control.
 
@@ -140,9 +137,6 @@ def deformation(points: ArrayLike, control: ModelControl, base: float) -> Floats
     """Influence of the elements `FREE` on points of the oriented model, less what control takes back, (q, 3, 4)."""
     operator, of_control = orientation_operator(points, control), free_influence(control.points, base)
     return np.asarray(free_influence(points, base) - np.einsum("qanb,nbk->qak", operator, of_control))
-
-
-# --------------------------------------------------------------------------------------------- expected errors
 
 
 def expected_errors(

@@ -122,9 +122,6 @@ def _oriented(strip: IdealStrip, numbers: Numbers, control: ControlPoints) -> _F
     )
 
 
-# --------------------------------------------------------------------------------------- similarity, polynomials
-
-
 def _fitted(strip: IdealStrip, ground: _Fit, method: str) -> Accuracy:
     """Similarity, and polynomials of a fixed degree as far as the control carries them."""
     numbers, targets, weight, xyz = ground.numbers, ground.targets, ground.weight, ground.xyz
@@ -174,9 +171,6 @@ def _precision(strip: IdealStrip) -> tuple[float, float]:
     return plan, plan * float(np.sqrt(2.0)) * depth / geometry.base
 
 
-# ---------------------------------------------------------------------------------------------------- covariance
-
-
 def _predicted(strip: IdealStrip, ground: _Fit) -> Accuracy:
     """Misclosures distributed by the strip's own covariance, with the distances of the pass points at the junctions."""
     numbers, errors = ground.numbers, strip.errors
@@ -195,9 +189,6 @@ def _predicted(strip: IdealStrip, ground: _Fit) -> Accuracy:
     return Accuracy(
         method=COVARIANCE, used=COVARIANCE, covariance=points.covariance, control=numbers, detectable=detectable
     )
-
-
-# -------------------------------------------------------------------------------------------------------- bundle
 
 
 def _bundle(strip: IdealStrip, layout: ControlLayout, spots: tuple[Spot, ...], control: ControlPoints) -> Accuracy:

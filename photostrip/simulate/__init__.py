@@ -1,8 +1,8 @@
 """Strips of photos with known truth: what would be measured, and what it should give.
 
 In comes a ``Spec``, out go observations, control and truth, without rounding. ``draws`` gives random numbers that are
-the same on every machine; ``ground`` the world and its terrain, ``flight`` the photos, ``placement`` and ``coverage``
-the points and the photos that show them, ``imaging`` and ``film`` image coordinates, ``plotter`` independent models,
+the same on every machine; ``ground`` the world and its terrain, ``flight`` the photos, ``placement`` the
+points, ``imaging`` and ``film`` the photos that show them and image coordinates, ``plotter`` independent models,
 ``control`` given points, ``gross`` gross errors, ``validation`` what cannot be simulated.
 
 >>> from photostrip.simulate import Flight, Spec, simulate

@@ -13,13 +13,12 @@ from photostrip.geodesy.frame_spec import FrameSpec
 from photostrip.geodesy.tying import tie_frames
 from photostrip.points import Frame, PhotoPoints, PointTable
 from photostrip.simulate.control import given_coordinates, roles
-from photostrip.simulate.coverage import shown
 from photostrip.simulate.draws import Draws, Purpose
 from photostrip.simulate.film import sheets
 from photostrip.simulate.flight import fly
 from photostrip.simulate.gross import spoil_control, spoil_images
 from photostrip.simulate.ground import surface, world
-from photostrip.simulate.imaging import bent, project
+from photostrip.simulate.imaging import bent, project, shown
 from photostrip.simulate.placement import place
 from photostrip.simulate.plotter import TruePlaces, plotted
 from photostrip.simulate.validation import LARGEST_ARC, faults_of

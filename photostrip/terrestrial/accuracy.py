@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.terrestrial.directions import partials
-from photostrip.terrestrial.frame import ARCSECONDS, ground_from_photo
+from photostrip.terrestrial.frame import ARCSECONDS, ground_from_photo, partials
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -102,9 +101,6 @@ def grid(photo_format: tuple[float, float], step: float, *, level: bool = True) 
         upper = np.append(inside, half)
         axes.append(upper if level else np.concatenate([-upper[:0:-1], upper]))
     return axes[0], axes[1]
-
-
-# ---------------------------------------------------------------------------------- the examples of the source
 
 
 @dataclass(frozen=True, slots=True)

@@ -129,9 +129,6 @@ def _consistent(coordinates: Floats) -> Floats:
     return kept
 
 
-# ------------------------------------------------------------------------------------------ turns of the cameras
-
-
 def _motion(series: Series, pair: StereoPair, number: int) -> Motion | None:
     """Compare the stable points of an epoch with the reference epoch."""
     rows = np.flatnonzero(series.stable)
@@ -143,7 +140,7 @@ def _motion(series: Series, pair: StereoPair, number: int) -> Motion | None:
     if without.any():  # a turn about the axis needs to know roughly where the point stands
         before[without, 3] = meeting_z(before[without], pair, rotations[without])
     after = series.coordinates[number, rows]
-    variances = series.own[0, rows] + series.own[number, rows]
+    variances = series.of_epoch[0, rows] + series.of_epoch[number, rows]
     left, right = (
         ImagePair(
             before=before[:, columns],
@@ -204,13 +201,10 @@ def _turns(series: Series, motion: Motion | None, removed: tuple[bool, ...]) -> 
     return result
 
 
-# ---------------------------------------------------------------------------------------------------- one epoch
-
-
 def _epoch(series: Series, pair: StereoPair, number: int, turns: _Turns) -> _Epoch:
     angles = turns.values.reshape(-1, 2, 3)
     rotations = pair.rotations @ small_turn(angles)
-    weights = series.shared + series.own[0]
+    weights = series.shared + series.of_epoch[0]
     normal = to_normal(series.coordinates[number], weights, pair, rotations)
     xyz, jacobian = intersect(normal.coordinates, pair.principal_distances[0], pair.base)
     on_ground = pair.ground_from_normal() @ jacobian
@@ -234,13 +228,10 @@ def _reasons(series: Series, epochs: list[_Epoch]) -> Numbers:
     return found
 
 
-# --------------------------------------------------------------------------------------------------- covariances
-
-
 def _covariances(series: Series, epochs: list[_Epoch]) -> Floats:
     """Covariances of the displacements since the first epoch, of all pairs of epochs, shape (e, e, n, 3, 3)."""
     reference = epochs[0]
-    common = _sandwich(reference.by_measured, series.own[0], reference.by_measured)
+    common = _sandwich(reference.by_measured, series.of_epoch[0], reference.by_measured)
     changes = [each.by_measured - reference.by_measured for each in epochs]
     count = len(epochs)
     whole = np.zeros((count, count, len(series.points), 3, 3))
@@ -248,7 +239,7 @@ def _covariances(series: Series, epochs: list[_Epoch]) -> Floats:
         for two in range(1, one + 1):
             part = _sandwich(changes[one], series.shared, changes[two]) + common
             if one == two:
-                part += _sandwich(epochs[one].by_measured, series.own[one], epochs[one].by_measured)
+                part += _sandwich(epochs[one].by_measured, series.of_epoch[one], epochs[one].by_measured)
             part += _from_turns(series, epochs, one, two)
             whole[one, two] = part
             whole[two, one] = part.transpose(0, 2, 1)
@@ -260,14 +251,14 @@ def _covariances(series: Series, epochs: list[_Epoch]) -> Floats:
 def _from_turns(series: Series, epochs: list[_Epoch], one: int, two: int) -> Floats:
     """Covariance that comes from the turns: stable points have errors too, those of the first epoch in all turns."""
     first, second = epochs[one], epochs[two]
-    variances = series.own[0, series.stable] + (series.own[one, series.stable] if one == two else 0.0)
+    variances = series.of_epoch[0, series.stable] + (series.of_epoch[one, series.stable] if one == two else 0.0)
     between = first.turns.between(second.turns, variances, series.stable)
     return np.asarray(first.by_turn @ between @ second.by_turn.transpose(0, 2, 1))
 
 
 def _position_covariance(series: Series, epochs: list[_Epoch], number: int) -> Floats:
     each = epochs[number]
-    measured = _sandwich(each.by_measured, series.shared + series.own[number], each.by_measured)
+    measured = _sandwich(each.by_measured, series.shared + series.of_epoch[number], each.by_measured)
     whole: Floats = measured + (_from_turns(series, epochs, number, number) if number else 0.0)
     whole[~each.turns.known] = np.nan
     return whole
@@ -275,9 +266,6 @@ def _position_covariance(series: Series, epochs: list[_Epoch], number: int) -> F
 
 def _sandwich(left: Floats, variances: Floats, right: Floats) -> Floats:
     return np.asarray(np.einsum("nij,nj,nkj->nik", left, variances, right), float)
-
-
-# ------------------------------------------------------------------------------------------------ displacements
 
 
 def _steps(epochs: list[_Epoch], covariance: Floats, ground: Floats, pair: StereoPair) -> tuple[list[Step], list[Step]]:
@@ -303,15 +291,15 @@ def _parallax_precision(series: Series, epochs: list[_Epoch]) -> tuple[Floats, F
     """Return the standard deviations of vertical parallaxes and of their changes since the first epoch."""
     gradients = np.array([each.normal.parallax_by_measured for each in epochs])
     unknown = np.array([np.isnan(each.normal.parallax + epochs[0].normal.parallax) for each in epochs])
-    total = np.einsum("enj,enj->en", gradients**2, series.shared + series.own)
-    own = np.einsum("enj,enj->en", gradients**2, series.own)
+    total = np.einsum("enj,enj->en", gradients**2, series.shared + series.of_epoch)
+    alone = np.einsum("enj,enj->en", gradients**2, series.of_epoch)
     common = np.einsum("enj,nj->en", (gradients - gradients[0]) ** 2, series.shared)
-    turned = np.zeros_like(own)
+    turned = np.zeros_like(alone)
     for number, each in enumerate(epochs[1:], 1):
-        variances = series.own[0, series.stable] + series.own[number, series.stable]
+        variances = series.of_epoch[0, series.stable] + series.of_epoch[number, series.stable]
         turned[number] = each.turns.along(each.normal.parallax_by_turn, variances, series.stable)
         turned[number, ~each.turns.known] = np.nan
-    change = own + own[0] + common + turned
+    change = alone + alone[0] + common + turned
     change[0] = np.nan
     return np.sqrt(np.where(unknown, np.nan, total + turned)), np.sqrt(change)
 

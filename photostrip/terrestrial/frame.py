@@ -1,4 +1,4 @@
-"""How a camera on a tripod looks at the ground: its rotation, its rays, their directions.
+"""How a camera on a tripod looks at the ground: its rotation, its rays, their directions, and back to its photo.
 
 The ground has X to the right of Y and Z up (east, north, up). The photo has x to the right, z up; the third axis of its
 rays points away from the object, as everywhere in this program: a ray is (x, z, -f). The rotation from the photo to
@@ -8,10 +8,14 @@ aerial camera, to its left and above it, lies to the right of a terrestrial one,
 - alpha: azimuth of the optical axis, clockwise from the ground's Y axis (north);
 - omega: elevation of the optical axis, positive when the camera looks up;
 - kappa: roll about the optical axis, positive when the photo's x axis turns counter-clockwise for the photographer.
+
+Directions (..., 2) are azimuths lambda, clockwise from the ground's Y axis in (-pi, pi], and elevations beta. ``xz``
+(..., 2) are image coordinates in mm, reduced to the principal point; ``rotation`` (3, 3) takes the photo to the ground.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,6 +32,7 @@ ARCSECONDS = 180.0 * 3600.0 / np.pi  # in a radian
 GROUND_FROM_HOUSE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 # what small turns of a camera in its own axes are as a vector: (alpha, omega, kappa) -> (omega, -alpha, kappa)
 TURN_AXES = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+BEHIND = 1e-6  # cosine of the angle to the optical axis below which a direction cannot be on the photo
 
 
 def ground_from_photo(alpha: ArrayLike, omega: ArrayLike = 0.0, kappa: ArrayLike = 0.0) -> Floats:
@@ -92,3 +97,49 @@ def direction_gradient(vector: ArrayLike) -> Floats:
     gradient[..., 1, 1] = -up * north / (level * length2)
     gradient[..., 1, 2] = level / length2
     return gradient
+
+
+@dataclass(frozen=True, slots=True)
+class Phototheodolite:
+    """What a terrestrial camera is made of."""
+
+    name: str
+    principal_distance: float  # principal distance f in mm
+    principal_point: tuple[float, float] = (0.0, 0.0)  # x0, z0 in mm in the system of the image coordinates
+    format: tuple[float, float] | None = None  # width and height in mm of the field in which points are measured
+
+
+@dataclass(frozen=True, eq=False)
+class Partials:
+    """Derivatives of the directions of image points."""
+
+    by_xz: Floats  # (..., 2, 2): rows lambda and beta, columns x and z, rad/mm
+    by_f: Floats  # (..., 2): by the principal distance, rad/mm
+
+
+def directions_from_photo(xz: ArrayLike, principal_distance: float, rotation: ArrayLike) -> Floats:
+    """Horizontal and vertical directions of image points.
+
+    Source: [002] eq. 1 turned round; for omega = kappa = 0 eq. 3 with cos(lambda') where sec(lambda') is printed.
+    """
+    return directions_of(rays(xz, principal_distance) @ np.asarray(rotation, float).T)
+
+
+def photo_from_directions(directions: ArrayLike, principal_distance: float, rotation: ArrayLike) -> Floats:
+    """Image coordinates of directions; NaN where the direction is 90 degrees or more from the optical axis.
+
+    Source: [002] eq. 1; eq. 2 for omega = kappa = 0.
+    """
+    ray = vectors_of(directions) @ np.asarray(rotation, float)
+    depth = np.where(-ray[..., 2] > BEHIND, -ray[..., 2], np.nan)
+    return np.asarray(principal_distance * ray[..., :2] / depth[..., None], float)
+
+
+def partials(xz: ArrayLike, principal_distance: float, rotation: ArrayLike) -> Partials:
+    """Return the derivatives of the directions by what is measured in the photo.
+
+    Source: derived; for omega = kappa = 0 they are [002] eq. 4 with the error of eq. 3 removed.
+    """
+    turn = np.asarray(rotation, float)
+    gradient = direction_gradient(rays(xz, principal_distance) @ turn.T) @ turn
+    return Partials(gradient[..., :2], -gradient[..., 2])

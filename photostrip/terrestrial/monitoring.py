@@ -53,7 +53,7 @@ class Series:
     # (e, n, 4): x, z of the left and x, z of the right photo in mm, reduced to the principal points. NaN where a point
     # was not measured; the last alone is NaN where z was not measured on the right photo
     coordinates: Floats
-    own: Floats  # (e, n, 4): variances of the errors that an epoch has for itself, mm^2
+    of_epoch: Floats  # (e, n, 4): variances of the errors that an epoch has for itself, mm^2
     shared: Floats  # (n, 4): variances of the errors that all epochs share, mm^2
     stable: Flags  # (n,): points that are taken not to move
     times: Floats | None = None  # (e,), optional: times of the epochs in a unit of the user's choice, ascending

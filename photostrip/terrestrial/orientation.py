@@ -306,9 +306,6 @@ def _result(
     )
 
 
-# ---------------------------------------------------------------------------------------------------- screening
-
-
 def _worst(solution: PhotoOrientation, sightings: Sightings, settings: OrientationSettings) -> PointRejection | None:
     """Find the point that fits worst, if it should be taken out.
 

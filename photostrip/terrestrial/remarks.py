@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.notes import Note
+from photostrip.notes import Note, named
 from photostrip.statistics import chi2_quantile
 from photostrip.terrestrial.frame import ARCSECONDS
 from photostrip.terrestrial.monitoring import MEASURED, REASONS
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 
 SURE = 0.99  # probability below which a misfit may be chance
-NAMED = 8  # ids named in one message
 MICROMETRES = 1000.0  # in a millimetre
 
 
@@ -119,7 +118,7 @@ def _missing(result: Monitoring) -> Iterator[Note]:
             names = [result.series.points[row] for row in np.flatnonzero(result.reason[number] == code)]
             verb = "has" if len(names) == 1 else "have"
             what = "displacement" if number else "coordinates"
-            message = f"epoch {epoch}: {_listed(names)} {verb} no {what}: {REASONS[int(code)]}"
+            message = f"epoch {epoch}: {named('point', names)} {verb} no {what}: {REASONS[int(code)]}"
             yield Note("not-determined", message, "note", points=tuple(names))
     untested = [
         result.series.points[row]
@@ -127,11 +126,5 @@ def _missing(result: Monitoring) -> Iterator[Note]:
         if any(np.isfinite(step.values[row, 0]) and not np.isfinite(step.statistic[row]) for step in result.since_first)
     ]
     if untested:
-        message = f"not tested, because the turn of a camera depends on them: {_listed(untested)}"
+        message = f"not tested, because the turn of a camera depends on them: {named('point', untested)}"
         yield Note("not-tested", message, "note", points=tuple(untested))
-
-
-def _listed(names: list[str]) -> str:
-    head = ", ".join(names[:NAMED])
-    word = "point" if len(names) == 1 else "points"
-    return f"{word} {head}" if len(names) <= NAMED else f"{word} {head} and {len(names) - NAMED} more"

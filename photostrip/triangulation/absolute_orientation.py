@@ -19,6 +19,7 @@ from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geometry.rotation import cross_matrix, from_vector
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS as PARAMETERS
 from photostrip.geometry.similarity import Similarity, collinearity, similarity_derivatives
+from photostrip.notes import listed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -310,9 +311,7 @@ def free_motion(direction: Floats, xyz: Floats, control: ControlPoints, half: fl
     offset = np.linalg.norm(np.cross((xyz - xyz.mean(axis=0)) / half - foot, axis), axis=1)
     near = [name for name, distance in zip(control.ids, offset, strict=True) if distance < 0.02]  # noqa: PLR2004
     if len(near) >= 2:
-        more = f" and {len(near) - IDS_NAMED} more" if len(near) > IDS_NAMED else ""
-        named = ", ".join(near[:IDS_NAMED]) + more
-        return f"the rotation about the line of control points {named}"
+        return f"the rotation about the line of control points {listed(near, IDS_NAMED)}"
     if abs(axis[2]) > 0.7:  # noqa: PLR2004
         return "the azimuth (rotation about the vertical)"
     return "the rotation about the flight line" if abs(axis[0]) > abs(axis[1]) else "the tilt along the flight line"

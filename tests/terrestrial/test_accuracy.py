@@ -20,8 +20,7 @@ from photostrip.terrestrial.accuracy import (
     supported,
     worked,
 )
-from photostrip.terrestrial.directions import directions_from_photo
-from photostrip.terrestrial.frame import ARCSECONDS, ground_from_photo
+from photostrip.terrestrial.frame import ARCSECONDS, directions_from_photo, ground_from_photo
 from tests.loops import nonempty
 from tests.vectors import cases
 

@@ -10,13 +10,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from photostrip.errors import GeometryError
-from photostrip.terrestrial.directions import directions_from_photo, partials, photo_from_directions
 from photostrip.terrestrial.frame import (
     ARCSECONDS,
     angles_of,
     direction_gradient,
+    directions_from_photo,
     directions_of,
     ground_from_photo,
+    partials,
+    photo_from_directions,
     small_turn,
     vectors_of,
 )

@@ -40,8 +40,8 @@ def test_displacements_are_the_difference_of_two_space_intersections(
     truth = replace(world(seed=seed, size=size), right_z=right_z)
     truth = turned(truth, *TURN) if turned_camera else truth
     series = truth.measure(1, 0.0)
-    weights = np.full_like(series.own, SIGMA**2)
-    result = monitor(replace(series, own=weights), truth.pair, MonitoringSettings())
+    weights = np.full_like(series.of_epoch, SIGMA**2)
+    result = monitor(replace(series, of_epoch=weights), truth.pair, MonitoringSettings())
     (step,) = result.since_first
     np.testing.assert_allclose(step.values, truth.velocity, atol=NANOMETRE)
     np.testing.assert_allclose(result.positions[0].values, truth.points, atol=NANOMETRE)
@@ -55,7 +55,7 @@ def test_without_turns_displacements_are_differences_of_two_intersections_also_o
     result = monitor(series, truth.pair, MonitoringSettings(moved_camera="never"))
     rotations = np.broadcast_to(truth.pair.rotations, (30, 2, 3, 3))
     points = [
-        intersect(to_normal(each, series.own[0], truth.pair, rotations).coordinates, 190.0, truth.pair.base)[0]
+        intersect(to_normal(each, series.of_epoch[0], truth.pair, rotations).coordinates, 190.0, truth.pair.base)[0]
         for each in series.coordinates
     ]
     ground = truth.pair.ground_from_normal()
@@ -303,7 +303,9 @@ def test_vertical_parallaxes_are_as_large_as_stated() -> None:
 def test_a_survey_without_noise_and_without_motion_has_no_displacement() -> None:
     truth = world(moving=0)
     series = truth.measure(1, 0.0)
-    result = monitor(replace(series, own=np.full_like(series.own, SIGMA**2)), truth.pair, MonitoringSettings())
+    result = monitor(
+        replace(series, of_epoch=np.full_like(series.of_epoch, SIGMA**2)), truth.pair, MonitoringSettings()
+    )
     step: Step = result.since_first[0]
     assert np.abs(step.values).max() < 1e-9
     assert np.nanmax(step.statistic) < 1e-9

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from photostrip.formats.output.terrestrial_directions import Attitude, Grid
-    from photostrip.terrestrial.directions import Phototheodolite
+    from photostrip.terrestrial.frame import Phototheodolite
 
 HELP_NAMES = {"help_option_names": ["--help", "-h"]}
 MOST_POINTS = 20_000  # of a table over the photo

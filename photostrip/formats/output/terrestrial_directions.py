@@ -9,8 +9,7 @@ import numpy as np
 from photostrip.formats.output.csv_text import to_csv
 from photostrip.result.numbers import rounded, significant
 from photostrip.terrestrial import accuracy
-from photostrip.terrestrial.directions import Phototheodolite, directions_from_photo, photo_from_directions
-from photostrip.terrestrial.frame import ARCSECONDS
+from photostrip.terrestrial.frame import ARCSECONDS, Phototheodolite, directions_from_photo, photo_from_directions
 from photostrip.terrestrial.orientation import ANGLES
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats
     from photostrip.notes import Note
     from photostrip.result.numbers import Document
-    from photostrip.terrestrial.directions import Phototheodolite
+    from photostrip.terrestrial.frame import Phototheodolite
     from photostrip.terrestrial.monitoring import CameraState, Monitoring, Step
 
 

@@ -14,7 +14,7 @@ from photostrip.project.schema.values import Id, Number, Section, Words, bounded
 from photostrip.project.terrestrial.ranges import COORDINATE, FORMAT, PRINCIPAL_DISTANCE
 from photostrip.project.yaml.parsing import parse, read_document
 from photostrip.project.yaml.validation import checked
-from photostrip.terrestrial.directions import Phototheodolite
+from photostrip.terrestrial.frame import Phototheodolite
 
 if TYPE_CHECKING:
     from photostrip.project.yaml.document import Node

@@ -27,8 +27,7 @@ from photostrip.project.terrestrial.ranges import (
     refuse_outside,
     within,
 )
-from photostrip.terrestrial.directions import Phototheodolite, photo_from_directions
-from photostrip.terrestrial.frame import ARCSECONDS, ground_from_photo
+from photostrip.terrestrial.frame import ARCSECONDS, Phototheodolite, ground_from_photo, photo_from_directions
 from photostrip.terrestrial.orientation import FREE, Sightings
 
 if TYPE_CHECKING:

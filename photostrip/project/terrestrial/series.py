@@ -79,7 +79,7 @@ def read_series(file: str, table: Table, centre: Floats, wanted: Wanted, finding
         points=read.points,
         epochs=epochs,
         coordinates=built.coordinates,
-        own=built.own,
+        of_epoch=built.own,
         shared=built.shared,
         stable=stable,
         times=times,

@@ -18,8 +18,7 @@ from photostrip.project.terrestrial.survey_file import Camera, Measurements, Ter
 from photostrip.project.yaml.parsing import read_document
 from photostrip.project.yaml.reading import Reading
 from photostrip.project.yaml.validation import valid_section
-from photostrip.terrestrial.directions import Phototheodolite
-from photostrip.terrestrial.frame import ground_from_photo
+from photostrip.terrestrial.frame import Phototheodolite, ground_from_photo
 from photostrip.terrestrial.monitoring import MonitoringSettings, Series
 from photostrip.terrestrial.normal_case import SIDES, StereoPair, normal_pair
 

@@ -1,7 +1,7 @@
 """Bundle adjustment: all rays of all photos with control and camera positions in one least-squares solution.
 
 In comes a ``BundleProblem`` (``observations.problem``), out come a ``BundleSolution`` and its ``Cofactors``: ``solve``
-leads from the one to the other over the reduced ``normal_equations``; ``snooping``, ``robust`` take gross errors out,
+leads from the one to the other over the reduced ``normal_equations``; ``snooping`` takes gross errors out,
 ``quality`` says how good everything is. Arrays in, arrays out: frames, ids and files are the business of the pipeline.
 
 Source: [Granshaw 1980]; step control after [Marquardt 1963].

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.triangulation.bundle import robust
 from photostrip.triangulation.bundle.quality import reliability
 from photostrip.triangulation.bundle.quality.cofactors import cofactors_of as precision_of
 from photostrip.triangulation.bundle.quality.self_calibration import image_shift
@@ -28,6 +27,11 @@ if TYPE_CHECKING:
 SEARCH_ROUNDS = 200  # of testing and taking out; each takes out one error of every neighbourhood
 READMISSIONS = 3
 NEAR = 0.5  # test value of what may go in the same round, in units of the worst of all
+REWEIGHTINGS = 6  # of the robust adjustment
+TUNING = 3.0  # standardised residuals up to which a ray keeps its weight
+NORMAL_MEDIAN = 1.1774  # median of the length of two standard normal residuals
+NO_WEIGHT = 1e-3  # weight below which a ray is out
+SMALLEST_WEIGHT = 1e-5  # that every ray keeps, so that its point stays determined
 
 
 @dataclass(frozen=True)
@@ -112,10 +116,10 @@ class _Search:
     def robust(self, selection: Selection) -> Selection:
         """Take out at once what re-weighting leaves next to no weight."""
         chosen = selected(self.problem, selection)
-        solution, weight = robust.adjust_robustly(chosen)
+        solution, weight = adjust_robustly(chosen)
         self.problem = restarted(self.problem, solution)
-        self.rounds += robust.REWEIGHTINGS
-        rows = np.flatnonzero(selection.images)[weight < robust.NO_WEIGHT]
+        self.rounds += REWEIGHTINGS
+        rows = np.flatnonzero(selection.images)[weight < NO_WEIGHT]
         rows, unknown = rows[~self.kept[rows]], np.nan
         images = selection.images.copy()
         images[rows] = False
@@ -258,6 +262,25 @@ class _Search:
                 yield BundleRejection(
                     kind=reliability.CONTROL, row=row, axis=axis, test="start", value=np.nan, limit=limit, size=error
                 )
+
+
+def adjust_robustly(problem: BundleProblem) -> tuple[BundleSolution, Floats]:
+    """Adjust with weights that fall with the residual, and give the factor of the weight of each ray, 0 to 1.
+
+    p = exp(1 - e^2) where the standardised residual exceeds three times its scale, e times. Source: [Krarup 1980], with
+    the scale of the residuals taken from their median.
+    """
+    weight = np.ones(len(problem.images))
+    sigma = problem.images.sigma
+    for _ in range(REWEIGHTINGS):
+        spread = sigma / np.sqrt(np.maximum(weight, SMALLEST_WEIGHT))[:, None]
+        solution = solve(replace(problem, images=replace(problem.images, sigma=spread)))
+        problem = restarted(problem, solution)
+        size = np.linalg.norm(solution.image_residuals / sigma, axis=1)
+        unit = max(float(np.median(size)) / NORMAL_MEDIAN, 1e-12)
+        excess = size / unit / TUNING
+        weight = np.where(excess > 1.0, np.exp(np.maximum(1.0 - excess**2, -50.0)), 1.0)
+    return solution, weight
 
 
 def predicted(

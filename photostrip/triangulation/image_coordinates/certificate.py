@@ -71,8 +71,11 @@ def solve(
     if nominal is None:
         lengths = np.linalg.norm(np.subtract(*np.moveaxis(xy[ends], 1, 0)), axis=1)
         xy = xy * float(given.sum() / lengths.sum())
-    xy = _adjusted(xy, ends, given)
-    xy = _turned(xy, unit) if nominal is None else _laid_on(xy, unit)
+        xy = _turned(_adjusted(xy, ends, given), unit)
+    else:  # shifted and turned to lie on the nominal coordinates
+        mean = xy.mean(axis=0)
+        figure = _adjusted(xy, ends, given)
+        xy = _turned(figure, unit - mean, figure.mean(axis=0)) + mean
     residuals = _lengths(xy, ends)[0] - given
     redundancy = len(given) - (2 * len(names) - 3)
     sigma0 = float(np.sqrt((residuals**2).sum() / redundancy)) if redundancy else float("nan")
@@ -125,12 +128,6 @@ def _adjusted(xy: Floats, ends: Numbers, given: Floats) -> Floats:
     message = "the distances between the fiducial marks contradict each other: no figure has them"
     fix = "check which marks each distance joins, and its digits"
     raise InputError(Fault(message, code="certificate", key="fiducial_distances", fix=fix))
-
-
-def _laid_on(xy: Floats, nominal: Floats) -> Floats:
-    """Shift and turn the figure to lie on nominal coordinates."""
-    mean = nominal.mean(axis=0)
-    return np.asarray(_turned(xy - xy.mean(axis=0), nominal - mean, np.zeros(2)) + mean, np.float64)
 
 
 def _turned(xy: Floats, unit: Floats, centre: Floats | None = None) -> Floats:

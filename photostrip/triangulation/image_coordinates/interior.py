@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import InputError
-from photostrip.notes import Note
+from photostrip.notes import Note, named
 from photostrip.triangulation.image_coordinates.fiducial_marks import enough, fault, gather, right_pattern
 from photostrip.triangulation.image_coordinates.film_deformation import Deformation
 from photostrip.triangulation.image_coordinates.mark_fit import InteriorOrientation, fit_marks, joined_cameras
 from photostrip.triangulation.image_coordinates.mark_notes import (
-    listed_photos,
+    SHOWN,
     marks_of_no_strip,
     marks_without_camera,
     notes_on_marks,
@@ -128,6 +128,6 @@ def _with_film(joined: InteriorOrientation, cameras: Mapping[str, Camera]) -> In
     if not len(unseen):
         return replace(joined, film=film)
     photos = tuple(joined.photo_ids[row] for row in unseen)
-    message = f"residuals of fiducial marks cannot be interpolated on {listed_photos(photos)}: fewer than four "
-    message += "marks, or all on one line; film deformation stays in the coordinates"
+    message = f"residuals of fiducial marks cannot be interpolated on {named('photo', photos, SHOWN)}: fewer than "
+    message += "four marks, or all on one line; film deformation stays in the coordinates"
     return replace(joined, film=film, notes=(*joined.notes, Note("film-unseen", message, photos=photos)))

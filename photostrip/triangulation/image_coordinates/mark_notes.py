@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.notes import Note
+from photostrip.notes import Note, named
 from photostrip.triangulation.image_coordinates.fiducial_marks import QUARTER, fault
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from photostrip.arrays import Flags
     from photostrip.camera import Camera
@@ -110,18 +110,12 @@ def _poor_fit(part: InteriorOrientation, poor: Flags) -> Note:
 
 
 def _note(code: str, message: str, part: InteriorOrientation, rows: Flags, *, severity: str = "warning") -> Note:
-    photos = tuple(photo for photo, named in zip(part.photo_ids, rows, strict=True) if named)
+    photos = tuple(photo for photo, row in zip(part.photo_ids, rows, strict=True) if row)
     return Note(code, message, severity=severity, photos=photos)
 
 
 def _photos(part: InteriorOrientation, rows: Flags) -> str:
-    return listed_photos([photo for photo, named in zip(part.photo_ids, rows, strict=True) if named])
-
-
-def listed_photos(photos: Sequence[str]) -> str:
-    """Name photos in a sentence, the first few of many."""
-    more = f" and {len(photos) - SHOWN} more" if len(photos) > SHOWN else ""
-    return f"photo{'s' * (len(photos) > 1)} {', '.join(photos[:SHOWN])}{more}"
+    return named("photo", [photo for photo, row in zip(part.photo_ids, rows, strict=True) if row], SHOWN)
 
 
 def marks_without_camera(
@@ -145,5 +139,5 @@ def marks_of_no_strip(fiducials: PhotoPoints, cameras: Mapping[str, Camera]) -> 
     unused = tuple(photo for photo in fiducials.photo_ids if photo not in cameras)
     if not unused:
         return []
-    message = f"fiducial marks of {listed_photos(unused)} are not used: in no strip"
+    message = f"fiducial marks of {named('photo', unused, SHOWN)} are not used: in no strip"
     return [Note("marks-unused", message, severity="note", photos=unused)]

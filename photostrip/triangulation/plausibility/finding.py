@@ -15,9 +15,6 @@ ERROR = "error"
 WARNING = "warning"
 
 
-MOST_NAMED = 8  # ids in one message
-
-
 class Kind(NamedTuple):
     """A kind of mistake."""
 
@@ -98,9 +95,3 @@ def accepted(findings: Iterable[Finding], entries: Sequence[str]) -> tuple[Findi
         is_accepted = each.code in codes or any((each.code, name) in single for name in each.names)
         once.setdefault((each.code, each.names), replace(each, accepted=is_accepted))
     return tuple(sorted(once.values(), key=lambda each: each.code))
-
-
-def listed(ids: Sequence[str]) -> str:
-    """Name the first of some photos or points in a message, and say how many more there are."""
-    more = len(ids) - MOST_NAMED
-    return ", ".join(ids[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")

@@ -1,4 +1,4 @@
-"""Points where rays meet: of two photos in a model, and of all photos that saw a point."""
+"""Points where the rays of two photos meet."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ def test_a_project_says_what_was_simulated(tmp_path: Path) -> None:
     np.testing.assert_allclose(survey.pair.centers, CENTERS)
     assert survey.pair.principal_distances == (190.0, 100.0)
     np.testing.assert_allclose(survey.series.coordinates, truth.coordinates, atol=5.1e-5)  # four decimals
-    np.testing.assert_allclose(survey.series.own, 0.005**2)
+    np.testing.assert_allclose(survey.series.of_epoch, 0.005**2)
     assert survey.series.points == truth.points
     assert survey.series.epochs == truth.epochs
     assert survey.series.stable.tolist() == [True] * 6 + [False] * 6
@@ -65,7 +65,7 @@ def test_pseudo_parallaxes_and_coordinates_give_the_same_displacements(tmp_path:
     text = text.replace("sigma: 0.005", f"sigma: 0.005, sigma_d: {0.005 * 2**0.5}")
     second = load_survey(write(tmp_path / "b", text, pseudo_parallaxes(), "pseudo.csv"))
     np.testing.assert_allclose(second.series.coordinates, first.series.coordinates, atol=1e-8)
-    assert (second.series.own[0] == 0).all()
+    assert (second.series.of_epoch[0] == 0).all()
     np.testing.assert_allclose(second.series.shared, 0.005**2)
     one = monitor(first.series, first.pair, first.settings)
     two = monitor(second.series, second.pair, second.settings)
@@ -87,7 +87,7 @@ def test_north_first_axes_gon_micrometres_and_z_downwards(tmp_path: Path) -> Non
     np.testing.assert_allclose(survey.pair.rotations, TRUTH.pair.rotations, atol=1e-12)
     np.testing.assert_allclose(survey.pair.centers, CENTERS)
     np.testing.assert_allclose(survey.series.coordinates, TRUTH.measure(1).coordinates, atol=1e-8)
-    np.testing.assert_allclose(survey.series.own, 0.005**2)
+    np.testing.assert_allclose(survey.series.of_epoch, 0.005**2)
     assert survey.frame.order == (1, 0, 2)
 
 
@@ -104,7 +104,7 @@ def test_standard_deviations_of_rows_count_before_that_of_the_project(tmp_path: 
     lines[1:] = [line + ",," for line in lines[1:]]
     lines[1] = lines[1][:-2] + ",0.01,0.02"
     survey = load_survey(write(tmp_path, table="\n".join(lines) + "\n"))
-    np.testing.assert_allclose(survey.series.own[0, 0], [0.01**2, 0.02**2, 0.005**2, 0.005**2])
+    np.testing.assert_allclose(survey.series.of_epoch[0, 0], [0.01**2, 0.02**2, 0.005**2, 0.005**2])
 
 
 def test_epochs_may_be_left_out_or_named_in_another_order(tmp_path: Path) -> None:

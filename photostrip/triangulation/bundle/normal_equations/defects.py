@@ -9,6 +9,7 @@ import numpy as np
 
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.geometry.similarity import similarity_derivatives
+from photostrip.notes import named
 from photostrip.triangulation.bundle.normal_equations import datum
 from photostrip.triangulation.bundle.normal_equations.reduced import factored, given_at
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO
@@ -30,7 +31,6 @@ STRAIGHT = 1e-3  # breadth of control on one line, as part of its length
 ITERATIONS = 3
 SHARE = 0.5  # of the largest element of a null vector: what is named with it
 TINY = 1e-9
-NAMED = 8
 MOVES = ("shift along its x", "shift along its y", "shift along its z", "roll about x", "turn about y", "turn about z")
 
 
@@ -64,17 +64,11 @@ def refuse_weak_points(prepared: PreparedProblem, reduced: Reduced) -> None:
     ]
     if weak:
         raise GeometryError(
-            f"rays and control do not determine {listed('point', weak)}: "
+            f"rays and control do not determine {named('point', weak)}: "
             "a point needs two rays that meet at an angle, or one and its given height",
             points=weak,
             code="bundle-rays",
         )
-
-
-def listed(noun: str, names: list[str]) -> str:
-    """Name the first few of many, and how many more."""
-    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-    return f"{noun}{'s' if len(names) > 1 else ''} {', '.join(names[:NAMED])}{more}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +94,7 @@ def refuse_loose(prepared: PreparedProblem, state: Parameters) -> None:
         loose = vectors[:, values < LOOSE**-2.0]
         if loose.shape[1]:
             names = [prepared.problem.photo_name(number) for number in photos.tolist()]
-            whole = "" if len(parts) == 1 else f" of {listed('photo', names)}"
+            whole = "" if len(parts) == 1 else f" of {named('photo', names)}"
             raise GeometryError(
                 f"what is given does not determine {_moves(state, held, loose)}{whole}: {_reason(held)}",
                 photos=() if len(parts) == 1 else names,
@@ -236,7 +230,7 @@ def refuse_singular(prepared: PreparedProblem, reduced: Reduced, extra: Floats |
         names = [MOVES[int(np.argmax(size[int(np.argmax(worst))]))]]
     what = f"; least of all the {names[0]}" if names else ""
     raise GeometryError(
-        f"the observations do not determine {listed('photo', photos) or 'the photos'}{what}: "
+        f"the observations do not determine {named('photo', photos) or 'the photos'}{what}: "
         "they need more points in common with the others, or control",
         photos=photos,
         code="bundle-rank",

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.triangulation.plausibility.finding import found, listed
+from photostrip.notes import listed
+from photostrip.triangulation.plausibility.finding import found
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.triangulation.plausibility.finding import MOST_NAMED, found, listed
+from photostrip.notes import MOST_NAMED, listed
+from photostrip.triangulation.plausibility.finding import found
 from photostrip.triangulation.plausibility.photos import mosaic
 from photostrip.triangulation.plausibility.photos.units import reading_of
 
