@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.points import locate
 from photostrip.triangulation import absolute_orientation as absolute
 from photostrip.triangulation.bundle import settings as bundle
 from photostrip.triangulation.covariance_adjustment import conditions
@@ -39,8 +40,11 @@ class Strip:
 
     def positions(self, observations: PhotoPoints) -> Numbers:
         """Place in the strip of the photo of every image point; -1 for photos of other strips."""
-        place = {photo: number for number, photo in enumerate(self.photos)}
-        return np.array([place.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo]
+        return locate(observations.photo_ids, self.photos)[observations.photo]
+
+    def median_sigma(self, observations: PhotoPoints) -> float:
+        """Median standard deviation of the image coordinates of its photos, mm."""
+        return float(np.median(observations.sigma[self.positions(observations) >= 0]))
 
 
 @dataclass(frozen=True)

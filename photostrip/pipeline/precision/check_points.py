@@ -38,7 +38,7 @@ class CheckPoints(NamedTuple):
 
 def check_points(strip: StripResult, control: ControlPoints, observations: PhotoPoints) -> CheckPoints:
     """Check points of a strip among all given points; the observations name its points."""
-    rows = rows_of_given(control, strip.formed.point, observations)
+    rows = rows_of_given(control.ids, strip.formed.point, observations.point_ids)
     found = np.flatnonzero(control.check & (rows >= 0) & control.use.any(axis=1))
     found = found[np.argsort(strip.xyz[rows[found], 0], kind="stable")]
     if len(found) > LARGEST:

@@ -233,7 +233,7 @@ def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> F
     observations: ideal image coordinates of the whole project.
     Raises GeometryError, InputError when a pair or a junction cannot be determined; the strip is named.
     """
-    sigma = _sigma(strip, observations)
+    sigma = strip.median_sigma(observations)
     pairs = collect_pairs(observations, strip.photos, strip.camera.principal_distance)
     pairs = pairs.without(overruling.touched(settings.relative.drop, observations, pairs.rows))
     first, converged = orient_unchecked(pairs)
@@ -264,8 +264,3 @@ def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> F
         formed=formed,
         contradictions=verdict,
     )
-
-
-def _sigma(strip: Strip, observations: PhotoPoints) -> float:
-    """Median standard deviation of the strip's image coordinates, mm."""
-    return float(np.median(observations.sigma[strip.positions(observations) >= 0]))

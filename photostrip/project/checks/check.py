@@ -19,6 +19,7 @@ from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline import overruling
 from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.refusals import require_whole
+from photostrip.points import locate
 from photostrip.project.checks.models import (
     counts_of_models,
     links_of_models,
@@ -196,8 +197,7 @@ def _junctions(project: Project) -> Iterator[Fault]:
 def _control_of_strips(project: Project) -> Iterator[Fault]:
     """Refuse strips with too little measured control for seven parameters."""
     inputs = project.inputs
-    number = {name: code for code, name in enumerate(inputs.observations.point_ids)}
-    given = np.array([number.get(name, -1) for name in inputs.control.ids], np.intp)
+    given = locate(inputs.control.ids, inputs.observations.point_ids)
     usable = observations_used(inputs) if inputs.models is None else np.zeros(0, np.intp)
     for i, strip in enumerate(inputs.flights):
         points = inputs.observations.point[usable == i] if inputs.models is None else points_of_strip(inputs.models, i)
