@@ -9,7 +9,6 @@ import numpy as np
 
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.triangulation import absolute_orientation
-from photostrip.triangulation.covariance_adjustment import prediction
 from photostrip.triangulation.error_propagation import control_errors, covariances
 from photostrip.triangulation.error_propagation.derivatives import ErrorRows
 
@@ -80,6 +79,8 @@ def by_fit(found: Propagation, compared: CheckDifferences, factor: float) -> cov
 
 def by_covariance(adjusted: CovarianceAdjustment, compared: CheckDifferences) -> covariances.CheckTest:
     """Test the check points of a strip that was adjusted with its own covariance."""
+    from photostrip.triangulation.covariance_adjustment import prediction  # no other adjustment needs it
+
     system, at = adjusted.system, compared.coordinates
     wanted = system.conditions
     operator = prediction.influence(system, at.rows, np.arange(len(wanted.value)))[:, 0]

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from photostrip.triangulation.error_propagation.control_errors import Misclosures
     from photostrip.triangulation.independent_models.link_screening import ScreenedLinks
     from photostrip.triangulation.independent_models.linking import StripModels
+    from photostrip.triangulation.independent_models.settings import LinkSettings
     from photostrip.triangulation.polynomial.correction import Polynomial
 
     Oriented = OrientedStrip[model_errors.ModelErrors]
@@ -186,7 +187,7 @@ def form_models(strip: ModelStrip, measured: ModelPoints, settings: Settings) ->
     return form_from_models(models, links, np.where(photos < 0, -1, photos + len(measured.point_ids)))
 
 
-def models_of(strip: ModelStrip, measured: ModelPoints, settings: link_screening.LinkSettings) -> StripModels:
+def models_of(strip: ModelStrip, measured: ModelPoints, settings: LinkSettings) -> StripModels:
     """Take the models of a strip out of those of the project, without what the user drops.
 
     Returns rows in the order of the models, then of the points.

@@ -12,8 +12,6 @@ from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.pipeline import overruling
 from photostrip.pipeline.results import PhotoStages, StripResult
 from photostrip.pipeline.strips import notes
-from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment, StripOnControl
-from photostrip.triangulation.covariance_adjustment.adjust import adjust as adjust_with_covariance
 from photostrip.triangulation.error_propagation import control_errors, covariances, strip_errors
 from photostrip.triangulation.gross_errors.control import control_significance
 from photostrip.triangulation.gross_errors.pairs import screening
@@ -30,6 +28,7 @@ if TYPE_CHECKING:
     from photostrip.pipeline.inputs import Settings, Strip
     from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip
     from photostrip.points import PhotoPoints
+    from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
     from photostrip.triangulation.polynomial.correction import Polynomial
 
     Oriented = OrientedStrip[strip_errors.StripErrors]
@@ -175,6 +174,8 @@ class FormedPhotos:
 
     def _by_covariance(self, oriented: Oriented, settings: Settings) -> CovarianceAdjustment:
         """Distribute the misclosures at the control by the strip's own covariance."""
+        from photostrip.triangulation.covariance_adjustment.adjust import StripOnControl, adjust
+
         start = StripOnControl(
             photos=self.strip.photos,
             focal=self.strip.camera.principal_distance,
@@ -189,7 +190,7 @@ class FormedPhotos:
             errors=oriented.errors,
             misclosures=oriented.misclosures,
         )
-        return adjust_with_covariance(start, settings.covariance)
+        return adjust(start, settings.covariance)
 
     def _rays_in_use(self) -> _Rays:
         """Image points that are used in a model or place a point without one, in the order of the photos."""

@@ -17,6 +17,7 @@ from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.text.findings import Findings
 from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline import overruling
+from photostrip.pipeline.image_coordinates import orient_interior
 from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.refusals import require_whole
 from photostrip.points import locate
@@ -31,7 +32,7 @@ from photostrip.project.checks.models import (
 from photostrip.project.checks.table_rows import gaps_of, observations_used, table_rows
 from photostrip.project.loading import load_project
 from photostrip.project.yaml.document import fault_at
-from photostrip.triangulation.image_coordinates import corrections, interior
+from photostrip.triangulation.image_coordinates import corrections
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -141,16 +142,13 @@ def _image_coordinates(project: Project, faults: list[Fault]) -> list[Note]:
     """Look at fiducial marks and distortion; what is refused there refuses the project."""
     inputs, notes = project.inputs, []
     cameras = {photo: strip.camera for strip in inputs.strips for photo in strip.photos}
-    observations = inputs.observations
     try:
         with project.places():
-            if inputs.fiducials is not None:
-                oriented = interior.orient(inputs.fiducials, cameras, project.settings.interior)
-                notes = list(oriented.notes)
-                observations = interior.transform(observations, oriented)
+            photo = orient_interior(inputs, project.settings)
+            notes = [] if photo.interior is None else list(photo.interior.notes)
             # refraction and curvature need heights that only a run can find; they refuse nothing in a file
             wanted = replace(project.settings.refinement, refraction=False, earth_radius=None)
-            corrections.refine(observations, cameras, wanted)
+            corrections.refine(photo.observations, cameras, wanted)
     except InputError as error:
         faults += error.faults
     except GeometryError as error:
