@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
     Prepared = tuple[StripErrors, conditions.Conditions]
 
+pytestmark = pytest.mark.usefixtures("_no_findings")
+
 COVARIANCE = Settings(adjustment="covariance", relative=UNSCREENED)
 SIMILARITY = Settings(adjustment="similarity", relative=UNSCREENED)
 
