@@ -80,27 +80,27 @@ class StripOnControl:
 def adjust(start: StripOnControl, settings: CovarianceSettings) -> CovarianceAdjustment:
     """Adjust a strip with its own covariance."""
     factor, basis = image_variance(start.orientation, start.sigma)
-    run = _Adjustment(start, settings, factor)
-    one, formations = run.first(), 1
+    one, formations = _solved(start, np.zeros((len(start.errors.images.row), 2)), settings, factor), 1
     turn = rate = relinearisation.largest_turn(one.system)
     while formations < MOST_FORMATIONS and turn * rate / 2 > ENOUGH * start.sigma / start.focal:
-        one, fresh = run.next(one, fresh=turn > FRESH), turn > FRESH
+        fresh = turn > FRESH
+        one = _formed_again(one, settings, factor, fresh=fresh)
         turn = relinearisation.largest_turn(one.system)
         formations, rate = formations + 1, turn if fresh else rate
-    errors = one.system.errors
+    errors, formed = one.strip.errors, one.strip.formed
     tables = [errors.points, prediction.photo_rows(errors)]
     (points, photos), cofactors = prediction.predict(one.system, tables)
     known = [relinearisation.displacements(errors, rows, one.images) for rows in tables]
     left = photos.error - known[1]
-    similarity = one.absolute.similarity
+    similarity = one.strip.absolute.similarity
     return CovarianceAdjustment(
-        xyz=similarity(one.formed.xyz) - (points.error - known[0]),
-        centers=similarity(one.formed.centers) - left[:, :3],
-        rotations=from_vector(-left[:, 3:]) @ similarity.rotation @ one.formed.rotations,
+        xyz=similarity(formed.xyz) - (points.error - known[0]),
+        centers=similarity(formed.centers) - left[:, :3],
+        rotations=from_vector(-left[:, 3:]) @ similarity.rotation @ formed.rotations,
         points=points.covariance * factor,
         photos=photos.covariance * factor,
-        control=one.control,
-        tested=prediction.tested(one.system, cofactors, len(one.control.point)),
+        control=one.strip.misclosures,
+        tested=prediction.tested(one.system, cofactors, len(one.strip.misclosures.point)),
         factor=factor,
         basis=basis,
         sigma=start.sigma * float(np.sqrt(factor)),
@@ -111,94 +111,52 @@ def adjust(start: StripOnControl, settings: CovarianceSettings) -> CovarianceAdj
 
 @dataclass(frozen=True, eq=False)
 class _Linearised:
-    """One linear adjustment, at a strip that was formed from image coordinates less the errors known so far.
+    """One linear adjustment, at a strip that was formed from image coordinates less the errors known so far."""
 
-    ``images`` are these errors, in units of the stated standard deviations.
-    """
-
-    orientation: Orientation
-    formed: FormedStrip
-    absolute: AbsoluteOrientation
-    images: Floats
-    control: control_errors.Misclosures
+    strip: StripOnControl  # as it was formed there, its observations as measured
+    images: Floats  # (k, 2): these errors, in units of the stated standard deviations
     system: strip_system.System
 
 
-@dataclass(frozen=True, eq=False)
-class _Adjustment:
-    """What all linearisations have in common."""
+def _formed_again(before: _Linearised, settings: CovarianceSettings, factor: float, *, fresh: bool) -> _Linearised:
+    """Form the strip from corrected image coordinates, and adjust it with the whole errors as unknowns again.
 
-    start: StripOnControl
-    settings: CovarianceSettings
-    factor: float  # variance factor of the image coordinates
-
-    def first(self) -> _Linearised:
-        """Linearise where the absolute orientation left the strip."""
-        start = self.start
-        images = np.zeros((len(start.errors.images.row), 2))
-        return self._solved(start.orientation, start.formed, start.absolute, start.errors, start.misclosures, images)
-
-    def next(self, before: _Linearised, *, fresh: bool) -> _Linearised:
-        """Form the strip from corrected image coordinates, and adjust it with the whole errors as unknowns again.
-
-        The derivatives at hand will do, unless the strip has turned too much; then they are made afresh.
-        """
-        start, targets, rows = self.start, self.start.targets, self.start.control_rows
-        images = relinearisation.image_errors(before.system)
-        measured = before.system.errors.images
-        xy = start.observations.xy.copy()
-        xy[measured.row] -= images * measured.sigma
-        orientation = relinearisation.oriented_again(before.orientation, xy)
-        observations = replace(start.observations, xy=xy)
-        formed = relinearisation.formed_again(before.formed, orientation, observations, start.photos)
-        # the strip fits its control by now: weights do not matter to where it lies
-        oriented = absolute.orient(formed.xyz[rows], targets, targets.control.use.astype(float), formed.xyz)
-        lost = np.isnan(before.formed.model_xyz)
-        if fresh:
-            formed = replace(formed, model_xyz=np.where(lost, np.nan, formed.model_xyz))
-            errors = strip_errors.differentiate_strip(
-                orientation, formed, oriented.similarity, start.position, start.observations.sigma
-            )
-            at_control = oriented.similarity(formed.xyz)[rows]
-            found = control_errors.misclosures(
-                errors.points, targets.turned(at_control), rows, targets.axes(at_control)
-            )
-            return self._solved(orientation, formed, oriented, errors, found, images)
-        found, wanted = before.control, before.system.conditions
-        control = oriented.misclosures[found.point, found.axis]
-        value = strip_conditions.misclosures_at(wanted, formed, oriented.similarity, control)
-        value += relinearisation.displacements(before.system.errors, wanted.rows, images)[:, 0]
-        return replace(
-            before,
-            orientation=orientation,
-            formed=replace(formed, model_xyz=np.where(lost, np.nan, formed.model_xyz)),
-            absolute=oriented,
-            images=images,
-            system=strip_system.solved_for(before.system, replace(wanted, value=value)),
+    The derivatives at hand will do, unless the strip has turned too much; then they are made afresh.
+    """
+    strip, targets, rows = before.strip, before.strip.targets, before.strip.control_rows
+    images = relinearisation.image_errors(before.system)
+    measured = strip.errors.images
+    xy = strip.observations.xy.copy()
+    xy[measured.row] -= images * measured.sigma
+    orientation = relinearisation.oriented_again(strip.orientation, xy)
+    observations = replace(strip.observations, xy=xy)
+    formed = relinearisation.formed_again(strip.formed, orientation, observations, strip.photos)
+    # the strip fits its control by now: weights do not matter to where it lies
+    oriented = absolute.orient(formed.xyz[rows], targets, targets.control.use.astype(float), formed.xyz)
+    kept = replace(formed, model_xyz=np.where(np.isnan(strip.formed.model_xyz), np.nan, formed.model_xyz))
+    again = replace(strip, orientation=orientation, formed=kept, absolute=oriented)
+    if fresh:
+        errors = strip_errors.differentiate_strip(
+            orientation, kept, oriented.similarity, strip.position, strip.observations.sigma
         )
+        at_control = oriented.similarity(formed.xyz)[rows]
+        found = control_errors.misclosures(errors.points, targets.turned(at_control), rows, targets.axes(at_control))
+        return _solved(replace(again, errors=errors, misclosures=found), images, settings, factor)
+    found, wanted = strip.misclosures, before.system.conditions
+    control = oriented.misclosures[found.point, found.axis]
+    value = strip_conditions.misclosures_at(wanted, formed, oriented.similarity, control)
+    value += relinearisation.displacements(strip.errors, wanted.rows, images)[:, 0]
+    return _Linearised(again, images, strip_system.solved_for(before.system, replace(wanted, value=value)))
 
-    def _solved(
-        self,
-        orientation: Orientation,
-        formed: FormedStrip,
-        oriented: AbsoluteOrientation,
-        errors: strip_errors.StripErrors,
-        found: control_errors.Misclosures,
-        images: Floats,
-    ) -> _Linearised:
-        """Solve the conditions ``w + H v = A y + H v' + g``, v known so far, v' all errors of the image coordinates."""
-        misclosures = oriented.misclosures[found.point, found.axis]
-        wanted = strip_conditions.conditions(
-            errors, orientation, formed, found, misclosures, distances=self.settings.distances
-        )
-        if images.any():
-            known = relinearisation.displacements(errors, wanted.rows, images)[:, 0]
-            wanted = replace(wanted, value=wanted.value + known)
-        return _Linearised(
-            orientation=orientation,
-            formed=formed,
-            absolute=oriented,
-            images=images,
-            control=found,
-            system=strip_system.system(errors, wanted, self.factor),
-        )
+
+def _solved(strip: StripOnControl, images: Floats, settings: CovarianceSettings, factor: float) -> _Linearised:
+    """Solve the conditions ``w + H v = A y + H v' + g``, v known so far, v' all errors of the image coordinates."""
+    found = strip.misclosures
+    misclosures = strip.absolute.misclosures[found.point, found.axis]
+    wanted = strip_conditions.conditions(
+        strip.errors, strip.orientation, strip.formed, found, misclosures, distances=settings.distances
+    )
+    if images.any():
+        known = relinearisation.displacements(strip.errors, wanted.rows, images)[:, 0]
+        wanted = replace(wanted, value=wanted.value + known)
+    return _Linearised(strip, images, strip_system.system(strip.errors, wanted, factor))

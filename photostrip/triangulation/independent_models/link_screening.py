@@ -85,12 +85,14 @@ def screen_links(shared: CommonPoints, models: StripModels, settings: LinkSettin
     """
     used, log = np.ones(len(shared.link), bool), list[LinkRejection]()
     mirrored = reflected(shared, models, used)
-    solved = linking.solve(shared, models, used)
-    tests = linking.studentised(shared, solved, used)
-    factor = _scatter(tests, solved)
     limit = _limits(shared, used, settings.alpha)
     open_links = np.ones(shared.count, bool)
-    while settings.screening != "none":
+    while True:
+        solved = linking.solve(shared, models, used)
+        tests = linking.studentised(shared, solved, used)
+        factor = _scatter(tests, solved)
+        if settings.screening == "none":
+            break
         worst = _worst(shared, models, used, used & ~kept, tests.value / factor, limit, open_links)
         if not len(worst):
             break
@@ -101,9 +103,6 @@ def screen_links(shared: CommonPoints, models: StripModels, settings: LinkSettin
             log.append(LinkRejection(link=link, row=row, value=size, limit=float(limit[link]), error=(x, y, z)))
         used = used.copy()
         used[worst] = False
-        solved = linking.solve(shared, models, used)
-        tests = linking.studentised(shared, solved, used)
-        factor = _scatter(tests, solved)
     value = tests.value / factor
     doubtful = _doubtful(shared, value, limit) if settings.screening != "none" else ()
     log.sort(key=lambda each: -each.value)

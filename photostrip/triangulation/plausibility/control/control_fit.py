@@ -73,7 +73,6 @@ def fit_similarity(w: Complex, plan: Complex, *, mirrored: bool = False) -> Plan
 
     w: (n,), places of the points in the upright strip.
     plan: (n,), given places E + iN, metres.
-    mirrored: whether the strip is to be mirrored.
     Returns none for fewer than three points, or when all stand at one place.
     """
     if len(w) < LEAST_POINTS:
@@ -192,9 +191,7 @@ def fit_robustly(columns: NDArray[Any], values: NDArray[Any], in_fit: Flags, flo
     It starts from the fit through as many points as unknowns whose median residual is smallest, goes on with weights
     that fall with the residual, and ends with the points that go with each other, all of one weight.
 
-    columns: (n, c), columns, the same for all points.
-    values: (n,), values, metres.
-    in_fit: (n,), points that may take part.
+    columns, values: (n, c), (n,), metres; in_fit: (n,), points that may take part.
     floor: smallest standard deviation that makes sense, metres.
     """
     size = np.maximum(np.abs(columns[in_fit]).max(axis=0, initial=TINY), TINY)

@@ -62,10 +62,7 @@ class HeightComparison:
 
 
 def compare_heights(given: GivenPoints, fitted: StraightenedStrip, consistent: Flags) -> HeightComparison | None:
-    """Compare given heights with those of a strip; None when too few are given.
-
-    consistent: (n,), points of lists that go with each other.
-    """
+    """Compare given heights with those of a strip; None when too few are given."""
     usable = given.use[:, 2] & np.isfinite(given.xyz[:, 2]) & np.isfinite(fitted.height)
     in_fit = usable & ~given.check & consistent
     agreeing = in_fit & ~(np.isfinite(fitted.plan.residual) & fitted.plan.odd)

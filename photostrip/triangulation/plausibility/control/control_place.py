@@ -45,7 +45,6 @@ class FramePlace(NamedTuple):
 def find_wrong_place(frame: GroundFrame, area: Area | None, enu: Floats, number: int) -> FramePlace:
     """Compare the place of control list `number` with the area of its coordinate reference system.
 
-    area: none when it is not known.
     enu: (n, 3), its points east, north, up, in the units of the frame.
     """
     known = enu[np.isfinite(enu[:, :2]).all(axis=1)]

@@ -156,9 +156,7 @@ def turn_level(given: GivenPoints, level: LevelStrip, floor: float, in_fit: Flag
 
     Relief times that tilt is a displacement in plan. Where the heights do not help, all stays as it is.
 
-    level: the strip, set upright by its cameras.
     floor: smallest standard deviation of a height that makes sense, as a share of the distance from camera to ground.
-    in_fit: (n,), points on which the strip is laid in plan.
     """
     similarity = level.similarity
     place, height = similarity(level.w), level.scale * level.z

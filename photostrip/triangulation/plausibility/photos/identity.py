@@ -42,7 +42,6 @@ def find_shared_ids(
     What a pair says is believed within what its y parallax lets expect along the base.
 
     names: ids of the points by number.
-    photos: photos of the strip in order.
     sigma: standard deviation of an image coordinate, mm.
     """
     rows = np.flatnonzero(np.isfinite(formed.model_xyz).all(axis=1))
