@@ -165,12 +165,9 @@ def parse_crs(spec: FrameSpec, directory: Path | None) -> CRS:
         parsed: CRS = load_pyproj().CRS.from_user_input(text)
     except load_pyproj().exceptions.CRSError as error:
         reason = re.sub(r".*Internal Proj Error: (proj_create: )?|\)$", "", " ".join(str(error).split()))
-        raise Refusal(
-            f"PROJ does not know the coordinate reference system {spec.name!r} ({reason})",
-            code="crs-unknown",
-            expected=expected,
-            fix="for a system of your own write `crs: local` (right-handed, metres)",
-        ) from None
+        message = f"PROJ does not know the coordinate reference system {spec.name!r} ({reason})"
+        fix = "for a system of your own write `crs: local` (right-handed, metres)"
+        raise Refusal(message, code="crs-unknown", expected=expected, fix=fix) from None
     return parsed
 
 
@@ -220,12 +217,9 @@ def _kind_of(spec: FrameSpec, core: CRS, *, compound: bool) -> Kind:
     elif compound and kind == "geocentric":
         kind = None
     if kind is None:
-        raise Refusal(
-            f"{spec.name} cannot carry ground control: it is of the kind {what!r}",
-            code="crs-kind",
-            expected="a projected, geographic or geocentric CRS, with heights or without",
-            fix=fix,
-        )
+        message = f"{spec.name} cannot carry ground control: it is of the kind {what!r}"
+        expected = "a projected, geographic or geocentric CRS, with heights or without"
+        raise Refusal(message, code="crs-kind", expected=expected, fix=fix)
     return kind
 
 
@@ -235,12 +229,10 @@ def _check_directions(spec: FrameSpec, core: CRS, kind: Kind) -> None:
     # On a polar grid both axes point north, or both south: away from the south pole, or from the north pole.
     polar = kind == "projected" and directions in (["north", "north"], ["south", "south"])
     if kind != "geocentric" and set(directions) != {"east", "north"} and not polar:
-        raise Refusal(
-            f"the axes of {spec.name} point {directions[0]} and {directions[1]}",
-            code="crs-axes",
-            expected="axes that point east and north, in any order",
-            fix="use the east-north form of the grid, with the signs of the coordinates changed",
-        )
+        message = f"the axes of {spec.name} point {directions[0]} and {directions[1]}"
+        expected = "axes that point east and north, in any order"
+        fix = "use the east-north form of the grid, with the signs of the coordinates changed"
+        raise Refusal(message, code="crs-axes", expected=expected, fix=fix)
 
 
 def area_of_use(spec: FrameSpec, *, directory: Path | None = None) -> tuple[float, float, float, float] | None:

@@ -124,20 +124,14 @@ def _ellipsoid(spec: FrameSpec) -> Iterator[Refusal]:
     if spec.ellipsoid is None:
         return
     if spec.crs != "geocentric":
-        yield Refusal(
-            f"`ellipsoid` belongs to `crs: geocentric`; {spec.name} has its own or none",
-            code="ellipsoid",
-            key="ellipsoid",
-            fix="drop `ellipsoid`, or write the radii into a PROJ string (+a=... +b=...)",
-        )
+        message = f"`ellipsoid` belongs to `crs: geocentric`; {spec.name} has its own or none"
+        fix = "drop `ellipsoid`, or write the radii into a PROJ string (+a=... +b=...)"
+        yield Refusal(message, code="ellipsoid", key="ellipsoid", fix=fix)
     a, b = spec.ellipsoid
     if not (math.isfinite(a) and math.isfinite(b) and a > 0.0 and abs(a - b) <= _LARGEST_FLATTENING * a):
-        yield Refusal(
-            f"a = {a}, b = {b} are not the semi-axes of an ellipsoid",
-            code="ellipsoid",
-            key="ellipsoid",
-            expected="both semi-axes in metres, for example a: 6378245, b: 6356863.019",
-        )
+        message = f"a = {a}, b = {b} are not the semi-axes of an ellipsoid"
+        expected = "both semi-axes in metres, for example a: 6378245, b: 6356863.019"
+        yield Refusal(message, code="ellipsoid", key="ellipsoid", expected=expected)
 
 
 def _heights_without_geoid(spec: FrameSpec, kind: Kind) -> Iterator[Refusal]:
@@ -153,46 +147,31 @@ def _heights_without_geoid(spec: FrameSpec, kind: Kind) -> Iterator[Refusal]:
 def _ellipsoidal_heights(spec: FrameSpec, vertical: str) -> Iterator[Refusal]:
     """Refuse a geoid beside ellipsoidal heights."""
     if spec.geoid_undulation is not None:
-        yield Refusal(
-            f"geoid_undulation is given for {spec.name}, but its heights are said to be ellipsoidal",
-            code="height-undulation",
-            key="geoid_undulation",
-            fix="drop it, or say `height: orthometric`",
-        )
+        message = f"geoid_undulation is given for {spec.name}, but its heights are said to be ellipsoidal"
+        fix = "drop it, or say `height: orthometric`"
+        yield Refusal(message, code="height-undulation", key="geoid_undulation", fix=fix)
     if vertical:
-        yield Refusal(
-            f"{spec.name} brings heights above a geoid ({vertical}), but they are said to be ellipsoidal",
-            code="height-compound",
-            key="height",
-            fix="say `height: orthometric`, or leave the vertical part out of `crs`",
-        )
+        message = f"{spec.name} brings heights above a geoid ({vertical}), but they are said to be ellipsoidal"
+        fix = "say `height: orthometric`, or leave the vertical part out of `crs`"
+        yield Refusal(message, code="height-compound", key="height", fix=fix)
 
 
 def _orthometric_heights(spec: FrameSpec, vertical: str, *, three_dimensional: bool) -> Iterator[Refusal]:
     """Ask for exactly one geoid under orthometric heights."""
     undulation = spec.geoid_undulation
     if three_dimensional:
-        yield Refusal(
-            f"the heights of {spec.name} are ellipsoidal by definition, but they are said to be orthometric",
-            code="height-compound",
-            key="height",
-            fix="use the two-dimensional CRS with `geoid_undulation`, or a compound CRS",
-        )
+        message = f"the heights of {spec.name} are ellipsoidal by definition, but they are said to be orthometric"
+        fix = "use the two-dimensional CRS with `geoid_undulation`, or a compound CRS"
+        yield Refusal(message, code="height-compound", key="height", fix=fix)
     elif undulation is None and not vertical:
-        yield Refusal(
-            f"{spec.name} with orthometric heights does not say how high the geoid lies above the ellipsoid",
-            code="height-geoid",
-            key="height",
-            expected="geoid_undulation: metres, or a vertical CRS in `crs` (such as EPSG:32633+5773)",
-            fix="a constant undulation does for a strip of a few kilometres",
-        )
+        message = f"{spec.name} with orthometric heights does not say how high the geoid lies above the ellipsoid"
+        expected = "geoid_undulation: metres, or a vertical CRS in `crs` (such as EPSG:32633+5773)"
+        fix = "a constant undulation does for a strip of a few kilometres"
+        yield Refusal(message, code="height-geoid", key="height", expected=expected, fix=fix)
     elif undulation is not None and vertical:
-        yield Refusal(
-            f"{spec.name} brings its own geoid ({vertical}), and geoid_undulation is given as well",
-            code="height-undulation",
-            key="geoid_undulation",
-            fix="drop `geoid_undulation`, or the vertical part of `crs`",
-        )
+        message = f"{spec.name} brings its own geoid ({vertical}), and geoid_undulation is given as well"
+        fix = "drop `geoid_undulation`, or the vertical part of `crs`"
+        yield Refusal(message, code="height-undulation", key="geoid_undulation", fix=fix)
     elif undulation is not None and not math.isfinite(undulation):
         message = f"geoid_undulation {undulation} is not a length in metres"
         yield Refusal(message, code="height-undulation", key="geoid_undulation")

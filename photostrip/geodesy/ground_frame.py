@@ -17,11 +17,11 @@ import numpy as np
 
 from photostrip.errors import GeometryError, PhotostripError
 from photostrip.geodesy.curvature import curvature_correction, meridian_radius, prime_vertical_radius
-from photostrip.geodesy.datum_shift import DatumShift, wrapped_longitude
 from photostrip.geodesy.domain import finite_rows, named_rows, require_reached, require_rows
 from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES, FrameSpec, Kind
 from photostrip.geodesy.ground_axes import axes_along_north, axes_between, true_axes
 from photostrip.geodesy.local_frame import geocentric_from_geodetic, geodetic_from_geocentric
+from photostrip.geodesy.proj_operation import DatumShift, wrapped_longitude
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

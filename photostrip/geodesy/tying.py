@@ -14,10 +14,9 @@ from typing import TYPE_CHECKING
 
 from photostrip.errors import Fault, InputError, PhotostripError
 from photostrip.geodesy.crs import CrsParts, missing_named_grids, read_crs
-from photostrip.geodesy.datum_shift import DatumShift
 from photostrip.geodesy.frame_spec import FrameSpec, Refusal, contradictions
 from photostrip.geodesy.ground_frame import GroundFrame
-from photostrip.geodesy.proj_operation import ProjOperation, missing_grids, trouble_with
+from photostrip.geodesy.proj_operation import DatumShift, ProjOperation, missing_grids, trouble_with
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -171,14 +171,9 @@ def orient(
         if np.abs(step).max() < CONVERGED * half:
             break
     if similarity.rotation[2, 2] < 0:
-        raise InputError(
-            Fault(
-                "the strip fits the control only upside down: the control coordinates are left-handed",
-                code="left-handed-control",
-                key="control.axes",
-                expected="the axes in the order of the columns, [north, east, up] where X is north",
-            )
-        )
+        message = "the strip fits the control only upside down: the control coordinates are left-handed"
+        expected = "the axes in the order of the columns, [north, east, up] where X is north"
+        raise InputError(Fault(message, code="left-handed-control", key="control.axes", expected=expected))
     misclosures = targets.misclosures(similarity(strip))
     values = np.linalg.svd(_scaled_design(plain, root), compute_uv=False)
     redundancy = int(targets.control.use.sum()) - PARAMETERS

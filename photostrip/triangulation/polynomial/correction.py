@@ -1,4 +1,7 @@
-"""Strip polynomials: the deformation that a similarity leaves, corrected axis by axis."""
+"""Strip polynomials: the deformation that a similarity leaves, corrected axis by axis.
+
+Which degree they get is decided by evidence: an F test of each step and errors at control points left out.
+"""
 
 from __future__ import annotations
 
@@ -8,18 +11,30 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.statistics import f_p_value
 from photostrip.triangulation.polynomial import terms as polynomial_terms
-from photostrip.triangulation.polynomial.degree import GROUPS, Evidence, decide
 from photostrip.triangulation.polynomial.least_squares import AxisFit, FitProblem, fit_axes
 
 if TYPE_CHECKING:
-    from photostrip.arrays import Floats
-    from photostrip.triangulation.polynomial.degree import Fits
+    from collections.abc import Callable, Sequence
+
+    from photostrip.arrays import Flags, Floats, Numbers
+    from photostrip.triangulation.polynomial.least_squares import Terms
+
+    Fits = Callable[[Terms], list[AxisFit]]
 
 
 __all__ = ["DEGREES", "GROUPS", "AxisFit", "Evidence", "FitProblem", "Polynomial", "PolynomialSettings", "fit"]
 
 DEGREES = ("auto", "1", "2", "3")
+SURE_LEVEL = 0.10  # of the F test: enough by itself
+LIKELY_LEVEL = 0.40  # enough when left-out points get better too
+# left-out errors may not grow by more, however significant the step: such control only bends the strip
+LARGEST_GROWTH = 1.5
+PLAN, HEIGHT = "plan", "height"
+GROUPS = ((PLAN, (0, 1)), (HEIGHT, (2,)))  # decided apart: control can be good in one and poor in the other
+SMALLEST_REST = 1e-6  # smallest eigenvalue of I - H for a group that can be left out
+SIMILARITY_PARAMETERS = {PLAN: 4, HEIGHT: 3}  # of the seven, those that each group determines
 
 
 @dataclass(frozen=True)
@@ -27,6 +42,25 @@ class PolynomialSettings:
     """Which polynomial takes out the strip deformation."""
 
     degree: str = "auto"  # ``"auto"`` (decided by evidence), ``"1"``, ``"2"`` or ``"3"``
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What speaks for a degree, in plan or in height."""
+
+    group: str  # ``"plan"`` (X and Y) or ``"height"``
+    degree: int
+    terms: int  # number of terms in each axis of the group
+    redundancy: int  # redundancy over the axes of the group
+    rms: float  # root mean square of the residuals at control, metres
+    left_out: float  # root mean square at control points that did not take part in the fit, metres
+    left_out_by: str  # ``"band"`` or ``"point"``: what was left out at a time
+    # f, p: F ratio of the step from the degree compared with, and the probability of a larger one by chance; NaN
+    # without
+    f: float
+    p: float
+    against: int  # the degree compared with
+    accepted: bool  # whether the step was taken
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,3 +108,189 @@ def fit(problem: FitProblem, settings: PolynomialSettings) -> Polynomial:
         reach=(float(inside.min()), float(inside.max())),
         asked=settings.degree,
     )
+
+
+def _candidates(problem: FitProblem, axis: int, asked: str) -> list[Terms]:
+    """Terms of all axes for the similarity alone and for every degree that adds something to one axis.
+
+    The other axes get the terms of the same degree as far as their own control carries them.
+    """
+    forced = asked != "auto"
+    points = [problem.xyz[_counted(problem, k)] for k in range(3)]
+    found: list[Terms] = [((), (), ())]
+    for degree in range(1, (int(asked) if forced else 3) + 1):
+        terms = tuple(polynomial_terms.choose_terms(xyz, degree, problem.sizes, forced=forced) for xyz in points)
+        if terms[axis] != found[-1][axis]:
+            found.append(terms)
+    return found
+
+
+def decide(
+    problem: FitProblem, part: tuple[str, tuple[int, ...]], asked: str, fits_of: Fits
+) -> tuple[tuple[str, ...], list[Evidence]]:
+    """Go up the degrees of plan or height: each step must be asked for by its F test and not spoil left-out points.
+
+    part: name and axes of the part, one of ``GROUPS``.
+    Returns the terms, and every degree that was weighed, ascending.
+    """
+    group, axes = part
+    every = _candidates(problem, axes[0], asked)
+    forced = asked != "auto"
+    fits = [fits_of(terms) for terms in every]
+    candidates = [terms[axes[0]] for terms in every]
+    left_out, by = _left_out_errors(problem, candidates, fits, axes)
+    expected = _expected(problem)
+    chosen, evidence = 0, []
+    for number, terms in enumerate(candidates):
+        against = chosen
+        f, p = _f_test(fits[against], fits[number], expected) if number else (float("nan"), float("nan"))
+        if forced:
+            accepted = number == len(candidates) - 1
+        else:
+            accepted = number == 0 or _is_justified(p, left_out[number], left_out[against])
+        chosen = number if accepted else chosen
+        of_group = [fits[number][axis] for axis in axes]
+        residuals = np.concatenate([a.residuals[_counted(problem, k)] for k, a in zip(axes, of_group, strict=True)])
+        evidence.append(
+            Evidence(
+                group=group,
+                degree=polynomial_terms.degree_of(terms),
+                terms=len(terms),
+                redundancy=_redundancy(of_group, SIMILARITY_PARAMETERS[group]),
+                rms=_rms(residuals),
+                left_out=left_out[number],
+                left_out_by=by,
+                f=f,
+                p=p,
+                against=polynomial_terms.degree_of(candidates[against]),
+                accepted=bool(accepted or number == 0),
+            )
+        )
+    return candidates[chosen], evidence
+
+
+def _is_justified(p: float, rich: float, simple: float) -> bool:
+    """Whether more terms are justified: by the F test alone, or by a weaker one that left-out points confirm."""
+    ratio = rich / simple if simple > 0 and np.isfinite(rich) else LARGEST_GROWTH
+    return (p < SURE_LEVEL and ratio < LARGEST_GROWTH) or (p < LIKELY_LEVEL and ratio < 1.0)
+
+
+def _expected(problem: FitProblem) -> Floats:
+    """Return the standard deviation, by axis in metres, of a misclosure from the control and the point alone."""
+    weight = problem.by_axis
+    with np.errstate(divide="ignore", invalid="ignore"):
+        variance = np.where(weight > 0, 1 / weight, 0.0).sum(axis=0) / (weight > 0).sum(axis=0)
+    return np.asarray(np.sqrt(np.nan_to_num(variance)), float)
+
+
+def _counted(problem: FitProblem, axis: int) -> Flags:
+    return problem.by_axis[:, axis] > 0
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else float("nan")
+
+
+def _redundancy(fits: Sequence[AxisFit], similarity: int) -> int:
+    """Redundancy of a fit; without terms the similarity's own parameters count."""
+    total = sum(axis.redundancy for axis in fits)
+    return total if any(axis.terms for axis in fits) else total - similarity
+
+
+def _of_all_axes(fits: Sequence[AxisFit]) -> int:
+    """Redundancy over all axes; a group without terms rests on its share of the similarity."""
+    return sum(_redundancy([fits[axis] for axis in axes], SIMILARITY_PARAMETERS[group]) for group, axes in GROUPS)
+
+
+def _f_test(simple: Sequence[AxisFit], rich: Sequence[AxisFit], expected: Floats) -> tuple[float, float]:
+    """F ratio of the richer fit against the simpler over all axes, each in units of its own richer variance.
+
+    A strip bends in plan and height together, so all axes testify to a step; whether plan or height takes it their
+    own left-out points say. The variance is never taken below what the control's own standard deviations say: with
+    few points a fit can look better than the control is.
+    """
+    left = _of_all_axes(rich)
+    gained = _of_all_axes(simple) - left
+    if gained < 1 or left < 1 or any(axis.redundancy < 1 for axis in rich):
+        return float("nan"), float("nan")
+    explained = 0.0
+    for before, after, limit in zip(simple, rich, expected, strict=True):
+        variance = max(float((after.residuals**2).sum()) / after.redundancy, float(limit) ** 2)
+        explained += max(float((before.residuals**2).sum() - (after.residuals**2).sum()), 0.0) / variance
+    f = explained / gained
+    return f, f_p_value(f, gained, left)
+
+
+def _left_out_errors(
+    problem: FitProblem, candidates: list[tuple[str, ...]], fits: list[list[AxisFit]], axes: tuple[int, ...]
+) -> tuple[list[float], str]:
+    """Errors at control that took no part: inner bands when every degree can do without one, else single points.
+
+    An outer band is not left out: predicting it would be extrapolation, which no user of a polynomial should do.
+    """
+    counted = np.flatnonzero(_counted(problem, axes[0]))
+    group = polynomial_terms.bands(problem.xyz[counted, 0], problem.spacing)
+    inner = [counted[group == band] for band in range(1, int(group.max(initial=0)))]
+    if inner and _carried_without(problem, counted, inner, candidates[-1]):
+        return [_left_out(problem, all_axes, axes, inner) for all_axes in fits], "band"
+    single = [np.array([row]) for row in counted]
+    return [_left_out(problem, all_axes, axes, single) for all_axes in fits], "point"
+
+
+def _carried_without(problem: FitProblem, counted: Numbers, inner: Sequence[Numbers], terms: tuple[str, ...]) -> bool:
+    """Whether the control carries all terms without any one of its inner bands.
+
+    The same choice as ``terms.choose_terms`` makes for what is left. A band that goes takes one station
+    with it: the next band begins at the same point as before. The squares of singular values are those of the whole
+    design less the band's share, so that nothing is fitted again.
+    """
+    stations = polynomial_terms.count_stations(problem.xyz[counted, 0], problem.spacing) - 1
+    degree = polynomial_terms.degree_of(terms)
+    sizes = np.array([len(rows) for rows in inner])
+    for size in np.unique(sizes).tolist():
+        chosen = polynomial_terms.ladder(stations, len(counted) - size, degree)
+        left = np.array([rows for rows in inner if len(rows) == size])
+        for drop in polynomial_terms.DROP_ORDER:
+            if not chosen or not len(left):
+                break
+            good = _conditions_without(problem, counted, left, chosen) < 1 / polynomial_terms.RANK_LIMIT
+            if good.any() and chosen != terms:
+                return False
+            left, chosen = left[~good], polynomial_terms.dropped(chosen, drop)
+        if len(left) and chosen != terms:
+            return False
+    return True
+
+
+def _conditions_without(problem: FitProblem, counted: Numbers, groups: Numbers, terms: tuple[str, ...]) -> Floats:
+    """Condition numbers of the scaled design without each of several groups of points of equal size."""
+    scaled = polynomial_terms.columns(problem.xyz, terms) / polynomial_terms.scales(terms, problem.sizes)
+    parts = scaled[groups]
+    squares = np.linalg.eigvalsh(scaled[counted].T @ scaled[counted] - parts.transpose(0, 2, 1) @ parts)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(squares[:, 0] > 0, np.sqrt(squares[:, -1] / squares[:, 0]), np.inf)
+
+
+def _left_out(problem: FitProblem, fits: Sequence[AxisFit], axes: tuple[int, ...], groups: Sequence[Numbers]) -> float:
+    """Root mean square error at groups of control predicted from all others, without fitting again.
+
+    The error of a left-out group is (I - H)^-1 times its residuals, H the part of the hat matrix within the group.
+    The similarity is taken to share its parameters evenly among the points.
+    """
+    share = SIMILARITY_PARAMETERS[PLAN] / 2 if len(axes) > 1 else float(SIMILARITY_PARAMETERS[HEIGHT])
+    errors: list[Floats] = []
+    for axis in axes:
+        fit_, total = fits[axis], int(_counted(problem, axis).sum())
+        root = np.sqrt(np.where(_counted(problem, axis), problem.by_axis[:, axis], 1.0))
+        for size in np.unique([len(rows) for rows in groups]).tolist():
+            rows = np.array([each for each in groups if len(each) == size])
+            parts = fit_.basis[rows]
+            hat = parts @ parts.transpose(0, 2, 1) if fit_.terms else np.eye(size) * min(share / total, 0.9)
+            rest = np.broadcast_to(np.eye(size) - hat, (len(rows), size, size))
+            free = np.linalg.eigvalsh(rest)[:, 0] >= SMALLEST_REST
+            # a group that alone determines part of the fit cannot be predicted by the others
+            errors.append(np.full(int((~free).sum()) * size, np.inf))
+            if free.any():
+                residuals = (fit_.residuals[rows] * root[rows])[free]
+                errors.append((np.linalg.solve(rest[free], residuals[:, :, None])[:, :, 0] / root[rows][free]).ravel())
+    return _rms(np.concatenate(errors))

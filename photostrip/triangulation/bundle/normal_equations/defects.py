@@ -63,12 +63,11 @@ def refuse_weak_points(prepared: PreparedProblem, reduced: Reduced) -> None:
         for number in batch.point[batch.real][~(each.strength[batch.real] > PARALLEL)].tolist()
     ]
     if weak:
-        raise GeometryError(
+        message = (
             f"rays and control do not determine {named('point', weak)}: "
-            "a point needs two rays that meet at an angle, or one and its given height",
-            points=weak,
-            code="bundle-rays",
+            "a point needs two rays that meet at an angle, or one and its given height"
         )
+        raise GeometryError(message, points=weak, code="bundle-rays")
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,11 +94,8 @@ def refuse_loose(prepared: PreparedProblem, state: Parameters) -> None:
         if loose.shape[1]:
             names = [prepared.problem.photo_name(number) for number in photos.tolist()]
             whole = "" if len(parts) == 1 else f" of {named('photo', names)}"
-            raise GeometryError(
-                f"what is given does not determine {_moves(state, held, loose)}{whole}: {_reason(held)}",
-                photos=() if len(parts) == 1 else names,
-                code="bundle-rank",
-            )
+            message = f"what is given does not determine {_moves(state, held, loose)}{whole}: {_reason(held)}"
+            raise GeometryError(message, photos=() if len(parts) == 1 else names, code="bundle-rank")
 
 
 def _parts(prepared: PreparedProblem) -> list[Numbers]:
@@ -229,12 +225,11 @@ def refuse_singular(prepared: PreparedProblem, reduced: Reduced, extra: Floats |
         photos = [prepared.problem.photo_name(number) for number in np.sort(numbers).tolist()]
         names = [MOVES[int(np.argmax(size[int(np.argmax(worst))]))]]
     what = f"; least of all the {names[0]}" if names else ""
-    raise GeometryError(
+    message = (
         f"the observations do not determine {named('photo', photos) or 'the photos'}{what}: "
-        "they need more points in common with the others, or control",
-        photos=photos,
-        code="bundle-rank",
+        "they need more points in common with the others, or control"
     )
+    raise GeometryError(message, photos=photos, code="bundle-rank")
 
 
 def refuse_common(prepared: PreparedProblem, before: Floats, left: Floats) -> None:
