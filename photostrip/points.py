@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import numpy as np
 
@@ -115,6 +115,12 @@ class PhotoPoints:
         n = len(self.photo)
         for name in ("xy", "sigma"):
             object.__setattr__(self, name, frozen(getattr(self, name), shape=(n, 2)))
+
+    @classmethod
+    def naming(cls, point_ids: tuple[str, ...]) -> Self:
+        """Return a table that holds no image point and only names points, as those of models."""
+        none, nothing = np.zeros(0, np.intp), np.zeros((0, 2))
+        return cls(photo_ids=(), point_ids=point_ids, photo=none, point=none, xy=nothing, sigma=nothing)
 
     def __len__(self) -> int:
         """Return the number of image points."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline import Settings, triangulate
-from photostrip.pipeline.precision.propagation import Propagation, propagation
+from photostrip.pipeline.precision.photo_precision import Propagation, propagation
 from photostrip.pipeline.strips.absolute import OrientedStrip
 from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.simulate.simulation import simulate

@@ -43,9 +43,6 @@ START = (
 )
 
 
-# --------------------------------------------------------------------------------------- on the parent's side
-
-
 class WorkerProcess:
     """A worker as its parent sees it; ``work`` is what it does with a task, as ``module:function``."""
 
@@ -104,9 +101,6 @@ def share_of_memory(workers: int) -> float:
         with suppress(OSError, ValueError):
             total = min(total, int(Path(file).read_text(encoding="ascii")))
     return total / MEGABYTE / workers
-
-
-# --------------------------------------------------------------------------------------- on the worker's side
 
 
 def serve(handle: int, megabytes: float, work: str) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from photostrip.compare.ground import difference_in_plan_and_height, plan_and_height
 from photostrip.compare.members import members_of, missing_and_new
 from photostrip.compare.quantities import Quantity, quantities_of
-from photostrip.compare.tolerances import SETS, UNITS, Tolerances
+from photostrip.compare.tolerances import SETS, UNITS, SetTolerance, Tolerances
 from photostrip.errors import Fault, InputError
 
 if TYPE_CHECKING:
@@ -85,32 +85,12 @@ def _require_comparable(document: Document, baseline: Document, files: tuple[str
             message = f"cannot be compared with {files[1] or 'the baseline'}: {words} is {_shown(now)}"
             fix = "write both in one frame (`output` in the project), or renew the baseline with --update"
             faults.append(
-                Fault(
-                    message=message,
-                    code="not-comparable",
-                    file=files[0],
-                    line=0,
-                    column=0,
-                    key=f"frame.{key}",
-                    expected=_shown(before),
-                    fix=fix,
-                )
+                Fault(message, "not-comparable", file=files[0], key=f"frame.{key}", expected=_shown(before), fix=fix)
             )
     if not faults and not _common_points(document, baseline):
         message = f"cannot be compared with {files[1] or 'the baseline'}: no point is in both"
         fix = "is it the baseline of another strip?"
-        faults.append(
-            Fault(
-                message=message,
-                code="not-comparable",
-                file=files[0],
-                line=0,
-                column=0,
-                key="points",
-                expected="the same strip",
-                fix=fix,
-            )
-        )
+        faults.append(Fault(message, "not-comparable", file=files[0], key="points", expected="the same strip", fix=fix))
     if faults:
         raise InputError(faults)
 
@@ -134,9 +114,6 @@ def _folded(value: object) -> object:
 
 def _shown(value: object) -> str:
     return ", ".join(map(str, value)) if isinstance(value, list) else "missing" if value is None else str(value)
-
-
-# ------------------------------------------------------------------------------------------------------- numbers
 
 
 def _compared(document: Document, baseline: Document, tolerances: Tolerances) -> Iterator[Document]:
@@ -211,8 +188,6 @@ def _without_verdict(row: Document) -> Document:
     return {key: value for key, value in row.items() if key != "differs"}
 
 
-# --------------------------------------------------------------------------------------------- places and rotations
-
 Difference = tuple[str, str, str, float]  # kind, block, id, size; infinite where there is a number in one only
 
 
@@ -266,11 +241,8 @@ def _shared(now: list[Document], before: list[Document], keys: Sequence[str]) ->
     return [row["id"] for row, _ in pairs], np.array(values, float).reshape(-1, 2, 3).transpose(1, 0, 2)
 
 
-# ---------------------------------------------------------------------------------------------------------- sets
-
-
 def _set(kind: str, document: Document, baseline: Document, tolerances: Tolerances) -> Document:
-    tolerance = tolerances.of_set(kind)
+    tolerance: SetTolerance = getattr(tolerances, kind)
     missing, new = missing_and_new(members_of(document, kind), members_of(baseline, kind))
     too_many = len(missing) > tolerance.missing or len(new) > tolerance.new
     return {

@@ -76,8 +76,3 @@ class Tolerances:
         tolerance = self.of(kind)
         absolute = tolerance.absolute if unit == UNITS[kind] else tolerance.absolute_um if unit == "um" else 0.0
         return max(absolute, tolerance.relative * abs(before))
-
-    def of_set(self, kind: str) -> SetTolerance:
-        """Return the tolerance of a kind of set."""
-        found: SetTolerance = getattr(self, kind)
-        return found

@@ -25,14 +25,14 @@ def not_determined(
         return {observations.point_ids[number]: why for number in np.flatnonzero(~done).tolist()}
     placed = {photo: (n, k) for n, strip in enumerate(inputs.strips) for k, photo in enumerate(strip.photos)}
     contradicted = {int(number) for strip in strips for number in strip.of_photos.contradictions.point}
-    seen: dict[int, list[tuple[int, int]]] = {}
+    on_photos: dict[int, list[tuple[int, int]]] = {}
     for row in np.flatnonzero(~done[observations.point]):
         photo = observations.photo_ids[observations.photo[row]]
         if photo in placed:
-            seen.setdefault(int(observations.point[row]), []).append(placed[photo])
+            on_photos.setdefault(int(observations.point[row]), []).append(placed[photo])
     return {
         observations.point_ids[point]: _reason(places, contradicted=point in contradicted)
-        for point, places in sorted(seen.items())
+        for point, places in sorted(on_photos.items())
     }
 
 

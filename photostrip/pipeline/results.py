@@ -120,7 +120,7 @@ class StripResult:
     # control coordinates that were not used; ``control`` says so in its ``use``
     wrong_control: tuple[ControlRejection, ...]
     # what the covariance of the strip says of each coordinate of ``control``; None without
-    judged_control: control_significance.ControlTests | None = None
+    control_tests: control_significance.ControlTests | None = None
     photo_stages: PhotoStages | None = None  # None for independent models
     model_stages: ModelStages | None = None  # None for photos
 

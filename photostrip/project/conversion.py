@@ -163,9 +163,6 @@ def _renumbered(ids: Sequence[str], codes: Numbers) -> tuple[tuple[str, ...], Nu
     return tuple(ids[code] for code in kept[order]), rank[inverse]
 
 
-# --------------------------------------------------------------------------------------------------- the ground
-
-
 def frame_spec(given: GivenList) -> FrameSpec:
     """Return the frame of a list of ground coordinates."""
     return FrameSpec(
@@ -296,9 +293,6 @@ def given_orientations(
 def _filled(sigma: Floats, default: Sequence[float] | float | None) -> Floats:
     """Put the default where a row has no standard deviation of its own."""
     return sigma if default is None else np.where(np.isnan(sigma), default, sigma)
-
-
-# ------------------------------------------------------------------------------------------------- the settings
 
 
 def settings(project: ProjectFile) -> Settings:

@@ -15,6 +15,7 @@ from photostrip.formats.text.source import current, seen_from
 from photostrip.geodesy.crs import grid_names
 from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline import Inputs, ModelStrip, Settings, triangulate
+from photostrip.points import PhotoPoints
 from photostrip.project.conversion import (
     ImageSystem,
     camera_positions,
@@ -30,7 +31,7 @@ from photostrip.project.conversion import (
     strips,
 )
 from photostrip.project.hints import hints
-from photostrip.project.models import check_models, measured_models, named_points
+from photostrip.project.models import check_models, measured_models
 from photostrip.project.places import places_of
 from photostrip.project.resolved import completed, text_of
 from photostrip.project.schema.cameras import Camera as CameraBlock
@@ -50,7 +51,6 @@ if TYPE_CHECKING:
     from photostrip.errors import Fault
     from photostrip.notes import Finding, Note
     from photostrip.pipeline import MeasuredModels, Result
-    from photostrip.points import PhotoPoints
 
 __all__ = ["Project", "adjust_project", "json_schema", "load_project"]
 
@@ -208,7 +208,9 @@ def _inputs(
     inputs = Inputs(
         name=str(project.name),
         strips=strips(project, known) if models is None else (),
-        observations=_observations(project, tables, photos) if models is None else named_points(models),
+        observations=_observations(project, tables, photos)
+        if models is None
+        else PhotoPoints.naming(models.points.point_ids),
         control=control_points(control, project.control),
         frames=frames,
         output=(output or first) if not frames else None if output == first else output,

@@ -11,7 +11,7 @@ import numpy as np
 from photostrip.formats.measured.models import read_models
 from photostrip.formats.text.findings import listed, suggestion
 from photostrip.pipeline import MeasuredModels, ModelStrip
-from photostrip.points import ModelPoints, PhotoPoints, locate
+from photostrip.points import ModelPoints, locate
 from photostrip.project.yaml.document import fault_at
 from photostrip.project.yaml.references import listed_photos
 
@@ -172,9 +172,6 @@ def _as_listed(
             yield fault_at(root, (*path, place), message, "wrong-center", fix=fix)
 
 
-# --------------------------------------------------------------------------------------------------- conversion
-
-
 def measured_models(tables: ModelTables, given: Models, strips: Sequence[ModelStrip]) -> MeasuredModels:
     """Bring the model coordinates of the strips into millimetres and right-handed axes."""
     photos = [photo for strip in strips for photo in strip.photos]
@@ -222,17 +219,4 @@ def _rows(read: ModelTable, rows: Numbers, wanted: Sequence[str], default: Seque
     models = [read.model_ids[code] for code in read.models[rows]]
     return _Rows(
         models=models, targets=[read.target_ids[code] for code in read.targets[rows]], xyz=read.xyz[rows], sigma=sigma
-    )
-
-
-def named_points(models: MeasuredModels) -> PhotoPoints:
-    """Return a table of image points that holds none and only names the points of the models."""
-    nothing = np.zeros(0, np.intp)
-    return PhotoPoints(
-        photo_ids=(),
-        point_ids=models.points.point_ids,
-        photo=nothing,
-        point=nothing,
-        xy=np.zeros((0, 2)),
-        sigma=np.zeros((0, 2)),
     )

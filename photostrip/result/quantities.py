@@ -114,9 +114,6 @@ def angle_decimals(unit: str) -> int:
     return RADIANS if unit == "rad" else DEGREES
 
 
-# ------------------------------------------------------------------------------------------------------ records
-
-
 def record(block: str, values: Mapping[str, Any]) -> Document:
     """Round the values of a record of a block, each as its key is described."""
     return _record(table_at(block), values)

@@ -42,8 +42,6 @@ def _command(name: str, *examples: str) -> Callable[[Callable[..., None]], Calla
     return register
 
 
-# ------------------------------------------------------------------------------------------------------- options
-
 PlanFile = Annotated[
     Path | None,
     typer.Argument(metavar="[FILE]", help="Plan (YAML); without one the options say all.", show_default=False),
@@ -196,9 +194,6 @@ def _by_option(fault: Fault, names: dict[str, str]) -> Fault:
 def _listed(value: str | None) -> str | None:
     """Turn ``a,b`` into a list of YAML."""
     return None if value is None else f"[{value}]"
-
-
-# ------------------------------------------------------------------------------------------------------ commands
 
 
 @_command("model", "--camera film --overlap 60 --scale 10000 --control corners", "model.yaml -o model.svg")

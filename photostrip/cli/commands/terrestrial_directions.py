@@ -40,8 +40,6 @@ def _command(name: str, example: str) -> Callable[[Callable[..., None]], Callabl
     return register
 
 
-# ------------------------------------------------------------------------------------------------------- options
-
 CameraName = Annotated[str | None, typer.Option("--camera", metavar="NAME", help="Camera of a list; see `cameras`.")]
 Presets = Annotated[str | None, typer.Option("--presets", metavar="FILE", help="Your own list of cameras (YAML).")]
 Distance = Annotated[
@@ -118,9 +116,6 @@ class Looking:
         from photostrip.project.terrestrial.options import attitude
 
         return attitude(self.alpha, self.omega, self.kappa, self.angles)
-
-
-# ------------------------------------------------------------------------------------------------------ commands
 
 
 @_command("from-photo", '--camera "Photheo 19/1318" --at 80,60')

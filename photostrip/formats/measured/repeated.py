@@ -56,16 +56,16 @@ def averaged(read: Measurements, target: str, default: float | None, findings: F
     off = np.where(count[group, None] > 1, read.xy - mean[group], 0.0)
     _refuse_far(read, target, np.abs(off) / sigma, group, findings)
     findings.notes.append(_spread(read, target, off, count))
-    own = np.where(count[:, None] > 1, np.where(np.isnan(_sums(group, sigma)), np.nan, total**-0.5), read.sigma[first])
+    of_mean = np.where(np.isnan(_sums(group, sigma)), np.nan, total**-0.5)
     order = np.argsort(first)
-    rows = first[order]
+    rows, several = first[order], count[order, None] > 1
     return replace(
         read,
         table=read.table.take(rows),
         photo=read.photo[rows],
         target=read.target[rows],
-        xy=np.where(count[order, None] > 1, mean[order], read.xy[rows]),
-        sigma=own[order],
+        xy=np.where(several, mean[order], read.xy[rows]),
+        sigma=np.where(several, of_mean[order], read.sigma[rows]),
         times=count[order],
     )
 

@@ -44,9 +44,6 @@ def summary_csv(outcomes: Sequence[Document]) -> str:
     return to_csv((*COLUMNS, "message"), rows)
 
 
-# ------------------------------------------------------------------------------------------------------ records
-
-
 def record_text(record: Document) -> str:
     """Write the record of a result, one key a line."""
     lines = (f"{json.dumps(key)}: {json.dumps(value, ensure_ascii=False)}" for key, value in record.items())

@@ -130,9 +130,6 @@ def _share(source: str, sigmas: Floats) -> Document:
     }
 
 
-# ------------------------------------------------------------------------------------------------------- cameras
-
-
 def camera_document(name: str, cameras: Sequence[ComparedCamera], reference: ComparedCamera) -> Document:
     """Return a comparison of cameras as a document, one row for each camera in the order given."""
     order = [camera.name for camera in by_efficiency(cameras)]
@@ -173,8 +170,6 @@ def source_document() -> Document:
         row["printed_eta"] = printed.area
     return document | {"kind": "source-table"}
 
-
-# --------------------------------------------------------------------------------------------------------- tables
 
 TABLES = {"model": "points", "cameras": "cameras", "source-table": "cameras"}
 

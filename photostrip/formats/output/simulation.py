@@ -9,8 +9,6 @@ from __future__ import annotations
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from photostrip.formats.output import simulation_tables as tables
 from photostrip.formats.output.simulation_tables import on_one_line
 from photostrip.formats.output.simulation_truth import truth_text
@@ -25,8 +23,6 @@ if TYPE_CHECKING:
     from photostrip.geodesy.frame_spec import FrameSpec
     from photostrip.points import ModelPoints
     from photostrip.simulate import Simulation
-
-# ------------------------------------------------------------------------------------------------ in memory
 
 
 def inputs_of(simulation: Simulation) -> Inputs:
@@ -52,18 +48,10 @@ def _inputs_of_models(simulation: Simulation, points: ModelPoints) -> Inputs:
         count = len(photos) - 1
         flights.append(ModelStrip(name, photos, points.model_ids[first : first + count]))
         first += count
-    nothing = np.zeros(0, np.intp)
     return Inputs(
         name=simulation.spec.name,
         strips=(),
-        observations=PhotoPoints(
-            photo_ids=(),
-            point_ids=points.point_ids,
-            photo=nothing,
-            point=nothing,
-            xy=np.zeros((0, 2)),
-            sigma=np.zeros((0, 2)),
-        ),
+        observations=PhotoPoints.naming(points.point_ids),
         control=simulation.control,
         frames=simulation.frames,
         models=MeasuredModels(tuple(flights), points),
@@ -73,9 +61,6 @@ def _inputs_of_models(simulation: Simulation, points: ModelPoints) -> Inputs:
 def settings_of(simulation: Simulation) -> Settings:
     """Return the settings that the written project has: defaults, and refraction when it was simulated."""
     return Settings(refinement=ImageCorrectionSettings(refraction=simulation.spec.refraction))
-
-
-# ------------------------------------------------------------------------------------------------- as files
 
 
 def project_files(simulation: Simulation) -> dict[str, str]:
@@ -100,9 +85,6 @@ def project_files(simulation: Simulation) -> dict[str, str]:
 def control_file(number: int) -> str:
     """Name of a control list: ``control.csv``, ``control_2.csv``."""
     return "control.csv" if number == 0 else f"control_{number + 1}.csv"
-
-
-# ---------------------------------------------------------------------------------------- the project file
 
 
 def _project(simulation: Simulation) -> str:

@@ -71,9 +71,6 @@ def positive(angle: float) -> float:
     return 0.0 if FULL_CIRCLE - turned < ROUNDING else turned
 
 
-# ---------------------------------------------------------------------------------------------------- conversion
-
-
 def directions_document(
     camera: Phototheodolite, attitude: Attitude, ids: Sequence[str], xz: Floats, sigma: float | None
 ) -> Document:
@@ -114,9 +111,6 @@ def _points_and_directions(
         for name, (x, z), (horizontal, vertical) in rows
     ]
     return document
-
-
-# ------------------------------------------------------------------------------------------------------ accuracy
 
 
 def required_accuracy(
@@ -219,9 +213,6 @@ def worked_examples() -> Document:
             }
         )
     return document
-
-
-# --------------------------------------------------------------------------------------------------- orientation
 
 
 def oriented(

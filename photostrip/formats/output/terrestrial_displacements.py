@@ -196,9 +196,6 @@ def _step(result: Monitoring, step: Step, row: int, order: list[int], axes: Sequ
     }
 
 
-# ------------------------------------------------------------------------------------------------------- as CSV
-
-
 def displacements_csv(document: Document) -> str:
     """Return the displacements since the first epoch as CSV: a row for each point and later epoch.
 

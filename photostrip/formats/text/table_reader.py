@@ -120,8 +120,6 @@ class _Reader:
         else:
             self.findings.add(self.source.fault(line, column, message, code, expected=expected, fix=fix))
 
-    # ---------------------------------------------------------------------------------------- the header
-
     def _header(self) -> bool:
         """Read the header; False when the table cannot be read without it."""
         try:
@@ -221,8 +219,6 @@ class _Reader:
             used = ", ".join(column.name for column in self.columns)
             message = f"{counted(len(others), 'column')} not used: {listed(others)}; used: {used}"
             self.findings.notes.append(Note("unused-column", message, "note", file=self.source.file, line=line))
-
-    # ------------------------------------------------------------------------------------------ the rows
 
     def _chunks(self) -> Iterator[tuple[list[list[str]], list[int]]]:
         """Give rows with their line numbers, some thousands at a time."""

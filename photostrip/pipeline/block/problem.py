@@ -104,9 +104,6 @@ def _cameras(inputs: Inputs, settings: Settings) -> BundleCameras:
     return BundleCameras(of_photo, focal, sigmas(asked, settings.bundle.calibration_sigma))
 
 
-# ----------------------------------------------------------------------------------------------- on the ground
-
-
 class GivenPositions(NamedTuple):
     """Given coordinates as ``ControlObservations`` has them."""
 
@@ -256,9 +253,6 @@ def refilled(
     moved = np.abs(np.einsum("nij,nj->ni", given.axes, xyz - given.xyz))[np.isfinite(given.sigma)]
     changed = replace(block.problem, control=replace(given, xyz=xyz))
     return replace(block, problem=changed), float(moved.max(initial=0.0))
-
-
-# ------------------------------------------------------------------------------------------- what takes part first
 
 
 def _begin(

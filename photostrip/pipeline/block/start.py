@@ -127,17 +127,17 @@ class _Block:
         ids = tuple(self.observations.point_ids[n] for n in numbers[chosen])
         ground = known.output.ground_from_cartesian(cartesian[chosen], ids=ids)
         given = set(ids)
-        own = known.control.take(np.array([name not in given for name in known.control.ids], bool))
+        others = known.control.take(np.array([name not in given for name in known.control.ids], bool))
         scale = np.linalg.norm(np.ptp(cartesian, axis=0)) / np.linalg.norm(np.ptp(stage.formed.xyz, axis=0))
         sigma = max(1e-3, 1e-5 * float(scale * np.linalg.norm(np.ptp(stage.formed.xyz, axis=0))))
         count = len(chosen)
         control = ControlPoints(
-            ids=(*own.ids, *ids),
-            enu=np.concatenate([own.enu, ground]),
-            use=np.concatenate([own.use, np.ones((count, 3), bool)]),
-            check=np.concatenate([own.check, np.zeros(count, bool)]),
-            sigma=np.concatenate([own.sigma, np.full((count, 3), sigma)]),
-            frame=np.concatenate([own.frame, np.full(count, len(known.frames), np.intp)]),
+            ids=(*others.ids, *ids),
+            enu=np.concatenate([others.enu, ground]),
+            use=np.concatenate([others.use, np.ones((count, 3), bool)]),
+            check=np.concatenate([others.check, np.zeros(count, bool)]),
+            sigma=np.concatenate([others.sigma, np.full((count, 3), sigma)]),
+            frame=np.concatenate([others.frame, np.full(count, len(known.frames), np.intp)]),
         )
         return adjust_formed(stage, control, (*known.frames, known.output), self.tied)
 

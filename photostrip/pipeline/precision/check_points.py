@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.pipeline.precision.propagation import Propagation
+    from photostrip.pipeline.precision.photo_precision import Propagation
     from photostrip.pipeline.results import StripResult
     from photostrip.points import ControlPoints, PhotoPoints
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment

@@ -2,26 +2,40 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.pipeline.precision import check_points
-from photostrip.pipeline.precision.propagation import propagation
 from photostrip.pipeline.precision.strip_precision import StripPrecision
-from photostrip.triangulation.error_propagation import covariances
+from photostrip.triangulation.error_propagation import control_errors, covariances, photo_errors
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from photostrip.arrays import Floats
+    from photostrip.arrays import Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.precision.check_points import CheckPoints
     from photostrip.pipeline.results import StripResult
     from photostrip.pipeline.strips.absolute import OrientedStrip
     from photostrip.points import ControlPoints, PhotoPoints
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
+    from photostrip.triangulation.error_propagation.derivatives import ErrorRows
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
+
+
+@dataclass(frozen=True, eq=False)
+class Propagation:
+    """Rows of derivatives of one strip in its intermediate frame, and what the fit to the control takes away."""
+
+    errors: StripErrors
+    control: control_errors.Misclosures  # control coordinates that count
+    fit: control_errors.FitOperator
+    influence: Floats  # (q, 3, t): points by the parameters of the fit
+    photos: ErrorRows  # photos that could be oriented
+    photo_influence: Floats  # (k, 6, t): the same of them
+    oriented: Numbers  # (k,): their places in the strip
 
 
 def of_photos(
@@ -81,3 +95,30 @@ def _turned(strip: StripResult, photos: Floats) -> Floats:
     turn = np.zeros((6, 6))
     turn[:3, :3] = turn[3:, 3:] = strip.intermediate.axes
     return turn @ photos @ turn.T
+
+
+def propagation(strip: StripResult, oriented: OrientedStrip[StripErrors], observations: PhotoPoints) -> Propagation:
+    """Differentiate the strip method for one strip; `oriented` is the strip before its deformation was corrected."""
+    errors, found = oriented.errors, oriented.misclosures
+    terms = [axis.terms for axis in strip.polynomial.axes] if strip.polynomial else [(), (), ()]
+    fit = control_errors.fit_operator(found, oriented.weights, oriented.at_control, terms, errors.origin)
+    influence = fit.influence(oriented.xyz)
+    rows, flown = strip.of_photos.rows, strip.of_photos.strip
+    point = np.searchsorted(strip.formed.point, observations.point[rows])
+    sightings = photo_errors.Sightings(
+        photo=flown.positions(observations)[rows],
+        point=point,
+        image=rows,
+        xyz=strip.xyz[point],
+        focal=flown.camera.principal_distance,
+    )
+    photos = photo_errors.differentiate_photos(errors, sightings, strip.of_photos.resection, influence)
+    return Propagation(
+        errors=errors,
+        control=found,
+        fit=fit,
+        influence=influence,
+        photos=photos.rows,
+        photo_influence=photos.influence,
+        oriented=photos.photos,
+    )

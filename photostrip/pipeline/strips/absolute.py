@@ -13,9 +13,10 @@ import numpy as np
 
 from photostrip.errors import GeometryError, InputError
 from photostrip.geodesy.local_frame import IntermediateFrame, mean_position, strip_azimuth
+from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.triangulation import absolute_orientation
-from photostrip.triangulation.gross_errors.control import control_screening
+from photostrip.triangulation.gross_errors.control import control_screening, control_significance
 from photostrip.triangulation.gross_errors.control.strip_at_control import StripAtControl
 
 if TYPE_CHECKING:
@@ -28,12 +29,19 @@ if TYPE_CHECKING:
     from photostrip.pipeline.results import StripResult, StripShape
     from photostrip.points import ControlPoints
     from photostrip.triangulation.error_propagation.control_errors import Misclosures
-    from photostrip.triangulation.gross_errors.control import control_significance
     from photostrip.triangulation.gross_errors.control.control_rejections import ControlRejection
     from photostrip.triangulation.polynomial.correction import Polynomial
 
 
-Errors = TypeVar("Errors")  # derivatives of a placed strip by what was measured
+class StripDerivatives(Protocol):
+    """Derivatives of a strip on the ground by what was measured."""
+
+    @property
+    def origin(self) -> Floats:
+        """Common origin of all similarities, shape (3,)."""
+
+
+Errors = TypeVar("Errors", bound=StripDerivatives)
 
 
 class StripStage(Protocol[Errors]):
@@ -63,8 +71,8 @@ class StripStage(Protocol[Errors]):
     def misclosures(self, oriented: OrientedStrip[Errors]) -> Misclosures:
         """Control coordinates that count, with the derivatives of the strip there."""
 
-    def misclosure_covariance(self, oriented: OrientedStrip[Errors]) -> control_significance.ControlCovariance | None:
-        """Covariance of all misclosures at the control; None where there are too many to form it as a whole."""
+    def misclosure_covariance(self, oriented: OrientedStrip[Errors]) -> Floats:
+        """Covariance of all misclosures at the control, shape (w, w)."""
 
     def screens_control(self, settings: Settings) -> bool:
         """Whether wrong control is looked for."""
@@ -137,7 +145,7 @@ class ScreenedStrip(Generic[Errors]):
     oriented: OrientedStrip[Errors]
     wrong_control: tuple[ControlRejection, ...] = ()
     # what the covariance of the strip says of each coordinate of the control; None without
-    judged_control: control_significance.ControlTests | None = None
+    control_tests: control_significance.ControlTests | None = None
 
 
 def orient_on_control(
@@ -171,13 +179,28 @@ def reject_wrong_control(oriented: OrientedStrip[Errors], settings: Settings) ->
         precision=oriented.precision,
         spacing=spacing,
         breadth=breadth,
-        covariance=stage.misclosure_covariance(oriented),
+        covariance=_covariance_at_control(oriented),
     )
     kept, wrong = control_screening.screen_control(control, place)
-    judged = place.tests_by_covariance(control, kept)
+    tests = place.tests_by_covariance(control, kept)
     if wrong:
         oriented = to_ground(stage, kept, oriented.control_rows, oriented.frames)
-    return ScreenedStrip(oriented, wrong, judged)
+    return ScreenedStrip(oriented, wrong, tests)
+
+
+def _covariance_at_control(oriented: OrientedStrip[Errors]) -> control_significance.ControlCovariance | None:
+    """Covariance of all misclosures at the control; None where there are too many to form it as a whole."""
+    many = oriented.control.use.sum() > control_significance.LARGEST
+    if many or len(oriented.stage.strip.photos) > control_significance.LONGEST:
+        return None
+    found = oriented.misclosures
+    moved = similarity_derivatives(oriented.at_control[found.point], oriented.errors.origin)
+    return control_significance.ControlCovariance(
+        point=found.point,
+        axis=found.axis,
+        design=np.einsum("wi,wij->wj", found.direction, moved),
+        covariance=oriented.stage.misclosure_covariance(oriented),
+    )
 
 
 def control_of(formed: StripShape, control: ControlPoints, point_ids: Sequence[str]) -> tuple[ControlPoints, Numbers]:

@@ -100,6 +100,6 @@ def far_ends(formed: FormedModels) -> Floats:
     scale = solved.similarities.scale
     found = np.zeros(len(scale))
     np.maximum.at(found, link, variance)
-    own = np.array([np.median(models.sigma[rows[link == number]]) for number in range(len(scale))])
-    ratio: Floats = np.sqrt(found) / np.maximum(scale * own, 1e-300)
+    stated = np.array([np.median(models.sigma[rows[link == number]]) for number in range(len(scale))])
+    ratio: Floats = np.sqrt(found) / np.maximum(scale * stated, 1e-300)
     return ratio

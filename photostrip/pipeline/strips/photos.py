@@ -8,12 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import GeometryError
-from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.pipeline import overruling
 from photostrip.pipeline.results import PhotoStages, StripResult
 from photostrip.pipeline.strips import notes
 from photostrip.triangulation.error_propagation import control_errors, covariances, strip_errors
-from photostrip.triangulation.gross_errors.control import control_significance
 from photostrip.triangulation.gross_errors.pairs import screening
 from photostrip.triangulation.gross_errors.rays import screened_formation, strip_screening
 from photostrip.triangulation.relative_orientation.orientation import Orientation, orient_unchecked, refuse_unusable
@@ -91,20 +89,13 @@ class FormedPhotos:
         rows = oriented.control_rows
         return control_errors.misclosures(oriented.errors.points, targets.turned(xyz), rows, targets.axes(xyz))
 
-    def misclosure_covariance(self, oriented: Oriented) -> control_significance.ControlCovariance | None:
-        """Covariance of all misclosures at the control; None where there are too many to form it as a whole."""
-        many = oriented.control.use.sum() > control_significance.LARGEST
-        if many or len(self.strip.photos) > control_significance.LONGEST:
-            return None
-        errors, found = oriented.errors, oriented.misclosures
+    def misclosure_covariance(self, oriented: Oriented) -> Floats:
+        """Covariance of all misclosures at the control, shape (w, w)."""
+        found = oriented.misclosures
         # image coordinates are taken as good as stated, or as bad as the pairs have proved
         factor = max(1.0, float(np.median(self.screened.scatter.by_pair)) ** 2 / (2 * self.sigma**2))
-        covariance = covariances.of_parameters(errors, found, np.eye(len(found.point)), factor).parameters * factor
-        moved = similarity_derivatives(oriented.at_control[found.point], errors.origin)
-        design = np.einsum("wi,wij->wj", found.direction, moved)
-        return control_significance.ControlCovariance(
-            point=found.point, axis=found.axis, design=design, covariance=covariance
-        )
+        everything = np.eye(len(found.point))
+        return covariances.of_parameters(oriented.errors, found, everything, factor).parameters * factor
 
     def screens_control(self, settings: Settings) -> bool:
         """Whether wrong control is looked for."""
@@ -159,7 +150,7 @@ class FormedPhotos:
                 *notes.covariance_notes(strip, oriented.control, covariance),
             ),
             wrong_control=screened.wrong_control,
-            judged_control=screened.judged_control,
+            control_tests=screened.control_tests,
             photo_stages=PhotoStages(
                 strip=strip,
                 sigma=self.sigma,

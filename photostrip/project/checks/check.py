@@ -135,9 +135,6 @@ def _refused(project: Project, test: Callable[[], None]) -> list[Fault]:
     return []
 
 
-# ----------------------------------------------------------------------------------------------- the photos
-
-
 def _image_coordinates(project: Project, faults: list[Fault]) -> list[Note]:
     """Look at fiducial marks and distortion; what is refused there refuses the project."""
     inputs, notes = project.inputs, []
@@ -228,9 +225,6 @@ def _counts(project: Project) -> Document:
         "check_height": int((given.use[:, 2] & given.check & shown).sum()),
         "without_neighbour": len(gaps_of(inputs)) if inputs.models is None else 0,
     }
-
-
-# ---------------------------------------------------------------------------------------------- the ground
 
 
 def _frames(project: Project, faults: list[Fault]) -> list[Document]:

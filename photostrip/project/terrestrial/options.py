@@ -114,9 +114,6 @@ def attitude(alpha: float, omega: float, kappa: float, unit: str) -> Attitude:
     return Attitude(angles, ground_from_photo(*angles), unit)
 
 
-# -------------------------------------------------------------------------------------------------------- points
-
-
 class Points(NamedTuple):
     """Points of a table or of the command line, where they are numbered."""
 

@@ -80,7 +80,7 @@ def read_series(file: str, table: Table, centre: Floats, wanted: Wanted, finding
         points=read.points,
         epochs=epochs,
         coordinates=built.coordinates,
-        of_epoch=built.own,
+        of_epoch=built.of_epoch,
         shared=built.shared,
         stable=stable,
         times=times,
@@ -137,7 +137,7 @@ class _Measured(NamedTuple):
     """Coordinates and variances of a ``Series``."""
 
     coordinates: Floats
-    own: Floats
+    of_epoch: Floats
     shared: Floats
 
 
@@ -151,14 +151,14 @@ def _from_coordinates(
     number = locate(read.epochs, epochs)[read.epoch]
     rows = np.flatnonzero(number >= 0)
     shape = (len(epochs), len(read.points), len(SIDES), 2)
-    coordinates, own = np.full(shape, np.nan), np.ones(shape)
+    coordinates, of_epoch = np.full(shape, np.nan), np.ones(shape)
     where = (number[rows], read.point[rows], read.side[rows])
     flip = np.array([1.0, -1.0 if table.z_axis == "down" else 1.0])
     scale = MILLIMETRES[table.unit]
     coordinates[where] = read.table.columns("x", "z")[rows] * scale * flip - centre[read.side[rows]]
-    own[where] = (sigma[rows] * scale) ** 2
+    of_epoch[where] = (sigma[rows] * scale) ** 2
     flat = (*shape[:2], 4)
-    return _Measured(coordinates.reshape(flat), own.reshape(flat), np.zeros(flat[1:]))
+    return _Measured(coordinates.reshape(flat), of_epoch.reshape(flat), np.zeros(flat[1:]))
 
 
 def _from_pseudo_parallaxes(
@@ -178,15 +178,15 @@ def _from_pseudo_parallaxes(
     number = locate(names, epochs)[read.epoch]
     rows = np.flatnonzero(number >= 0)
     shape = (len(epochs), len(read.points), 4)
-    coordinates, own = np.full(shape, np.nan), np.zeros(shape)
+    coordinates, of_epoch = np.full(shape, np.nan), np.zeros(shape)
     coordinates[0] = first
     change = read.table.columns("dx", "dz", "dx_right", "dz_right")[rows] * scale
     coordinates[number[rows], read.point[rows]] = first[read.point[rows]] + change
-    own[1:] = 1.0
-    own[number[rows], read.point[rows]] = (sigma_d[rows] * MILLIMETRES[table.unit]) ** 2
+    of_epoch[1:] = 1.0
+    of_epoch[number[rows], read.point[rows]] = (sigma_d[rows] * MILLIMETRES[table.unit]) ** 2
     shared = np.zeros((len(read.points), 4))
     shared[read.point[::-1]] = (sigma[::-1] * MILLIMETRES[table.unit]) ** 2  # the first row of a point counts
-    return _Measured(coordinates, own, shared)
+    return _Measured(coordinates, of_epoch, shared)
 
 
 def _filled(

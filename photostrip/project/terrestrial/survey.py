@@ -94,9 +94,6 @@ def load_normal_case(
     )
 
 
-# ------------------------------------------------------------------------------------------------------- cameras
-
-
 def _cameras(given: TerrestrialFile, reading: Reading) -> list[Phototheodolite]:
     """Return the cameras of both stations; fewer when one is at fault."""
     known = own_presets()
@@ -143,9 +140,6 @@ def _pair(given: TerrestrialFile, cameras: Sequence[Phototheodolite]) -> StereoP
     centers = np.array([each.position for each in both], float)[:, order]
     angles = np.array([[each.alpha or 0.0, each.omega or 0.0, each.kappa or 0.0] for each in both]) * scale
     return StereoPair(focal, centers, np.array([ground_from_photo(*each) for each in angles]))
-
-
-# -------------------------------------------------------------------------------------------------- measurements
 
 
 def _series(given: TerrestrialFile | None, reading: Reading, cameras: Sequence[Phototheodolite]) -> Series | None:

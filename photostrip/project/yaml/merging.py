@@ -77,17 +77,17 @@ def where_named(fault: Fault, owner: Node, key: Path) -> Fault:
     return replace(at_key(fault, owner, key), message=f"{shown(fault.file, 200)} {fault.message}", fix=fix)
 
 
-def merge(base: Node, own: Node) -> Node:
-    """Lay one tree over another: mappings are merged, lists and values replaced; where both have a value, `own` counts.
+def merge(base: Node, over: Node) -> Node:
+    """Lay one tree over another: mappings are merged; of lists and values that both have, those of `over` count.
 
     Every value keeps the place where it stands.
     """
-    if not (isinstance(base.value, dict) and isinstance(own.value, dict)):
-        return own
+    if not (isinstance(base.value, dict) and isinstance(over.value, dict)):
+        return over
     entries = dict(base.value)
-    for key, node in own.value.items():
+    for key, node in over.value.items():
         entries[key] = merge(entries[key], node) if key in entries else node
-    return Node(entries, own.place, {**base.keys, **own.keys})
+    return Node(entries, over.place, {**base.keys, **over.keys})
 
 
 def override(root: Node, assignments: Sequence[str], findings: Findings) -> Node:

@@ -85,14 +85,11 @@ class Reading:
     @contextmanager
     def places(self, keys: Mapping[str, str] | None = None) -> Iterator[None]:
         """Give faults that know only a key the place of that key; `keys` are those of the file for other names."""
-
-        def own(fault: Fault) -> Fault:
-            return replace(fault, key=(keys or {}).get(fault.key, fault.key))
-
         try:
             yield
         except InputError as error:
-            raise InputError(at_own_key(own(fault), self.root) for fault in error.faults) from None
+            named = (replace(fault, key=(keys or {}).get(fault.key, fault.key)) for fault in error.faults)
+            raise InputError(at_own_key(fault, self.root) for fault in named) from None
 
 
 def read_file(kind: type[S], file: str, assignments: Sequence[str] = ()) -> tuple[S, Reading]:

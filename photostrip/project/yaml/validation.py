@@ -108,9 +108,6 @@ def _wrong_length(schema: Model, root: Node, path: Path) -> Fault:
     return fault_at(root, path, f"there is no {what}", "length", expected=f"at least {counted(1, what)}")
 
 
-# ---------------------------------------------------------------------------------- looking into the schema
-
-
 def _annotation(schema: Model, path: Path) -> Any:  # noqa: ANN401 (a type)
     """Type that the schema wants at a path; None where the schema ends."""
     current: Any = schema

@@ -133,9 +133,6 @@ def _along(document: Document, name: str) -> Table:
     return tabulated(rows, (*LAYOUT_AND_METHOD, *(number(str(photo + 1), f"along.{photo}", 2) for photo in shown)))
 
 
-# --------------------------------------------------------------------------------------------------- reliability
-
-
 def _detectable(document: Document) -> Table:
     rows = []
     for row in document["accuracy"]:
@@ -173,9 +170,6 @@ def _largest(values: Sequence[Detected]) -> str:
     if size == float("inf"):
         return "never"
     return DASH if size < 0 else metres(size)
-
-
-# ---------------------------------------------------------------------------------------------- needed and placed
 
 
 def _needed(document: Document) -> Table:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from photostrip.report.commands.plan_strip import strip_sections
 from photostrip.report.page.numbers import calibrated, counted, fixed, metres, micrometres, short
 from photostrip.report.page.parts import Column, Facts, Part, Section, Table, Words
-from photostrip.report.page.tables import number, tabulated, words
+from photostrip.report.page.tables import number, over_plane, tabulated, words
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,9 +21,6 @@ def plan_report(document: Document) -> tuple[str, tuple[Section, ...]]:
     """Make the report of a plan."""
     title, build = BUILDERS[document["kind"]]
     return title, build(document)
-
-
-# ----------------------------------------------------------------------------------------------------- one model
 
 
 def _model(document: Document) -> tuple[Section, ...]:
@@ -76,13 +73,8 @@ def _control(document: Document) -> str:
 
 
 def _grid(document: Document, name: str) -> Table:
-    """One quantity over the model: a row for each y, a column for each x."""
-    points = document["points"]
-    x = sorted({point["x_mm"] for point in points})
-    y = sorted({point["y_mm"] for point in points}, reverse=True)
-    value = {(point["x_mm"], point["y_mm"]): point[name] for point in points}
-    columns = (Column("y \\ x", "mm"), *(Column(fixed(each, 0)) for each in x))
-    return Table(columns, tuple((fixed(b, 0), *(metres(value[a, b]) for a in x)) for b in y))
+    corner = Column("y \\ x", "mm")
+    return over_plane(document["points"], ("x_mm", "y_mm"), name, corner, metres, lambda at: fixed(at, 0))
 
 
 def _sources(document: Document) -> Table:
@@ -124,9 +116,6 @@ def _simple(document: Document) -> Table:
             number("height", "rigorous_z_m", 3, "rigorous, m"),
         ),
     )
-
-
-# ------------------------------------------------------------------------------------------------------- cameras
 
 
 def _cameras(document: Document) -> tuple[Section, ...]:

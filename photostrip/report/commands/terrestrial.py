@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from photostrip.report.page.numbers import calibrated, counted, fixed, short
 from photostrip.report.page.parts import DASH, Column, Facts, Part, Section, Table, Words
-from photostrip.report.page.tables import number, tabulated, words
+from photostrip.report.page.tables import number, over_plane, tabulated, words
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -40,9 +40,6 @@ def _sigma(document: Document) -> str:
     return f"{short(document['image_sigma_um'])} µm in the photo, of x, z and the principal distance"
 
 
-# ---------------------------------------------------------------------------------------------------- conversion
-
-
 def _conversion(document: Document) -> tuple[Section, ...]:
     unit = document["orientation"]["unit"]
     facts = _camera_facts(document)
@@ -52,9 +49,6 @@ def _conversion(document: Document) -> tuple[Section, ...]:
         facts.append(("standard error", _sigma(document)))
         columns += [number(f"m_{name}", f"sigma_{name}_arcsec", 2, "″") for name in ("lambda", "beta")]
     return (Section("", (Facts(tuple(facts)), tabulated(document["points"], columns))),)
-
-
-# ------------------------------------------------------------------------------------------------------ accuracy
 
 
 def _accuracy(document: Document) -> tuple[Section, ...]:
@@ -70,31 +64,27 @@ def _accuracy(document: Document) -> tuple[Section, ...]:
     )
     sections = [
         Section("", (Facts(tuple(facts)),)),
-        Section("Horizontal directions, m_lambda in ″", (_matrix(points, "horizontal_arcsec", 2),)),
+        Section("Horizontal directions, m_lambda in ″", (_matrix(points, "horizontal_arcsec"),)),
     ]
     if not printed:
-        sections.append(Section("Vertical directions, m_beta in ″", (_matrix(points, "vertical_arcsec", 2),)))
+        sections.append(Section("Vertical directions, m_beta in ″", (_matrix(points, "vertical_arcsec"),)))
         return tuple(sections)
     note = (
         "The vertical directions inherit sec(lambda') from eq. 3, where cos(lambda') is right; without --as-printed the"
         " exact values are given."
     )
     sections += [
-        Section("Vertical directions as printed (eq. 6), m_beta in ″", (_matrix(points, "vertical_arcsec", 2),)),
-        Section("Vertical directions as printed (eq. 5), m_beta in ″", (_matrix(points, "vertical_eq5_arcsec", 2),)),
-        Section("Vertical directions, exact, m_beta in ″", (_matrix(points, "vertical_exact_arcsec", 2), Words(note))),
+        Section("Vertical directions as printed (eq. 6), m_beta in ″", (_matrix(points, "vertical_arcsec"),)),
+        Section("Vertical directions as printed (eq. 5), m_beta in ″", (_matrix(points, "vertical_eq5_arcsec"),)),
+        Section("Vertical directions, exact, m_beta in ″", (_matrix(points, "vertical_exact_arcsec"), Words(note))),
     ]
     return tuple(sections)
 
 
-def _matrix(points: Sequence[Document], name: str, decimals: int) -> Table:
-    """Arrange values over the photo as they lie in it: x to the right, z upwards."""
-    across = sorted({row["x"] for row in points})
-    upwards = sorted({row["z"] for row in points}, reverse=True)
-    value = {(row["x"], row["z"]): row[name] for row in points}
-    columns = (Column("z \\ x", "mm"), *(Column(short(x, 9)) for x in across))
-    rows = tuple((short(z, 9), *(fixed(value[x, z], decimals) for x in across)) for z in upwards)
-    return Table(columns, rows)
+def _matrix(points: Sequence[Document], name: str) -> Table:
+    return over_plane(
+        points, ("x", "z"), name, Column("z \\ x", "mm"), lambda value: fixed(value, 2), lambda at: short(at, 9)
+    )
 
 
 def _theodolite(document: Document) -> tuple[Section, ...]:
@@ -128,7 +118,7 @@ def _theodolite(document: Document) -> tuple[Section, ...]:
         Section("", (Facts(tuple(facts)),)),
         Section(
             "Standard error of image coordinates that it supports, µm",
-            (_matrix(document["points"], "supported_um", 2),),
+            (_matrix(document["points"], "supported_um"),),
         ),
     )
 
@@ -188,9 +178,6 @@ def _misprints(document: Document) -> tuple[Part, ...]:
         ),
     )
     return tuple(Words(text, mark=f"{number}.") for number, text in enumerate(texts, 1))
-
-
-# --------------------------------------------------------------------------------------------------- orientation
 
 
 def _orientation(document: Document) -> tuple[Section, ...]:

@@ -148,9 +148,6 @@ def _row(
     return GAP.join(pad(cut(row[n], sizes[n], dots), sizes[n], left=columns[n].left) for n in shown)
 
 
-# -------------------------------------------------------------------------------------------------------- words
-
-
 def wrapped(text: str, width: int) -> list[str]:
     """Break a text into lines of so many cells; longer words are broken."""
     lines: list[str] = []

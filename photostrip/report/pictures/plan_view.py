@@ -49,13 +49,15 @@ def plan_of(document: Document) -> Plan:
     def spot(row: Document, role: str, given: Document | None = None) -> Spot:
         east, north = grid.place(row)
         shift, up = grid.difference(given) if given else (None, None)
+        place, side = turned(east - start[0], north - start[1])
         return Spot(
-            row["id"],
-            role,
-            *turned(east - start[0], north - start[1]),
-            None if shift is None else turned(*shift),
-            up,
-            _ellipse(row, turned),
+            id=row["id"],
+            role=role,
+            along=place,
+            across=side,
+            shift=None if shift is None else turned(*shift),
+            up=up,
+            ellipse=_ellipse(row, turned),
         )
 
     given = {row["id"]: row for row in document["control"] if row["measured"]}

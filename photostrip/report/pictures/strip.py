@@ -36,9 +36,6 @@ def strip_pictures(document: Document) -> list[Picture]:
     return found
 
 
-# --------------------------------------------------------------------------------------------------------- plan
-
-
 class Sheet(NamedTuple):
     """Where the ground and what is enlarged on it lie on the picture of the plan."""
 
@@ -152,9 +149,6 @@ def _bars(sheet: Sheet, residual: float, north: tuple[float, float]) -> list[str
 
 def _metres(size: float) -> str:
     return f"{size / 1000:g} km" if size >= 1000 else f"{size:g} m" if size >= 1 else f"{size * 1000:g} mm"
-
-
-# ------------------------------------------------------------------------------------------------- along the strip
 
 
 def _axes(xs: Sequence[float], ys: Sequence[float], height: float) -> tuple[Axis, Axis]:

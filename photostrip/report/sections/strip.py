@@ -161,9 +161,6 @@ def _weights(precision: Document) -> str:
     )
 
 
-# --------------------------------------------------------------------------------------------------- polynomials
-
-
 def polynomial_section(document: Document, *, everything: bool) -> Section:
     """Polynomial adjustment: what was chosen, why, and how large it is."""
     blocks = document["polynomials"]

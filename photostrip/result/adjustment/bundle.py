@@ -183,9 +183,6 @@ def image_fit(found: Bundle) -> Document:
     }
 
 
-# -------------------------------------------------------------------------------------------------- reliability
-
-
 def _group(group: reliability.Group, shift: float) -> Document:
     """Sum up the redundancy of one kind of observations; effects of errors of those that others check."""
     kind, given = KINDS[group.kind], np.isfinite(group.sigma)

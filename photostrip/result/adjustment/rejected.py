@@ -80,9 +80,6 @@ def _entry(**values: object) -> Document:
     return record("rejected", EMPTY | values)
 
 
-# -------------------------------------------------------------------------------------------------------- photos
-
-
 def _from_pairs(strip: StripResult, observations: PhotoPoints) -> list[Document]:
     ids, oriented = observations.point_ids, strip.of_photos.orientation
 
@@ -224,9 +221,6 @@ def _from_control(strip: StripResult, wrong: ControlRejection) -> Document:
     )
 
 
-# -------------------------------------------------------------------------------------------- independent models
-
-
 def _from_links(result: Result, strip: StripResult) -> list[Document]:
     formed, names, found = strip.of_models.formed, strip.of_models.strip.models, []
     for each in formed.links.rejections:
@@ -263,9 +257,6 @@ def _other_point(strip: StripResult, row: int, size: float) -> str:
     xyz = models.xyz[models.model == models.model[row]]
     extent = float(np.linalg.norm(xyz - xyz.mean(axis=0), axis=1).max())
     return ", as where one id stands for two points" if size > ANOTHER_POINT * extent else ""
-
-
-# ------------------------------------------------------------------------------------------------------- bundle
 
 
 def _after_bundle(found: Bundle, rejected: list[Document]) -> list[Document]:

@@ -221,7 +221,7 @@ def misclosures_of(result: Result) -> list[Document]:
     found = []
     for strip in result.strips:
         nothing = np.full(strip.control.use.shape, np.nan)
-        tested, correction = strip.judged_control, strip.polynomial
+        tested, correction = strip.control_tests, strip.polynomial
         detectable = nothing if tested is None else tested.detectable
         redundancy = nothing if tested is None else np.where(np.isfinite(detectable), tested.redundancy, np.nan)
         leverage = [

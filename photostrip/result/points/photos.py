@@ -115,9 +115,6 @@ def point_rms(result: Result, images: Sequence[ImageResiduals]) -> Floats:
         return np.sqrt(np.where(count > 0, squares / np.maximum(count, 1), np.nan))
 
 
-# -------------------------------------------------------------------------------------------------- orientations
-
-
 def photos_of(result: Result, images: Sequence[ImageResiduals]) -> list[Document]:
     """Return the list ``photos``: exterior orientations in the frame of the result, in flight order.
 

@@ -50,9 +50,6 @@ def ellipses(level: Floats) -> tuple[Floats, Floats]:
     return axes, np.arctan2(mixed, (north - east) / 2) / 2 % np.pi
 
 
-# ------------------------------------------------------------------------------------------------------- columns
-
-
 def point_columns(result: Result) -> Document:
     """Return columns of ``points``: standard deviations, covariances, error ellipse in plan.
 
@@ -120,9 +117,6 @@ def _rates(rotations: Floats, system: str) -> Floats:
             for rotation in rotations
         ]
         return np.concatenate(single)
-
-
-# --------------------------------------------------------------------------------------------------------- block
 
 
 def precision_of(result: Result) -> Document:

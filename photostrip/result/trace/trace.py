@@ -77,9 +77,6 @@ def _strip(result: Result, strip: StripResult, factor: float) -> Document:
     }
 
 
-# -------------------------------------------------------------------------------------------------------- pairs
-
-
 def _pairs(result: Result, strip: StripResult, factor: float) -> list[Document]:
     """Relative orientation of every pair: rounds of the iteration, rejections, parallaxes and model points."""
     photos, orientation = strip.strip.photos, strip.of_photos.orientation
@@ -149,9 +146,6 @@ def _points(result: Result, strip: StripResult, number: int) -> list[Document]:
     return as_records(columns)
 
 
-# ---------------------------------------------------------------------------------------------- chain and scales
-
-
 def _chain(strip: StripResult, factor: float) -> list[Document]:
     """Orientation and place of every photo in the strip, and the base that leads to it."""
     formed, found = strip.of_photos.formed, []
@@ -202,9 +196,6 @@ def _scale_transfer(result: Result, strip: StripResult) -> list[Document]:
             }
         )
     return found
-
-
-# ---------------------------------------------------------------------------------------------------- the ground
 
 
 def _absolute(result: Result, strip: StripResult, factor: float) -> Document:
