@@ -26,14 +26,13 @@ def check(
     and back, the standard deviation of every control coordinate and where it stands, and what became of every row of
     every table; and mistakes that the data themselves show. The exit code is 2 when any project has a fault.
     """
-    from photostrip.cli.garbage import without_garbage_collection
     from photostrip.cli.jobs.check import print_checked
     from photostrip.errors import EXIT_DONE, EXIT_INPUT
     from photostrip.project.checks.check import check_project
     from photostrip.report.page.progress import progress
 
     found = []
-    with without_garbage_collection(), progress(sys.stderr, len(projects), quiet=quiet) as waiting:
+    with progress(sys.stderr, len(projects), quiet=quiet) as waiting:
         for project in projects:
             waiting.at(f"checking {project}")
             found.append(check_project(project, assignments or []))

@@ -42,7 +42,6 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
     folder of its own in DIR.
     """
     from photostrip.cli.failures import failures_as
-    from photostrip.cli.garbage import without_garbage_collection
     from photostrip.cli.stderr import Messages
     from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE
     from photostrip.formats.output.result_files import result_files
@@ -57,7 +56,7 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
         from photostrip.cli.jobs.method_comparison import compare_methods
 
         return compare_methods(project, assignments or [], output, form, width, messages, quiet=quiet)
-    with failures_as(form), without_garbage_collection(), progress(sys.stderr, quiet=quiet) as waiting:
+    with failures_as(form), progress(sys.stderr, quiet=quiet) as waiting:
         if html:
             from photostrip.report.html import check_html, to_html
 

@@ -6,7 +6,6 @@ import sys
 from typing import TYPE_CHECKING
 
 from photostrip.cli.failures import failures_as
-from photostrip.cli.garbage import without_garbage_collection
 from photostrip.cli.stdout import Format, print_json, print_sections
 from photostrip.errors import EXIT_DONE, GeometryError, InputError
 from photostrip.formats.output.result_files import result_files
@@ -43,7 +42,7 @@ def compare_methods(
     """
     found: dict[str, Document | PhotostripError] = {}
     name = ""
-    with failures_as(form), without_garbage_collection(), progress(sys.stderr, quiet=quiet) as waiting:
+    with failures_as(form), progress(sys.stderr, quiet=quiet) as waiting:
         for adjustment in ADJUSTMENTS:
             waiting.at(f"adjusting: {adjustment}")
             loaded = load_project(project, [*assignments, f"processing.adjustment={adjustment}"])
