@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from functools import cache
 from typing import TYPE_CHECKING
 
 from tests.source_tree import modules
@@ -22,6 +23,7 @@ METHODS: dict[str, tuple[int, ...]] = {"_add": (3,), "_refuse": (2,), "fault": (
 UNNAMED = {"input", "geometry", "tolerance"}  # what has no code of its own
 
 
+@cache
 def codes() -> dict[str, str]:
     """Give every code with the first place where it is told: ``module:line``."""
     found = dict.fromkeys(UNNAMED, "photostrip.errors")

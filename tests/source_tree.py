@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
@@ -22,6 +23,7 @@ class Import:
         return f"{self.module}:{self.line} imports {self.target}"
 
 
+@cache
 def modules(root: Path = ROOT) -> dict[str, Path]:
     """Give every module of the package below `root` with its file."""
     found = {}
@@ -31,6 +33,7 @@ def modules(root: Path = ROOT) -> dict[str, Path]:
     return found
 
 
+@cache
 def imports(root: Path = ROOT) -> list[Import]:
     """Give every import of the package, also those inside functions and under ``TYPE_CHECKING``.
 
