@@ -29,10 +29,7 @@ def require_runnable(inputs: Inputs, settings: Settings) -> None:
 
 
 def require_whole(inputs: Inputs, frames: Sequence[GroundFrame]) -> None:
-    """Refuse geocentric points of which only some coordinates count: X, Y, Z are neither plan nor height.
-
-    Raises InputError with a fault for each such point.
-    """
+    """Refuse geocentric points of which only some coordinates count: X, Y, Z are neither plan nor height."""
     control = inputs.control
     if not frames:
         return

@@ -1,7 +1,4 @@
-"""A project file and its tables, read and checked: plain inputs and settings for the pipeline.
-
-Everything that is wrong with any of the files is reported in one go; see ``errors.Fault``.
-"""
+"""A project file and its tables, read and checked: plain inputs and settings for the pipeline."""
 
 from __future__ import annotations
 
@@ -119,10 +116,7 @@ def adjust_project(project: Project) -> Result:
 
 
 def load_project(path: Path, overrides: Sequence[str] = ()) -> Project:
-    """Read a project and all its tables.
-
-    Raises InputError with every fault of every file.
-    """
+    """Read a project and all its tables, or raise every fault of every file."""
     reading = Reading.of(str(path), overrides)
     root, findings = reading.root, reading.findings
     checked = reading.checked(ProjectFile)

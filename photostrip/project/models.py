@@ -70,10 +70,7 @@ def read_model_points(path: str, root: Node, findings: Findings, *, centers: boo
 
 
 def check_models(root: Node, tables: ModelTables, findings: Findings) -> dict[int, tuple[str, ...]]:
-    """Return the models of every strip, in flight order, by number of the strip, and refuse what does not fit.
-
-    Strips at fault are missing.
-    """
+    """Return the models of every strip without faults, by its number, in flight order; refuse what does not fit."""
     photos = [photo.id for photo in listed_photos(root)]
     centers = tables.centers_of(photos)
     _refuse_centers(tables, photos, centers, findings)

@@ -43,10 +43,7 @@ def _block(value: Plain, encode: Callable[[Plain], str]) -> str:
 
 
 def read_result(file: str) -> Document:
-    """Read a result.json.
-
-    Raises InputError when the file cannot be read, is not JSON or not a result of photostrip.
-    """
+    """Read a result.json, or raise what keeps it from being one."""
     text, _ = decode(file, read_bytes(file, LARGEST_RESULT))
     try:
         document: Any = json.loads(text)

@@ -19,6 +19,8 @@ from photostrip.points import PhotoPoints
 from photostrip.triangulation.image_coordinates.settings import ImageCorrectionSettings
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from photostrip.camera import Camera
     from photostrip.geodesy.frame_spec import FrameSpec
     from photostrip.points import ModelPoints
@@ -43,19 +45,22 @@ def _inputs_of_models(simulation: Simulation, points: ModelPoints) -> Inputs:
     """Return the same of a simulation of models; those of left-handed axes are turned over, as a project says it."""
     if simulation.spec.models is not None and simulation.spec.models.hand == "left-handed":
         points = replace(points, xyz=points.xyz * (1.0, -1.0, 1.0))
-    flights, first = [], 0
-    for name, photos in simulation.strips:
-        count = len(photos) - 1
-        flights.append(ModelStrip(name, photos, points.model_ids[first : first + count]))
-        first += count
     return Inputs(
         name=simulation.spec.name,
         strips=(),
         observations=PhotoPoints.naming(points.point_ids),
         control=simulation.control,
         frames=simulation.frames,
-        models=MeasuredModels(tuple(flights), points),
+        models=MeasuredModels(tuple(_flights(simulation, points)), points),
     )
+
+
+def _flights(simulation: Simulation, points: ModelPoints) -> Iterator[ModelStrip]:
+    first = 0
+    for name, photos in simulation.strips:
+        end = first + len(photos) - 1
+        yield ModelStrip(name, photos, points.model_ids[first:end])
+        first = end
 
 
 def settings_of(simulation: Simulation) -> Settings:
@@ -105,13 +110,11 @@ def _project(simulation: Simulation) -> str:
 def _of_models(simulation: Simulation, measured: ModelPoints) -> list[str]:
     """Lines of strips and models."""
     lines = ["strips:"]
-    listed, first = simulation.spec.models is not None and not simulation.spec.models.centers, 0
-    for name, photos in simulation.strips:
-        lines += [f"  - id: {on_one_line(name)}", f"    photos: {on_one_line(photos)}"]
-        count = len(photos) - 1
+    listed = simulation.spec.models is not None and not simulation.spec.models.centers
+    for strip in _flights(simulation, measured):
+        lines += [f"  - id: {on_one_line(strip.id)}", f"    photos: {on_one_line(strip.photos)}"]
         if listed:  # without centres nothing else tells which photos a model shows
-            lines += [f"    models: {on_one_line(measured.model_ids[first : first + count])}"]
-        first += count
+            lines += [f"    models: {on_one_line(strip.models)}"]
     lines += ["models:", "  file: models.csv", "  unit: mm"]
     if simulation.spec.models is not None and simulation.spec.models.hand != "right-handed":
         lines += [f"  axes: {simulation.spec.models.hand}"]

@@ -48,7 +48,6 @@ def adjust_block(
 ) -> AdjustedStrips:
     """Adjust all strips of a project together.
 
-    control: measured control of the project, no check points.
     Raises GeometryError when a strip, a photo or the datum cannot be determined, by name.
     """
     known = known_of(inputs, control, ground)

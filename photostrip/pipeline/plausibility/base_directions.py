@@ -33,7 +33,6 @@ def closer_look(
 ) -> Callable[[str, str], tuple[complex, complex] | None]:
     """Return a function that gives the directions in which two photos of a strip lie from each other.
 
-    cameras: camera of every photo that was measured.
     Returns of two photos, the direction towards the second on the first and towards the first on the second; None where
         the pair cannot be oriented well enough to say.
     """

@@ -111,10 +111,7 @@ def form(strip: Strip, observations: PhotoPoints, settings: Settings) -> Evidenc
 
 
 def ideal(observations: PhotoPoints, cameras: Mapping[str, Camera], settings: Settings) -> PhotoPoints:
-    """Image points free of distortion, without refraction, whose heights are not known; else as they are.
-
-    cameras: camera of every photo that was measured.
-    """
+    """Image points free of distortion, without refraction, whose heights are not known; else as they are."""
     try:
         return corrections.refine(observations, cameras, replace(settings.refinement, refraction=False)).observations
     except InputError:

@@ -169,10 +169,7 @@ def angles(
     observations: PhotoPoints,
     directory: Path | None = None,
 ) -> list[Finding]:
-    """Compare given angles with those of strips that are laid on their control, whatever an adjustment made of them.
-
-    Returns P601, P602.
-    """
+    """Compare given angles with those of strips on their control, whatever an adjustment made of them (P601, P602)."""
     given = inputs.orientations
     if given is None:
         return []

@@ -153,7 +153,6 @@ def orient_on_control(
 ) -> OrientedStrip[Errors]:
     """Lay a strip on its control: intermediate frame and absolute orientation.
 
-    control: measured control of the project, no check points.
     Raises GeometryError, InputError when the control does not determine the similarity, or strip and control are of
         different hands; the strip is named.
     """
@@ -262,7 +261,6 @@ def middle_frame(control: ControlPoints, frames: Sequence[GroundFrame]) -> Inter
     """Return the frame at the control's centre of gravity, X to the north.
 
     control: control; points without plan position do not count, a missing height is taken from the others.
-    frames: their ground frames.
     Raises GeometryError when no point gives a plan position.
     """
     known = ~np.isnan(control.enu[:, :2]).any(axis=1) & control.use[:, 0]

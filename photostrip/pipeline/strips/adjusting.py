@@ -30,10 +30,7 @@ def adjust(screened: ScreenedStrip[Errors], settings: Settings) -> StripResult:
 def adjust_formed(
     stage: StripStage[Errors], control: ControlPoints, frames: Sequence[GroundFrame], settings: Settings
 ) -> StripResult:
-    """Take a formed strip to the ground with its own control.
-
-    Raises GeometryError, InputError when the absolute orientation cannot be determined; the strip is named.
-    """
+    """Take a formed strip to the ground with its own control."""
     return adjust(reject_wrong_control(orient_on_control(stage, control, frames), settings), settings)
 
 

@@ -9,20 +9,21 @@ from photostrip.pipeline.refusals import require_adjustment_of_models
 from photostrip.pipeline.strips.photos import FormedPhotos, form_strip
 
 if TYPE_CHECKING:
-    from photostrip.pipeline.inputs import Inputs, MeasuredModels, Settings
+    from photostrip.pipeline.inputs import Inputs, Settings
     from photostrip.pipeline.strips.absolute import StripStage
-    from photostrip.pipeline.strips.models import LinkedModels
     from photostrip.points import PhotoPoints
 
 
 def form_strips(inputs: Inputs, observations: PhotoPoints, settings: Settings) -> list[StripStage[Any]]:
-    """Form the strips of a project, of photos or of independent models, each by itself.
+    """Form the strips of a project, of photos or of independent models, each by itself."""
+    models = inputs.models
+    if models is None:
+        return list(form_photos(inputs, observations, settings))
+    from photostrip.pipeline.strips.models import link_strip  # strips of photos need none of it
 
-    Raises GeometryError, InputError when a pair, a junction or a link cannot be determined; the strip is named.
-    """
-    if inputs.models is not None:
-        return list(_link_strips(inputs.models, settings))
-    return list(form_photos(inputs, observations, settings))
+    require_adjustment_of_models(settings)
+    overruling.require_named(settings.links, models.points)
+    return [link_strip(strip, models.points, settings) for strip in models.strips]
 
 
 def form_photos(inputs: Inputs, observations: PhotoPoints, settings: Settings) -> list[FormedPhotos]:
@@ -30,12 +31,3 @@ def form_photos(inputs: Inputs, observations: PhotoPoints, settings: Settings) -
     overruling.require(settings.relative, observations)
     whole = [strip for strip in inputs.strips if len(strip.photos) > 1 or settings.adjustment != "bundle"]
     return [form_strip(strip, observations, settings) for strip in whole]
-
-
-def _link_strips(models: MeasuredModels, settings: Settings) -> list[LinkedModels]:
-    """Link the strips of independent models."""
-    from photostrip.pipeline.strips.models import link_strip  # strips of photos need none of it
-
-    require_adjustment_of_models(settings)
-    overruling.require_named(settings.links, models.points)
-    return [link_strip(strip, models.points, settings) for strip in models.strips]

@@ -150,10 +150,7 @@ class LinkedModels:
 
 
 def link_strip(strip: ModelStrip, measured: ModelPoints, settings: Settings) -> LinkedModels:
-    """Link the models of a strip and form it, without any control.
-
-    measured: model coordinates of the whole project.
-    """
+    """Link the models of a strip, and keep what was measured."""
     return LinkedModels(strip, measured, form_models(strip, measured, settings))
 
 

@@ -220,11 +220,7 @@ class _Rays:
 
 
 def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> FormedPhotos:
-    """Orient the pairs of a strip and form it, without any control.
-
-    observations: ideal image coordinates of the whole project.
-    Raises GeometryError, InputError when a pair or a junction cannot be determined; the strip is named.
-    """
+    """Orient the pairs of a strip and form it, without any control."""
     sigma = strip.median_sigma(observations)
     pairs = collect_pairs(observations, strip.photos, strip.camera.principal_distance)
     pairs = pairs.without(overruling.touched(settings.relative.drop, observations, pairs.rows))

@@ -10,13 +10,14 @@ from photostrip.formats.measured.exterior import OrientationTable, PositionTable
 from photostrip.project.tables import rays
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
     from photostrip.arrays import Flags, Numbers
     from photostrip.formats.measured.control import ControlTable
     from photostrip.formats.measured.measurements import Measurements
+    from photostrip.formats.text.tables import Table
     from photostrip.pipeline import Inputs, MeasuredModels
     from photostrip.project.loading import Project
     from photostrip.project.tables import Tables
@@ -91,7 +92,7 @@ def table_rows(project: Project) -> list[Document]:
         found.append(_measured(tables.observations, photos, apart, control if bundle else set()))
     if (marks := tables.fiducials) is not None:
         reasons = [_outside(IN_NO_STRIP, marks.photo_ids, photos, marks.photo)]
-        found.append(_block(marks.table.file, marks.table.lines, reasons, marks.times))
+        found.append(_block(marks.table, reasons, marks.times))
     count = {} if tables.observations is None else rays(tables.observations, photos)
     if bundle:  # and control of a single one
         count = {name: max(number, 2) for name, number in count.items()}
@@ -108,14 +109,14 @@ def model_rows(tables: Tables, models: MeasuredModels) -> list[Document]:
     for each in () if read is None else (read.points, read.centers):
         if each is not None:
             reasons = [_outside(IN_NO_MODEL, each.model_ids, known, each.models)]
-            found.append(_block(each.table.file, each.table.lines, reasons))
+            found.append(_block(each.table, reasons))
     points = set(models.points.point_ids)
     for control in tables.control:
         if control is not None:
             missing = _outside(NO_MODEL, control.ids, points)
             off = Reason(OFF, ~control.used, missing.ids)
             reasons = [off, missing._replace(rows=control.used & missing.rows)]
-            found.append(_block(control.table.file, control.table.lines, reasons))
+            found.append(_block(control.table, reasons))
     return found
 
 
@@ -132,7 +133,7 @@ def _cameras(read: PositionTable | OrientationTable, photos: set[str], bundle: b
         Reason(OFF, ~outside.rows & off, outside.ids),
         Reason(NO_BUNDLE, ~outside.rows & ~off & (not bundle), outside.ids),
     ]
-    return _block(read.table.file, read.table.lines, reasons)
+    return _block(read.table, reasons)
 
 
 def _measured(read: Measurements, photos: set[str], gaps: set[str], whole: set[str]) -> Document:
@@ -147,7 +148,7 @@ def _measured(read: Measurements, photos: set[str], gaps: set[str], whole: set[s
         Reason(ONCE, ~outside.rows & once, names),
         Reason(NO_NEIGHBOUR, ~outside.rows & ~once & apart, names),
     ]
-    return _block(read.table.file, read.table.lines, reasons, read.times)
+    return _block(read.table, reasons, read.times)
 
 
 def _given(read: ControlTable, count: dict[str, int], gaps: set[str]) -> Document:
@@ -160,20 +161,17 @@ def _given(read: ControlTable, count: dict[str, int], gaps: set[str]) -> Documen
         Reason(ONCE, read.used & (number == 1), names),
         Reason(NO_NEIGHBOUR, read.used & (number > 1) & apart, names),
     ]
-    return _block(read.table.file, read.table.lines, reasons)
+    return _block(read.table, reasons)
 
 
-def _block(file: str, lines: Numbers, reasons: list[Reason], times: Numbers | None = None) -> Document:
+def _block(table: Table, reasons: list[Reason], times: Numbers | None = None) -> Document:
     """Count the rows of a table; `times` says of how many rows of the file each of them is made."""
-    times = np.ones(len(lines), np.intp) if times is None else times
-    unused = list(_unused(lines, reasons, times))
-    rows = int(times.sum())
-    return {"file": file, "rows": rows, "used": rows - sum(each["rows"] for each in unused), "unused": unused}
-
-
-def _unused(lines: Numbers, reasons: list[Reason], times: Numbers) -> Iterator[Document]:
+    times = np.ones(len(table.lines), np.intp) if times is None else times
+    unused: list[Document] = []
     for reason in reasons:
-        rows = np.flatnonzero(reason.rows)
-        if len(rows):
-            ids = list(dict.fromkeys(reason.ids[rows].tolist()))
-            yield {"why": reason.why, "rows": int(times[rows].sum()), "ids": ids, "first_line": int(lines[rows[0]])}
+        at = np.flatnonzero(reason.rows)
+        if len(at):
+            ids, line = list(dict.fromkeys(reason.ids[at].tolist())), int(table.lines[at[0]])
+            unused.append({"why": reason.why, "rows": int(times[at].sum()), "ids": ids, "first_line": line})
+    rows = int(times.sum())
+    return {"file": table.file, "rows": rows, "used": rows - sum(each["rows"] for each in unused), "unused": unused}

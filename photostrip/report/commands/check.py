@@ -1,7 +1,4 @@
-"""What ``photostrip check`` prints of a project: contents, frames, standard deviations, rows that are not used.
-
-Rendered from plain values alone, as the accuracy report is; nothing is computed here.
-"""
+"""What ``photostrip check`` prints of a project: contents, frames, standard deviations, rows that are not used."""
 
 from __future__ import annotations
 

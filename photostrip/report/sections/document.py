@@ -1,7 +1,4 @@
-"""The accuracy report: from the document of a result to sections, worst things first. Nothing is computed here.
-
-The only input is the content of result.json, so that ``photostrip report`` prints what ``photostrip run`` printed.
-"""
+"""The accuracy report: from the document of a result to sections, worst things first. Nothing is computed here."""
 
 from __future__ import annotations
 
