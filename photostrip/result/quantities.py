@@ -47,7 +47,9 @@ class Quantity:
         if kind == "by":
             return cls(meaning, "number", unit_key=rest[0])
         places, unit = int(rest[0]), "" if kind == "ratio" else kind
-        return cls(meaning, "number", unit, digits=places) if rest[1:] else cls(meaning, "number", unit, places)
+        if rest[1:]:
+            return cls(meaning, "number", unit, digits=places)
+        return cls(meaning, "number", unit, decimals=places)
 
     def rounded(self, value: ArrayLike, unit: str = "") -> Plain:
         """Return a value, or an array of them, as it is written; None for a number that is not finite."""

@@ -39,7 +39,7 @@ class Reading:
         root = read_tree(file, findings, files)
         if root is None:
             raise InputError(findings.faults)
-        return cls(file, root, findings, files).with_set(assignments)
+        return cls(file=file, root=root, findings=findings, files=files).with_set(assignments)
 
     def with_set(self, assignments: Sequence[str]) -> Reading:
         """Apply ``path=value`` assignments."""

@@ -39,7 +39,7 @@ class Parallaxes:
         count = oriented.points_used
         mean = pairs.sums(np.where(used, oriented.parallax**2, 0.0)) / np.maximum(count, 1)
         squares = pairs.sums(pairs.weight * oriented.parallax**2)
-        return cls(squares, count - MINIMUM_POINTS, np.sqrt(mean), peak[first])
+        return cls(squares=squares, redundancy=count - MINIMUM_POINTS, rms=np.sqrt(mean), worst=peak[first])
 
 
 def sigma0(squares: Floats, redundancy: Numbers) -> float:
