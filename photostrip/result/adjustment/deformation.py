@@ -1,22 +1,114 @@
-"""Deformations of single models, where there is height control enough to see them."""
+"""Deformation of single models of a strip, where the height control of a model is dense enough to see it."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photostrip.result.adjustment.deformation_surface import model_deformations
+from photostrip.planning.deformation import Paraboloid, determines_paraboloid, fit_paraboloid
 from photostrip.result.quantities import record
+from photostrip.triangulation.absolute_orientation import Targets
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from photostrip.arrays import Numbers
+    from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline import Result
-    from photostrip.result.adjustment.deformation_surface import ModelDeformation
+    from photostrip.pipeline.results import StripResult
     from photostrip.result.numbers import Document
 
+
+MILLIMETRES = 1000.0  # per metre
 LEVEL = 0.05  # of all tests together
 ARCSECONDS = float(np.degrees(1.0)) * 3600.0
 TERMS = ("twist", "bending")
+
+
+@dataclass(frozen=True, eq=False)
+class ModelDeformation:
+    """Twist and bending of one model."""
+
+    model: int
+    points: tuple[str, ...]
+    surface: Paraboloid  # height residuals in metres as a function of x and y at photo scale, mm
+    # base, width: photo base, and distance of the outermost of the points from the line of flight, mm at photo scale
+    base: float
+    width: float
+    scale: float
+    sigma: float  # mean stated standard deviation of a height residual, metres
+
+    @property
+    def at_corner(self) -> tuple[float, float]:
+        """Height that twist and bending give a corner of the model against its middle, metres."""
+        twist, bend = self.surface.coefficients[3:]
+        return abs(float(twist)) * self.base / 2 * self.width, abs(float(bend)) * (self.base / 2) ** 2
+
+    @property
+    def elements(self) -> tuple[float, float]:
+        """Errors of omega2' and of alpha2' - alpha1' that bend a model so, radians."""
+        return self.surface.elements(self.scale / MILLIMETRES, self.base)
+
+
+def model_deformations(strip: StripResult, frames: Sequence[GroundFrame]) -> tuple[ModelDeformation, ...]:
+    """Estimate twist and bending of every model that has the height control for it.
+
+    Returns in flight order; models with less than five height control points, or with points at fewer than three
+        distances along the base, are left out.
+
+    Each model counts as it was measured, carried to the ground by the similarity of the whole strip: its shift and
+    its tilts are estimated too, and a polynomial would bend it. Check points take no part.
+
+    Source: [003] eq. 10.12.
+    """
+    height = np.flatnonzero(strip.control.use[:, 2])
+    oriented, formed = strip.of_photos.orientation, strip.of_photos.formed
+    number = formed.point[strip.control_rows[height]]
+    order = np.argsort(number)
+    found = []
+    usable = oriented.used & np.isfinite(formed.model_xyz).all(axis=1) & np.isin(oriented.point, number)
+    for model in range(oriented.pairs.size):
+        rows = np.flatnonzero(usable & (oriented.pairs.pair == model))
+        control = height[order[np.searchsorted(number[order], oriented.point[rows])]]
+        deformed = _of_model(strip, frames, model, rows, control)
+        if deformed is not None:
+            found.append(deformed)
+    return tuple(found)
+
+
+def _of_model(
+    strip: StripResult, frames: Sequence[GroundFrame], model: int, rows: Numbers, control: Numbers
+) -> ModelDeformation | None:
+    """Twist and bending of one model from its rows of the pairs' table and their control points."""
+    similarity = strip.absolute.similarity
+    ends = similarity(strip.formed.centers[model : model + 2])
+    base = ends[1] - ends[0]
+    length = float(np.hypot(base[0], base[1]))
+    along = np.array([base[0], base[1]]) / length
+    xyz = similarity(strip.of_photos.formed.model_xyz[rows])
+    if not len(rows):
+        return None
+    arm = xyz - ends[0]
+    scale = float(-arm[:, 2].mean()) / (strip.of_photos.orientation.pairs.focal / MILLIMETRES)
+    xy = np.column_stack([arm[:, :2] @ along, arm[:, :2] @ (-along[1], along[0])]) / scale * MILLIMETRES
+    if not determines_paraboloid(xy):
+        return None
+    given = strip.control.take(control)
+    residual = Targets(given, frames, strip.intermediate).misclosures(xyz)[:, 2]
+    sigma = np.hypot(strip.precision[1], given.sigma[:, 2])
+    width = float(np.abs(xy[:, 1]).max())
+    surface = fit_paraboloid(xy, residual, sigma)
+    return ModelDeformation(
+        model=model,
+        points=given.ids,
+        surface=surface,
+        base=length / scale * MILLIMETRES,
+        width=width,
+        scale=scale,
+        sigma=float(sigma.mean()),
+    )
 
 
 def deformations_of(result: Result) -> Document:

@@ -11,7 +11,7 @@ import pytest
 from photostrip.formats.output.simulation import inputs_of, settings_of
 from photostrip.pipeline import triangulate
 from photostrip.report.sections.document import sections_of
-from photostrip.result.adjustment.deformation_surface import model_deformations
+from photostrip.result.adjustment.deformation import model_deformations
 from photostrip.result.document import document_of
 from photostrip.simulate import Control, Flight, Points, Spec, Terrain, simulate
 
