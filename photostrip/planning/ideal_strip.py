@@ -52,7 +52,6 @@ class StripGeometry:
 
     @property
     def _spec(self) -> Spec:
-        camera = replace(self.camera, principal_point=(0.0, 0.0), distortion=None, fiducials={})
         flight = Flight(
             photos=self.photos,
             end_lap_percent=self.end_lap_percent,
@@ -62,7 +61,7 @@ class StripGeometry:
         )
         return Spec(
             name="plan",
-            camera=camera,
+            camera=replace(self.camera, principal_point=(0.0, 0.0), distortion=None, fiducials={}),
             ground=Ground(crs="local"),
             flight=flight,
             terrain=Terrain(height=0.0, relief=0.0),
@@ -126,10 +125,8 @@ def ideal_strip(geometry: StripGeometry) -> IdealStrip:
     xyz = truth[formed.point]
     similarity = Similarity.from_points(formed.xyz, xyz)
     centers = similarity(formed.centers)
-    rotations = similarity.rotation @ formed.rotations
     station, row = _columns(geometry, centers, xyz)
     position = np.array([photos.index(photo) for photo in observations.photo_ids], np.intp)
-    errors = differentiate_strip(orientation, formed, similarity, position[observations.photo], observations.sigma)
     return IdealStrip(
         geometry=geometry,
         photos=photos,
@@ -139,10 +136,10 @@ def ideal_strip(geometry: StripGeometry) -> IdealStrip:
         similarity=similarity,
         xyz=xyz,
         centers=centers,
-        rotations=rotations,
+        rotations=similarity.rotation @ formed.rotations,
         station=station,
         row=row,
-        errors=errors,
+        errors=differentiate_strip(orientation, formed, similarity, position[observations.photo], observations.sigma),
     )
 
 

@@ -93,10 +93,9 @@ def _gruber_slots(spec: Spec, photos: Photos, home: Numbers, drawn: Floats) -> _
     length, width = spec.footprint
     zone = min(max(length / 2.0 - spec.base, 0.0), spec.base / 2.0)  # half the width of what lies on three photos
     inside = home % n
-    neighbours = np.stack([np.where(inside > 0, home - 1, -1), home, np.where(inside < n - 1, home + 1, -1)], axis=1)
     side = 1.0 - 2.0 * (np.arange(len(home)) % rows) / (rows - 1)  # 1 on the left, -1 on the right
     return _Slots(
-        photos=neighbours,
+        photos=np.stack([np.where(inside > 0, home - 1, -1), home, np.where(inside < n - 1, home + 1, -1)], axis=1),
         along=photos.along[home],
         across=photos.across[home],
         drawn=drawn * (spec.points.scatter_percent / 100.0 * zone),

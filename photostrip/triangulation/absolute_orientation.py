@@ -178,11 +178,10 @@ def orient(
     values = np.linalg.svd(_scaled_design(plain, root), compute_uv=False)
     redundancy = int(targets.control.use.sum()) - PARAMETERS
     squares = float((weight * misclosures**2).sum())
-    sigma0 = float(np.sqrt(squares / redundancy)) if redundancy > 0 else float("nan")
     return AbsoluteOrientation(
         similarity=similarity,
         misclosures=misclosures,
-        sigma0=sigma0,
+        sigma0=float(np.sqrt(squares / redundancy)) if redundancy > 0 else float("nan"),
         redundancy=redundancy,
         condition=float(values[0] / values[-1]),
         iterations=iteration,

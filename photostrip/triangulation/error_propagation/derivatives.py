@@ -62,14 +62,13 @@ class ErrorRows:
     def without_images(cls, first: Numbers, by_similarity: Floats, by_component: Floats) -> Self:
         """Rows that no image point enters directly."""
         none = np.zeros(0, np.intp)
-        by_image = np.zeros((0, by_similarity.shape[1], 2))
         return cls(
             first=first,
             by_similarity=by_similarity,
             by_component=by_component,
             item=none,
             image=none,
-            by_image=by_image,
+            by_image=np.zeros((0, by_similarity.shape[1], 2)),
         )
 
     @classmethod

@@ -88,11 +88,10 @@ def differentiate_strip(
     points = _point_rows(strip)
     if len(formed.bridging):
         points = with_bridges(points, strip)
-    covariances = _component_covariances(strip.images, len(strip.steps))
     return StripErrors(
         images=strip.images,
         steps=strip.steps,
-        component_covariances=covariances,
+        component_covariances=_component_covariances(strip.images, len(strip.steps)),
         points=points,
         pairs=pairs,
         origin=origin,

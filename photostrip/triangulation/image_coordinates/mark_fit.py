@@ -108,7 +108,6 @@ def _described(marks: Marks, kinds: tuple[str, ...], photo_from_measured: plane.
     residuals = photo_from_measured.residuals(marks.measured, marks.calibrated)
     redundancy = 2 * marks.count - np.array([plane.KINDS[kind].unknowns for kind in kinds], np.intp)
     squares = (marks.weights[..., None] * residuals**2).sum((1, 2))
-    sigma0 = np.sqrt(np.where(redundancy > 0, squares / np.maximum(redundancy, 1), np.nan))
     centers = (used[..., None] * marks.measured).sum(1) / np.maximum(used.sum(1), 1)[:, None]
     linear = linear_shape(photo_from_measured.jacobian(centers[:, None])[:, 0])
     return InteriorOrientation(
@@ -117,7 +116,7 @@ def _described(marks: Marks, kinds: tuple[str, ...], photo_from_measured: plane.
         photo_from_measured=photo_from_measured,
         marks=tuple(marks.on_photo(row) for row in range(len(marks.photos))),
         residuals=tuple(residuals[row, used[row]] for row in range(len(marks.photos))),
-        sigma0=sigma0,
+        sigma0=np.sqrt(np.where(redundancy > 0, squares / np.maximum(redundancy, 1), np.nan)),
         redundancy=redundancy,
         **linear._asdict(),
         mirrored=np.full(len(marks.photos), marks.mirrored),

@@ -180,18 +180,15 @@ def solve(shared: CommonPoints, models: StripModels, used: Flags) -> SolvedLinks
         if np.abs(step / unit).max(initial=0.0) < CONVERGED * size.max(initial=1.0):
             break
     residual = a - found.of(shared.link, b)
-    squares = shared.sums(share * np.einsum("ti,tij,tj->t", residual, weight, residual))
-    redundancy = 3 * shared.sums(share).astype(np.intp) - SIMILARITY_PARAMETERS
-    cofactors = inverse * unit[:, :, None] * unit[:, None, :]
     return SolvedLinks(
         similarities=found,
         residual=residual,
         weight=weight,
         design=design,
-        cofactors=cofactors,
+        cofactors=inverse * unit[:, :, None] * unit[:, None, :],
         centroid=centroid,
-        squares=squares,
-        redundancy=redundancy,
+        squares=shared.sums(share * np.einsum("ti,tij,tj->t", residual, weight, residual)),
+        redundancy=3 * shared.sums(share).astype(np.intp) - SIMILARITY_PARAMETERS,
     )
 
 

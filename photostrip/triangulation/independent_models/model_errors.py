@@ -62,7 +62,6 @@ def differentiate_models(formed: FormedModels, similarity: Similarity) -> ModelE
     before, after = np.full(len(models.model), -1), np.full(len(models.model), -1)
     before[first], after[second] = np.arange(len(used)), np.arange(len(used))
     item = np.where(formed.used, np.searchsorted(formed.node, models.node), -1)
-    share = np.where(formed.used, 1 / formed.node_models[np.maximum(item, 0)], 0.0)
     return ModelErrors(
         origin=origin,
         covariance=covariance,
@@ -74,7 +73,7 @@ def differentiate_models(formed: FormedModels, similarity: Similarity) -> ModelE
         second=second,
         model=models.model,
         item=item,
-        share=share,
+        share=np.where(formed.used, 1 / formed.node_models[np.maximum(item, 0)], 0.0),
         by_similarity=similarity_derivatives(nodes, origin),
         models=models.count,
     )

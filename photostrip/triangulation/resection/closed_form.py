@@ -59,16 +59,14 @@ def space_resection(xy: Floats, sigma: Floats, points: Floats, focal: float) -> 
         raise GeometryError("the space resection does not settle: the points are too few or too weak", code="resection")
     by_photo, _ = derivatives(points, found.centers, found.rotations, number, f)
     design = (by_photo / sigma[:, :, None]).reshape(-1, 6)
-    covariance = _inverse(design)
     redundancy = 2 * len(xy) - 6
     squares = float(((found.residuals / sigma) ** 2).sum())
-    sigma0 = float(np.sqrt(squares / redundancy)) if redundancy > 0 else float("nan")
     return OrientedPhoto(
         center=found.centers[0],
         rotation=found.rotations[0],
-        covariance=covariance,
+        covariance=_inverse(design),
         residuals=found.residuals,
-        sigma0=sigma0,
+        sigma0=float(np.sqrt(squares / redundancy)) if redundancy > 0 else float("nan"),
         redundancy=redundancy,
     )
 

@@ -150,7 +150,6 @@ def _batch(
     weight[:, :, real] = 1.0 / np.moveaxis(images.sigma[shown], 2, 0)
     changes = [0, *(np.flatnonzero(np.diff(slots)) + 1).tolist(), len(slots)]
     edges = np.append(start, slots.sum())
-    runs = tuple((int(edges[a]), int(edges[b]), b - a, int(slots[a])) for a, b in pairwise(changes))
     return Batch(
         point=members[member],
         real=np.flatnonzero(real),
@@ -159,7 +158,7 @@ def _batch(
         row=rows,
         xy=np.ascontiguousarray(np.moveaxis(images.xy[rows], 2, 0)),
         weight=weight,
-        runs=runs,
+        runs=tuple((int(edges[a]), int(edges[b]), b - a, int(slots[a])) for a, b in pairwise(changes)),
         sets=np.ascontiguousarray(photo[:, order[begin]].T),
         control=np.zeros(0, np.intp),
         control_normal=np.zeros((3, 3, 0)),

@@ -122,12 +122,10 @@ def parameters_of(problem: BundleProblem, solution: BundleSolution, precision: C
         p = t_p_value(value / deviation, solution.redundancy) if deviation > 0 and solution.redundancy > 0 else 1.0
         prior = float(sigma[camera, column])
         share = float(precision.common_residuals[number]) / prior**2 if np.isfinite(prior) else float("nan")
-        camera_id = problem.camera_ids[camera] if problem.camera_ids else str(camera)
-        title = TITLES.get(name, name)
         found.append(
             Parameter(
-                camera=camera_id,
-                name=title,
+                camera=problem.camera_ids[camera] if problem.camera_ids else str(camera),
+                name=TITLES.get(name, name),
                 unit=UNITS.get(name, "1"),
                 value=value,
                 sigma=deviation,

@@ -218,10 +218,9 @@ def fit_robustly(columns: NDArray[Any], values: NDArray[Any], in_fit: Flags, flo
     inverse = np.linalg.pinv(scaled[used].conj().T @ scaled[used], rcond=1e-12)
     lever = np.einsum("ni,ij,nj->n", scaled, inverse, scaled.conj()).real
     sigma = np.sqrt(np.maximum(np.diag(inverse).real, 0.0)) * (sigma0 if freedom > 0 else np.inf)
-    spread = np.sqrt(1.0 + np.maximum(lever, 0.0)) * (sigma0 if freedom > 0 else np.inf)
     return RobustFit(
         residual=residual,
-        spread=spread,
+        spread=np.sqrt(1.0 + np.maximum(lever, 0.0)) * (sigma0 if freedom > 0 else np.inf),
         used=used,
         coefficient=coefficient / size,
         sigma=sigma / size,
