@@ -95,6 +95,22 @@ def test_the_probe_of_loaded_packages_can_see_one() -> None:
     assert loaded_after("import photostrip, yaml", HEAVY) == {"yaml"}
 
 
+def test_a_plain_run_loads_no_room_that_it_does_not_enter() -> None:
+    names = python(
+        "import sys\nfrom photostrip.cli.main import main\n"
+        "assert main(['run', 'sample_data/simulated-20/project.yaml', '--quiet']) == 0\nprint(*sys.modules)"
+    ).split()
+    assert "photostrip.triangulation.polynomial.correction" in names
+    rooms = (
+        "independent_models.linking",
+        "covariance_adjustment.adjust",
+        "image_coordinates.interior",
+        "bundle.solution",
+    )
+    assert not {f"photostrip.triangulation.{room}" for room in rooms} & set(names)
+    assert not {"photostrip.report.html", "photostrip.cli.jobs.method_comparison", "scipy"} & set(names)
+
+
 # ---------------------------------------------------------------------------------------------------- the table
 
 
