@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,9 +18,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from photostrip.arrays import Floats
+    from photostrip.result.numbers import Document
 
-
-Document = dict[str, Any]
 
 SCHEMA = 1
 # A number of ours, and what the other numbers are made of.

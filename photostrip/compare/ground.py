@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,9 +11,7 @@ from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats
-
-
-Document = dict[str, Any]
+    from photostrip.result.numbers import Document
 
 
 def plan_and_height(frame: Document, now: Floats, before: Floats) -> tuple[Floats, Floats]:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from photostrip.compare.quantities import name_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-Document = dict[str, Any]
+    from photostrip.result.numbers import Document
+
 Member = tuple[str, str, str]  # block, id, what it is
 
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeGuard
+from typing import TYPE_CHECKING, NamedTuple, TypeGuard
 
 from photostrip.result.quantities import quantity_at
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-Document = dict[str, Any]
+    from photostrip.result.numbers import Document
+
 Number = float | None
 
 DEGREES = {"deg": 1.0, "gon": 0.9, "rad": 57.29577951308232}

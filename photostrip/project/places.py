@@ -21,10 +21,7 @@ if TYPE_CHECKING:
 def places_of(
     findings: Iterable[Finding], tree: Node, tables: Tables, strips: Sequence[Strip | ModelStrip]
 ) -> Iterator[Finding]:
-    """Return findings with the places of what they name.
-
-    That is the place of the key, else of the first point in a control list, else of the first photo in its strip.
-    """
+    """Return findings with the place of their key, else of the first point in a control list or photo in a strip."""
     for each in findings:
         if each.key:
             path, key = steps(each.key), each.key

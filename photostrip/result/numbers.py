@@ -30,10 +30,7 @@ DIGITS = re.compile("([0-9]+)")
 
 
 def rounded(values: ArrayLike, decimals: int) -> Plain:
-    """Round numbers to decimals: a number or nested lists in the shape of `values`.
-
-    None stands where there is no number (NaN, infinite); never -0.
-    """
+    """Round numbers, or nested lists of them, to decimals; None for what is no number (NaN, infinite), never -0."""
     return plain(np.round(np.asarray(values, float), decimals) + 0.0)
 
 

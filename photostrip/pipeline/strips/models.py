@@ -175,10 +175,7 @@ def form_models(strip: ModelStrip, measured: ModelPoints, settings: Settings) ->
 
 
 def models_of(strip: ModelStrip, measured: ModelPoints, settings: LinkSettings) -> StripModels:
-    """Take the models of a strip out of those of the project, without what the user drops.
-
-    Returns rows in the order of the models, then of the points.
-    """
+    """Take the models of a strip out of those of the project, row by row in flight order, without what is dropped."""
     place = locate(measured.model_ids, strip.models)[measured.model]
     rows = np.flatnonzero(place >= 0)
     rows = rows[np.lexsort((measured.node[rows], place[rows]))]

@@ -43,10 +43,7 @@ class Reason(NamedTuple):
 
 
 def observations_used(inputs: Inputs) -> Numbers:
-    """Return the number of the strip in which each image point takes part, shape (n,).
-
-    -1 stands for points that no neighbouring photo of the strip shows: they are in no pair.
-    """
+    """Return the strip in which each image point takes part, shape (n,); -1 where no neighbouring photo shows it."""
     observations = inputs.observations
     places = {photo: (i, j) for i, strip in enumerate(inputs.strips) for j, photo in enumerate(strip.photos)}
     strip, place = np.array([places[name] for name in observations.photo_ids], np.intp).reshape(-1, 2).T

@@ -91,10 +91,7 @@ def merge(base: Node, over: Node) -> Node:
 
 
 def override(root: Node, assignments: Sequence[str], findings: Findings) -> Node:
-    """Apply ``path=value`` assignments, the value being YAML, such as ``strips[0].camera=RC30``.
-
-    Unknown keys are found by the schema later.
-    """
+    """Apply ``path=value`` assignments, the value being YAML, such as ``strips[0].camera=RC30``."""
     for assignment in assignments:
         name, equals, text = assignment.partition("=")
         path = steps(name.strip())

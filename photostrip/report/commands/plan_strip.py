@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from photostrip.report.page.numbers import counted, fixed, listed, metres, micrometres, short
-from photostrip.report.page.parts import DASH, Column, Facts, Part, Section, Table, Words
+from photostrip.report.page.parts import DASH, Column, Document, Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-Document = dict[str, Any]
 Detected = tuple[float | None, bool | None]  # size in metres, whether anything checks the coordinate
 
 PHOTOS_SHOWN = 11  # columns of the tables along a strip

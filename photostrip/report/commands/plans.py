@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from photostrip.report.commands.plan_strip import strip_sections
 from photostrip.report.page.numbers import calibrated, counted, fixed, metres, micrometres, short
-from photostrip.report.page.parts import Column, Facts, Part, Section, Table, Words
+from photostrip.report.page.parts import Column, Document, Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import number, over_plane, tabulated, words
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-Document = dict[str, Any]
 
 USES = {"xyz": "in full", "xy": "in plan", "z": "in height"}
 

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from photostrip.report.page.numbers import calibrated, counted, fixed, short
-from photostrip.report.page.parts import DASH, Column, Facts, Part, Section, Table, Words
+from photostrip.report.page.parts import DASH, Column, Document, Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import number, over_plane, tabulated, words
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-Document = dict[str, Any]
 
 ANGLE_DECIMALS = 5  # in deg and gon: 0.04 and 0.03 seconds of arc
 

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from photostrip.report.page.numbers import counted, fixed, metres, micrometres, short, signed
-from photostrip.report.page.parts import DASH, Column, Facts, Part, Section, Table, Words
+from photostrip.report.page.parts import DASH, Column, Document, Facts, Part, Section, Table, Words
 from photostrip.report.page.tables import number, tabulated, words
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-Document = dict[str, Any]
 
 VERDICTS = {True: "moved", False: "", None: "not tested"}
 

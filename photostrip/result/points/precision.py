@@ -51,10 +51,7 @@ def ellipses(level: Floats) -> tuple[Floats, Floats]:
 
 
 def point_columns(result: Result) -> Document:
-    """Return columns of ``points``: standard deviations, covariances, error ellipse in plan.
-
-    Only empty standard deviations when nothing is known.
-    """
+    """Return columns of ``points``: standard deviations, empty when unknown, covariances, error ellipse in plan."""
     precision, frame, place = result.precision, result.output, result.points.cartesian
     if precision is None:
         return dict.fromkeys(("sigma_x", "sigma_y", "sigma_z"))

@@ -54,10 +54,7 @@ class SimilarityStep:
 
 
 def pair_rounds(result: Result, strip: StripResult) -> list[list[PairRound]]:
-    """Repeat the relative orientation of every pair: with all its points, then without those that were rejected.
-
-    A pair has one round, or two when points of it were rejected.
-    """
+    """Repeat the relative orientation of every pair: with all its points, then without those that were rejected."""
     final = strip.of_photos.orientation
     given = _with_all_points(result, strip)
     start = _starts(given, final.elements)
