@@ -108,7 +108,8 @@ def test_independent_models_prints_three_tables() -> None:
 
 
 @pytest.mark.slow
-def test_mutations_prints_changes_and_who_notices_them() -> None:
+def test_mutations_prints_changes_and_who_notices_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HYPOTHESIS_PROFILE", "quick")
     out = printed("mutations.py", "--count", "2", "--seed", "1", "--room", "geometry", "--near")
     rows = re.findall(r"^\| `geometry/\w+\.py:\d+` \| `.+` to `.+` in `.+` \| (.+) \|$", out, re.MULTILINE)
     assert len(rows) == 2

@@ -396,6 +396,7 @@ def on_a_plane(radius: float | None = None) -> tuple[Floats, Floats, Result]:
     return ground, found.control_differences, found
 
 
+@pytest.mark.usefixtures("_no_findings")
 @pytest.mark.slow
 def test_a_flat_moon_is_wrong_by_kilometres() -> None:
     ground, flat, found = on_a_plane()
@@ -411,6 +412,7 @@ def test_a_flat_moon_is_wrong_by_kilometres() -> None:
     assert rms(flat[check, 2] - expected[check]) < 0.1 * rms(expected[check])
 
 
+@pytest.mark.usefixtures("_no_findings")
 @pytest.mark.slow
 def test_the_curvature_formula_needs_the_radius_of_the_moon() -> None:
     _, flat, found = on_a_plane()

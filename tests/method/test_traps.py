@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
+pytestmark = pytest.mark.usefixtures("_no_findings")
+
 CUBIC = ("1", "X", "Y", "XY", "X^2", "X^3")
 SIMILARITY = Settings(adjustment="similarity")
 LOCAL = FrameSpec("local", ("east", "north", "up"))
@@ -372,7 +374,6 @@ def test_photos_that_see_no_control_are_carried_by_the_strip() -> None:
 # -------------------------------------------------------------------------------- what polynomials are not made for
 
 
-@pytest.mark.usefixtures("_no_findings")
 @pytest.mark.slow
 def test_points_beyond_the_control_are_warned_of() -> None:
     """Control in the first three fifths only: a cubic runs away where it is not held, and the report says so."""

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from photostrip.pipeline import Inputs
     from photostrip.simulate import Simulation
 
+pytestmark = pytest.mark.usefixtures("_no_findings")
+
 MICROMETRE = 1e-6  # metres
 BLOCK = exact(flight=Flight(photos=6, strips=3))
 

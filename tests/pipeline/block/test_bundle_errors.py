@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from photostrip.pipeline import Result
     from photostrip.simulate import Simulation
 
+pytestmark = pytest.mark.usefixtures("_no_findings")
+
 TRIALS = 400
 BLOCK = Spec(flight=Flight(photos=8, strips=2), points=Points(extra_per_model=8))
 
