@@ -107,7 +107,12 @@ class Bundle(Section):
         "`tau`: residuals against the sigma0 found; `baarda`: against the stated standard deviations",
         DEFAULTS.bundle.test,
     )
-    alpha: Fraction = key("Probability of rejecting one good observation", DEFAULTS.bundle.alpha)
+    level: Fraction = key(
+        "Probability of rejecting anything in an adjustment without gross errors", DEFAULTS.bundle.level
+    )
+    alpha: Fraction | None = key(
+        "Probability of rejecting one good observation; by default `level` is shared out among all observations", None
+    )
     power: Fraction = key("Probability with which the minimal detectable errors are found", DEFAULTS.bundle.power)
     variance_components: Flag = key(
         "Estimate the standard deviations of image coordinates, control and camera positions",

@@ -18,7 +18,9 @@ class BundleSettings:
     screening: str = "snooping"
     # ``"tau"``: residuals are compared with the sigma0 found; ``"baarda"``: with the stated standard deviations
     test: str = "tau"
-    alpha: float = 0.001  # probability that the test of one good observation rejects it
+    level: float = 0.05  # probability that anything is rejected in an adjustment without gross errors
+    # probability that the test of one good observation rejects it; None: the level, shared out among all of them
+    alpha: float | None = None
     power: float = 0.80  # probability with which an error of the size of the minimal detectable one is found
     variance_components: bool = False  # whether the standard deviations of the groups of observations are estimated
     self_calibration: tuple[str, ...] = ()  # parameters of every camera that are estimated, of ``CALIBRATION``

@@ -58,6 +58,24 @@ class Rejection:
     readmitted: bool = False  # whether it came back
 
 
+def alpha_of(problem: BundleProblem, settings: BundleSettings) -> float:
+    """Probability that the test of one good observation rejects it: by default the level over their number."""
+    if settings.alpha is not None:
+        return settings.alpha
+    parts = problem.images, problem.control, problem.positions, problem.attitudes
+    return settings.level / max(sum(int(np.isfinite(part.sigma).sum()) for part in parts), 1)
+
+
+def limit_of(screened: ScreenedBundle, settings: BundleSettings) -> Limit:
+    """Limit of standardised residuals: never sharper than the stated standard deviations allow."""
+    alpha, solution = alpha_of(screened.problem, settings), screened.solution
+    stated = Limit(normal_quantile(1 - alpha / 2), 1 - alpha, 1.0)
+    if settings.test != "tau" or solution.redundancy < 1:
+        return stated
+    found = Limit(reliability.limit("tau", alpha, solution.redundancy), 1 - alpha, solution.sigma0)
+    return found if found.value * found.unit > stated.value else stated
+
+
 @dataclass(frozen=True, eq=False)
 class ScreenedBundle:
     """A solution and how it was cleaned."""
@@ -160,18 +178,9 @@ class _Search:
             selection = supported(self.problem, selection)
         return self.adjust(selection)
 
-    def limit(self, solution: BundleSolution) -> Limit:
-        """Limit of standardised residuals: never sharper than the stated standard deviations allow."""
-        alpha, redundancy = self.settings.alpha, solution.redundancy
-        stated = Limit(normal_quantile(1 - alpha / 2), 1 - alpha, 1.0)
-        if self.settings.test != "tau" or redundancy < 1:
-            return stated
-        found = Limit(reliability.limit("tau", alpha, redundancy), 1 - alpha, solution.sigma0)
-        return found if found.value * found.unit > stated.value else stated
-
     def _worst(self, done: ScreenedBundle) -> list[Rejection]:
         """Return the worst rays of every neighbourhood, or the worst given coordinate where that is worse."""
-        limit = self.limit(done.solution)
+        limit = limit_of(done, self.settings)
         rays, given = np.zeros(0), None
         for group in reliability.groups_of(done.problem, done.solution, done.precision):
             value = np.abs(np.nan_to_num(group.standardised)) / limit.unit
@@ -266,7 +275,7 @@ class _Search:
 
     def fitting(self, done: ScreenedBundle) -> Selection | None:
         """Put back what fits the adjustment without it; None when there is nothing new."""
-        limit = self.limit(done.solution)
+        limit = limit_of(done, self.settings)
         point, images = self.problem.images.point, done.selection.images.copy()
         xyz = self.problem.start.points.copy()
         for number in np.unique(point[~images]).tolist():
@@ -321,7 +330,7 @@ class _Search:
 
     def log(self, done: ScreenedBundle, begin: Selection) -> Iterator[Rejection]:
         """Return every observation that was out at some time."""
-        limit, unknown = self.limit(done.solution).value, float("nan")
+        limit, unknown = limit_of(done, self.settings).value, float("nan")
         for (kind, row, axis), each in self.out.items():
             found = each
             if np.isnan(each.value) and kind == reliability.IMAGE and row in self.latest:

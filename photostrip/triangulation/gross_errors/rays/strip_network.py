@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.strip_formation.strip import FormedStrip
 
 
-ALPHA = 0.05  # probability that any ray of a strip without gross errors is rejected
 FAR = 10.0  # times the median misclosure: points beyond begin outside
 
 
@@ -51,9 +50,8 @@ def wrong_rays(oriented: Orientation, formed: FormedStrip, rays: StripRays) -> t
     problem, far = _free_network(oriented, formed, rays, rows)
     every = Selection.everything(problem)
     begin = Selection(images=~far, control=every.control, positions=every.positions, attitudes=every.attitudes)
-    settings = BundleSettings(alpha=ALPHA / (2 * len(rows)))
     try:
-        found = screen_bundle(problem, begin, settings, np.isin(rows, rays.kept))
+        found = screen_bundle(problem, begin, BundleSettings(), np.isin(rows, rays.kept))
     except GeometryError:
         return None
     return tuple(replace(each, row=int(rows[each.row])) for each in found.rejections if not each.readmitted)
