@@ -18,14 +18,16 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.statistics import chi2_quantile
+from photostrip.triangulation.bundle.quality.reliability import UNCONTROLLED
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from photostrip.arrays import Flags, Floats, Numbers
 
 
 LIKELIER = 9.0  # difference of two sums of squares that tells sets of rays apart: a likelihood ratio of 90
 LARGEST_SET = 3  # rays
-UNTESTABLE = 0.01  # redundancy below which a coordinate cannot be tested
 ROUNDING = 1e-9  # keeps a point that holds its photos alone from stopping the others
 WRONG_RAY, TWO_RAYS, SEVERAL_RAYS = "ray", "pair", "rays"
 """What was found at a point: its wrong rays; two rays that contradict each other; several of which any may be wrong."""
@@ -73,8 +75,8 @@ def decide(point: PointRays, limit: Limit) -> Decision:
     r, freedom = point.rays, len(gap)
     pulled, normal = basis @ weight @ gap, basis @ weight @ basis.T
     share = np.diag(normal)[: 2 * r]
-    tests = np.abs(pulled[: 2 * r]) / np.sqrt(np.maximum(share, UNTESTABLE))
-    value = float(tests[share > UNTESTABLE].max(initial=0.0))
+    tests = np.abs(pulled[: 2 * r]) / np.sqrt(np.maximum(share, UNCONTROLLED))
+    value = float(tests[share > UNCONTROLLED].max(initial=0.0))
     size = np.full((r, 2), np.nan)
     if value <= limit.value * limit.unit:
         return Decision(np.zeros(r, bool), "", value, size)
@@ -97,7 +99,7 @@ def decide(point: PointRays, limit: Limit) -> Decision:
         for number in np.argsort(-left, kind="stable"):  # the likeliest set with each ray says its error
             size[sets[number]] = errors[number]
     elif r == 2:
-        size = np.sqrt(0.5) * gap[0] * np.array([[0.0, 1.0], [0.0, -1.0]])
+        size = np.column_stack([np.zeros(2), 0.5 * pulled[1::2] / share[1::2]])  # half of the y parallax each
     return Decision(np.ones(r, bool), TWO_RAYS if r == 2 else SEVERAL_RAYS, value, size)
 
 
@@ -135,7 +137,7 @@ class _Deleted(NamedTuple):
     errors: Floats  # (s, k, 2): errors of their coordinates
 
 
-def _without(total: float, pulled: Floats, normal: Floats, sets: list[tuple[int, ...]]) -> _Deleted:
+def _without(total: float, pulled: Floats, normal: Floats, sets: Sequence[tuple[int, ...]]) -> _Deleted:
     """Take sets of as many rays each out."""
     rays = np.array(sets, np.intp)
     rows = (2 * rays[:, :, None] + np.arange(2)).reshape(len(rays), -1)

@@ -38,9 +38,7 @@ if TYPE_CHECKING:
 
 
 SEARCH_ROUNDS = 200  # of testing and taking out; each takes out one error of every neighbourhood
-READMISSIONS = 3
 NEAR = 0.5  # test value of what may go in a round, in units of the worst on the same photos
-FARTHEST = 1e6  # standard deviations: a misclosure beyond is no worse
 
 
 @dataclass(frozen=True)
@@ -115,10 +113,7 @@ def screen_bundle(
     if settings.screening == "robust":
         chosen = search.robust(chosen)
     done = search.clean(chosen)
-    for _ in range(READMISSIONS):
-        more = search.fitting(done)
-        if more is None:
-            break
+    while (more := search.fitting(done)) is not None:  # a point comes back once only
         done = search.clean(more)
     return replace(done, rejections=tuple(search.log(done, begin)), rounds=search.rounds)
 
@@ -308,7 +303,7 @@ class _Search:
             for each in place
         ]
         size = np.abs(np.array(off) / self.problem.images.sigma[rows]).max(axis=2)
-        best = np.sqrt(np.minimum(np.nan_to_num(size, nan=FARTHEST), FARTHEST)).sum(axis=1).argmin()
+        best = np.log1p(np.nan_to_num(size, nan=np.inf)).sum(axis=1).argmin()
         return np.asarray(place[best], float)
 
     @property

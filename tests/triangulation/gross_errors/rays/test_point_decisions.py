@@ -1,0 +1,179 @@
+"""Decisions on single points: the algebra of points taken out, how often good ones go, which ray is blamed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import settings as examples
+from hypothesis import strategies as st
+
+from photostrip.geometry.rotation import from_vector
+from photostrip.statistics import chi2_quantile, normal_quantile
+from photostrip.triangulation.gross_errors.rays import point_decisions
+from photostrip.triangulation.gross_errors.rays.point_decisions import (
+    LIKELIER,
+    SEVERAL_RAYS,
+    TWO_RAYS,
+    WRONG_RAY,
+    Limit,
+    PointRays,
+    decide,
+)
+from photostrip.triangulation.resection.collinearity import derivatives
+
+SIGMA = 0.005  # mm
+ALPHA = 0.01
+SEEDS = st.integers(0, 2**31)
+
+
+def limit(alpha: float = ALPHA) -> Limit:
+    return Limit(normal_quantile(1 - alpha / 2), 1 - alpha, 1.0)
+
+
+def a_point(seed: int, rays: int = 3) -> PointRays:
+    """A point that a row of photos sees, one base apart, with random measurements; photos known exactly."""
+    rng = np.random.default_rng(seed)
+    centers = np.column_stack([np.arange(rays, dtype=float), rng.normal(0, 0.02, (rays, 2))])
+    rotations = from_vector(rng.normal(0, 0.03, (rays, 3)))
+    xyz = np.array([rng.uniform(0, rays - 1), rng.uniform(-1, 1), -1.7])
+    place = np.broadcast_to(xyz, (rays, 3))
+    by_photo, by_point = derivatives(place, centers, rotations, np.arange(rays), np.full(rays, 153.0))
+    wide = np.zeros((rays, 2, rays, 6))
+    wide[np.arange(rays), :, np.arange(rays)] = by_photo / SIGMA
+    return PointRays(
+        rays=rays,
+        misfit=rng.normal(0, 1, 2 * rays),
+        by_point=(by_point / SIGMA).reshape(-1, 3),
+        by_photos=wide.reshape(2 * rays, -1),
+        cofactors=np.zeros((6 * rays, 6 * rays)),
+        inside=np.zeros(2 * rays, bool),
+    )
+
+
+def spoiled(point: PointRays, errors: dict[tuple[int, int], float], noise: float = 0.2) -> PointRays:
+    """Add errors by ray and axis, in standard deviations, to quiet measurements."""
+    misfit = noise * point.misfit
+    for (ray, axis), size in errors.items():
+        misfit[2 * ray + axis] += size
+    return replace(point, misfit=misfit)
+
+
+@pytest.mark.parametrize(("rays", "gone"), [(2, ()), (3, ()), (4, ()), (4, (1,)), (5, (0, 3))])
+def test_a_point_that_took_part_is_predicted_as_if_it_had_not(rays: int, gone: tuple[int, ...]) -> None:
+    """Against least squares with photos known beforehand and the point as an unknown, all at once."""
+    point = a_point(7, rays)
+    rng = np.random.default_rng(8)
+    root = rng.normal(0, 1e-5, (6 * rays, 6 * rays))
+    before = np.asarray(root @ root.T, float)
+    rows = ~np.isin(np.arange(2 * rays) // 2, gone)
+    # photos after an adjustment with the point's rays, and what that leaves of its misclosures
+    design = np.column_stack([point.by_photos[rows], point.by_point[rows]])
+    weight = np.zeros((6 * rays + 3, 6 * rays + 3))
+    weight[: 6 * rays, : 6 * rays] = np.linalg.inv(before)
+    cofactors = np.linalg.inv(design.T @ design + weight)
+    shift = cofactors @ design.T @ point.misfit[rows]
+    after = replace(
+        point,
+        cofactors=np.asarray(cofactors[: 6 * rays, : 6 * rays], float),
+        inside=rows,
+        misfit=point.misfit - point.by_photos @ shift[: 6 * rays] - point.by_point @ shift[6 * rays :],
+    )
+    expected = point_decisions._misclosures(replace(point, cofactors=before))
+    found = point_decisions._misclosures(after)
+    assert found.gap == pytest.approx(expected.gap, rel=1e-5, abs=1e-5)
+    assert found.weight == pytest.approx(expected.weight, rel=1e-5, abs=1e-7)
+
+
+def test_sums_of_squares_without_rays_are_those_of_adjustments_without_them() -> None:
+    point = a_point(3, 5)
+    gap, weight, basis = point_decisions._misclosures(point)
+    sets = [(0,), (3,), (4,)]
+    left, _, errors = point_decisions._without(
+        float(gap @ weight @ gap), basis @ weight @ gap, basis @ weight @ basis.T, sets
+    )
+    for value, (ray,), ((error,),) in zip(left, sets, [each[None] for each in errors], strict=True):
+        rows = np.arange(10) // 2 != ray
+        design, misfit = point.by_point[rows], point.misfit[rows]
+        xyz = np.linalg.lstsq(design, misfit, rcond=None)[0]
+        assert value == pytest.approx(float(((misfit - design @ xyz) ** 2).sum()), rel=1e-6)
+        assert error == pytest.approx((point.misfit - point.by_point @ xyz)[~rows], rel=1e-5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rays", [2, 3, 4])
+def test_good_points_are_called_wrong_as_often_as_the_level_says(rays: int) -> None:
+    """One test for each coordinate: together at most the level times their number, for two rays one test in all."""
+    alarms = [decide(a_point(seed, rays), limit()).out.any() for seed in range(4000)]
+    assert (0.5 if rays > 2 else 0.7) * ALPHA < np.mean(alarms) < (2 * rays if rays > 2 else 1.4) * ALPHA
+
+
+@given(SEEDS, st.integers(0, 2), st.sampled_from([-1, 1]), st.floats(20.0, 1000.0))
+@examples(max_examples=40)
+def test_of_three_rays_the_wrong_one_is_found_across_the_base_and_not_along(
+    seed: int, place: int, sign: int, size: float
+) -> None:
+    across = decide(spoiled(a_point(seed), {(place, 1): sign * size}), limit())
+    assert across.cause == WRONG_RAY
+    assert across.out.tolist() == [n == place for n in range(3)]
+    assert across.size[place, 1] == pytest.approx(sign * size, rel=0.2)
+    along = decide(spoiled(a_point(seed), {(place, 0): sign * size}), limit())
+    # tilted photos: a large error along the photo's x is a little one across the base too
+    assert along.cause in {WRONG_RAY, SEVERAL_RAYS}
+    assert along.out[place]
+    assert along.out.all() == (along.cause == SEVERAL_RAYS)
+
+
+def test_two_rays_that_do_not_meet_are_both_left_out() -> None:
+    found = decide(spoiled(a_point(5, 2), {(0, 1): 30.0}), limit())
+    assert found.out.tolist() == [True, True]
+    assert found.cause == TWO_RAYS
+    assert found.size[:, 1] == pytest.approx([15.0, -15.0], abs=2.0)  # half of the y parallax each
+
+
+def test_control_says_which_of_two_rays_is_wrong() -> None:
+    point = spoiled(a_point(5, 2), {(0, 0): 30.0})
+    assert not decide(point, limit()).out.any()  # an error along the base shows nowhere
+    given_ = replace(
+        point,
+        misfit=np.append(point.misfit, np.zeros(3)),
+        by_point=np.concatenate([point.by_point, np.eye(3) * 1e5]),
+        by_photos=np.concatenate([point.by_photos, np.zeros((3, 12))]),
+        inside=np.append(point.inside, np.zeros(3, bool)),
+    )
+    found = decide(given_, limit())
+    assert found.out.tolist() == [True, False]
+    assert found.size[0, 0] == pytest.approx(30.0, rel=0.1)
+
+
+@pytest.mark.parametrize(("wrong", "cause"), [(1, WRONG_RAY), (2, WRONG_RAY), (3, WRONG_RAY), (4, SEVERAL_RAYS)])
+def test_sets_of_up_to_three_rays_are_looked_for(wrong: int, cause: str) -> None:
+    errors = {(ray, 1): 200.0 * (1 + ray) * (-1) ** ray for ray in range(wrong)}
+    found = decide(spoiled(a_point(11, 9), errors), limit())
+    assert found.cause == cause
+    assert found.out.sum() == (wrong if cause == WRONG_RAY else 9)
+
+
+@pytest.mark.parametrize(("times", "cause"), [(0.75, SEVERAL_RAYS), (1.5, WRONG_RAY)])
+def test_a_ray_is_blamed_when_it_is_so_much_likelier_than_any_other(times: float, cause: str) -> None:
+    """An error along y of a ray, as large as makes the next best ray worse by a multiple of the limit."""
+    point = a_point(2)
+    level = Limit(1.0, 1 - 1e-12, 1.0)  # nearly any scatter of the rest is allowed: the comparison decides alone
+
+    def next_best(size: float) -> float:
+        gap, weight, basis = point_decisions._misclosures(spoiled(point, {(0, 1): size}, 0.0))
+        total, normal = float(gap @ weight @ gap), basis @ weight @ basis.T
+        left = point_decisions._without(total, basis @ weight @ gap, normal, [(0,), (1,), (2,)]).left
+        return float(np.partition(left, 1)[1] - left.min())
+
+    size = np.sqrt(times * LIKELIER / next_best(1.0))
+    assert next_best(size) == pytest.approx(times * 9.0)
+    assert next_best(size) < chi2_quantile(level.level, 1)
+    assert decide(spoiled(point, {(0, 1): size}, 0.0), level).cause == cause
+
+
+def test_rays_that_meet_nowhere_are_left_out() -> None:
+    assert point_decisions.undecided(2).cause == TWO_RAYS
+    assert point_decisions.undecided(3).out.tolist() == [True, True, True]
