@@ -11,7 +11,6 @@ from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.result.numbers import rms
 from photostrip.result.quantities import record
 from photostrip.triangulation.bundle.quality import reliability
-from photostrip.triangulation.gross_errors.rays.snooping import alpha_of, limit_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -52,7 +51,7 @@ def bundle_of(result: Result) -> Document:
         return {}
     screened, settings = found.screened, result.settings.bundle
     problem, solution = screened.problem, screened.solution
-    shift = reliability.noncentrality(alpha_of(screened.problem, settings), settings.power)
+    shift = reliability.noncentrality(screened.limit.alpha, settings.power)
     block: Document = {
         "free_network": solution.free,
         "sigma0": solution.sigma0,
@@ -117,8 +116,8 @@ def _screening(found: Bundle, settings: BundleSettings) -> Document:
     return {
         "method": settings.screening,
         "test": settings.test,
-        "alpha": alpha_of(screened.problem, settings),
-        "limit": limit_of(screened, settings).value,
+        "alpha": screened.limit.alpha,
+        "limit": screened.limit.value,
         "rejected": {kind: sum(each.kind == kind for each in out) for kind in KINDS},
         "readmitted": len(screened.rejections) - len(out),
     }
@@ -214,8 +213,7 @@ def with_reliability(result: Result, residuals: list[Document]) -> list[Document
     found = result.bundle
     if found is None:
         return residuals
-    settings = result.settings.bundle
-    shift = reliability.noncentrality(alpha_of(found.screened.problem, settings), settings.power)
+    shift = reliability.noncentrality(found.screened.limit.alpha, result.settings.bundle.power)
     (group,) = (each for each in found.groups if each.kind == reliability.IMAGE)
     values = np.column_stack([group.redundancy, group.standardised, group.detectable(shift) * MICROMETRES])
     values = np.vstack([values, np.full(len(RELIABILITY), np.nan)])  # the last row: a ray that took no part

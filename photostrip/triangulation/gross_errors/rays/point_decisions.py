@@ -37,7 +37,7 @@ class Limit(NamedTuple):
     """What a point is tested against."""
 
     value: float  # largest standardised residual of a coordinate
-    level: float  # probability of the sum of squares of rays that agree
+    alpha: float  # probability that the test of one good coordinate, or of rays that agree, rejects them
     unit: float  # standard deviation of unit weight in force
 
 
@@ -86,7 +86,7 @@ def decide(point: PointRays, limit: Limit) -> Decision:
             break
         left, sets, errors = _without(total, pulled, normal, list(combinations(range(r), count)))
         best = int(left.argmin())
-        bound = chi2_quantile(limit.level, freedom - 2 * count) * unit
+        bound = chi2_quantile(1 - limit.alpha, freedom - 2 * count) * unit
         if left[best] <= bound:
             others = np.delete(left, best)
             if (others > np.minimum(bound, left[best] + LIKELIER * unit)).all():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -10,7 +10,6 @@ import numpy as np
 from photostrip.errors import GeometryError
 from photostrip.triangulation.gross_errors.pairs.zones import MINIMUM_LEFT
 from photostrip.triangulation.gross_errors.rays.point_decisions import SEVERAL_RAYS
-from photostrip.triangulation.gross_errors.rays.strip_network import StripRays, wrong_rays
 from photostrip.triangulation.relative_orientation.orientation import orient_again
 from photostrip.triangulation.strip_formation import non_neighbours
 from photostrip.triangulation.strip_formation.strip import form_from_pairs, without_rows
@@ -18,12 +17,24 @@ from photostrip.triangulation.strip_formation.strip import form_from_pairs, with
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from photostrip.arrays import Flags, Floats
+    from photostrip.arrays import Flags, Floats, Numbers
+    from photostrip.points import PhotoPoints
     from photostrip.triangulation.gross_errors.pairs.screening import PairRejection
     from photostrip.triangulation.gross_errors.rays.snooping import Rejection
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
     from photostrip.triangulation.strip_formation.strip import FormedStrip
+
+
+@dataclass(frozen=True, eq=False)
+class StripRays:
+    """All rays of a strip."""
+
+    observations: PhotoPoints
+    position: Numbers  # (n,): place in the strip of the photo of every image point; -1 for photos of other strips
+    sigma: Floats  # (p,): standard deviations of a y parallax of weight one in each pair, mm
+    stated: float  # standard deviation of an image coordinate of weight one, mm
+    kept: Numbers  # rows that the user keeps: their points are not tested
 
 
 class ScreenedStrip(NamedTuple):
@@ -53,6 +64,8 @@ def form_screened(
     formed = form_from_pairs(of_pairs, settings, photos, rays.sigma)
     if of_pairs.used.all() and formed.junctions.used.all():
         return ScreenedStrip(of_pairs, formed, ())
+    from photostrip.triangulation.gross_errors.rays.strip_network import wrong_rays  # needs the bundle adjustment
+
     found = wrong_rays(of_pairs, formed, rays)
     if found is None:
         return ScreenedStrip(of_pairs, formed, ())

@@ -56,21 +56,15 @@ class Rejection:
     readmitted: bool = False  # whether it came back
 
 
-def alpha_of(problem: BundleProblem, settings: BundleSettings) -> float:
-    """Probability that the test of one good observation rejects it: by default the level over their number."""
-    if settings.alpha is not None:
-        return settings.alpha
-    parts = problem.images, problem.control, problem.positions, problem.attitudes
-    return settings.level / max(sum(int(np.isfinite(part.sigma).sum()) for part in parts), 1)
-
-
-def limit_of(screened: ScreenedBundle, settings: BundleSettings) -> Limit:
+def _limit(problem: BundleProblem, solution: BundleSolution, settings: BundleSettings) -> Limit:
     """Limit of standardised residuals: never sharper than the stated standard deviations allow."""
-    alpha, solution = alpha_of(screened.problem, settings), screened.solution
-    stated = Limit(normal_quantile(1 - alpha / 2), 1 - alpha, 1.0)
+    parts = problem.images, problem.control, problem.positions, problem.attitudes
+    count = sum(int(np.isfinite(part.sigma).sum()) for part in parts)
+    alpha = settings.level / max(count, 1) if settings.alpha is None else settings.alpha
+    stated = Limit(normal_quantile(1 - alpha / 2), alpha, 1.0)
     if settings.test != "tau" or solution.redundancy < 1:
         return stated
-    found = Limit(reliability.limit("tau", alpha, solution.redundancy), 1 - alpha, solution.sigma0)
+    found = Limit(reliability.limit("tau", alpha, solution.redundancy), alpha, solution.sigma0)
     return found if found.value * found.unit > stated.value else stated
 
 
@@ -82,15 +76,22 @@ class ScreenedBundle:
     selection: Selection  # which those are
     solution: BundleSolution
     precision: Cofactors
+    limit: Limit  # what its residuals are tested against
     rejections: tuple[Rejection, ...] = ()  # what was taken out, in order; re-admitted ones are marked
     rounds: int = 1
 
     @classmethod
-    def of(cls, problem: BundleProblem, selection: Selection) -> ScreenedBundle:
+    def of(cls, problem: BundleProblem, selection: Selection, settings: BundleSettings) -> ScreenedBundle:
         """Adjust a selection."""
         chosen = selected(problem, selection)
         solution = solve(chosen)
-        return cls(problem=chosen, selection=selection, solution=solution, precision=cofactors_of(solution))
+        return cls(
+            problem=chosen,
+            selection=selection,
+            solution=solution,
+            precision=cofactors_of(solution),
+            limit=_limit(chosen, solution, settings),
+        )
 
     @cached_property
     def joint(self) -> JointCofactors:
@@ -107,7 +108,7 @@ def screen_bundle(
     the tests say.
     """
     if settings.screening == "none":
-        return ScreenedBundle.of(problem, supported(problem, Selection.everything(problem)))
+        return ScreenedBundle.of(problem, supported(problem, Selection.everything(problem)), settings)
     search = _Search(problem, settings, np.zeros(len(problem.images), bool) if kept is None else kept)
     chosen = supported(problem, begin)
     if settings.screening == "robust":
@@ -139,7 +140,7 @@ class _Search:
 
     def adjust(self, selection: Selection) -> ScreenedBundle:
         """Adjust a selection, and start from there the next time."""
-        done = ScreenedBundle.of(self.problem, selection)
+        done = ScreenedBundle.of(self.problem, selection, self.settings)
         self.problem = restarted(self.problem, done.solution)
         self.rounds += 1
         return done
@@ -175,7 +176,7 @@ class _Search:
 
     def _worst(self, done: ScreenedBundle) -> list[Rejection]:
         """Return the worst rays of every neighbourhood, or the worst given coordinate where that is worse."""
-        limit = limit_of(done, self.settings)
+        limit = done.limit
         rays, given = np.zeros(0), None
         for group in reliability.groups_of(done.problem, done.solution, done.precision):
             value = np.abs(np.nan_to_num(group.standardised)) / limit.unit
@@ -270,7 +271,7 @@ class _Search:
 
     def fitting(self, done: ScreenedBundle) -> Selection | None:
         """Put back what fits the adjustment without it; None when there is nothing new."""
-        limit = limit_of(done, self.settings)
+        limit = done.limit
         point, images = self.problem.images.point, done.selection.images.copy()
         xyz = self.problem.start.points.copy()
         for number in np.unique(point[~images]).tolist():
@@ -325,7 +326,7 @@ class _Search:
 
     def log(self, done: ScreenedBundle, begin: Selection) -> Iterator[Rejection]:
         """Return every observation that was out at some time."""
-        limit, unknown = limit_of(done, self.settings).value, float("nan")
+        limit, unknown = done.limit.value, float("nan")
         for (kind, row, axis), each in self.out.items():
             found = each
             if np.isnan(each.value) and kind == reliability.IMAGE and row in self.latest:

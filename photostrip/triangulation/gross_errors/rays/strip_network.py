@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,24 +21,13 @@ from photostrip.triangulation.resection.collinearity import project
 from photostrip.triangulation.strip_formation.strip import mean_points
 
 if TYPE_CHECKING:
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.points import PhotoPoints
+    from photostrip.arrays import Flags, Numbers
+    from photostrip.triangulation.gross_errors.rays.screened_formation import StripRays
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.strip import FormedStrip
 
 
 FAR = 10.0  # times the median misclosure: points beyond begin outside
-
-
-@dataclass(frozen=True, eq=False)
-class StripRays:
-    """All rays of a strip."""
-
-    observations: PhotoPoints
-    position: Numbers  # (n,): place in the strip of the photo of every image point; -1 for photos of other strips
-    sigma: Floats  # (p,): standard deviations of a y parallax of weight one in each pair, mm
-    stated: float  # standard deviation of an image coordinate of weight one, mm
-    kept: Numbers  # rows that the user keeps: their points are not tested
 
 
 def wrong_rays(oriented: Orientation, formed: FormedStrip, rays: StripRays) -> tuple[Rejection, ...] | None:

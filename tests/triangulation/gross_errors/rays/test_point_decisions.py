@@ -30,7 +30,7 @@ SEEDS = st.integers(0, 2**31)
 
 
 def limit(alpha: float = ALPHA) -> Limit:
-    return Limit(normal_quantile(1 - alpha / 2), 1 - alpha, 1.0)
+    return Limit(normal_quantile(1 - alpha / 2), alpha, 1.0)
 
 
 def a_point(seed: int, rays: int = 3) -> PointRays:
@@ -160,7 +160,7 @@ def test_sets_of_up_to_three_rays_are_looked_for(wrong: int, cause: str) -> None
 def test_a_ray_is_blamed_when_it_is_so_much_likelier_than_any_other(times: float, cause: str) -> None:
     """An error along y of a ray, as large as makes the next best ray worse by a multiple of the limit."""
     point = a_point(2)
-    level = Limit(1.0, 1 - 1e-12, 1.0)  # nearly any scatter of the rest is allowed: the comparison decides alone
+    level = Limit(1.0, 1e-12, 1.0)  # nearly any scatter of the rest is allowed: the comparison decides alone
 
     def next_best(size: float) -> float:
         gap, weight, basis = point_decisions._misclosures(spoiled(point, {(0, 1): size}, 0.0))
@@ -170,7 +170,7 @@ def test_a_ray_is_blamed_when_it_is_so_much_likelier_than_any_other(times: float
 
     size = np.sqrt(times * LIKELIER / next_best(1.0))
     assert next_best(size) == pytest.approx(times * 9.0)
-    assert next_best(size) < chi2_quantile(level.level, 1)
+    assert next_best(size) < chi2_quantile(1 - level.alpha, 1)
     assert decide(spoiled(point, {(0, 1): size}, 0.0), level).cause == cause
 
 
