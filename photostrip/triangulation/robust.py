@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 TUNING = 3.0  # standard deviations up to which an observation keeps its weight [Krarup 1980]
-SMALLEST_WEIGHT = 2e-22  # exp(-50)
+SMALLEST_WEIGHT = 1e-5  # that everything keeps, so that unknowns stay determined
 
 
 def falling_weights(size: Floats) -> Floats:
@@ -27,10 +27,9 @@ def falling_weights(size: Floats) -> Floats:
 
     size: absolute residuals in units of their scale.
     """
-    excess = size / TUNING
     with np.errstate(over="ignore"):
-        weight: Floats = np.where(excess > 1.0, np.maximum(np.exp(1.0 - excess**2), SMALLEST_WEIGHT), 1.0)
-    return weight
+        weight: Floats = np.exp(1.0 - np.maximum(size / TUNING, 1.0) ** 2)
+    return np.maximum(weight, SMALLEST_WEIGHT)
 
 
 def medians(values: Floats, weight: Floats, group: Numbers, groups: int) -> Floats:
@@ -46,5 +45,5 @@ def medians(values: Floats, weight: Floats, group: Numbers, groups: int) -> Floa
 
 
 def scales(size: Floats, weight: Floats, group: Numbers, groups: int) -> Floats:
-    """Standard deviation of each group from its median absolute residual; NaN for a group without any."""
+    """Estimate the standard deviation of each group from its median absolute residual; NaN for a group without any."""
     return SIGMA_FROM_MEDIAN * medians(size, (weight > 0).astype(float), group, groups)

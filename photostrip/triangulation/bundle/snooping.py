@@ -14,6 +14,7 @@ from photostrip.triangulation.bundle.selection import FIELDS, Selection, restart
 from photostrip.triangulation.bundle.solve import solve
 from photostrip.triangulation.resection.collinearity import KnownPhotos, derivatives, project
 from photostrip.triangulation.resection.ray_intersection import intersect_points
+from photostrip.triangulation.robust import falling_weights
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -28,10 +29,8 @@ SEARCH_ROUNDS = 200  # of testing and taking out; each takes out one error of ev
 READMISSIONS = 3
 NEAR = 0.5  # test value of what may go in the same round, in units of the worst of all
 REWEIGHTINGS = 6  # of the robust adjustment
-TUNING = 3.0  # standardised residuals up to which a ray keeps its weight
 NORMAL_MEDIAN = 1.1774  # median of the length of two standard normal residuals
 NO_WEIGHT = 1e-3  # weight below which a ray is out
-SMALLEST_WEIGHT = 1e-5  # that every ray keeps, so that its point stays determined
 
 
 @dataclass(frozen=True)
@@ -267,19 +266,17 @@ class _Search:
 def adjust_robustly(problem: BundleProblem) -> tuple[BundleSolution, Floats]:
     """Adjust with weights that fall with the residual, and give the factor of the weight of each ray, 0 to 1.
 
-    p = exp(1 - e^2) where the standardised residual exceeds three times its scale, e times. Source: [Krarup 1980], with
-    the scale of the residuals taken from their median.
+    The weights are those of ``triangulation.robust``, with the scale of the residuals taken from their median.
     """
     weight = np.ones(len(problem.images))
     sigma = problem.images.sigma
     for _ in range(REWEIGHTINGS):
-        spread = sigma / np.sqrt(np.maximum(weight, SMALLEST_WEIGHT))[:, None]
+        spread = sigma / np.sqrt(weight)[:, None]
         solution = solve(replace(problem, images=replace(problem.images, sigma=spread)))
         problem = restarted(problem, solution)
         size = np.linalg.norm(solution.image_residuals / sigma, axis=1)
         unit = max(float(np.median(size)) / NORMAL_MEDIAN, 1e-12)
-        excess = size / unit / TUNING
-        weight = np.where(excess > 1.0, np.exp(np.maximum(1.0 - excess**2, -50.0)), 1.0)
+        weight = falling_weights(size / unit)
     return solution, weight
 
 

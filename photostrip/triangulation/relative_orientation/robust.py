@@ -14,6 +14,7 @@ import numpy as np
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
 from photostrip.triangulation.relative_orientation.solution import (
     LARGEST_STEP,
+    RIDGE,
     Linearised,
     gauss_newton_steps,
     in_front_of_cameras,
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
 
 
 STEPS = 30
-RIDGE = 1e-9  # relative, of the normal matrices: weights that fall may leave a pair without support for a step
 CONVERGED = 1e-6  # rad; what follows is least squares
 SETS = 300  # with a third of the points wrong, 13 % of the sets of five are right
 

@@ -79,23 +79,22 @@ def form_from_pairs(
     sigma: Floats | None = None,
     doubtful: Flags | None = None,
     earlier: tuple[FormedStrip, Flags] | None = None,
+    *,
+    searched: bool = False,
 ) -> FormedStrip:
     """Form the strip from its oriented pairs, in the frame of the first photo.
 
-    sigma, doubtful: as in ``transfer_scale``.
-    earlier: (p,), optional, the strip as it was formed before some of its pairs changed, and which: only their
-        junctions are made anew.
+    sigma, doubtful, searched: as in ``transfer_scale``.
+    earlier: (p,), optional, the strip as it was formed before some of its pairs changed, and which: only their model
+        points are computed anew.
     Raises GeometryError when a junction is broken or a base is parallel to the strip's Z axis.
     """
     if earlier is None:
         models = model_points(orientation)
-        junctions = transfer_scale(orientation, models.vectors, settings, photos, sigma, doubtful)
     else:
         before, changed = earlier
         models = _renewed_models(orientation, before, np.flatnonzero(changed))
-        renewed = np.asarray(changed[:-1] | changed[1:], bool)
-        fresh = transfer_scale(orientation, models.vectors, settings, photos, sigma, doubtful, renewed)
-        junctions = before.junctions.with_new(fresh, renewed)
+    junctions = transfer_scale(orientation, models.vectors, settings, photos, sigma, doubtful, searched=searched)
     formed = place_models(orientation, models, junctions, orientation.used & models.sound)
     _refuse_vertical_base(np.diff(formed.centers, axis=0) / formed.scale[:, None], photos)
     return formed
