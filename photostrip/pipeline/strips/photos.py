@@ -15,7 +15,8 @@ from photostrip.pipeline.strips import notes
 from photostrip.triangulation.error_propagation import control_errors, covariances, strip_errors
 from photostrip.triangulation.gross_errors.control import control_significance
 from photostrip.triangulation.gross_errors.pairs import screening
-from photostrip.triangulation.gross_errors.rays import screened_formation, strip_screening
+from photostrip.triangulation.gross_errors.rays.screened_formation import form_screened, with_readmitted
+from photostrip.triangulation.gross_errors.rays.strip_network import StripRays
 from photostrip.triangulation.relative_orientation.orientation import Orientation, orient_unchecked, refuse_unusable
 from photostrip.triangulation.relative_orientation.pairs import collect_pairs
 from photostrip.triangulation.resection.resection import Resection, resect, with_residuals
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip
     from photostrip.points import PhotoPoints
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
+    from photostrip.triangulation.gross_errors.rays.snooping import Rejection
     from photostrip.triangulation.polynomial.correction import Polynomial
 
     Oriented = OrientedStrip[strip_errors.StripErrors]
@@ -44,7 +46,7 @@ class FormedPhotos:
     sigma: float  # median standard deviation of the strip's image coordinates, mm
     screened: screening.ScreenedPairs  # the search for gross errors in its pairs
     formed: FormedStrip
-    contradictions: strip_screening.RayRejections  # points whose rays contradict each other from model to model
+    wrong_rays: tuple[Rejection, ...]  # rays that the others of their points contradict
 
     @property
     def orientation(self) -> Orientation:
@@ -165,7 +167,7 @@ class FormedPhotos:
                 sigma=self.sigma,
                 screened=self.screened,
                 formed=formed,
-                contradictions=self.contradictions,
+                wrong_rays=self.wrong_rays,
                 resection=resection,
                 rows=rays.rows,
                 covariance=covariance,
@@ -243,19 +245,22 @@ def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> F
     screened = overruling.restored(screened, pairs.weight, kept)
     oriented, scatter = screened.orientation, screened.scatter.by_pair
     refuse_unusable(oriented, screened.converged, strip.photos)
-    verdict = strip_screening.RayRejections()
+    wrong: tuple[Rejection, ...] = ()
     if settings.relative.screening == "none":
         formed = form_from_pairs(oriented, settings.formation, strip.photos, scatter)
     else:  # the strip decides what its pairs could not
-        named = overruling.rows(settings.relative.keep, observations)
-        measured = screened_formation.Measurements(
-            observations=observations, photos=strip.photos, weight=pairs.weight, sigma=scatter, stated=sigma, kept=named
+        rays = StripRays(
+            observations=observations,
+            position=strip.positions(observations),
+            sigma=scatter,
+            stated=sigma,
+            kept=overruling.rows(settings.relative.keep, observations),
         )
         readmit = settings.relative.screening in screening.SEARCHES
-        oriented, formed, verdict = screened_formation.form_screened(
-            oriented, measured, settings.formation, readmit=readmit
+        oriented, formed, wrong = form_screened(
+            oriented, rays, pairs.weight, strip.photos, settings.formation, readmit=readmit
         )
-        rejections = screened_formation.with_readmitted(screened.rejections, oriented.used)
+        rejections = with_readmitted(screened.rejections, oriented.used)
         screened = replace(screened, orientation=oriented, rejections=rejections)
     return FormedPhotos(
         strip=strip,
@@ -263,5 +268,5 @@ def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> F
         sigma=sigma,
         screened=screened,
         formed=formed,
-        contradictions=verdict,
+        wrong_rays=wrong,
     )
