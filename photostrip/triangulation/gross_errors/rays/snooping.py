@@ -274,12 +274,11 @@ class _Search:
             placed = images[rows].sum() > 1
             place = done.solution.points[number] if placed else self._meeting(done.solution, rows)
             decision = self._decided(done, rows, limit, place)
-            out = decision.out
             self.latest |= {each.row: each for each in self._rejected(rows, decision.out, decision, limit)}
-            if number not in self.back and (~out & ~images[rows]).any():
+            if number not in self.back and (~decision.out & ~images[rows]).any():
                 self.back.add(number)
                 xyz[number] = place
-                images[rows] = ~out
+                images[rows] = ~decision.out | (images[rows] & self.spared[number])
         control = self._given(done, limit.value * limit.unit)
         chosen = replace(done.selection, images=images, control=done.selection.control | control)
         self.problem = replace(self.problem, start=replace(self.problem.start, points=xyz))

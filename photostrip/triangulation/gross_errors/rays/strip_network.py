@@ -82,6 +82,7 @@ def _free_network(
     limit = FAR * max(1.0, float(np.nanmedian(size)))
     far = np.zeros(len(point), bool)
     far[at[~(size <= limit)]] = True
+    far[at[np.isin(rows, rays.kept)]] = False
     problem = BundleProblem(
         images=ImageObservations(photo, at.astype(np.intp), o.xy[rows], sigma),
         cameras=BundleCameras(np.zeros(len(formed.centers), np.intp), focal),
