@@ -20,10 +20,10 @@ demo: $(VENV)/photostrip.installed ## run the main job on every sample project a
 	done
 
 test: lint types ## lint, format, types and all tests
-	$(BIN)/python -m pytest -n $(WORKERS)
+	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
 check: lint types ## the fast gates: no slow tests, few random examples
-	HYPOTHESIS_PROFILE=quick $(BIN)/python -m pytest -n $(WORKERS) -q -m "not slow"
+	HYPOTHESIS_PROFILE=quick $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal -q -m "not slow"
 
 lint: $(VENV)/dev.installed
 	$(BIN)/ruff check $(SOURCES)
@@ -37,7 +37,7 @@ lowest: ## all tests on exactly the lower bounds of pyproject.toml, in a venv of
 	$(PYTHON) -m venv .venv-lowest
 	$(PYTHON) -c "import tomllib; print(*(d.replace('>=', '==') for d in tomllib.load(open('pyproject.toml', 'rb'))['project']['dependencies']), sep='\n')" > .venv-lowest/constraints.txt
 	.venv-lowest/bin/python -m pip install --quiet --only-binary :all: --constraint .venv-lowest/constraints.txt ".[test]"
-	.venv-lowest/bin/python -m pytest -n $(WORKERS)
+	.venv-lowest/bin/python -m pytest -n $(WORKERS) --dist worksteal
 
 bench: $(VENV)/dev.installed ## tables of seconds, memory and accuracy
 	@for program in $(filter-out benchmarks/mutations.py,$(wildcard benchmarks/*.py)); do printf '\n==> %s\n' "$$program"; $(BIN)/python "$$program" || exit $$?; done

@@ -4,7 +4,7 @@ Errors are those of all adjusted points that are not control, root mean square o
 along the strip (X), across it (Y) and up (Z). Beside the strip method stands a rigorous bundle adjustment of the same
 measurements, written apart from the program: it shows what the measurements hold.
 
-Usage: python benchmarks/accuracy.py [--seeds N] [--cases a b length long layout] [--workers N]
+Usage: python benchmarks/accuracy.py [--seeds N] [--cases a b length long layout] [--workers N] [--longest N]
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import sys
 import time
 from collections import Counter
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import product
 from multiprocessing import get_context
 from pathlib import Path
@@ -465,12 +466,15 @@ def case_length(pool: Pool, seeds: int) -> None:
     print_auto(autos)
 
 
-def case_long(pool: Pool, seeds: int) -> None:
+LONG = (10, 20, 30, 40, 60, 100)  # photos
+
+
+def case_long(pool: Pool, seeds: int, longest: int = LONG[-1]) -> None:
     """Print how polynomials fall behind a bundle on long strips."""
     print("(long) strips as in (b), two control points every 5 models; rms in plan/height, m, and the same divided by")
     print(f"    that of the bundle; {seeds} strips up to 20 photos, fewer of longer ones\n")
     rows = []
-    for photos in (10, 20, 30, 40, 60, 100):
+    for photos in (size for size in LONG if size <= longest):
         count = max(2, min(seeds, seeds * 20 // photos))
         found = measure(pool, pairs_of_control(photos), count, (*CHOICES, BUNDLE))
         cells = [slashed(found[choice].plan_height, 3) for choice in (*CHOICES, BUNDLE)]
@@ -533,11 +537,13 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=20, help="strips of each kind (default 20; 200 for firm numbers)")
     parser.add_argument("--cases", nargs="+", choices=CASES, default=["a", "b", "length"], help="tables to print")
     parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes (default: one for each core)")
+    parser.add_argument("--longest", type=int, default=LONG[-1], help="photos of the longest strip of the case long")
     options = parser.parse_args()
+    cases = CASES | {"long": partial(case_long, longest=options.longest)}
     with get_context("spawn").Pool(options.workers) as pool:
         for case in options.cases:
             start = time.perf_counter()
-            CASES[case](pool, options.seeds)
+            cases[case](pool, options.seeds)
             print(f"case {case}: {time.perf_counter() - start:.0f} s", file=sys.stderr)
 
 

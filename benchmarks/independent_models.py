@@ -29,7 +29,7 @@ from photostrip.pipeline.strips.adjusting import adjust_formed  # noqa: E402
 from photostrip.pipeline.strips.models import form_models, link_strip  # noqa: E402
 from photostrip.points import ModelPoints, PhotoPoints  # noqa: E402
 from photostrip.simulate import Control, Flight, Image, Models, Points, Simulation, Spec, simulate  # noqa: E402
-from photostrip.triangulation.independent_models import link_screening  # noqa: E402
+from photostrip.triangulation.independent_models.settings import LinkSettings  # noqa: E402
 from photostrip.triangulation.polynomial import correction  # noqa: E402
 from photostrip.triangulation.relative_orientation.orientation import orient_unchecked  # noqa: E402
 from photostrip.triangulation.relative_orientation.pairs import collect_pairs  # noqa: E402
@@ -128,7 +128,7 @@ def precision(repetitions: int) -> None:
             settings = Settings(
                 "polynomial" if degree else "similarity",
                 polynomial=correction.PolynomialSettings(degree or "auto"),
-                links=link_screening.LinkSettings("none"),
+                links=LinkSettings("none"),
             )
             ratios = scatter(models, settings, repetitions)
             cells = " | ".join(f"{r.mean():.3f} ({r.min():.2f} to {r.max():.2f})" for r in ratios)

@@ -39,7 +39,7 @@ from photostrip.pipeline.strips.adjusting import adjust_formed  # noqa: E402
 from photostrip.pipeline.strips.photos import form_strip  # noqa: E402
 from photostrip.simulate.simulation import simulate  # noqa: E402
 from photostrip.simulate.spec import FILM, Control, Flight, Image, Points, Spec, Terrain  # noqa: E402
-from photostrip.triangulation.covariance_adjustment import conditions  # noqa: E402
+from photostrip.triangulation.covariance_adjustment.settings import CovarianceSettings  # noqa: E402
 from photostrip.triangulation.polynomial import correction  # noqa: E402
 from photostrip.triangulation.relative_orientation.orientation import RelativeSettings  # noqa: E402
 
@@ -145,7 +145,7 @@ def settings(method: str, *, screening: str = "none", precision: bool = True) ->
     adjustments = {"similarity": "similarity", "covariance": "covariance", ALONE: "covariance"}
     return Settings(
         adjustment=adjustments.get(method, "polynomial"),
-        covariance=conditions.CovarianceSettings(distances=method != ALONE),
+        covariance=CovarianceSettings(distances=method != ALONE),
         relative=RelativeSettings(screening=screening),
         polynomial=correction.PolynomialSettings(degree),
         precision=precision,

@@ -57,6 +57,12 @@ def take_rows(table: T, rows: Sequence[int] | Numbers | Flags, columns: Iterable
     return replace(table, **chosen)
 
 
+def locate(wanted: Iterable[str], ids: Iterable[str]) -> Numbers:
+    """Place of each wanted id among ids; -1 for those that are not there."""
+    place = {name: number for number, name in enumerate(ids)}
+    return np.array([place.get(name, -1) for name in wanted], np.intp)
+
+
 @dataclass(frozen=True, eq=False)
 class PointTable:
     """Coordinates of points in one named frame."""

@@ -63,7 +63,7 @@ def oriented_of(result: Result, number: int = 0) -> OrientedStrip[StripErrors]:
         sigma=photos.sigma,
         screened=photos.screened,
         formed=photos.formed,
-        contradictions=photos.contradictions,
+        wrong_rays=photos.wrong_rays,
     )
     return OrientedStrip(
         stage=stage,

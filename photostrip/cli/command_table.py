@@ -58,6 +58,7 @@ _MODULES = {"completion": "shell", "man": "shell"}  # where it is not that of th
 COMMANDS = {
     name: Entry(f"photostrip.cli.commands.{_MODULES.get(name, name)}", text, example) for name, text, example in _TEXTS
 }
+COMPLETION = "_PHOTOSTRIP_COMPLETE"  # the variable in which the script of a shell asks what can stand at the cursor
 
 
 def usage() -> str:

@@ -12,8 +12,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, cast
 
 from photostrip import __version__
-from photostrip.cli.command_table import COMMANDS, usage
-from photostrip.cli.jobs import completion
+from photostrip.cli.command_table import COMMANDS, COMPLETION, usage
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -55,8 +54,10 @@ def _never_fail_on_characters(stream: TextIO) -> None:
 
 def _dispatch(arguments: list[str]) -> int:
     """Answer the options that come before a command, or call the command."""
-    if completion.VARIABLE in os.environ:  # the shell asks what can stand at the cursor
-        return completion.answer(os.environ[completion.VARIABLE])
+    if COMPLETION in os.environ:  # the shell asks what can stand at the cursor
+        from photostrip.cli.jobs.completion import answer
+
+        return answer(os.environ[COMPLETION])
     first, rest = (arguments[0], arguments[1:]) if arguments else ("", [])
     if first == "--version":
         sys.stdout.write(f"photostrip {__version__}\n")

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.points import locate
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -27,11 +29,19 @@ def measured_control(control: ControlPoints, observations: PhotoPoints) -> Contr
     return control.take(np.array(kept, np.intp))
 
 
-def rows_of_given(control: ControlPoints, numbers: Numbers, observations: PhotoPoints) -> Numbers:
-    """Row of each given point among points by their numbers in the observations; -1 for none."""
-    number = {name: n for n, name in enumerate(observations.point_ids)}
-    row_of = {int(n): row for row, n in enumerate(numbers)}
-    return np.array([row_of.get(number.get(name, -1), -1) for name in control.ids], np.intp)
+def rows_of_given(ids: Sequence[str], numbers: Numbers, point_ids: Sequence[str]) -> Numbers:
+    """Row of each given point among points that have numbers in a list of ids; -1 for those that are not there."""
+    return locate(ids, [point_ids[number] for number in numbers])
+
+
+def cartesian_of(control: ControlPoints, frames: Sequence[GroundFrame]) -> Floats:
+    """Cartesian coordinates of points given in full, each from its own ground frame."""
+    xyz = np.zeros((len(control), 3))
+    for number, frame in enumerate(frames):
+        rows = control.frame == number
+        if rows.any():
+            xyz[rows] = frame.cartesian_from_ground(control.enu[rows])
+    return xyz
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +58,7 @@ def compare_with_given(
     control: ControlPoints, frames: Sequence[GroundFrame], points: Adjusted, observations: PhotoPoints
 ) -> AtGivenPoints:
     """Compare adjusted with given coordinates at control and check points, each in its own ground frame."""
-    rows = rows_of_given(control, points.number, observations)
+    rows = rows_of_given(control.ids, points.number, observations.point_ids)
     differences = np.full((len(control), 3), np.nan)
     for index, frame in enumerate(frames):
         inside = np.flatnonzero((control.frame == index) & (rows >= 0))

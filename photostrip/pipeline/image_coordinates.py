@@ -14,7 +14,7 @@ from photostrip.pipeline.common_points import mean_points
 from photostrip.pipeline.given_points import measured_control
 from photostrip.pipeline.strips.adjusting import adjust_formed
 from photostrip.pipeline.strips.forming import form_photos
-from photostrip.triangulation.image_coordinates import corrections, interior
+from photostrip.triangulation.image_coordinates import corrections
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats
@@ -45,6 +45,8 @@ def orient_interior(inputs: Inputs, settings: Settings) -> PhotoCoordinates:
     """Interior orientation, when fiducial marks were measured."""
     if inputs.fiducials is None:
         return PhotoCoordinates(inputs.observations, None)
+    from photostrip.triangulation.image_coordinates import interior  # digital cameras need none of it
+
     orientation = interior.orient(inputs.fiducials, inputs.cameras, settings.interior)
     return PhotoCoordinates(interior.transform(inputs.observations, orientation), orientation)
 

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.points import locate
 from photostrip.triangulation import absolute_orientation as absolute
 from photostrip.triangulation.bundle import settings as bundle
-from photostrip.triangulation.covariance_adjustment import conditions
-from photostrip.triangulation.image_coordinates import corrections as refinement
-from photostrip.triangulation.image_coordinates import interior
-from photostrip.triangulation.independent_models import link_screening
+from photostrip.triangulation.covariance_adjustment.settings import CovarianceSettings
+from photostrip.triangulation.image_coordinates.settings import ImageCorrectionSettings, InteriorSettings
+from photostrip.triangulation.independent_models.settings import LinkSettings
 from photostrip.triangulation.polynomial import correction as polynomial
 from photostrip.triangulation.relative_orientation.orientation import RelativeSettings
 from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
@@ -39,8 +39,11 @@ class Strip:
 
     def positions(self, observations: PhotoPoints) -> Numbers:
         """Place in the strip of the photo of every image point; -1 for photos of other strips."""
-        place = {photo: number for number, photo in enumerate(self.photos)}
-        return np.array([place.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo]
+        return locate(observations.photo_ids, self.photos)[observations.photo]
+
+    def median_sigma(self, observations: PhotoPoints) -> float:
+        """Median standard deviation of the image coordinates of its photos, mm."""
+        return float(np.median(observations.sigma[self.positions(observations) >= 0]))
 
 
 @dataclass(frozen=True)
@@ -127,13 +130,13 @@ class Settings:
     adjustment: str = "polynomial"  # one of ``ADJUSTMENTS``
     relative: RelativeSettings = field(default_factory=RelativeSettings)
     formation: StripFormationSettings = field(default_factory=StripFormationSettings)
-    links: link_screening.LinkSettings = field(default_factory=link_screening.LinkSettings)
+    links: LinkSettings = field(default_factory=LinkSettings)
     absolute: absolute.AbsoluteSettings = field(default_factory=absolute.AbsoluteSettings)
     polynomial: polynomial.PolynomialSettings = field(default_factory=polynomial.PolynomialSettings)
-    covariance: conditions.CovarianceSettings = field(default_factory=conditions.CovarianceSettings)
+    covariance: CovarianceSettings = field(default_factory=CovarianceSettings)
     bundle: bundle.BundleSettings = field(default_factory=bundle.BundleSettings)
-    interior: interior.InteriorSettings = field(default_factory=interior.InteriorSettings)
-    refinement: refinement.ImageCorrectionSettings = field(default_factory=refinement.ImageCorrectionSettings)
+    interior: InteriorSettings = field(default_factory=InteriorSettings)
+    refinement: ImageCorrectionSettings = field(default_factory=ImageCorrectionSettings)
     precision: bool = True  # whether standard deviations and covariances of points and photos are computed
     # angle_system, angle_unit: system (``geometry.rotation.SYSTEMS``) and unit (``"deg"``, ``"gon"``, ``"rad"``) of
     # exported angles

@@ -24,7 +24,7 @@ def not_determined(
         why = "its coordinates in the models contradict each other, or were left out"
         return {observations.point_ids[number]: why for number in np.flatnonzero(~done).tolist()}
     placed = {photo: (n, k) for n, strip in enumerate(inputs.strips) for k, photo in enumerate(strip.photos)}
-    contradicted = {int(number) for strip in strips for number in strip.of_photos.contradictions.point}
+    contradicted = {int(observations.point[each.row]) for strip in strips for each in strip.of_photos.wrong_rays}
     seen: dict[int, list[tuple[int, int]]] = {}
     for row in np.flatnonzero(~done[observations.point]):
         photo = observations.photo_ids[observations.photo[row]]

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.points import ModelPoints, PhotoPoints
     from photostrip.triangulation.gross_errors.pairs.screening import ScreenedPairs
-    from photostrip.triangulation.independent_models.link_screening import LinkSettings
+    from photostrip.triangulation.independent_models.settings import LinkSettings
 
 
 CENTER = "center of photo "  # before the name of a perspective centre in model coordinates

@@ -19,18 +19,8 @@ OF_MODELS = ("polynomial", "similarity")  # adjustments that need no image coord
 
 
 def require_runnable(inputs: Inputs, settings: Settings) -> None:
-    """Refuse an adjustment that does not exist, and measurements on photos whose camera nobody knows.
-
-    Raises InputError by the key in the project file.
-    """
-    if settings.adjustment not in ADJUSTMENTS:
-        fault = Fault(
-            f"adjustment {settings.adjustment!r} is not available",
-            code="not-available",
-            key="processing.adjustment",
-            expected=" or ".join(ADJUSTMENTS),
-        )
-        raise InputError(fault)
+    """Refuse an adjustment that does not exist, and measurements on photos whose camera nobody knows."""
+    _require_adjustment(settings, ADJUSTMENTS, "is not available", "not-available")
     cameras = inputs.cameras
     stray = [photo for photo in inputs.observations.photo_ids if photo not in cameras]
     if stray:
@@ -76,15 +66,12 @@ def refuse_curvature_twice(inputs: Inputs, settings: Settings) -> None:
 
 
 def require_adjustment_of_models(settings: Settings) -> None:
-    """Refuse adjustments that need image coordinates where models were measured.
+    """Refuse adjustments that need image coordinates where models were measured."""
+    message = "needs image coordinates; the project gives model coordinates"
+    _require_adjustment(settings, OF_MODELS, message, "needs-image-coordinates")
 
-    Raises InputError by the key in the project file.
-    """
-    if settings.adjustment not in OF_MODELS:
-        fault = Fault(
-            f"adjustment {settings.adjustment!r} needs image coordinates; the project gives model coordinates",
-            code="needs-image-coordinates",
-            key="processing.adjustment",
-            expected=" or ".join(OF_MODELS),
-        )
-        raise InputError(fault)
+
+def _require_adjustment(settings: Settings, known: Sequence[str], message: str, code: str) -> None:
+    if settings.adjustment not in known:
+        message = f"adjustment {settings.adjustment!r} {message}"
+        raise InputError(Fault(message, code, key="processing.adjustment", expected=" or ".join(known)))

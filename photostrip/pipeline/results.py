@@ -21,13 +21,12 @@ if TYPE_CHECKING:
     from photostrip.triangulation.bundle.quality import reliability, self_calibration, variance_components
     from photostrip.triangulation.bundle.quality.correlations import Correlation
     from photostrip.triangulation.bundle.selection import Selection
-    from photostrip.triangulation.bundle.snooping import ScreenedBundle
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
     from photostrip.triangulation.error_propagation.covariances import CheckTest
     from photostrip.triangulation.gross_errors.control import control_significance
     from photostrip.triangulation.gross_errors.control.control_rejections import ControlRejection
     from photostrip.triangulation.gross_errors.pairs import screening
-    from photostrip.triangulation.gross_errors.rays import strip_screening
+    from photostrip.triangulation.gross_errors.rays.snooping import Rejection, ScreenedBundle
     from photostrip.triangulation.image_coordinates import corrections
     from photostrip.triangulation.image_coordinates.mark_fit import InteriorOrientation
     from photostrip.triangulation.independent_models.formation import FormedModels
@@ -73,7 +72,7 @@ class PhotoStages:
     # relative orientation of its pairs with the search for gross errors: log, zones, detectable errors
     screened: screening.ScreenedPairs
     formed: FormedStrip
-    contradictions: strip_screening.RayRejections  # measurements that the strip as a whole does not confirm
+    wrong_rays: tuple[Rejection, ...]  # rays that the others of their points contradict
     resection: exterior.Resection  # photos oriented on the adjusted points, intermediate frame
     rows: Numbers  # (m,): image points that took part in the resections, rows of the observations
     # the adjustment with the strip's own covariance; None with other adjustments

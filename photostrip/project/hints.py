@@ -10,6 +10,7 @@ import numpy as np
 
 from photostrip.formats.text.findings import counted, listed
 from photostrip.notes import Note
+from photostrip.points import locate
 from photostrip.project.conversion import certificate_of
 from photostrip.project.tables import alike, rays
 from photostrip.project.yaml.document import key_path
@@ -69,8 +70,7 @@ def _of_models(models: ModelTables, control: Sequence[ControlTable | None], proj
         strangers = [] if each is None else [name for name in each.model_ids if name not in used]
         if each is None or not strangers:
             continue
-        number = {name: code for code, name in enumerate(each.model_ids)}
-        rows = np.flatnonzero(np.isin(each.models, [number[name] for name in strangers]))
+        rows = np.flatnonzero(np.isin(each.models, locate(strangers, each.model_ids)))
         number_of = counted(len(strangers), "model")
         message = f"{counted(len(rows), what)} of {number_of} in no strip not used: {listed(strangers)}"
         yield each.table.note(rows[0], "model-in-no-strip", message, key="model")
@@ -149,8 +149,7 @@ def _photos_in_no_strip(read: Measurements, photos: set[str]) -> Iterator[Note]:
     others = [name for name in read.photo_ids if name not in photos]
     if not others:
         return
-    number = {name: code for code, name in enumerate(read.photo_ids)}
-    rows = np.flatnonzero(np.isin(read.photo, [number[name] for name in others]))
+    rows = np.flatnonzero(np.isin(read.photo, locate(others, read.photo_ids)))
     yield _in_no_strip(read.table, rows.tolist(), others, photos)
 
 
@@ -181,8 +180,7 @@ def _measured_once(
 
 def _first_row(read: Measurements, points: Sequence[str]) -> int:
     """First row of any of some points."""
-    number = {name: code for code, name in enumerate(read.target_ids)}
-    return int(np.flatnonzero(np.isin(read.target, [number[name] for name in points]))[0])
+    return int(np.flatnonzero(np.isin(read.target, locate(points, read.target_ids)))[0])
 
 
 def _switched_off(read: ControlTable) -> Iterator[Note]:

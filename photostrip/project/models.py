@@ -11,7 +11,7 @@ import numpy as np
 from photostrip.formats.measured.models import read_models
 from photostrip.formats.text.findings import listed, suggestion
 from photostrip.pipeline import MeasuredModels, ModelStrip
-from photostrip.points import ModelPoints, PhotoPoints
+from photostrip.points import ModelPoints, PhotoPoints, locate
 from photostrip.project.yaml.document import fault_at
 from photostrip.project.yaml.references import listed_photos
 
@@ -189,16 +189,14 @@ def measured_models(tables: ModelTables, given: Models, strips: Sequence[ModelSt
     if centers is not None:
         parts.append(_rows(centers, np.arange(len(centers.table)), wanted, given.center_sigma or given.sigma))
     point_ids = tuple(dict.fromkeys(measured.targets))
-    number = {name: k for k, name in enumerate(point_ids)}
-    center = {name: len(point_ids) + k for k, name in enumerate(photos)}
-    node = [number[name] for name in measured.targets] + [center[name] for part in parts[1:] for name in part.targets]
-    model = {name: k for k, name in enumerate(wanted)}
+    centers_of = [name for part in parts[1:] for name in part.targets]
+    node = np.concatenate([locate(measured.targets, point_ids), locate(centers_of, photos) + len(point_ids)])
     model_points = ModelPoints(
         model_ids=tuple(wanted),
         point_ids=point_ids,
         photo_ids=tuple(photos),
-        model=np.array([model[name] for part in parts for name in part.models], np.intp),
-        node=np.array(node, np.intp),
+        model=locate([name for part in parts for name in part.models], wanted),
+        node=node,
         xyz=np.concatenate([part.xyz for part in parts]) * factor * hand,
         sigma=np.concatenate([part.sigma for part in parts]) * factor,
     )

@@ -64,7 +64,7 @@ def counts_of(result: Result, measurements: int) -> Document:
         "rejected_in_pairs": sum(not rejection.readmitted for each in photos for rejection in each.rejections),
         "rejected_in_scale_transfer": sum(int((~each.formed.junctions.used).sum()) for each in photos),
         "rejected_for_rays": sum(
-            len(np.unique(strip.of_photos.contradictions.point[rejected_by_strip(strip)]))
+            len({int(result.refined.observations.point[each.row]) for each in rejected_by_strip(strip)})
             for strip in result.photo_strips
         ),
         **({} if bundle is None else {"rejected_in_bundle": len(out)}),

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 PROJECTS = 4
-RUNS = int(os.environ.get("PHOTOSTRIP_KILLS", "50"))  # killed inside this process's children
+RUNS = int(os.environ.get("PHOTOSTRIP_KILLS", "25"))  # killed inside this process's children
 WHOLE_RUNS = 4  # killed as whole commands with their workers
 SUMMARIES = {"summary.txt", "summary.csv", "summary.json", "junit.xml"}
 BATCH = ["batch", "strips", "-o", "out", "-j", "2"]

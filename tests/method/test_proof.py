@@ -449,6 +449,7 @@ def test_relative_orientation_finds_the_noise() -> None:
     assert variance == pytest.approx(1.0, abs=3 * np.sqrt(2 / redundancy.sum()))
 
 
+@pytest.mark.usefixtures("_no_findings")
 @pytest.mark.slow
 def test_second_degree_takes_out_what_the_similarity_leaves() -> None:
     """Limits of ten models and three bands, in units of sigma at photo scale; floors at half of them."""
@@ -460,6 +461,7 @@ def test_second_degree_takes_out_what_the_similarity_leaves() -> None:
     assert np.linalg.norm(found["auto"]) < 1.1 * np.linalg.norm(found["2"])
 
 
+@pytest.mark.usefixtures("_no_findings")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("bands", "degree", "limits"), [(3, "2", (4.8, 4.4, 9.2)), (4, "3", (2.9, 2.9, 5.9))], ids=["3 bands", "4 bands"]

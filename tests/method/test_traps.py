@@ -372,6 +372,7 @@ def test_photos_that_see_no_control_are_carried_by_the_strip() -> None:
 # -------------------------------------------------------------------------------- what polynomials are not made for
 
 
+@pytest.mark.usefixtures("_no_findings")
 @pytest.mark.slow
 def test_points_beyond_the_control_are_warned_of() -> None:
     """Control in the first three fifths only: a cubic runs away where it is not held, and the report says so."""

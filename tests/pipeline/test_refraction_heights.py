@@ -13,7 +13,7 @@ from photostrip.pipeline import Inputs, Settings, triangulate
 from photostrip.pipeline.frames import tie_ground_frames
 from photostrip.pipeline.image_coordinates import heights_of, orient_interior
 from photostrip.simulate import simulate
-from photostrip.triangulation.image_coordinates.corrections import ImageCorrectionSettings
+from photostrip.triangulation.image_coordinates.settings import ImageCorrectionSettings
 from tests.geodesy.frames import write_gtx
 from tests.results import spec
 

@@ -18,6 +18,7 @@ from photostrip.simulate.spec import FILM as CAMERA
 from photostrip.simulate.spec import Film, Flight, Image, Spec, Terrain
 from photostrip.triangulation.image_coordinates import corrections, interior
 from photostrip.triangulation.image_coordinates.refraction import refraction_constant
+from photostrip.triangulation.image_coordinates.settings import ImageCorrectionSettings, InteriorSettings
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -56,10 +57,10 @@ def ideal(done: Simulation) -> Floats:
 def corrected(done: Simulation, *, transform: str = "affine", camera: Camera = LENS, refraction: bool = True) -> Floats:
     cameras = dict.fromkeys(done.truth.photo_ids, camera)
     assert done.fiducials is not None
-    oriented = interior.orient(done.fiducials, cameras, interior.InteriorSettings(transform))
+    oriented = interior.orient(done.fiducials, cameras, InteriorSettings(transform))
     photo = interior.transform(done.observations, oriented)
     flying, ground = (float(xyz[:, 2].mean()) for xyz in (done.truth.centers_ground, done.truth.ground.xyz))
-    settings = corrections.ImageCorrectionSettings(refraction=refraction, flying_height=flying, ground_height=ground)
+    settings = ImageCorrectionSettings(refraction=refraction, flying_height=flying, ground_height=ground)
     return corrections.refine(photo, cameras, settings).observations.xy
 
 

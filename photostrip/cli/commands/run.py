@@ -43,22 +43,24 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
     """
     from photostrip.cli.failures import failures_as
     from photostrip.cli.garbage import without_garbage_collection
-    from photostrip.cli.jobs.method_comparison import compare_methods
     from photostrip.cli.stderr import Messages
     from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE
     from photostrip.formats.output.result_files import result_files
     from photostrip.formats.text.writing import make_rule, write_files, write_text
     from photostrip.project.loading import adjust_project, load_project
-    from photostrip.report.html import check_html, to_html
     from photostrip.report.page.progress import progress
     from photostrip.result.document import document_of
 
     _refuse_contradictions(output, depfile=depfile, trace=trace, methods=methods, html=html)
     messages = Messages(quiet=quiet, verbose=verbose)
     if methods:
+        from photostrip.cli.jobs.method_comparison import compare_methods
+
         return compare_methods(project, assignments or [], output, form, width, messages, quiet=quiet)
     with failures_as(form), without_garbage_collection(), progress(sys.stderr, quiet=quiet) as waiting:
         if html:
+            from photostrip.report.html import check_html, to_html
+
             check_html()
         waiting.at(f"reading {project}")
         loaded = load_project(project, assignments or [])

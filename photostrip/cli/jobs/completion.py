@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 
-VARIABLE = "_PHOTOSTRIP_COMPLETE"  # set by the script of the shell when it asks
+from photostrip.cli.command_table import COMPLETION
 
 
 def answer(instruction: str) -> int:
@@ -16,13 +16,13 @@ def answer(instruction: str) -> int:
     """
     from photostrip.cli.whole_program import whole_program
 
-    os.environ[VARIABLE] = instruction
+    os.environ[COMPLETION] = instruction
     try:
         whole_program(completing=True)(args=[], prog_name="photostrip", standalone_mode=False)
     except SystemExit as stop:
         return stop.code if isinstance(stop.code, int) else 0
     finally:
-        del os.environ[VARIABLE]
+        del os.environ[COMPLETION]
         sys.stdout.flush()
     return 0
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from photostrip.formats.measured.columns import POINT, numbers, sigmas
 from photostrip.formats.text.tables import Column, Table
+from photostrip.points import locate
 
 if TYPE_CHECKING:
     from collections.abc import Set as AbstractSet
@@ -72,13 +73,9 @@ def _photos(table: Table, photos: AbstractSet[str], findings: Findings) -> tuple
     """Left and right photo of each row, shape (n, 2), counted in the ids; -1 where a pair is none, which is refused."""
     if "pair" not in table.ids:
         names = tuple(dict.fromkeys((*table.ids["left"], *table.ids["right"])))
-        number = {name: code for code, name in enumerate(names)}
-        sides = [
-            np.array([number[name] for name in table.ids[side]], np.intp)[table.codes[side]]
-            for side in ("left", "right")
-        ]
+        sides = [locate(table.ids[side], names)[table.codes[side]] for side in ("left", "right")]
         return names, np.stack(sides, -1)
-    number = {}
+    number: dict[str, int] = {}
     of_pair = np.full((len(table.ids["pair"]), 2), -1, np.intp)
     for code, pair in enumerate(table.ids["pair"]):
         ways = [(pair[:place].strip(), pair[place + 1 :].strip()) for place, sign in enumerate(pair) if sign in SIGNS]

@@ -18,7 +18,7 @@ from photostrip.formats.text.findings import counted
 from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline import Inputs, MeasuredModels, ModelStrip, Settings, Strip
 from photostrip.points import PhotoPoints
-from photostrip.triangulation.image_coordinates import corrections
+from photostrip.triangulation.image_coordinates.settings import ImageCorrectionSettings
 
 if TYPE_CHECKING:
     from photostrip.camera import Camera
@@ -72,7 +72,7 @@ def _inputs_of_models(simulation: Simulation, points: ModelPoints) -> Inputs:
 
 def settings_of(simulation: Simulation) -> Settings:
     """Return the settings that the written project has: defaults, and refraction when it was simulated."""
-    return Settings(refinement=corrections.ImageCorrectionSettings(refraction=simulation.spec.refraction))
+    return Settings(refinement=ImageCorrectionSettings(refraction=simulation.spec.refraction))
 
 
 # ------------------------------------------------------------------------------------------------- as files

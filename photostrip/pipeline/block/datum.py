@@ -10,7 +10,9 @@ import numpy as np
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_angles
 from photostrip.geometry.similarity import Similarity, collinearity
+from photostrip.pipeline.given_points import cartesian_of
 from photostrip.pipeline.strips.absolute import middle_frame
+from photostrip.points import locate
 from photostrip.triangulation import absolute_orientation
 
 if TYPE_CHECKING:
@@ -113,9 +115,8 @@ def datum(
 ) -> tuple[Similarity, bool]:
     """Similarity from the frame of a block to the Cartesian frame; True with it when nothing gave it."""
     names = tuple(photo for number in group.members for photo in stages[number].strip.photos)
-    number_of = {name: number for number, name in enumerate(observations.point_ids)}
-    rows = np.array([number_of.get(name, -1) for name in known.control.ids], np.intp)
-    inside = (rows >= 0) & np.isfinite(group.points[rows, 0]) if len(rows) else np.zeros(0, bool)
+    rows = locate(known.control.ids, observations.point_ids)
+    inside = (rows >= 0) & np.isfinite(group.points[rows, 0])
     control, rows = known.control.take(inside), rows[inside]
     cameras = [name for name in names if name in known.centers]
     refusal: GeometryError | None = None
@@ -172,12 +173,12 @@ def _by_cameras(
     Where all of them lie on one line, cameras are taken to look down: that is a start, the adjustment decides.
     """
     names, centers, rotations = _oriented(stages, group)
-    rows = np.array([row for row, name in enumerate(names) if name in known.centers], np.intp)
+    rows = np.flatnonzero([name in known.centers for name in names])
     source, target = centers[rows], np.array([known.centers[names[row]] for row in rows])
     control, numbers = given
     full = np.asarray(control.use.all(axis=1), bool)
     source = np.concatenate([source, group.points[numbers[full]]])
-    target = np.concatenate([target, cartesian_of(control.take(full), known)])
+    target = np.concatenate([target, cartesian_of(control.take(full), known.frames)])
     weight = np.ones(len(source))
     scale = np.linalg.norm(target - target.mean(axis=0)) / np.linalg.norm(source - source.mean(axis=0))
     arm = _depth(stages, group)
@@ -199,16 +200,6 @@ def _by_cameras(
         antenna = np.array([names[row] not in known.rotations for row in rows])
         target[: len(rows)] -= np.where(antenna[:, None], (found.rotation @ rotations[rows]) @ known.lever, 0.0)
         found = Similarity.from_points(source, target, weight)
-    return found
-
-
-def cartesian_of(control: ControlPoints, known: Known) -> Floats:
-    """Cartesian coordinates of full control points."""
-    found = np.empty((len(control), 3))
-    for number, frame in enumerate(known.frames):
-        rows = control.frame == number
-        if rows.any():
-            found[rows] = frame.cartesian_from_ground(control.enu[rows])
     return found
 
 

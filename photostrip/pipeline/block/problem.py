@@ -11,6 +11,7 @@ from photostrip.geodesy.frame_spec import GROUND_AXES
 from photostrip.geometry.rotation import angle_rates, from_angles
 from photostrip.pipeline import overruling
 from photostrip.pipeline.results import BlockProblem
+from photostrip.points import locate
 from photostrip.triangulation.bundle.observations.problem import (
     AttitudeObservations,
     BundleCameras,
@@ -97,8 +98,7 @@ def _named(entries: Sequence[str], observations: PhotoPoints) -> Flags:
 def _cameras(inputs: Inputs, settings: Settings) -> BundleCameras:
     """Cameras of all photos, and what is calibrated of them."""
     cameras = {strip.camera.name: strip for strip in inputs.strips}
-    number = {name: row for row, name in enumerate(cameras)}
-    of_photo = np.array([number[strip.camera.name] for strip in inputs.strips for _ in strip.photos], np.intp)
+    of_photo = locate([strip.camera.name for strip in inputs.strips for _ in strip.photos], cameras)
     focal = np.array([strip.camera.principal_distance for strip in cameras.values()])
     asked = [strip.calibrate for strip in cameras.values()]
     return BundleCameras(of_photo, focal, sigmas(asked, settings.bundle.calibration_sigma))
@@ -133,10 +133,8 @@ def _control(
     control: ControlPoints, frames: Sequence[GroundFrame], observations: PhotoPoints, start: BlockStart, origin: Floats
 ) -> tuple[ControlObservations, Numbers]:
     """Control as observations; points without start coordinates, which no ray determines, are left out."""
-    number = {name: n for n, name in enumerate(observations.point_ids)}
-    point = np.array([number[name] for name in control.ids], np.intp)
-    known = np.isfinite(start.points[point, 0]) if len(point) else np.zeros(0, bool)
-    rows = np.flatnonzero(known)
+    point = locate(control.ids, observations.point_ids)
+    rows = np.flatnonzero(np.isfinite(start.points[point, 0]))
     xyz, axes, sigma = np.empty((len(rows), 3)), np.empty((len(rows), 3, 3)), np.empty((len(rows), 3))
     for index, frame in enumerate(frames):
         inside = control.frame[rows] == index
@@ -246,7 +244,7 @@ def refilled(
     """
     given = block.problem.control
     xyz = given.xyz.copy()
-    partial = ~control.use[block.control].all(axis=1) if len(block.control) else np.zeros(0, bool)
+    partial = ~control.use[block.control].all(axis=1)
     for index, frame in enumerate(frames):
         rows = np.flatnonzero(partial & (control.frame[block.control] == index))
         if len(rows):

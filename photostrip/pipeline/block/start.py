@@ -20,14 +20,14 @@ from photostrip.pipeline.block.datum import (
     ON_A_LINE,
     JoinedStrips,
     Known,
-    cartesian_of,
     datum,
     join_waiting,
 )
 from photostrip.pipeline.common_points import mean_points
+from photostrip.pipeline.given_points import cartesian_of
 from photostrip.pipeline.results import BlockStart
 from photostrip.pipeline.strips.adjusting import adjust_formed
-from photostrip.points import ControlPoints
+from photostrip.points import ControlPoints, locate
 from photostrip.triangulation.resection.closed_form import approximate
 from photostrip.triangulation.resection.collinearity import KnownPhotos
 from photostrip.triangulation.resection.ray_intersection import intersect_points
@@ -186,12 +186,10 @@ def _mean_points(strips: Sequence[StripResult], count: int) -> Floats:
 def _with_control(points: Floats, observations: PhotoPoints, known: Known) -> Floats:
     """Put full control in where a point has no coordinates."""
     found = points.copy()
-    number = {name: n for n, name in enumerate(observations.point_ids)}
     full = known.control.take(np.asarray(known.control.use.all(axis=1), bool))
-    rows = np.array([number[name] for name in full.ids], np.intp)
-    missing = np.isnan(found[rows, 0]) if len(rows) else np.zeros(0, bool)
-    if missing.any():
-        found[rows[missing]] = cartesian_of(full.take(missing), known)
+    rows = locate(full.ids, observations.point_ids)
+    missing = np.isnan(found[rows, 0])
+    found[rows[missing]] = cartesian_of(full.take(missing), known.frames)
     return found
 
 
@@ -215,13 +213,13 @@ def _single(photo: str, focal: float, points: Floats, observations: PhotoPoints,
 
 def _rest(inputs: Inputs, observations: PhotoPoints, oriented: tuple[Floats, Floats], points: Floats) -> Floats:
     """Intersect the points that no strip has, as those seen on one photo of each of two strips."""
-    place = {photo: row for row, photo in enumerate(photo for strip in inputs.strips for photo in strip.photos)}
+    photos = [photo for strip in inputs.strips for photo in strip.photos]
     focal = np.array([strip.camera.principal_distance for strip in inputs.strips for _ in strip.photos])
     rows = np.flatnonzero(np.isnan(points[observations.point, 0]))
     if not len(rows):
         return points
     numbers, point = np.unique(observations.point[rows], return_inverse=True)
-    photo = np.array([place[name] for name in observations.photo_ids], np.intp)[observations.photo[rows]]
+    photo = locate(observations.photo_ids, photos)[observations.photo[rows]]
     found = intersect_points(
         observations.xy[rows], observations.sigma[rows], (photo, point), KnownPhotos(*oriented, focal), len(numbers)
     )

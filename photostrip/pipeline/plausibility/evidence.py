@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import GeometryError, InputError
+from photostrip.pipeline.given_points import rows_of_given
+from photostrip.points import locate
 from photostrip.triangulation.gross_errors.pairs import screening
 from photostrip.triangulation.image_coordinates import corrections
 from photostrip.triangulation.plausibility.control.control_strip import Rays, StripPoints
@@ -99,7 +101,7 @@ def form(strip: Strip, observations: PhotoPoints, settings: Settings) -> Evidenc
     try:
         pairs = collect_pairs(observations, strip.photos, strip.camera.principal_distance)
         first, converged = orient_unchecked(pairs)
-        screened = screening.screen_pairs(first, settings.relative, _sigma(observations, strip), converged)
+        screened = screening.screen_pairs(first, settings.relative, strip.median_sigma(observations), converged)
         refuse_unusable(screened.orientation, screened.converged, strip.photos)
         scatter = screened.scatter.by_pair
         formed = form_from_pairs(screened.orientation, settings.formation, strip.photos, scatter)
@@ -119,29 +121,6 @@ def ideal(observations: PhotoPoints, cameras: Mapping[str, Camera], settings: Se
         return observations
 
 
-def _positions(observations: PhotoPoints, photos: Sequence[str]) -> Numbers:
-    """Place in a list of photos of the photo of each image point, shape (n,); -1 for the others."""
-    place = {photo: number for number, photo in enumerate(photos)}
-    return np.array([place.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo]
-
-
-def _point_numbers(point_ids: Sequence[str], ids: Sequence[str]) -> Numbers:
-    """Numbers of points among the measured ones; -1 for those that are not measured."""
-    number = {name: n for n, name in enumerate(point_ids)}
-    return np.array([number.get(name, -1) for name in ids], np.intp)
-
-
-def rows_of(point: Numbers, point_ids: Sequence[str], ids: Sequence[str]) -> Numbers:
-    """Rows of given points among those of a strip, which have the numbers `point`; -1 for those that it lacks."""
-    row_of = {number: row for row, number in enumerate(point.tolist())}
-    return np.array([row_of.get(number, -1) for number in _point_numbers(point_ids, ids).tolist()], np.intp)
-
-
-def _sigma(observations: PhotoPoints, strip: Strip) -> float:
-    """Median standard deviation of the image coordinates of a strip, mm."""
-    return float(np.median(observations.sigma[_positions(observations, strip.photos) >= 0]))
-
-
 def _base_angle(photos: Sequence[str], steps: Mapping[str, complex]) -> float:
     """Mean direction on the photos towards the next one, radians."""
     known = np.array([steps.get(photo, complex("nan")) for photo in photos])
@@ -154,10 +133,10 @@ def strip_points(
 ) -> tuple[Numbers, StripPoints]:
     """Rows of the given points that a formed strip holds, and the same points in the strip."""
     strip, depth = formed.formed, float(np.median(formed.depth))
-    row = rows_of(strip.point, observations.point_ids, control.ids)
+    row = rows_of_given(control.ids, strip.point, observations.point_ids)
     rows = np.flatnonzero(row >= 0)
     base = float(np.median(np.linalg.norm(np.diff(strip.centers, axis=0), axis=1)))
-    share = _sigma(observations, formed.strip) / formed.strip.camera.principal_distance
+    share = formed.strip.median_sigma(observations) / formed.strip.camera.principal_distance
     return rows, StripPoints(
         formed.strip.id,
         xyz=strip.xyz[row[rows]],
@@ -172,7 +151,7 @@ def strip_points(
 
 def _rays(formed: EvidenceStrip, observations: PhotoPoints, name: str) -> Rays:
     """Collect what the photos of a strip show of a point."""
-    position = _positions(observations, formed.strip.photos)
+    position = formed.strip.positions(observations)
     rows = np.flatnonzero((observations.point == observations.point_ids.index(name)) & (position >= 0))
     strip, photo = formed.formed, position[rows]
     return Rays(
@@ -214,7 +193,7 @@ def mosaic_points(
     """
     photos = _photos_with_most(strip, observations, control)
     plane = mosaic.lay_out(mosaic.link(observations, photos), len(photos))
-    position = _positions(observations, photos)
+    position = locate(observations.photo_ids, photos)[observations.photo]
     rows = np.flatnonzero(position >= 0)
     rows = rows[plane.part[position[rows]] == 0]
     if not len(rows):
@@ -225,7 +204,7 @@ def mosaic_points(
     total = np.bincount(point, minlength=len(observations.point_ids))
     count = np.maximum(total, 1)
     x, y = (np.bincount(point, part, len(total)) / count for part in (z.real, z.imag))
-    numbers = _point_numbers(observations.point_ids, control.ids)
+    numbers = locate(control.ids, observations.point_ids)
     given = np.flatnonzero((numbers >= 0) & (total[numbers] > 0))
     held = numbers[given]
     depth = strip.camera.principal_distance * float(np.median(np.abs(plane.factor)))
@@ -246,7 +225,7 @@ def _photos_with_most(strip: Strip, observations: PhotoPoints, control: ControlP
         return strip.photos
     given = {name for name, use in zip(control.ids, control.use[:, 0], strict=True) if use}
     wanted = np.array([name in given for name in observations.point_ids], bool)[observations.point]
-    position = _positions(observations, strip.photos)[wanted]
+    position = strip.positions(observations)[wanted]
     count = np.bincount(position[position >= 0], minlength=len(strip.photos))
     first = int(np.convolve(count, np.ones(MOSAIC_PHOTOS), "valid").argmax())
     return strip.photos[first : first + MOSAIC_PHOTOS]
@@ -265,7 +244,7 @@ def places_along_strip(
     size = len(observations.point_ids)
     count = np.bincount(observations.point[rows], minlength=size)
     total = np.bincount(observations.point[rows], along, size)
-    numbers = _point_numbers(observations.point_ids, control.ids)
+    numbers = locate(control.ids, observations.point_ids)
     given = np.flatnonzero((numbers >= 0) & (count[numbers] >= LEAST_RAYS))
     chosen = numbers[given]
     return given, total[chosen] / count[chosen]
@@ -277,7 +256,7 @@ def places_in_photos(strip: Strip, observations: PhotoPoints, steps: Mapping[str
     Returns rows: (m,), image points of the strip.
     Returns along: (m,), their places in bases, from 0 at the first photo.
     """
-    position = _positions(observations, strip.photos)
+    position = strip.positions(observations)
     rows = np.flatnonzero(position >= 0)
     step = np.array([steps.get(photo, complex("nan")) for photo in strip.photos])
     known = np.isfinite(step) & (step != 0)
@@ -294,11 +273,10 @@ def half_breadth(
 
     The scale is that of photos that show two given points or more, whose plan coordinates are `plan` (n, 2), metres.
     """
-    inside = _positions(observations, strip.photos) >= 0
+    inside = strip.positions(observations) >= 0
     angle = _base_angle(strip.photos, steps)
     across = observations.xy[inside] @ [-np.sin(angle), np.cos(angle)]
-    row_of = {name: row for row, name in enumerate(ids)}
-    given = np.array([row_of.get(name, -1) for name in observations.point_ids], np.intp)[observations.point]
+    given = locate(observations.point_ids, ids)[observations.point]
     rows = np.flatnonzero(inside & (given >= 0))
     rows = rows[np.argsort(observations.photo[rows], kind="stable")]
     one, other = rows[:-1], rows[1:]

@@ -17,6 +17,7 @@ from photostrip.pipeline.image_coordinates import PhotoCoordinates
 from photostrip.pipeline.plausibility import evidence, given_cameras, given_control
 from photostrip.pipeline.plausibility.given_control import GivenControl
 from photostrip.pipeline.plausibility.image_evidence import of_images
+from photostrip.points import locate
 from photostrip.triangulation.plausibility import accepted
 from photostrip.triangulation.plausibility.photos import flight, flight_order, identity, rotations
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from photostrip.arrays import Floats
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.notes import Finding
     from photostrip.pipeline.frames import GroundFrames
@@ -189,17 +191,15 @@ def _of_rotations(result: Result, formed: Sequence[EvidenceStrip], directory: Pa
             return findings
     target = result.inputs.output or next(iter(result.inputs.frames), given.frame)
     frame = tie_frames([given.frame], target, directory=directory)[0][0]
-    row_of = {photo: row for row, photo in enumerate(given.photos)}
-    photos, found = [], []
+    found: dict[str, Floats] = {}
+    listed = set(given.photos)
     for strip in result.strips:
         resection = strip.of_photos.resection
         cartesian = strip.intermediate.cartesian_from_intermediate(resection.centers)
         turned = frame.axes_at(cartesian) @ strip.intermediate.cartesian_rotations(resection.rotations)
-        for photo, rotation in zip(strip.strip.photos, turned, strict=True):
-            if photo in row_of:
-                photos.append(photo)
-                found.append(rotation)
+        found |= zip(strip.strip.photos, turned, strict=True)
+    photos = [photo for photo in found if photo in listed]
     if not photos:
         return []
-    angles = given.angles[[row_of[photo] for photo in photos]]
-    return list(rotations.find_wrong_angles(angles, given.system, np.array(found), photos))
+    angles = given.angles[locate(photos, given.photos)]
+    return list(rotations.find_wrong_angles(angles, given.system, np.array([found[name] for name in photos]), photos))

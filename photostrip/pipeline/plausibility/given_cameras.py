@@ -10,7 +10,8 @@ import numpy as np
 from photostrip.errors import GeometryError, InputError
 from photostrip.geodesy.tying import tie_frames
 from photostrip.geometry.similarity import Similarity, collinearity
-from photostrip.pipeline.plausibility import evidence
+from photostrip.pipeline.given_points import cartesian_of, rows_of_given
+from photostrip.points import locate
 from photostrip.triangulation.plausibility import found
 from photostrip.triangulation.plausibility.photos import flight
 from photostrip.triangulation.plausibility.photos import rotations as given_angles
@@ -95,21 +96,11 @@ def _given_centers(inputs: Inputs) -> Iterator[GivenCenters]:
         yield GivenCenters(key="orientations", frame=orientations.frame, photos=photos, enu=orientations.enu[whole])
 
 
-def _cartesian(control: ControlPoints, frames: Sequence[GroundFrame]) -> Floats:
-    """Cartesian coordinates of given points, each from its own frame."""
-    xyz = np.zeros((len(control), 3))
-    for number, frame in enumerate(frames):
-        rows = control.frame == number
-        if rows.any():
-            xyz[rows] = frame.cartesian_from_ground(control.enu[rows])
-    return xyz
-
-
 def _level_plan(
     given: GivenCenters, control: ControlPoints, tied: Sequence[GroundFrame], target: GroundFrame
 ) -> LevelPlan:
     """Bring perspective centres and control points to one level plane with heights above the ellipsoid."""
-    together = np.concatenate([tied[0].cartesian_from_ground(given.enu), _cartesian(control, tied[1:])])
+    together = np.concatenate([tied[0].cartesian_from_ground(given.enu), cartesian_of(control, tied[1:])])
     middle = np.median(together, axis=0)
     level = (together - middle) @ target.level_axes_at(middle[None, :])[0].T
     if target.kind != "local":  # the Earth falls away from a plane
@@ -119,11 +110,11 @@ def _level_plan(
 
 
 def _of_strip(strip: Strip, plan: LevelPlan, observations: PhotoPoints) -> Iterator[Finding]:
-    row_of = {photo: row for row, photo in enumerate(plan.photos)}
-    photos = tuple(photo for photo in strip.photos if photo in row_of)
+    rows = locate(strip.photos, plan.photos)
+    photos = tuple(photo for photo, row in zip(strip.photos, rows, strict=True) if row >= 0)
     if not photos:
         return
-    xyz = plan.centers[[row_of[photo] for photo in photos]]
+    xyz = plan.centers[rows[rows >= 0]]
     height, scale = _ground_below(photos, plan, observations)
     usual = float(np.ptp(xyz[:, :2], axis=0).max())
     depth = xyz[:, 2] - height if np.isfinite(height).all() else np.full(len(photos), max(usual, 1.0))
@@ -143,11 +134,9 @@ def _of_strip(strip: Strip, plan: LevelPlan, observations: PhotoPoints) -> Itera
 def _ground_below(photos: Sequence[str], plan: LevelPlan, observations: PhotoPoints) -> tuple[Floats, Floats]:
     """Height of the ground under each photo, and metres on the ground in a millimetre of the photo."""
     height, scale = np.full(len(photos), np.nan), np.full(len(photos), np.nan)
-    row_of = {name: row for row, name in enumerate(plan.ids)}
-    given = np.array([row_of.get(name, -1) for name in observations.point_ids], np.intp)
-    number = {photo: place for place, photo in enumerate(observations.photo_ids)}
-    for place, photo in enumerate(photos):
-        rows = np.flatnonzero((observations.photo == number.get(photo, -1)) & (given[observations.point] >= 0))
+    given = locate(observations.point_ids, plan.ids)
+    for place, number in enumerate(locate(photos, observations.photo_ids)):
+        rows = np.flatnonzero((observations.photo == number) & (given[observations.point] >= 0))
         if not len(rows):
             continue
         ground = plan.control[given[observations.point[rows]]]
@@ -217,9 +206,9 @@ def _on_control(
     """Similarity from the strip to its control; None where that does not hold all rotations."""
     strip = formed.formed
     counts = control.use.all(axis=1) & ~control.check
-    places = evidence.rows_of(strip.point, observations.point_ids, control.ids)
+    places = rows_of_given(control.ids, strip.point, observations.point_ids)
     rows = np.flatnonzero(counts & (places >= 0))
-    source, target = strip.xyz[places[rows]], _cartesian(control.take(rows), frames)
+    source, target = strip.xyz[places[rows]], cartesian_of(control.take(rows), frames)
     keep = np.ones(len(rows), bool)
     for _ in range(MOST_REFITS):
         if keep.sum() < LEAST_POINTS or collinearity(target[keep]) < LEAST_BREADTH:

@@ -9,7 +9,6 @@ import numpy as np
 
 from photostrip.errors import GeometryError, InputError
 from photostrip.pipeline.plausibility.base_directions import closer_look
-from photostrip.triangulation.image_coordinates import interior
 from photostrip.triangulation.plausibility.photos import flight_order, units
 
 if TYPE_CHECKING:
@@ -77,6 +76,8 @@ def _photo_coordinates(
     measured = _on_listed_photos(inputs.observations, cameras)
     if inputs.fiducials is None:
         return measured, []
+    from photostrip.triangulation.image_coordinates import interior  # digital cameras need none of it
+
     try:
         oriented = interior.orient(_on_listed_photos(inputs.fiducials, cameras), cameras, settings.interior)
         observations = interior.transform(measured, oriented)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import GeometryError
-from photostrip.pipeline.plausibility.evidence import rows_of
+from photostrip.pipeline.given_points import rows_of_given
 from photostrip.pipeline.strips.models import form_models
 from photostrip.triangulation.plausibility.control.control_strip import StripPoints
 
@@ -54,7 +54,7 @@ def _evidence(
 ) -> ModelStripEvidence:
     known = np.flatnonzero(np.isfinite(formed.centers[:, 0]))
     centers, depth = formed.centers[known], _depths(formed)[known]
-    places = rows_of(formed.point, point_ids, control.ids)
+    places = rows_of_given(control.ids, formed.point, point_ids)
     rows = np.flatnonzero(places >= 0)
     xyz, middle = formed.xyz[places[rows]], float(np.median(depth))
     turn = formed.places.rotation[formed.models.model]

@@ -9,7 +9,6 @@ import numpy as np
 
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.triangulation import absolute_orientation
-from photostrip.triangulation.covariance_adjustment import prediction
 from photostrip.triangulation.error_propagation import control_errors, covariances
 from photostrip.triangulation.error_propagation.derivatives import ErrorRows
 
@@ -38,7 +37,7 @@ class CheckPoints(NamedTuple):
 
 def check_points(strip: StripResult, control: ControlPoints, observations: PhotoPoints) -> CheckPoints:
     """Check points of a strip among all given points; the observations name its points."""
-    rows = rows_of_given(control, strip.formed.point, observations)
+    rows = rows_of_given(control.ids, strip.formed.point, observations.point_ids)
     found = np.flatnonzero(control.check & (rows >= 0) & control.use.any(axis=1))
     found = found[np.argsort(strip.xyz[rows[found], 0], kind="stable")]
     if len(found) > LARGEST:
@@ -80,6 +79,8 @@ def by_fit(found: Propagation, compared: CheckDifferences, factor: float) -> cov
 
 def by_covariance(adjusted: CovarianceAdjustment, compared: CheckDifferences) -> covariances.CheckTest:
     """Test the check points of a strip that was adjusted with its own covariance."""
+    from photostrip.triangulation.covariance_adjustment import prediction  # no other adjustment needs it
+
     system, at = adjusted.system, compared.coordinates
     wanted = system.conditions
     operator = prediction.influence(system, at.rows, np.arange(len(wanted.value)))[:, 0]

@@ -13,6 +13,7 @@ import numpy as np
 
 from photostrip.errors import GeometryError, InputError
 from photostrip.geodesy.local_frame import IntermediateFrame, mean_position, strip_azimuth
+from photostrip.pipeline.given_points import rows_of_given
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.gross_errors.control import control_screening
 from photostrip.triangulation.gross_errors.control.strip_at_control import StripAtControl
@@ -181,12 +182,10 @@ def reject_wrong_control(oriented: OrientedStrip[Errors], settings: Settings) ->
 
 def control_of(formed: StripShape, control: ControlPoints, point_ids: Sequence[str]) -> tuple[ControlPoints, Numbers]:
     """Control points that have strip coordinates, and their rows there."""
-    number = {name: n for n, name in enumerate(point_ids)}
-    # a point without a model has no place in the strip's covariance
-    row_of = {int(n): row for row, n in enumerate(formed.point) if formed.model_count[row]}
-    found = [(row, row_of.get(number[name], -1)) for row, name in enumerate(control.ids)]
-    kept = np.array([pair for pair in found if pair[1] >= 0], np.intp).reshape(-1, 2)
-    return control.take(kept[:, 0]), kept[:, 1]
+    rows = rows_of_given(control.ids, formed.point, point_ids)
+    inside = rows >= 0
+    inside[inside] = formed.model_count[rows[inside]] > 0  # one without a model has no place in the covariance
+    return control.take(inside), rows[inside]
 
 
 def to_ground(

@@ -13,6 +13,7 @@ from photostrip.pipeline.overruling import CENTER
 from photostrip.pipeline.results import ModelStages, StripResult
 from photostrip.pipeline.strips import notes
 from photostrip.pipeline.strips.model_notes import link_notes
+from photostrip.points import locate, take_rows
 from photostrip.triangulation.gross_errors.control import control_significance
 from photostrip.triangulation.independent_models import (
     link_screening,
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from photostrip.triangulation.error_propagation.control_errors import Misclosures
     from photostrip.triangulation.independent_models.link_screening import ScreenedLinks
     from photostrip.triangulation.independent_models.linking import StripModels
+    from photostrip.triangulation.independent_models.settings import LinkSettings
     from photostrip.triangulation.polynomial.correction import Polynomial
 
     Oriented = OrientedStrip[model_errors.ModelErrors]
@@ -181,18 +183,16 @@ def form_models(strip: ModelStrip, measured: ModelPoints, settings: Settings) ->
     kept = _named(settings.links.keep, strip, measured, models)
     links = link_screening.screen_links(shared, models, settings.links, kept[shared.before] | kept[shared.after])
     _refuse_reflected(strip, links)
-    number = {photo: node for node, photo in enumerate(measured.photo_ids, len(measured.point_ids))}
-    photos = np.array([number.get(photo, -1) for photo in strip.photos], np.intp)
-    return form_from_models(models, links, photos)
+    photos = locate(strip.photos, measured.photo_ids)
+    return form_from_models(models, links, np.where(photos < 0, -1, photos + len(measured.point_ids)))
 
 
-def models_of(strip: ModelStrip, measured: ModelPoints, settings: link_screening.LinkSettings) -> StripModels:
+def models_of(strip: ModelStrip, measured: ModelPoints, settings: LinkSettings) -> StripModels:
     """Take the models of a strip out of those of the project, without what the user drops.
 
     Returns rows in the order of the models, then of the points.
     """
-    number = {name: k for k, name in enumerate(strip.models)}
-    place = np.array([number.get(name, -1) for name in measured.model_ids], np.intp)[measured.model]
+    place = locate(measured.model_ids, strip.models)[measured.model]
     rows = np.flatnonzero(place >= 0)
     rows = rows[np.lexsort((measured.node[rows], place[rows]))]
     whole = linking.StripModels(
@@ -205,15 +205,7 @@ def models_of(strip: ModelStrip, measured: ModelPoints, settings: link_screening
         sigma=measured.sigma[rows],
     )
     left = ~_named(settings.drop, strip, measured, whole)
-    return linking.StripModels(
-        count=whole.count,
-        points=whole.points,
-        row=rows[left],
-        model=whole.model[left],
-        node=whole.node[left],
-        xyz=whole.xyz[left],
-        sigma=whole.sigma[left],
-    )
+    return take_rows(whole, left, ("row", "model", "node", "xyz", "sigma"))
 
 
 def _named(names: Sequence[str], strip: ModelStrip, measured: ModelPoints, models: StripModels) -> Flags:

@@ -12,12 +12,11 @@ from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.pipeline import overruling
 from photostrip.pipeline.results import PhotoStages, StripResult
 from photostrip.pipeline.strips import notes
-from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment, StripOnControl
-from photostrip.triangulation.covariance_adjustment.adjust import adjust as adjust_with_covariance
 from photostrip.triangulation.error_propagation import control_errors, covariances, strip_errors
 from photostrip.triangulation.gross_errors.control import control_significance
 from photostrip.triangulation.gross_errors.pairs import screening
-from photostrip.triangulation.gross_errors.rays import screened_formation, strip_screening
+from photostrip.triangulation.gross_errors.rays.screened_formation import form_screened, with_readmitted
+from photostrip.triangulation.gross_errors.rays.strip_network import StripRays
 from photostrip.triangulation.relative_orientation.orientation import Orientation, orient_unchecked, refuse_unusable
 from photostrip.triangulation.relative_orientation.pairs import collect_pairs
 from photostrip.triangulation.resection.resection import Resection, resect, with_residuals
@@ -30,6 +29,8 @@ if TYPE_CHECKING:
     from photostrip.pipeline.inputs import Settings, Strip
     from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip
     from photostrip.points import PhotoPoints
+    from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
+    from photostrip.triangulation.gross_errors.rays.snooping import Rejection
     from photostrip.triangulation.polynomial.correction import Polynomial
 
     Oriented = OrientedStrip[strip_errors.StripErrors]
@@ -45,7 +46,7 @@ class FormedPhotos:
     sigma: float  # median standard deviation of the strip's image coordinates, mm
     screened: screening.ScreenedPairs  # the search for gross errors in its pairs
     formed: FormedStrip
-    contradictions: strip_screening.RayRejections  # points whose rays contradict each other from model to model
+    wrong_rays: tuple[Rejection, ...]  # rays that the others of their points contradict
 
     @property
     def orientation(self) -> Orientation:
@@ -166,7 +167,7 @@ class FormedPhotos:
                 sigma=self.sigma,
                 screened=self.screened,
                 formed=formed,
-                contradictions=self.contradictions,
+                wrong_rays=self.wrong_rays,
                 resection=resection,
                 rows=rays.rows,
                 covariance=covariance,
@@ -175,6 +176,8 @@ class FormedPhotos:
 
     def _by_covariance(self, oriented: Oriented, settings: Settings) -> CovarianceAdjustment:
         """Distribute the misclosures at the control by the strip's own covariance."""
+        from photostrip.triangulation.covariance_adjustment.adjust import StripOnControl, adjust
+
         start = StripOnControl(
             photos=self.strip.photos,
             focal=self.strip.camera.principal_distance,
@@ -189,7 +192,7 @@ class FormedPhotos:
             errors=oriented.errors,
             misclosures=oriented.misclosures,
         )
-        return adjust_with_covariance(start, settings.covariance)
+        return adjust(start, settings.covariance)
 
     def _rays_in_use(self) -> _Rays:
         """Image points that are used in a model or place a point without one, in the order of the photos."""
@@ -233,7 +236,7 @@ def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> F
     observations: ideal image coordinates of the whole project.
     Raises GeometryError, InputError when a pair or a junction cannot be determined; the strip is named.
     """
-    sigma = _sigma(strip, observations)
+    sigma = strip.median_sigma(observations)
     pairs = collect_pairs(observations, strip.photos, strip.camera.principal_distance)
     pairs = pairs.without(overruling.touched(settings.relative.drop, observations, pairs.rows))
     first, converged = orient_unchecked(pairs)
@@ -242,19 +245,22 @@ def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> F
     screened = overruling.restored(screened, pairs.weight, kept)
     oriented, scatter = screened.orientation, screened.scatter.by_pair
     refuse_unusable(oriented, screened.converged, strip.photos)
-    verdict = strip_screening.RayRejections()
+    wrong: tuple[Rejection, ...] = ()
     if settings.relative.screening == "none":
         formed = form_from_pairs(oriented, settings.formation, strip.photos, scatter)
     else:  # the strip decides what its pairs could not
-        named = overruling.rows(settings.relative.keep, observations)
-        measured = screened_formation.Measurements(
-            observations=observations, photos=strip.photos, weight=pairs.weight, sigma=scatter, stated=sigma, kept=named
+        rays = StripRays(
+            observations=observations,
+            position=strip.positions(observations),
+            sigma=scatter,
+            stated=sigma,
+            kept=overruling.rows(settings.relative.keep, observations),
         )
         readmit = settings.relative.screening in screening.SEARCHES
-        oriented, formed, verdict = screened_formation.form_screened(
-            oriented, measured, settings.formation, readmit=readmit
+        oriented, formed, wrong = form_screened(
+            oriented, rays, pairs.weight, strip.photos, settings.formation, readmit=readmit
         )
-        rejections = screened_formation.with_readmitted(screened.rejections, oriented.used)
+        rejections = with_readmitted(screened.rejections, oriented.used)
         screened = replace(screened, orientation=oriented, rejections=rejections)
     return FormedPhotos(
         strip=strip,
@@ -262,10 +268,5 @@ def form_strip(strip: Strip, observations: PhotoPoints, settings: Settings) -> F
         sigma=sigma,
         screened=screened,
         formed=formed,
-        contradictions=verdict,
+        wrong_rays=wrong,
     )
-
-
-def _sigma(strip: Strip, observations: PhotoPoints) -> float:
-    """Median standard deviation of the strip's image coordinates, mm."""
-    return float(np.median(observations.sigma[strip.positions(observations) >= 0]))

@@ -17,8 +17,10 @@ from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.formats.text.findings import Findings
 from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline import overruling
+from photostrip.pipeline.image_coordinates import orient_interior
 from photostrip.pipeline.plausibility import gate
 from photostrip.pipeline.refusals import require_whole
+from photostrip.points import locate
 from photostrip.project.checks.models import (
     counts_of_models,
     links_of_models,
@@ -30,7 +32,7 @@ from photostrip.project.checks.models import (
 from photostrip.project.checks.table_rows import gaps_of, observations_used, table_rows
 from photostrip.project.loading import load_project
 from photostrip.project.yaml.document import fault_at
-from photostrip.triangulation.image_coordinates import corrections, interior
+from photostrip.triangulation.image_coordinates import corrections
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -140,16 +142,13 @@ def _image_coordinates(project: Project, faults: list[Fault]) -> list[Note]:
     """Look at fiducial marks and distortion; what is refused there refuses the project."""
     inputs, notes = project.inputs, []
     cameras = {photo: strip.camera for strip in inputs.strips for photo in strip.photos}
-    observations = inputs.observations
     try:
         with project.places():
-            if inputs.fiducials is not None:
-                oriented = interior.orient(inputs.fiducials, cameras, project.settings.interior)
-                notes = list(oriented.notes)
-                observations = interior.transform(observations, oriented)
+            photo = orient_interior(inputs, project.settings)
+            notes = [] if photo.interior is None else list(photo.interior.notes)
             # refraction and curvature need heights that only a run can find; they refuse nothing in a file
             wanted = replace(project.settings.refinement, refraction=False, earth_radius=None)
-            corrections.refine(observations, cameras, wanted)
+            corrections.refine(photo.observations, cameras, wanted)
     except InputError as error:
         faults += error.faults
     except GeometryError as error:
@@ -196,8 +195,7 @@ def _junctions(project: Project) -> Iterator[Fault]:
 def _control_of_strips(project: Project) -> Iterator[Fault]:
     """Refuse strips with too little measured control for seven parameters."""
     inputs = project.inputs
-    number = {name: code for code, name in enumerate(inputs.observations.point_ids)}
-    given = np.array([number.get(name, -1) for name in inputs.control.ids], np.intp)
+    given = locate(inputs.control.ids, inputs.observations.point_ids)
     usable = observations_used(inputs) if inputs.models is None else np.zeros(0, np.intp)
     for i, strip in enumerate(inputs.flights):
         points = inputs.observations.point[usable == i] if inputs.models is None else points_of_strip(inputs.models, i)

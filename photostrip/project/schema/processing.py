@@ -29,7 +29,7 @@ from photostrip.project.schema.values import (
 )
 from photostrip.triangulation.bundle.settings import CALIBRATION, SCREENINGS, TESTS
 from photostrip.triangulation.gross_errors.pairs.screening import METHODS
-from photostrip.triangulation.independent_models.link_screening import METHODS as LINK_METHODS
+from photostrip.triangulation.independent_models.settings import METHODS as LINK_METHODS
 from photostrip.triangulation.polynomial.correction import DEGREES
 from photostrip.triangulation.strip_formation.scale_transfer import SCALE_TRANSFERS
 

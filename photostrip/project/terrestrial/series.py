@@ -20,6 +20,7 @@ from photostrip.formats.measured.terrestrial import (
 )
 from photostrip.formats.text.findings import counted, listed, suggestion
 from photostrip.notes import Note
+from photostrip.points import locate
 from photostrip.project.terrestrial.ranges import COORDINATE, IMAGE_SIGMA, MILLIMETRES, refuse_outside
 from photostrip.terrestrial.monitoring import Series
 
@@ -147,8 +148,7 @@ def _from_coordinates(
     sigma = _filled(read, ("sx", "sz"), table.sigma, "sigma", findings)
     if sigma is None:
         return None
-    place = {name: number for number, name in enumerate(epochs)}
-    number = np.array([place.get(name, -1) for name in read.epochs], np.intp)[read.epoch]
+    number = locate(read.epochs, epochs)[read.epoch]
     rows = np.flatnonzero(number >= 0)
     shape = (len(epochs), len(read.points), len(SIDES), 2)
     coordinates, own = np.full(shape, np.nan), np.ones(shape)
@@ -174,9 +174,8 @@ def _from_pseudo_parallaxes(
     scale = MILLIMETRES[table.unit] * np.array([1.0, -1.0 if table.z_axis == "down" else 1.0] * 2)
     x, z, p, q = reference.T
     first = np.column_stack([x, z, x - p, z - q]) * scale - centre.ravel()
-    place = {name: number for number, name in enumerate(epochs)}
     names = read.epochs or epochs[1:2] or (SECOND,)
-    number = np.array([place.get(name, -1) for name in names], np.intp)[read.epoch]
+    number = locate(names, epochs)[read.epoch]
     rows = np.flatnonzero(number >= 0)
     shape = (len(epochs), len(read.points), 4)
     coordinates, own = np.full(shape, np.nan), np.zeros(shape)

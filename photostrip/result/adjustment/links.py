@@ -10,7 +10,6 @@ from photostrip.pipeline.strips.model_notes import far_ends
 from photostrip.result.adjustment.junctions import DIRECTIONS, PPM, discrepancies
 from photostrip.result.numbers import rms
 from photostrip.result.quantities import grouped, record, records
-from photostrip.triangulation.independent_models.link_screening import detectable
 
 if TYPE_CHECKING:
     from photostrip.arrays import Numbers
@@ -73,6 +72,8 @@ def links_of(result: Result) -> list[Document]:
 
 
 def _links(result: Result, strip: StripResult) -> list[Document]:
+    from photostrip.triangulation.independent_models.link_screening import detectable  # strips of photos need none
+
     formed, names = strip.of_models.formed, strip.of_models.strip.models
     links, models, shared, solved = formed.links, formed.models, formed.links.shared, formed.links.solved
     gap, far, smallest, found = discrepancies(strip), far_ends(formed), detectable(shared, links), []

@@ -12,18 +12,17 @@ from photostrip.result.adjustment.junctions import PPM
 from photostrip.result.adjustment.links import AXES, names_of
 from photostrip.result.numbers import natural, rounded
 from photostrip.result.quantities import DECIMALS_BY_UNIT, record
-from photostrip.triangulation.gross_errors.rays.strip_screening import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY
+from photostrip.triangulation.gross_errors.rays.point_decisions import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY
 from photostrip.triangulation.strip_formation.scale_transfer import depths
 
 if TYPE_CHECKING:
-    from photostrip.arrays import Flags
     from photostrip.pipeline import Result, StripResult
     from photostrip.pipeline.results import Bundle
     from photostrip.points import PhotoPoints
     from photostrip.result.numbers import Document
-    from photostrip.triangulation.bundle.snooping import BundleRejection
     from photostrip.triangulation.gross_errors.control.control_rejections import ControlRejection
     from photostrip.triangulation.gross_errors.pairs.screening import PairRejection
+    from photostrip.triangulation.gross_errors.rays.snooping import Rejection
 
 
 MICROMETRES = 1000.0  # in a millimetre
@@ -93,14 +92,14 @@ def _from_pairs(strip: StripResult, observations: PhotoPoints) -> list[Document]
 
 
 def _from_pair(strip: StripResult, rejection: PairRejection, observations: PhotoPoints) -> Document:
-    oriented, wrong = strip.of_photos.orientation, strip.of_photos.contradictions
+    oriented = strip.of_photos.orientation
     pair = int(oriented.pairs.pair[rejection.row])
     size = rejection.size * MICROMETRES
     factor = MICROMETRES if rejection.test == "parallax" else 1.0
     blamed = [
-        observations.photo_ids[observations.photo[row]]
-        for row, kind in zip(wrong.wrong, wrong.kind, strict=True)
-        if kind == WRONG_RAY and row in oriented.rows[rejection.row]
+        observations.photo_ids[observations.photo[each.row]]
+        for each in strip.of_photos.wrong_rays
+        if each.cause == WRONG_RAY and each.row in oriented.rows[rejection.row]
     ]
     if rejection.readmitted:
         blamed = []
@@ -168,42 +167,40 @@ def _from_rays(strip: StripResult, observations: PhotoPoints) -> list[Document]:
 
     A ray that all its pairs have rejected stands with those.
     """
-    found = strip.of_photos.contradictions
     zone = np.zeros(len(observations), np.intp)  # in the pair with the next photo, else with the one before
     for side in (1, 0):
         zone[strip.of_photos.orientation.rows[:, side]] = strip.of_photos.screened.zone
-    photos = [observations.photo_ids[observations.photo[row]] for row in found.wrong]
-    names = [observations.point_ids[number] for number in found.point]
-    place = {photo: number for number, photo in enumerate(strip.strip.photos)}
+    photo_of = {photo: number for number, photo in enumerate(strip.strip.photos)}
     rows = []
-    for number in sorted(np.flatnonzero(rejected_by_strip(strip)), key=lambda n: (natural(names[n]), place[photos[n]])):
-        kind, size = found.kind[number], found.size[number]
-        known = bool(np.isfinite(size).all())
-        rows.append(
-            _entry(
-                strip=strip.strip.id,
-                photo=photos[number],
-                point=names[number],
-                stage="rays",
-                test="strip",
-                value=found.value[number],
-                limit=found.limit[number],
-                zone=int(zone[found.wrong[number]]) or None,
-                size=size[np.argmax(np.abs(size))] * MICROMETRES if known else None,
-                size_unit="um" if known else "",
-                blamed=[photos[number]] if kind == WRONG_RAY else [],
-                reason=REASONS[kind],
-            )
+    for each in rejected_by_strip(strip):
+        photo = observations.photo_ids[observations.photo[each.row]]
+        point = observations.point_ids[observations.point[each.row]]
+        known = bool(np.isfinite(each.size))
+        entry = _entry(
+            strip=strip.strip.id,
+            photo=photo,
+            point=point,
+            stage="rays",
+            test="strip",
+            value=each.value,
+            limit=each.limit,
+            zone=int(zone[each.row]) or None,
+            size=each.size * MICROMETRES if known else None,
+            size_unit="um" if known else "",
+            blamed=[photo] if each.cause == WRONG_RAY else [],
+            reason=REASONS[each.cause],
         )
-    return rows
+        rows.append((natural(point), photo_of[photo], entry))
+    return [entry for _, _, entry in sorted(rows, key=lambda each: each[:2])]
 
 
-def rejected_by_strip(strip: StripResult) -> Flags:
-    """Return which of the strip's contradicting measurements had not been rejected by all their pairs already."""
-    oriented, wrong = strip.of_photos.orientation, strip.of_photos.contradictions.wrong
+def rejected_by_strip(strip: StripResult) -> list[Rejection]:
+    """Return the wrong rays of the strip that had not been rejected by all their pairs already."""
+    oriented = strip.of_photos.orientation
     logged = np.zeros(len(oriented.point), bool)
     logged[[each.row for each in strip.of_photos.rejections if not each.readmitted]] = True
-    return np.asarray(np.isin(wrong, oriented.rows[~logged]), bool)
+    left = set(oriented.rows[~logged].ravel().tolist())
+    return [each for each in strip.of_photos.wrong_rays if each.row in left]
 
 
 def _from_control(strip: StripResult, wrong: ControlRejection) -> Document:
@@ -285,7 +282,7 @@ def _after_bundle(found: Bundle, rejected: list[Document]) -> list[Document]:
     return rows
 
 
-def _from_bundle(found: Bundle, each: BundleRejection) -> Document:
+def _from_bundle(found: Bundle, each: Rejection) -> Document:
     kind = KINDS[each.kind]
     photo, point = names_of_observation(found.block.problem, each.kind, each.row)
     size = rounded(each.size * kind.factor, DECIMALS_BY_UNIT[kind.unit])

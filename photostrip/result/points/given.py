@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.geodesy.frame_spec import GROUND_AXES
+from photostrip.points import locate
 from photostrip.result.numbers import natural_rank
 from photostrip.result.quantities import records
 
@@ -98,14 +99,13 @@ def of_used(result: Result, found: Differences) -> Differences:
 def _rejected(result: Result) -> Flags:
     """Control coordinates that were given for use and that nothing used."""
     control = result.inputs.control
-    row_of = {name: row for row, name in enumerate(control.ids)}
     held, used = np.zeros((len(control), 1), bool), np.zeros(control.use.shape, bool)
     if result.bundle is not None:
         problem, selection = result.bundle.screened.problem, result.bundle.screened.selection
-        rows = [row_of[problem.point_name(int(point))] for point in problem.control.point]
+        rows = locate(map(problem.point_name, problem.control.point.tolist()), control.ids)
         held[rows], used[rows] = True, selection.control
     for strip in result.photo_strips if result.bundle is None else ():
-        rows = [row_of[name] for name in strip.control.ids]
+        rows = locate(strip.control.ids, control.ids)
         held[rows] = True
         used[rows] |= strip.control.use
     return np.asarray(control.use & held & ~used & ~control.check[:, None], bool)
@@ -119,8 +119,7 @@ def _turned(found: Floats, frame: GroundFrame, place: Floats, axes: Floats) -> F
 
 def _held(result: Result) -> Flags:
     """Return which strip holds which given point, shape (s, c)."""
-    number = {name: n for n, name in enumerate(result.refined.observations.point_ids)}
-    numbers = np.array([number.get(name, -1) for name in result.inputs.control.ids], np.intp)
+    numbers = locate(result.inputs.control.ids, result.refined.observations.point_ids)
     held = [np.isin(numbers, strip.formed.point) for strip in result.strips]
     return np.array(held, bool).reshape(len(result.strips), len(numbers))
 
@@ -160,8 +159,7 @@ def _expected(result: Result, held: Flags) -> Floats:
     sigma = np.sqrt(control.sigma**2 + variance)
     if bundle is not None and of_bundle is not None:
         problem = bundle.screened.problem
-        row_of = {name: row for row, name in enumerate(control.ids)}
-        rows = np.array([row_of[problem.point_name(int(point))] for point in problem.control.point], np.intp)
+        rows = locate(map(problem.point_name, problem.control.point.tolist()), control.ids)
         for group in (each for each in bundle.groups if each.kind == CONTROL):
             share = np.sqrt(np.clip(group.redundancy, LEAST_SHARE**2, 1.0))
             residual = group.sigma * share * bundle.unit

@@ -45,8 +45,7 @@ def image_residuals(result: Result, rank: Numbers) -> list[ImageResiduals]:
 
 def _of_strip(result: Result, strip: StripResult, rank: Numbers) -> ImageResiduals:
     observations, stages = result.refined.observations, strip.of_photos
-    place = {photo: number for number, photo in enumerate(strip.strip.photos)}
-    position = np.array([place.get(photo, -1) for photo in observations.photo_ids], np.intp)[observations.photo]
+    position = stages.strip.positions(observations)
     rows = np.flatnonzero(position >= 0)
     rows = rows[np.lexsort((rank[observations.point[rows]], position[rows]))]
     known = np.full((len(observations.point_ids), 3), np.nan)

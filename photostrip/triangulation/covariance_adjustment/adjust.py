@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.points import PhotoPoints
     from photostrip.triangulation.absolute_orientation import AbsoluteOrientation, Targets
+    from photostrip.triangulation.covariance_adjustment.settings import CovarianceSettings
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.strip import FormedStrip
 
@@ -76,7 +77,7 @@ class StripOnControl:
     misclosures: control_errors.Misclosures
 
 
-def adjust(start: StripOnControl, settings: strip_conditions.CovarianceSettings) -> CovarianceAdjustment:
+def adjust(start: StripOnControl, settings: CovarianceSettings) -> CovarianceAdjustment:
     """Adjust a strip with its own covariance."""
     factor, basis = image_variance(start.orientation, start.sigma)
     run = _Adjustment(start, settings, factor)
@@ -128,7 +129,7 @@ class _Adjustment:
     """What all linearisations have in common."""
 
     start: StripOnControl
-    settings: strip_conditions.CovarianceSettings
+    settings: CovarianceSettings
     factor: float  # variance factor of the image coordinates
 
     def first(self) -> _Linearised:

@@ -32,14 +32,6 @@ if TYPE_CHECKING:
 JUNCTION, CONTROL, DISTANCE = 0, 1, 2
 
 
-@dataclass(frozen=True)
-class CovarianceSettings:
-    """Which misclosures an adjustment with the covariance of the strip distributes."""
-
-    # whether distances of pass points from the common centres of their models count beside the control
-    distances: bool = True
-
-
 @dataclass(frozen=True, eq=False)
 class LocalSimilarities:
     """Similarities of the models about their own left photos."""

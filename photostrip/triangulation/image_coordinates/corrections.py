@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
     from photostrip.camera import Camera, Distortion
     from photostrip.points import PhotoPoints
+    from photostrip.triangulation.image_coordinates.settings import ImageCorrectionSettings
 
 
 MICROMETRE = 1e-3  # mm
@@ -36,31 +37,6 @@ SHOWN = 20  # points beyond the distortion table that are named one by one
 
 CONVERGED = 1e-15  # relative to the radius
 ITERATIONS = 20
-
-
-@dataclass(frozen=True)
-class ImageCorrectionSettings:
-    """Which corrections are applied."""
-
-    # principal_point, distortion: reduce to the principal point of the camera; take out its lens distortion
-    principal_point: bool = True
-    distortion: bool = True
-    refraction: bool = False
-    # flying_height, ground_height: mean heights of the perspective centers and of the ground above sea level, in
-    # metres; None: derived from camera and control
-    flying_height: float | None = None
-    ground_height: float | None = None
-    earth_radius: float | None = None  # radius of the Earth in metres for the correction in image space; None: none
-
-    def applied_to(self, camera: Camera) -> Camera:
-        """Return a camera with its principal point in the middle, or without distortion, where that is switched off."""
-        point = camera.principal_point if self.principal_point else (0.0, 0.0)
-        return replace(camera, principal_point=point, distortion=camera.distortion if self.distortion else None)
-
-    @property
-    def needs_heights(self) -> bool:
-        """Whether a correction depends on the heights of camera and ground."""
-        return self.refraction or self.earth_radius is not None
 
 
 @dataclass(frozen=True)

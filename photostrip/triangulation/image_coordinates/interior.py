@@ -5,7 +5,7 @@ A plane transformation takes the marks of a photo to their calibrated coordinate
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,19 +28,7 @@ if TYPE_CHECKING:
     from photostrip.camera import Camera
     from photostrip.errors import Fault
     from photostrip.points import PhotoPoints
-
-
-@dataclass(frozen=True)
-class InteriorSettings:
-    """How photo coordinates are formed from measured fiducial marks."""
-
-    # ``"conformal"`` (two marks or more), ``"affine"`` (three or more), ``"bilinear"`` or ``"projective"`` (four or
-    # more); ``"auto"``: affine from four marks on, so that one redundant mark for each axis is left, conformal with two
-    # or three
-    transform: str = "auto"
-    # ``"interpolate"`` the residuals of the marks to the points, for film that is deformed in other ways than the
-    # transformation has, or ``"ignore"`` them
-    residuals: str = "ignore"
+    from photostrip.triangulation.image_coordinates.settings import InteriorSettings
 
 
 def orient(fiducials: PhotoPoints, cameras: Mapping[str, Camera], settings: InteriorSettings) -> InteriorOrientation:

@@ -20,9 +20,9 @@ from photostrip.triangulation.independent_models import linking
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.triangulation.independent_models.linking import CommonPoints, PointTests, SolvedLinks, StripModels
+    from photostrip.triangulation.independent_models.settings import LinkSettings
 
 
-METHODS = ("auto", "none")
 MEDIAN = 2.366  # of chi-square with three degrees of freedom
 MEDIAN_SPREAD = 1.124  # standard deviation of the ratio of a sample's median to it, times the root of the sample's size
 SURE = 2.6  # standard deviations beyond which the stated precision is contradicted
@@ -31,17 +31,6 @@ LEFT = 4  # common points, centre included, that a link keeps
 REFLECTED = 0.1  # squares of the best similarity of the other hand over those of the best one
 CONSPICUOUS = 36.0  # mean square in units of the stated variance that makes a reflection worth a look
 POWER = 21.5  # non-centrality of chi-square with three degrees of freedom found in 80 % of cases at a level of 0.001
-
-
-@dataclass(frozen=True)
-class LinkSettings:
-    """How models are joined by similarities."""
-
-    screening: str = "auto"  # ``"auto"`` or ``"none"``
-    alpha: float = 0.001  # probability of rejecting a good point of a link without gross errors
-    # keep, drop: coordinates, ``model/point`` or ``model/photo``, that take part whatever the test says, or not at all
-    keep: tuple[str, ...] = ()
-    drop: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

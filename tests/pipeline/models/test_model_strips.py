@@ -17,7 +17,8 @@ from photostrip.pipeline.strips.models import form_models, link_strip
 from photostrip.report.sections.document import sections_of
 from photostrip.result.document import document_of
 from photostrip.simulate import Control, Flight, Ground, Models, Points, Spec, simulate
-from photostrip.triangulation.independent_models import link_screening, model_errors, perspective_centers
+from photostrip.triangulation.independent_models import model_errors, perspective_centers
+from photostrip.triangulation.independent_models.settings import LinkSettings
 from photostrip.triangulation.polynomial import correction
 from tests.loops import nonempty
 from tests.models import inputs, truth
@@ -135,7 +136,7 @@ def test_a_wrong_control_point_is_named() -> None:
 
 def test_entries_that_name_nothing_are_refused() -> None:
     given = truth(3)
-    lists = link_screening.LinkSettings(keep=("M1/P001", "M9/P001"), drop=("M1/P001", "M2/104", "M2/102"))
+    lists = LinkSettings(keep=("M1/P001", "M9/P001"), drop=("M1/P001", "M2/104", "M2/102"))
     with pytest.raises(InputError) as told:
         triangulate(inputs(given, given.measured()), Settings(links=lists))
     assert [(fault.key, fault.message.split("`")[1]) for fault in told.value.faults] == [
@@ -157,7 +158,7 @@ def test_a_model_alone_is_a_strip() -> None:
 
 def nodes_of(measured: ModelPoints) -> FormedModels:
     strip = ModelStrip("A", measured.photo_ids, measured.model_ids)
-    return form_models(strip, measured, Settings(links=link_screening.LinkSettings("none")))
+    return form_models(strip, measured, Settings(links=LinkSettings("none")))
 
 
 @pytest.mark.slow
@@ -219,9 +220,7 @@ def test_centers_follow_the_polynomial_as_a_stiff_body() -> None:
 
 def straight(adjustment: str) -> Settings:
     """Settings in which nothing is decided from the data."""
-    return Settings(
-        adjustment, polynomial=correction.PolynomialSettings("1"), links=link_screening.LinkSettings("none")
-    )
+    return Settings(adjustment, polynomial=correction.PolynomialSettings("1"), links=LinkSettings("none"))
 
 
 @pytest.mark.slow

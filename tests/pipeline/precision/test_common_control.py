@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
+pytestmark = pytest.mark.usefixtures("_no_findings")
+
 STEP = 0.05  # m
 
 

@@ -53,6 +53,7 @@ def documents(result: Result) -> list[dict[str, Any]]:
     return found
 
 
+@pytest.mark.usefixtures("_no_findings")
 @pytest.mark.slow
 def test_models_without_deformation_rarely_seem_deformed() -> None:
     t = np.array([model.surface.t_values for seed in range(30) for model in _deformations(run(seed))])

@@ -22,6 +22,7 @@ from photostrip.triangulation.covariance_adjustment import (
     relinearisation,
     system,
 )
+from photostrip.triangulation.covariance_adjustment.settings import CovarianceSettings
 from photostrip.triangulation.polynomial import correction
 from tests.derivatives import UNSCREENED, errors_of, spec, without_noise, written_out
 from tests.loops import nonempty
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
     Prepared = tuple[StripErrors, conditions.Conditions]
+
+pytestmark = pytest.mark.usefixtures("_no_findings")
 
 COVARIANCE = Settings(adjustment="covariance", relative=UNSCREENED)
 SIMILARITY = Settings(adjustment="similarity", relative=UNSCREENED)
@@ -178,7 +181,7 @@ def test_passes_go_on_until_nothing_is_left_to_be_linear(monkeypatch: pytest.Mon
 def test_the_control_alone_when_asked_for() -> None:
     """Without the distances nothing is known better, and much is known worse; both forms say what took part."""
     inputs = noisy(9, 80.0).inputs
-    alone = replace(COVARIANCE, covariance=conditions.CovarianceSettings(distances=False))
+    alone = replace(COVARIANCE, covariance=CovarianceSettings(distances=False))
     found = [triangulate(inputs, wanted) for wanted in (alone, COVARIANCE)]
     documents = [document_of(result) for result in found]
     blocks = [document["covariance"][0] for document in documents]

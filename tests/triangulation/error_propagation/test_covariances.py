@@ -22,6 +22,8 @@ from tests.derivatives import (
 )
 from tests.loops import nonempty
 
+pytestmark = pytest.mark.usefixtures("_no_findings")
+
 CLOSE = 1e-6  # of the largest derivative; differences of a run know no more
 MIXED = {"xyz": 0.4, "xy": 0.3, "z": 0.3}
 

@@ -17,8 +17,9 @@ from photostrip.camera import Camera, Distortion
 from photostrip.errors import GeometryError, InputError
 from photostrip.points import PhotoPoints
 from photostrip.triangulation.image_coordinates import corrections, lens_distortion
-from photostrip.triangulation.image_coordinates.corrections import Bending, ImageCorrectionSettings, Refined
+from photostrip.triangulation.image_coordinates.corrections import Bending, Refined
 from photostrip.triangulation.image_coordinates.refraction import curvature_constant, refraction_constant
+from photostrip.triangulation.image_coordinates.settings import ImageCorrectionSettings
 
 Floats = NDArray[np.float64]
 

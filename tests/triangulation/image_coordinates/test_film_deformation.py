@@ -13,6 +13,7 @@ from photostrip.camera import Camera
 from photostrip.points import PhotoPoints
 from photostrip.triangulation.image_coordinates import interior
 from photostrip.triangulation.image_coordinates.film_deformation import Deformation
+from photostrip.triangulation.image_coordinates.settings import InteriorSettings
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -55,23 +56,23 @@ def surveyed(
 
 def rms_um(marks: dict[str, tuple[float, float]], residuals: str) -> float:
     cameras, fiducials, points, truth = surveyed(marks)
-    found = interior.orient(fiducials, cameras, interior.InteriorSettings("affine", residuals))
+    found = interior.orient(fiducials, cameras, InteriorSettings("affine", residuals))
     return float(np.sqrt(((interior.transform(points, found).xy - truth) ** 2).mean()) / MICROMETRE)
 
 
 def test_the_marks_come_to_their_calibrated_places() -> None:
     cameras, fiducials, _, _ = surveyed(EIGHT)
-    found = interior.orient(fiducials, cameras, interior.InteriorSettings("affine", "interpolate"))
+    found = interior.orient(fiducials, cameras, InteriorSettings("affine", "interpolate"))
     calibrated = np.array(list(EIGHT.values()))[fiducials.point]
     assert np.abs(interior.transform(fiducials, found).xy - calibrated).max() < PICOMETRE
-    plain = interior.orient(fiducials, cameras, interior.InteriorSettings("affine"))
+    plain = interior.orient(fiducials, cameras, InteriorSettings("affine"))
     assert np.abs(interior.transform(fiducials, plain).xy - calibrated).max() > 5 * MICROMETRE
 
 
 @pytest.mark.parametrize("transform", ["conformal", "affine", "bilinear", "projective"])
 def test_the_whole_interior_orientation_has_its_inverse(transform: str) -> None:
     cameras, fiducials, points, _ = surveyed(EIGHT)
-    found = interior.orient(fiducials, cameras, interior.InteriorSettings(transform, "interpolate"))
+    found = interior.orient(fiducials, cameras, InteriorSettings(transform, "interpolate"))
     photo_points = interior.transform(points, found)
     assert np.abs(interior.measured(photo_points, found).xy - points.xy).max() < PICOMETRE
 
@@ -107,9 +108,7 @@ def test_without_deformation_it_costs_the_scatter_of_the_marks() -> None:
         np.array(list(EIGHT.values()))[fiducials.point] + np.random.default_rng(1).normal(0, 0.003, fiducials.xy.shape),
         fiducials.sigma,
     )
-    ways = [
-        interior.orient(flat, cameras, interior.InteriorSettings("affine", way)) for way in ("ignore", "interpolate")
-    ]
+    ways = [interior.orient(flat, cameras, InteriorSettings("affine", way)) for way in ("ignore", "interpolate")]
     moved = [interior.transform(points, found).xy - points.xy for found in ways]
     assert 1.4 < np.sqrt((moved[1] ** 2).mean() / (moved[0] ** 2).mean()) < 2.2
 
@@ -125,9 +124,7 @@ def test_photos_whose_marks_cannot_tell_are_named() -> None:
         fiducials.xy[rows],
         fiducials.sigma[rows],
     )
-    ways = [
-        interior.orient(fewer, cameras, interior.InteriorSettings("affine", way)) for way in ("ignore", "interpolate")
-    ]
+    ways = [interior.orient(fewer, cameras, InteriorSettings("affine", way)) for way in ("ignore", "interpolate")]
     (note,) = [note for note in ways[1].notes if note.code == "film-unseen"]
     assert note.photos == ("3",)
     one = points.photo == 3

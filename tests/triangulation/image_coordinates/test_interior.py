@@ -18,8 +18,8 @@ from photostrip.points import PhotoPoints
 from photostrip.triangulation.image_coordinates import interior
 from photostrip.triangulation.image_coordinates.fiducial_marks import WRONG_PATTERN, right_pattern
 from photostrip.triangulation.image_coordinates.fiducial_marks import Marks as MarksOfPhotos
-from photostrip.triangulation.image_coordinates.interior import InteriorSettings
 from photostrip.triangulation.image_coordinates.mark_fit import InteriorOrientation, linear_shape
+from photostrip.triangulation.image_coordinates.settings import InteriorSettings
 from tests.loops import nonempty
 
 if TYPE_CHECKING:

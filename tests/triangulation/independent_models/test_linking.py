@@ -19,6 +19,7 @@ from photostrip.geometry.similarity import Similarity
 from photostrip.pipeline import ModelStrip, Settings
 from photostrip.pipeline.strips.models import form_models, models_of
 from photostrip.triangulation.independent_models import link_screening, linking
+from photostrip.triangulation.independent_models.settings import LinkSettings
 from tests.models import SIGMA, truth
 
 if TYPE_CHECKING:
@@ -37,8 +38,8 @@ def strip_of(measured: ModelPoints) -> ModelStrip:
     return ModelStrip("A", measured.photo_ids, measured.model_ids)
 
 
-def formed_of(measured: ModelPoints, links: link_screening.LinkSettings | None = None) -> FormedModels:
-    return form_models(strip_of(measured), measured, Settings(links=links or link_screening.LinkSettings()))
+def formed_of(measured: ModelPoints, links: LinkSettings | None = None) -> FormedModels:
+    return form_models(strip_of(measured), measured, Settings(links=links or LinkSettings()))
 
 
 @settings(max_examples=25, deadline=None)
@@ -55,7 +56,7 @@ def test_models_without_errors_come_back_whatever_their_axes(models: int, across
 def test_the_estimate_is_that_of_a_general_optimiser() -> None:
     true = truth(2, 4, 3)
     measured = true.measured(np.random.default_rng(1).normal(size=(len(true.model), 3)), (0.01, 0.02, 0.05))
-    models = models_of(strip_of(measured), measured, link_screening.LinkSettings())
+    models = models_of(strip_of(measured), measured, LinkSettings())
     shared = linking.common(models)
     solved = linking.solve(shared, models, np.ones(len(shared.link), bool))
     a, b = models.xyz[shared.before], models.xyz[shared.after]
@@ -82,7 +83,7 @@ def test_the_estimate_is_that_of_a_general_optimiser() -> None:
 
 def test_residuals_have_the_variance_that_is_stated() -> None:
     true, rng = truth(40, 4, 5), np.random.default_rng(2)
-    formed = formed_of(true.measured(rng.normal(size=(len(true.model), 3))), link_screening.LinkSettings("none"))
+    formed = formed_of(true.measured(rng.normal(size=(len(true.model), 3))), LinkSettings("none"))
     solved = formed.links.solved
     ratio = solved.squares.sum() / solved.redundancy.sum()
     assert 0.8 < ratio < 1.2
@@ -160,8 +161,8 @@ def test_keep_and_drop_overrule() -> None:
     xyz[row] += 5.0
     wrong = replace(measured, xyz=xyz)
     name = f"M2/{measured.point_ids[true.node[row]]}"
-    kept = formed_of(wrong, link_screening.LinkSettings(keep=(name,)))
-    dropped = formed_of(wrong, link_screening.LinkSettings(drop=(name,)))
+    kept = formed_of(wrong, LinkSettings(keep=(name,)))
+    dropped = formed_of(wrong, LinkSettings(drop=(name,)))
     assert true.node[row] in [kept.models.node[kept.links.shared.before[r]] for r in np.flatnonzero(kept.links.used)]
     assert dropped.links.rejections == ()
     assert dropped.node_models[int(np.searchsorted(dropped.node, true.node[row]))] == 1
@@ -223,10 +224,10 @@ def test_detectable_errors_are_found_in_four_of_five_cases() -> None:
     rng, found, cases = np.random.default_rng(4), 0, 150
     for _ in range(cases):
         measured = true.measured(rng.normal(size=(len(true.model), 3)))
-        models = models_of(strip_of(measured), measured, link_screening.LinkSettings())
+        models = models_of(strip_of(measured), measured, LinkSettings())
         shared = linking.common(models)
         none = np.zeros(len(shared.link), bool)
-        plain = link_screening.screen_links(shared, models, link_screening.LinkSettings("none"), none)
+        plain = link_screening.screen_links(shared, models, LinkSettings("none"), none)
         size = link_screening.detectable(shared, plain)[0]
         solved = plain.solved
         reduced = solved.weight - solved.weight @ solved.design @ solved.cofactors[

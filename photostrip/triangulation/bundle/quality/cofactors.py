@@ -8,7 +8,7 @@ Y = Z T and M = I + T'Y give the cofactors L^-T M L^-1 of the point and -Y L^-1 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 
@@ -71,12 +71,7 @@ class Inverse:
 def cofactors_of(solution: BundleSolution) -> Cofactors:
     """Cofactors of all parameters and residuals; ``bundle-rank`` when the normal matrix is singular at the solution."""
     prepared = solution.prepared
-    state = parameters_from(prepared, solution.centers, solution.rotations, solution.points, solution.common)
-    reduced = reduce(prepared, state)
-    blocks = reduced.blocks[prepared.structure.diagonal]
-    band = factored(prepared, reduced, datum.anchor(prepared, state, blocks) if solution.free else None)
-    if band is None:
-        raise GeometryError("the normal matrix is singular at the solution", code="bundle-rank")
+    state, reduced, band = _factored(solution)
     inverse = _inverse(reduced, band)
     points = np.full((prepared.problem.points, 3, 3), np.nan)
     residuals = np.zeros((len(prepared.problem.images), 2, 2))
@@ -103,6 +98,51 @@ def cofactors_of(solution: BundleSolution) -> Cofactors:
         common_residuals=np.where(weights > 0.0, prepared.prior**2 - np.diag(inverse.common), 0.0),
         photo_common=cross,
     )
+
+
+class _Factored(NamedTuple):
+    state: Parameters
+    reduced: Reduced
+    band: Factor
+
+
+def _factored(solution: BundleSolution) -> _Factored:
+    """Factor the reduced normal equations at the solution."""
+    prepared = solution.prepared
+    state = parameters_from(prepared, solution.centers, solution.rotations, solution.points, solution.common)
+    reduced = reduce(prepared, state)
+    blocks = reduced.blocks[prepared.structure.diagonal]
+    band = factored(prepared, reduced, datum.anchor(prepared, state, blocks) if solution.free else None)
+    if band is None:
+        raise GeometryError("the normal matrix is singular at the solution", code="bundle-rank")
+    return _Factored(state, reduced, band)
+
+
+@dataclass(frozen=True, eq=False)
+class JointCofactors:
+    """Joint cofactors of several photos; of a free network in some datum, which nothing feels that can be observed."""
+
+    inverse: Inverse
+    rank: Numbers  # (m,): places of the photos in the band
+    rotations: Floats  # (m, 3, 3): photo to Cartesian frame
+
+    @classmethod
+    def of_solution(cls, solution: BundleSolution) -> Self:
+        """Invert the normal matrix at a solution."""
+        _, reduced, band = _factored(solution)
+        return cls(_inverse(reduced, band), solution.prepared.structure.rank, solution.rotations)
+
+    def of(self, photos: Numbers) -> Floats:
+        """Shifts (m) and rotation vectors (rad) of k photos in the Cartesian frame, shape (6k, 6k)."""
+        order = np.argsort(self.rank[photos])
+        ordered = photos[order]
+        whole = self.inverse.cofactors(self.rank[ordered][None], 0)[0]
+        turn = np.zeros((len(photos), PHOTO, len(photos), PHOTO))
+        for place, photo in zip(order.tolist(), range(len(photos)), strict=True):
+            turn[place, :3, photo, :3] = turn[place, 3:, photo, 3:] = self.rotations[ordered[photo]]
+        turn *= SIGNS
+        flat = turn.reshape(whole.shape)
+        return np.asarray(flat @ whole @ flat.T, float)
 
 
 def _inverse(reduced: Reduced, band: Factor) -> Inverse:

@@ -1,0 +1,13 @@
+"""What is asked of the adjustment with a strip's own covariance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class CovarianceSettings:
+    """Which misclosures an adjustment with the covariance of the strip distributes."""
+
+    # whether distances of pass points from the common centres of their models count beside the control
+    distances: bool = True

@@ -1,0 +1,342 @@
+"""The search for gross errors in an adjustment of rays: test, take the worst out, adjust again, take back what fits.
+
+The adjustment is a bundle: the free network of one strip, or a block with its control and camera positions. What is
+tested are standardised residuals; of a point with a ray beyond the limit ``point_decisions`` says which rays are wrong.
+At the end every point with a ray outside is tested in the same way, by photos that the others orient.
+
+Source: [Baarda 1968], [Pope 1976].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.statistics import normal_quantile
+from photostrip.triangulation.bundle import robust
+from photostrip.triangulation.bundle.observations.collinearity import PHOTO
+from photostrip.triangulation.bundle.quality import reliability
+from photostrip.triangulation.bundle.quality.cofactors import JointCofactors, cofactors_of
+from photostrip.triangulation.bundle.quality.self_calibration import image_shift
+from photostrip.triangulation.bundle.selection import Selection, restarted, selected, supported
+from photostrip.triangulation.bundle.solve import solve
+from photostrip.triangulation.gross_errors.rays.point_decisions import Decision, Limit, PointRays, decide, undecided
+from photostrip.triangulation.resection.collinearity import derivatives, project
+from photostrip.triangulation.strip_formation.non_neighbours import meeting
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from photostrip.arrays import Flags, Floats, Numbers
+    from photostrip.triangulation.bundle.observations.problem import BundleProblem
+    from photostrip.triangulation.bundle.settings import BundleSettings
+    from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
+
+
+SEARCH_ROUNDS = 200  # of testing and taking out; each takes out one error of every neighbourhood
+READMISSIONS = 3
+NEAR = 0.5  # test value of what may go in a round, in units of the worst on the same photos
+FARTHEST = 1e6  # standard deviations: a misclosure beyond is no worse
+
+
+@dataclass(frozen=True)
+class Rejection:
+    """One observation that was taken out."""
+
+    kind: str  # ``image``, ``control``, ``position`` or ``attitude``
+    row: int
+    axis: int  # the coordinate beyond the limit: 0, 1 or 2. A ray goes out as a whole
+    test: str  # name of the test; ``start`` for what took no part from the start and does not fit
+    value: float
+    limit: float
+    size: float  # what error would explain the residual: mm, metres or radians
+    cause: str = ""  # of a ray: ``WRONG_RAY``, ``TWO_RAYS`` or ``SEVERAL_RAYS``
+    readmitted: bool = False  # whether it came back
+
+
+@dataclass(frozen=True, eq=False)
+class ScreenedBundle:
+    """A solution and how it was cleaned."""
+
+    problem: BundleProblem  # the problem with the observations that took part
+    selection: Selection  # which those are
+    solution: BundleSolution
+    precision: Cofactors
+    rejections: tuple[Rejection, ...] = ()  # what was taken out, in order; re-admitted ones are marked
+    rounds: int = 1
+
+    @classmethod
+    def of(cls, problem: BundleProblem, selection: Selection) -> ScreenedBundle:
+        """Adjust a selection."""
+        chosen = selected(problem, selection)
+        solution = solve(chosen)
+        return cls(problem=chosen, selection=selection, solution=solution, precision=cofactors_of(solution))
+
+    @cached_property
+    def joint(self) -> JointCofactors:
+        """Joint cofactors of the photos."""
+        return JointCofactors.of_solution(self.solution)
+
+
+def screen_bundle(
+    problem: BundleProblem, begin: Selection, settings: BundleSettings, kept: Flags | None = None
+) -> ScreenedBundle:
+    """Adjust a problem and take its gross errors out.
+
+    ``begin`` takes part at first, the rest is put in at the end where it fits; the rays ``kept`` (n,) stay in whatever
+    the tests say.
+    """
+    if settings.screening == "none":
+        return ScreenedBundle.of(problem, supported(problem, Selection.everything(problem)))
+    search = _Search(problem, settings, np.zeros(len(problem.images), bool) if kept is None else kept)
+    chosen = supported(problem, begin)
+    if settings.screening == "robust":
+        chosen = search.robust(chosen)
+    done = search.clean(chosen)
+    for _ in range(READMISSIONS):
+        more = search.fitting(done)
+        if more is None:
+            break
+        done = search.clean(more)
+    return replace(done, rejections=tuple(search.log(done, begin)), rounds=search.rounds)
+
+
+class _Search:
+    """What is remembered from round to round."""
+
+    def __init__(self, problem: BundleProblem, settings: BundleSettings, kept: Flags) -> None:
+        self.problem, self.settings = problem, settings
+        images = problem.images
+        self.by_point = np.lexsort((images.photo, images.point))
+        self.first = np.searchsorted(images.point[self.by_point], np.arange(problem.points + 1))
+        self.spared = np.zeros(problem.points, bool)  # points of rays that are kept
+        self.spared[images.point[kept]] = True
+        self.out: dict[tuple[str, int, int], Rejection] = {}
+        self.latest: dict[int, Rejection] = {}  # what was last said of rays outside
+        self.back: set[int] = set()  # points that came back; what must go again stays out
+        self.rounds = 0
+
+    def rays_of(self, point: int) -> Numbers:
+        """Rows of the rays of a point, in the order of the photos."""
+        return self.by_point[self.first[point] : self.first[point + 1]]
+
+    def adjust(self, selection: Selection) -> ScreenedBundle:
+        """Adjust a selection, and start from there the next time."""
+        done = ScreenedBundle.of(self.problem, selection)
+        self.problem = restarted(self.problem, done.solution)
+        self.rounds += 1
+        return done
+
+    def robust(self, selection: Selection) -> Selection:
+        """Take out at once what re-weighting leaves next to no weight."""
+        chosen = selected(self.problem, selection)
+        solution, weight = robust.adjust_robustly(chosen)
+        self.problem = restarted(self.problem, solution)
+        self.rounds += robust.REWEIGHTINGS
+        rows, unknown = np.flatnonzero(selection.images)[weight < robust.NO_WEIGHT], float("nan")
+        rows = rows[~self.spared[self.problem.images.point[rows]]]
+        images = selection.images.copy()
+        images[rows] = False
+        for row in rows.tolist():
+            self.out[reliability.IMAGE, row, 0] = Rejection(
+                kind=reliability.IMAGE, row=row, axis=0, test="robust", value=unknown, limit=unknown, size=unknown
+            )
+        return supported(self.problem, replace(selection, images=images))
+
+    def clean(self, selection: Selection) -> ScreenedBundle:
+        """Test and take out until nothing is beyond the limit."""
+        for _ in range(SEARCH_ROUNDS):
+            done = self.adjust(selection)
+            worst = self._worst(done)
+            if not worst:
+                return done
+            for each in worst:
+                self.out[each.kind, each.row, each.axis] = each
+                selection = selection.without(each.kind, each.row, each.axis)
+            selection = supported(self.problem, selection)
+        return self.adjust(selection)
+
+    def limit(self, solution: BundleSolution) -> Limit:
+        """Limit of standardised residuals: never sharper than the stated standard deviations allow."""
+        alpha, redundancy = self.settings.alpha, solution.redundancy
+        stated = Limit(normal_quantile(1 - alpha / 2), 1 - alpha, 1.0)
+        if self.settings.test != "tau" or redundancy < 1:
+            return stated
+        found = Limit(reliability.limit("tau", alpha, redundancy), 1 - alpha, solution.sigma0)
+        return found if found.value * found.unit > stated.value else stated
+
+    def _worst(self, done: ScreenedBundle) -> list[Rejection]:
+        """Return the worst rays of every neighbourhood, or the worst given coordinate where that is worse."""
+        limit = self.limit(done.solution)
+        rays, given = np.zeros(0), None
+        for group in reliability.groups_of(done.problem, done.solution, done.precision):
+            value = np.abs(np.nan_to_num(group.standardised)) / limit.unit
+            if group.kind == reliability.IMAGE:
+                rays = self._doubtful(done.selection, value.max(axis=1), limit)
+                continue
+            row, axis = np.unravel_index(int(value.argmax()), value.shape)
+            if value[row, axis] > (given.value if given else limit.value):
+                given = Rejection(
+                    kind=group.kind,
+                    row=int(row),
+                    axis=int(axis),
+                    test=self.settings.test,
+                    value=float(value[row, axis]),
+                    limit=limit.value,
+                    size=float(group.gross[row, axis]),
+                )
+        if given and given.value >= rays.max(initial=0.0):
+            return [given]
+        points = np.flatnonzero(self._worst_nearby(done.selection, rays))
+        return [each for point in points.tolist() for each in self._wrong_rays(done, point, limit)]
+
+    def _doubtful(self, selection: Selection, value: Floats, limit: Limit) -> Floats:
+        """Test values of points, by the worst of their rays; 0 where it is within the limit, or the user keeps one."""
+        worst = np.zeros(self.problem.points)
+        np.maximum.at(worst, self.problem.images.point[selection.images], value)
+        return np.where(self.spared | (worst <= limit.value), 0.0, worst)
+
+    def _worst_nearby(self, selection: Selection, value: Floats) -> Flags:
+        """Doubtful points that are not much better than the worst on their photos."""
+        photo, point = self.problem.images.photo[selection.images], self.problem.images.point[selection.images]
+        on_photo, near = np.zeros(self.problem.photos), np.zeros(self.problem.points)
+        np.maximum.at(on_photo, photo, value[point])
+        np.maximum.at(near, point, on_photo[photo])
+        return np.asarray((value > 0.0) & (value >= NEAR * near), bool)
+
+    def _wrong_rays(self, done: ScreenedBundle, point: int, limit: Limit) -> list[Rejection]:
+        """Return the rays of a point that must go; all where none of them alone does it."""
+        rows = self.rays_of(point)
+        rows = rows[done.selection.images[rows]]
+        decision = self._decided(done, rows, limit, done.solution.points[point])
+        out = decision.out if decision.out.any() else np.ones(len(rows), bool)
+        return self._rejected(rows, out, decision, limit)
+
+    def _rejected(self, rows: Numbers, out: Flags, decision: Decision, limit: Limit) -> list[Rejection]:
+        size = decision.size * self.problem.images.sigma[rows]
+        axis = np.nan_to_num(np.abs(size)).argmax(axis=1)
+        return [
+            Rejection(
+                kind=reliability.IMAGE,
+                row=int(rows[place]),
+                axis=int(axis[place]),
+                test=self.settings.test,
+                value=decision.value / limit.unit,
+                limit=limit.value,
+                size=float(size[place, axis[place]]),
+                cause=decision.cause,
+            )
+            for place in np.flatnonzero(out).tolist()
+        ]
+
+    def _decided(self, done: ScreenedBundle, rows: Numbers, limit: Limit, xyz: Floats) -> Decision:
+        """Decide on rays of a point, linearised at a place near it."""
+        images, solution, control = self.problem.images, done.solution, self.problem.control
+        photo, sigma, r = images.photo[rows], images.sigma[rows], len(rows)
+        photos = solution.centers, solution.rotations, photo, self._focal
+        place = np.broadcast_to(xyz, (r, 3))
+        by_photo, by_point = derivatives(place, *photos)
+        misfit = (self._measured(solution, rows) - project(place, *photos)) / sigma
+        if not (np.isfinite(misfit).all() and np.isfinite(by_photo).all()):
+            return undecided(r)
+        by_photos = np.zeros((r, 2, r, PHOTO))
+        by_photos[np.arange(r), :, np.arange(r)] = by_photo / sigma[:, :, None]
+        at = np.flatnonzero(control.point == images.point[rows[0]])
+        given, axis = np.nonzero(done.selection.control[at])
+        spread, axes = control.sigma[at[given], axis], control.axes[at[given], axis]
+        inside = done.selection.images[rows]
+        rays = PointRays(
+            rays=r,
+            misfit=np.append(misfit, np.einsum("ci,ci->c", axes, control.xyz[at[given]] - xyz) / spread),
+            by_point=np.concatenate([(by_point / sigma[:, :, None]).reshape(-1, 3), axes / spread[:, None]]),
+            by_photos=np.concatenate([by_photos.reshape(2 * r, -1), np.zeros((len(given), PHOTO * r))]),
+            cofactors=done.joint.of(photo),
+            inside=np.append(np.repeat(inside, 2), np.full(len(given), inside.any())),
+        )
+        return decide(rays, limit)
+
+    def _measured(self, solution: BundleSolution, rows: Numbers) -> Floats:
+        """Image coordinates with the calibration found."""
+        xy, photo = self.problem.images.xy[rows], self.problem.images.photo[rows]
+        return xy + image_shift(self.problem, solution.common, xy, photo)
+
+    def fitting(self, done: ScreenedBundle) -> Selection | None:
+        """Put back what fits the adjustment without it; None when there is nothing new."""
+        limit = self.limit(done.solution)
+        point, images = self.problem.images.point, done.selection.images.copy()
+        xyz = self.problem.start.points.copy()
+        for number in np.unique(point[~images]).tolist():
+            rows = self.rays_of(number)
+            placed = images[rows].sum() > 1
+            place = done.solution.points[number] if placed else self._meeting(done.solution, rows)
+            decision = self._decided(done, rows, limit, place)
+            self.latest |= {each.row: each for each in self._rejected(rows, decision.out, decision, limit)}
+            if number not in self.back and (~decision.out & ~images[rows]).any():
+                self.back.add(number)
+                xyz[number] = place
+                images[rows] = ~decision.out | (images[rows] & self.spared[number])
+        control = self._given(done, limit.value * limit.unit)
+        chosen = replace(done.selection, images=images, control=done.selection.control | control)
+        self.problem = replace(self.problem, start=replace(self.problem.start, points=xyz))
+        chosen = supported(self.problem, chosen)
+        return None if (chosen.images == done.selection.images).all() and not control.any() else chosen
+
+    def _meeting(self, solution: BundleSolution, rows: Numbers) -> Floats:
+        """Place where two rays of a point meet, those with which most others agree; NaN where none meet."""
+        if len(rows) < 2:
+            return np.full(3, np.nan)
+        photo, xy = self.problem.images.photo[rows], self._measured(solution, rows)
+        ray = np.einsum("nij,nj->ni", solution.rotations[photo], np.column_stack([xy, -self._focal[photo]]))
+        two = np.array(list(combinations(range(len(rows)), 2)), np.intp)
+        place, _ = meeting(solution.centers[photo][two], ray[two])
+        off = [
+            xy
+            - project(np.broadcast_to(each, (len(rows), 3)), solution.centers, solution.rotations, photo, self._focal)
+            for each in place
+        ]
+        size = np.abs(np.array(off) / self.problem.images.sigma[rows]).max(axis=2)
+        best = np.sqrt(np.minimum(np.nan_to_num(size, nan=FARTHEST), FARTHEST)).sum(axis=1).argmin()
+        return np.asarray(place[best], float)
+
+    @property
+    def _focal(self) -> Floats:
+        return self.problem.cameras.focal[self.problem.cameras.of_photo]
+
+    def _given(self, done: ScreenedBundle, limit: float) -> Flags:
+        """Control coordinates that were left out from the start and fit."""
+        control = self.problem.control
+        error = np.abs(done.solution.control_residuals)
+        cofactor = -np.diagonal(done.precision.control_residuals, axis1=1, axis2=2)
+        with np.errstate(invalid="ignore"):
+            fits = error < limit * np.sqrt(control.sigma**2 + np.maximum(cofactor, 0.0))
+        tested = np.zeros(control.sigma.shape, bool)
+        for kind, row, axis in self.out:
+            if kind == reliability.CONTROL:
+                tested[row, axis] = True
+        return fits & np.isfinite(control.sigma) & ~done.selection.control & ~tested
+
+    def log(self, done: ScreenedBundle, begin: Selection) -> Iterator[Rejection]:
+        """Return every observation that was out at some time."""
+        limit, unknown = self.limit(done.solution).value, float("nan")
+        for (kind, row, axis), each in self.out.items():
+            found = each
+            if np.isnan(each.value) and kind == reliability.IMAGE and row in self.latest:
+                found = replace(self.latest[row], test=each.test)
+            yield replace(found, readmitted=done.selection.holds(kind, row, axis))
+        known = {row for kind, row, _ in self.out if kind == reliability.IMAGE}
+        for row in np.flatnonzero(~done.selection.images & ~begin.images).tolist():
+            if row not in known:
+                nothing = Rejection(
+                    kind=reliability.IMAGE, row=row, axis=0, test="start", value=unknown, limit=limit, size=unknown
+                )
+                yield replace(self.latest.get(row, nothing), test="start")
+        for row, axis in np.argwhere(~begin.control & np.isfinite(self.problem.control.sigma)).tolist():
+            if not done.selection.control[row, axis]:
+                error = -float(done.solution.control_residuals[row, axis])
+                yield Rejection(
+                    kind=reliability.CONTROL, row=row, axis=axis, test="start", value=np.nan, limit=limit, size=error
+                )
