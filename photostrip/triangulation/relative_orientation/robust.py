@@ -72,21 +72,17 @@ def solve(start: Floats, pairs: Pairs, sigma: Floats) -> RobustElements:
     return RobustElements(reduced_angles(elements), scale)
 
 
-def orient_robustly(pairs: Pairs, given: Floats, sigma: Floats, few: int) -> RobustElements:
-    """Orient pairs of which some points are wrong.
+def orient_robustly(pairs: Pairs, sigma: Floats, few: int) -> RobustElements:
+    """Orient pairs of which some points are wrong, from the median parallax.
 
-    The start is the median parallax. Where more than ``few`` points disagree with the outcome, the ``given`` elements
-    (p, 5) and the set of five points with the least median are tried, too, and the elements kept that most points
-    agree with.
+    Where more than ``few`` points disagree with the outcome, weights fall again from the set of five points with the
+    least median, and the elements are kept that most points agree with.
     """
     elements, scale = solve(start_values(pairs), pairs, sigma)
-    for source in ("given", "sets"):
-        todo = np.flatnonzero(pairs.sums((pairs.weight > 0).astype(float)) - _agreeing(elements, pairs, scale) > few)
-        if not len(todo):
-            break
+    todo = np.flatnonzero(pairs.sums((pairs.weight > 0).astype(float)) - _agreeing(elements, pairs, sigma) > few)
+    if len(todo):
         part = pairs.take(todo)
-        start = np.nan_to_num(given[todo]) if source == "given" else _least_median(elements[todo], part)
-        other = solve(start, part, sigma[todo])
+        other = solve(_least_median(elements[todo], part), part, sigma[todo])
         common = np.minimum(scale[todo], other.scale)
         better = _agreeing(other.elements, part, common) > _agreeing(elements[todo], part, common)
         elements[todo[better]], scale[todo[better]] = other.elements[better], other.scale[better]

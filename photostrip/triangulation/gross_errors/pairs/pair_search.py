@@ -62,7 +62,7 @@ def search(given: Orientation, stated: float, doubtful: Flags, *, start: bool = 
     if not len(failed):
         return PairSearch(given, (), ParallaxScatter.of(given, stated), test)
     part, part_test, log = given.take(failed), test.take(failed), _Log([])
-    found = orient_robustly(part.pairs, part.elements, part_test.sigma, deletion.LARGEST)
+    found = orient_robustly(part.pairs, part_test.sigma, deletion.LARGEST)
     robust = assess_pairs(found.elements, part.pairs, part.iterations)
     if start:
         part = robust

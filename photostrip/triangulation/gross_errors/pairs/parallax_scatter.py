@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from photostrip.triangulation.relative_orientation.orientation import Orientation
 
 
-CONTRADICTION = 1.25  # ratio of the scatter found to the one stated that is worth a change
+FIFTH_WRONG = 1.315  # ratio of the scale from the median of residuals of which a fifth is large to that of the others
 MEDIAN_SPREAD = 1.1664  # sd of a standard deviation from the median of n normal residuals, times sqrt(n) [Hampel 1974]
 
 
@@ -44,5 +44,5 @@ class ParallaxScatter:
             sizes = np.abs(orientation.parallax[tested]) * np.sqrt(pairs.weight[tested] / share[tested])
             scale = SIGMA_FROM_MEDIAN * float(np.median(sizes))
             proof = 1.0 + normal_quantile(1.0 - ALPHA) * MEDIAN_SPREAD / np.sqrt(freedom)
-            found = scale if scale > max(CONTRADICTION, proof) * stated else np.nan
+            found = scale if scale > FIFTH_WRONG * proof * stated else np.nan
         return cls(found, np.full(pairs.size, max(stated, np.nan_to_num(found))))
