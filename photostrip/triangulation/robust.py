@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 
 TUNING = 3.0  # standard deviations up to which an observation keeps its weight [Krarup 1980]
+# standard deviation of a scale from the median of n normal residuals, over the scale, times sqrt(n) [Hampel 1974]
+MEDIAN_SPREAD = 1.1664
 SMALLEST_WEIGHT = 1e-5  # that everything keeps, so that unknowns stay determined
 
 

@@ -1,7 +1,7 @@
-"""Relative orientation that a fifth of wrong points does not pull away: the program's robust estimator on y parallaxes.
+"""Relative orientation that a fifth of wrong points does not pull away: the program's robust weights on y parallaxes.
 
-Source: ``triangulation.robust``; where more points disagree than a search can explain, least median of squares over sets
-of five points [Rousseeuw 1984].
+Source: the weights of ``triangulation.robust``; where more points disagree than a search can explain, a start by the
+least median over sets of five points [Rousseeuw 1984].
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 SCALE_TRANSFERS = ("least_squares", "distances")
-ALPHA = 0.001  # of leaving out a point of a junction without gross errors
+ALPHA = 0.01  # probability that a strip without gross errors loses a pass point
 FEWEST = 3  # with two ratios nobody can tell which is wrong
 SMALLEST_SIGMA = 1e-3  # mm, of a y parallax, when the pairs' own residuals have to say it
 
@@ -134,13 +134,12 @@ def contradictions(
     junction: (t,), junction of each ratio, ascending.
     """
     value = np.log(ratio)
-    count = np.bincount(junction, minlength=junctions)
+    many = (np.bincount(junction, minlength=junctions) >= FEWEST)[junction]
     off = np.abs(value - medians(value, weight, junction, junctions)[junction])
-    told = (off > 0).astype(float) * (count >= FEWEST)[junction]  # the median itself says nothing
-    scale = float(scales(off / size, told, np.zeros(len(off), np.intp), 1)[0])
-    levels = np.array([normal_quantile(1 - ALPHA / (2 * max(n, 1))) for n in range(int(count.max(initial=0)) + 1)])
-    limit = levels[count][junction] * size * max(1.0, np.nan_to_num(scale))
-    return (off > limit) & (count >= FEWEST)[junction], limit
+    counts = (many & (off > 0)).astype(float)  # the median itself says nothing
+    scale = float(scales(off / size, counts, np.zeros(len(off), np.intp), 1)[0])
+    limit = normal_quantile(1 - ALPHA / (2 * max(len(off), 1))) * max(1.0, np.nan_to_num(scale)) * size
+    return (off > limit) & many, limit
 
 
 def depths(vectors: Floats, base: Floats) -> Floats:

@@ -12,14 +12,16 @@ import numpy as np
 
 from photostrip.statistics import SIGMA_FROM_MEDIAN, normal_quantile
 from photostrip.triangulation.gross_errors.pairs.global_test import ALPHA, SMALLEST_REDUNDANCY
+from photostrip.triangulation.robust import MEDIAN_SPREAD
 
 if TYPE_CHECKING:
     from photostrip.arrays import Floats
     from photostrip.triangulation.relative_orientation.orientation import Orientation
 
 
-FIFTH_WRONG = 1.315  # ratio of the scale from the median of residuals of which a fifth is large to that of the others
-MEDIAN_SPREAD = 1.1664  # sd of a standard deviation from the median of n normal residuals, times sqrt(n) [Hampel 1974]
+FIFTH_WRONG = (
+    1.315  # scale of residuals of which a fifth are large over that of the others: normal_quantile(13/16) * 1.4826
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,11 +40,10 @@ class ParallaxScatter:
         """
         pairs, share = orientation.pairs, np.nan_to_num(orientation.redundancy)
         tested = orientation.used & (share > SMALLEST_REDUNDANCY)
-        freedom = float(share[tested].sum())
         found = np.nan
-        if freedom >= 1.0:
+        if tested.any():
             sizes = np.abs(orientation.parallax[tested]) * np.sqrt(pairs.weight[tested] / share[tested])
             scale = SIGMA_FROM_MEDIAN * float(np.median(sizes))
-            proof = 1.0 + normal_quantile(1.0 - ALPHA) * MEDIAN_SPREAD / np.sqrt(freedom)
+            proof = 1.0 + normal_quantile(1.0 - ALPHA) * MEDIAN_SPREAD / np.sqrt(float(share[tested].sum()))
             found = scale if scale > FIFTH_WRONG * proof * stated else np.nan
         return cls(found, np.full(pairs.size, max(stated, np.nan_to_num(found))))

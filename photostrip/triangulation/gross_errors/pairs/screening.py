@@ -22,7 +22,7 @@ from photostrip.errors import InputError
 from photostrip.statistics import grubbs_limit, tau_limit
 from photostrip.triangulation.gross_errors.pairs.global_test import SMALLEST_REDUNDANCY
 from photostrip.triangulation.gross_errors.pairs.pair_search import PairSearch, search
-from photostrip.triangulation.gross_errors.pairs.zones import Support, zones
+from photostrip.triangulation.gross_errors.pairs.zones import MINIMUM_LEFT, Support, zones
 from photostrip.triangulation.relative_orientation.orientation import (
     LEAST_IN_FRONT,
     RelativeSettings,
@@ -40,7 +40,6 @@ if TYPE_CHECKING:
 
 METHODS = ("auto", "parallax+grubbs", "tau", "deletion", "robust", "none")
 SEARCHES = {"auto": (True, True), "deletion": (False, True), "robust": (True, False)}  # robust start, sets of points
-GRUBBS_MINIMUM = 7  # below it the test is meaningless: G cannot exceed (n-1)/sqrt(n)
 NEGLIGIBLE = 1e-9  # mm; residuals of error-free data are rounding, not measurements
 LIMIT_FACTOR = 4.0  # a-priori standard deviations of a y parallax
 DETECTABLE = 4.13  # shift of a normal variable found in 80 % of cases by a two-sided test at 0.1 %
@@ -224,7 +223,7 @@ def _grubbs(orientation: Orientation, alpha: float) -> tuple[Floats, Floats]:
     mean = pairs.sums(np.where(used, orientation.parallax, 0.0)) / count
     deviation = np.where(used, orientation.parallax - mean[pairs.pair], 0.0)
     spread = np.sqrt(pairs.sums(deviation**2) / (count - 1))
-    tested = (count >= GRUBBS_MINIMUM) & (spread > NEGLIGIBLE)
+    tested = (count > MINIMUM_LEFT) & (spread > NEGLIGIBLE)
     limits = np.array([grubbs_limit(int(n), alpha) if ok else np.inf for n, ok in zip(count, tested, strict=True)])
     with np.errstate(divide="ignore", invalid="ignore"):
         value = np.abs(deviation) / spread[pairs.pair]

@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
 ZONES = 6
 MINIMUM_LEFT = 6  # a pair keeps at least one redundant point
-EMPTY_ZONES = 1  # zones that a rejection may leave without a point
 
 
 def zones(elements: Floats, pairs: Pairs) -> Numbers:
@@ -72,11 +71,11 @@ class Support:
         """Rows that can go: six points stay, and no zone loses its last point while another one is empty already."""
         enough = self.counts.sum(axis=1) > MINIMUM_LEFT
         last = self.counts[pair, self.zone - 1] <= 1
-        flags: Flags = enough[pair] & (~last | (self.empty[pair] < EMPTY_ZONES))
+        flags: Flags = enough[pair] & (~last | (self.empty[pair] == 0))
         return flags
 
     def holds_without(self, pair: int, rows: Numbers) -> bool:
-        """Whether a pair keeps six points without some rows, and no more zones become empty than may."""
+        """Whether a pair keeps six points without some rows, and no second zone becomes empty."""
         counts = self.counts[pair] - np.bincount(self.zone[rows] - 1, minlength=ZONES)
         empty = int((counts == 0).sum())
-        return bool(counts.sum() >= MINIMUM_LEFT and empty <= max(EMPTY_ZONES, int(self.empty[pair])))
+        return bool(counts.sum() >= MINIMUM_LEFT and empty <= max(1, int(self.empty[pair])))
