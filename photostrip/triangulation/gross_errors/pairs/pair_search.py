@@ -19,7 +19,7 @@ import numpy as np
 
 from photostrip.triangulation.gross_errors.pairs import deletion
 from photostrip.triangulation.gross_errors.pairs.global_test import GlobalTest
-from photostrip.triangulation.gross_errors.pairs.parallax_scatter import ParallaxScatter
+from photostrip.triangulation.gross_errors.pairs.parallax_scatter import FIFTH_WRONG, ParallaxScatter
 from photostrip.triangulation.gross_errors.pairs.zones import MINIMUM_LEFT, Support
 from photostrip.triangulation.relative_orientation.orientation import assess_pairs, orient_again
 from photostrip.triangulation.relative_orientation.robust import RobustElements, orient_robustly
@@ -51,7 +51,15 @@ class PairSearch:
     test: GlobalTest
 
 
-def search(given: Orientation, stated: float, doubtful: Flags, *, start: bool = True, sets: bool = True) -> PairSearch:
+def search(
+    given: Orientation,
+    stated: float,
+    doubtful: Flags,
+    *,
+    start: bool = True,
+    sets: bool = True,
+    spoiled: float = FIFTH_WRONG,
+) -> PairSearch:
     """Take gross errors out of all pairs that fail the global test.
 
     given: pairs oriented by least squares on all points.
@@ -59,11 +67,13 @@ def search(given: Orientation, stated: float, doubtful: Flags, *, start: bool = 
     doubtful: (p,), pairs whose elements cannot be used as they are; they are searched whatever the test says.
     start: begin with the robust elements.
     sets: look for sets of points that explain the misfit together; without it the worst goes alone.
+    spoiled: as in ``ParallaxScatter.of``.
     """
     test = GlobalTest.of(np.full(given.pairs.size, stated))
     failed = np.flatnonzero(test.failing(given) | doubtful)
     if not len(failed):
-        return PairSearch(given, (), ParallaxScatter.of(given, stated), test)
+        scatter = ParallaxScatter.of(given, stated, spoiled)
+        return PairSearch(given, (), scatter, GlobalTest.of(scatter.by_pair))
     part, part_test, log = given.take(failed), test.take(failed), _Log([])
     found = orient_robustly(part.pairs, part_test.sigma, deletion.LARGEST)
     robust = assess_pairs(found.elements, part.pairs, part.iterations)
@@ -75,9 +85,9 @@ def search(given: Orientation, stated: float, doubtful: Flags, *, start: bool = 
         todo = todo[part_test.failing(part)]
     # pairs that a few points explain speak for the scatter; of the others, what the robust start leaves
     cleaned = given.with_pairs(failed, part.with_pairs(todo, _agreeing(robust, found).take(todo)))
-    scatter = ParallaxScatter.of(cleaned, stated)
+    scatter = ParallaxScatter.of(cleaned, stated, spoiled)
     if not np.isnan(scatter.found):
-        again = search(given, scatter.found, doubtful, start=start, sets=sets)
+        again = search(given, scatter.found, doubtful, start=start, sets=sets, spoiled=1.0)
         return again if not np.isnan(again.scatter.found) else replace(again, scatter=scatter)
     if start:
         part = log.without_beyond(part, part_test, todo)

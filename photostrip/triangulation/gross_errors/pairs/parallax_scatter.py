@@ -33,10 +33,11 @@ class ParallaxScatter:
     by_pair: Floats  # (p,): those in force, mm
 
     @classmethod
-    def of(cls, orientation: Orientation, stated: float) -> ParallaxScatter:
+    def of(cls, orientation: Orientation, stated: float, spoiled: float = FIFTH_WRONG) -> ParallaxScatter:
         """Decide on the scatter of a strip whose pairs are oriented on points that agree with one another.
 
-        ``stated`` is that of a y parallax, mm. It holds unless the median residual of the whole strip proves more.
+        ``stated`` is that of a y parallax, mm. It holds unless the median residual of the whole strip proves more, even
+        if wrong points among them should make that ``spoiled`` times too large.
         """
         pairs, share = orientation.pairs, np.nan_to_num(orientation.redundancy)
         tested = orientation.used & (share > SMALLEST_REDUNDANCY)
@@ -45,5 +46,5 @@ class ParallaxScatter:
             sizes = np.abs(orientation.parallax[tested]) * np.sqrt(pairs.weight[tested] / share[tested])
             scale = SIGMA_FROM_MEDIAN * float(np.median(sizes))
             proof = 1.0 + normal_quantile(1.0 - ALPHA) * MEDIAN_SPREAD / np.sqrt(float(share[tested].sum()))
-            found = scale if scale > FIFTH_WRONG * proof * stated else np.nan
+            found = scale if scale > spoiled * proof * stated else np.nan
         return cls(found, np.full(pairs.size, max(stated, np.nan_to_num(found))))
