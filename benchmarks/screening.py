@@ -25,12 +25,11 @@ from photostrip.simulate.simulation import simulate  # noqa: E402
 from photostrip.simulate.spec import Flight, GrossError, Points, Spec  # noqa: E402
 from photostrip.statistics import chi2_quantile  # noqa: E402
 from photostrip.triangulation.gross_errors.pairs import deletion, screening  # noqa: E402
-from photostrip.triangulation.gross_errors.rays import screened_formation  # noqa: E402
+from photostrip.triangulation.gross_errors.rays.screened_formation import form_screened  # noqa: E402
+from photostrip.triangulation.gross_errors.rays.strip_network import StripRays  # noqa: E402
 from photostrip.triangulation.relative_orientation.orientation import RelativeSettings, orient_unchecked  # noqa: E402
 from photostrip.triangulation.relative_orientation.pairs import Pairs, collect_pairs  # noqa: E402
 from photostrip.triangulation.relative_orientation.solution import linearised_parallaxes  # noqa: E402
-from photostrip.triangulation.strip_formation import scale_ratios  # noqa: E402
-from photostrip.triangulation.strip_formation.scale_ratios import PassPoints  # noqa: E402
 from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings  # noqa: E402
 from photostrip.triangulation.strip_formation.strip import form_from_pairs  # noqa: E402
 
@@ -102,10 +101,17 @@ def spoiled(pairs: Pairs, errors: Floats) -> Pairs:
     return replace(pairs, left=left)
 
 
-def screened(pairs: Pairs, settings: RelativeSettings) -> screening.ScreenedPairs:
-    """Orient and screen pairs; photos have no names here."""
-    oriented, _ = orient_unchecked(pairs)
-    return screening.screen_pairs(oriented, settings, SIGMA_Q / np.sqrt(2.0))
+def screened(pairs: Pairs, settings: RelativeSettings, of_strip: int) -> list[screening.ScreenedPairs]:
+    """Orient and screen pairs, so many of them as one strip; photos have no names here."""
+    strips = [np.arange(of_strip) + of_strip * number for number in range(pairs.size // of_strip)]
+    oriented, converged = orient_unchecked(pairs)
+    sigma = SIGMA_Q / np.sqrt(2.0)
+    return [screening.screen_pairs(oriented.take(rows), settings, sigma, converged[rows]) for rows in strips]
+
+
+def rejected(results: Sequence[screening.ScreenedPairs]) -> Flags:
+    """Points that strips have lost, shape (strips, points)."""
+    return np.array([~result.orientation.used for result in results])
 
 
 # ------------------------------------------------------------------------------------- the published experiment
@@ -137,12 +143,12 @@ def experiment_errors(rng: np.random.Generator, repetitions: int) -> Floats:
     return errors.ravel()
 
 
-def rates(result: screening.ScreenedPairs, errors: Floats) -> Rates:
+def rates(results: Sequence[screening.ScreenedPairs], errors: Floats) -> Rates:
     """Count what was found, by stage, and what was lost."""
-    wrong = errors != 0
-    first = np.zeros(len(errors), bool)
-    first[[r.row for r in result.rejections if r.test == "parallax"]] = True
-    out = ~result.orientation.used
+    first = np.zeros((len(results), errors.shape[1]), bool)
+    for number, result in enumerate(results):
+        first[number, [r.row for r in result.rejections if r.test == "parallax"]] = True
+    wrong, out = errors != 0, rejected(results)
     total = float(wrong.sum())
     at_first, later, missed = (
         100 * float(part.sum()) / total for part in (wrong & first, wrong & out & ~first, wrong & ~out)
@@ -151,14 +157,15 @@ def rates(result: screening.ScreenedPairs, errors: Floats) -> Rates:
 
 
 def published_experiment(repetitions: int, seed: int = 1) -> dict[str, Rates]:
-    """Repeat the published experiment with every method."""
+    """Repeat the published experiment with every method, each repetition of 34 models as one strip."""
     rng = np.random.default_rng(seed)
     pairs = standard_pairs(rng, repetitions * MODELS)
     errors = experiment_errors(rng, repetitions)
     given = spoiled(pairs, errors)
     methods = {"parallax+grubbs": SOURCE_LIKE}
     methods |= {name: RelativeSettings(screening=name) for name in ("tau", "robust", "deletion", "auto")}
-    return {name: rates(screened(given, settings), errors) for name, settings in methods.items()}
+    found = {name: screened(given, settings, MODELS) for name, settings in methods.items()}
+    return {name: rates(results, errors.reshape(repetitions, -1)) for name, results in found.items()}
 
 
 # ------------------------------------------------------------------------------------------------ masked errors
@@ -211,7 +218,7 @@ def masked_errors(models: int, seed: int = 2) -> list[str]:
         row = f"{zone:4d}{points:8d}   {sizes[0]:+.1f} {sizes[1]:+.1f}{100 * can.mean():11.1f}"
         for method in ("parallax+grubbs", "tau", "auto"):
             settings = SOURCE_LIKE if method == "parallax+grubbs" else RelativeSettings(screening=method)
-            out = ~screened(spoiled(pairs, errors.ravel()), settings).orientation.used.reshape(errors.shape)
+            out = rejected(screened(spoiled(pairs, errors.ravel()), settings, 1))
             both = (out & (errors != 0)).sum(axis=1) == 2
             row += f"{100 * both[can].mean() if can.any() else float('nan'):12.1f}"
         lost = (out & (errors == 0)).sum(axis=1).mean()
@@ -235,25 +242,26 @@ def many_errors(models: int, seed: int = 3) -> list[str]:
                 wrong = order < round(share * n)
                 sizes = np.exp(rng.uniform(np.log(low), np.log(high), wrong.shape)) * rng.choice([-1, 1], wrong.shape)
                 errors = np.where(wrong, sizes, 0.0)
-                result = screened(spoiled(pairs, errors.ravel()), RelativeSettings())
-                out = ~result.orientation.used.reshape(wrong.shape)
+                results = screened(spoiled(pairs, errors.ravel()), RelativeSettings(), 1)
+                out = rejected(results)
                 found = 100 * (out & wrong).sum() / wrong.sum()
                 lost = 100 * (out & ~wrong).sum() / (~wrong).sum()
                 whole = 100 * ((out == wrong).all(axis=1)).mean()
-                left = 100 * result.masked.mean()
+                left = 100 * np.mean([result.masked[0] for result in results])
                 head = f"{n:6d}{100 * share:9.0f}   {low:5.2f}-{high:<5.2f}"
                 lines.append(f"{head}{found:9.1f}{lost:12.2f}{whole:13.1f}{left:10.1f}")
     return lines
 
 
-def clean_pairs(models: int, seed: int = 4) -> list[str]:
-    """Count false alarms in pairs without gross errors."""
+def clean_pairs(strips: int, seed: int = 4) -> list[str]:
+    """Count false alarms in strips without gross errors."""
     rng = np.random.default_rng(seed)
-    pairs = standard_pairs(rng, models)
+    pairs = standard_pairs(rng, MODELS * strips)
     lines = []
     for name in ("parallax+grubbs", "tau", "robust", "deletion", "auto"):
-        out = ~screened(pairs, RelativeSettings(screening=name)).orientation.used.reshape(models, -1)
-        lines.append(f"{name:16s}{100 * out.any(axis=1).mean():16.2f}{100 * out.mean():16.3f}")
+        out = rejected(screened(pairs, RelativeSettings(screening=name), MODELS))
+        touched = out.any(axis=1).mean(), out.reshape(pairs.size, -1).any(axis=1).mean(), out.mean()
+        lines.append(f"{name:16s}" + "".join(f"{100 * share:16.3f}" for share in touched))
     return lines
 
 
@@ -300,7 +308,7 @@ def strip_times(photos: int = 1000) -> list[str]:
 
 
 def stages(inputs: Inputs) -> Floats:
-    """Seconds of relative orientation, of searching its pairs, of testing scale ratios and of judging the strip."""
+    """Seconds of relative orientation, of searching its pairs and of judging the rays and forming the strip again."""
     (strip,), observations = inputs.strips, inputs.observations
     sigma, nothing = float(np.median(observations.sigma)), np.zeros(0, np.intp)
     begin = time.process_time()
@@ -312,19 +320,14 @@ def stages(inputs: Inputs) -> Floats:
     search = time.process_time() - begin
     scatter = screened.scatter.by_pair
     begin = time.process_time()
-    formed = form_from_pairs(screened.orientation, StripFormationSettings(), strip.photos, scatter)
+    form_from_pairs(screened.orientation, StripFormationSettings(), strip.photos, scatter)
     form = time.process_time() - begin
-    joined, joints = formed.junctions, pairs.size - 1
+    position = strip.positions(observations)
+    rays = StripRays(observations=observations, position=position, sigma=scatter, stated=sigma, kept=nothing)
     begin = time.process_time()
-    places = PassPoints(joined.junction, joined.before, joined.after)
-    spreads = scale_ratios.spreads(screened.orientation, formed.vectors, places, scatter)
-    scale_ratios.screen(joined.ratio, np.ones(len(joined.ratio)), spreads, joined.junction, joints)
-    ratios = time.process_time() - begin
-    measured = screened_formation.Measurements(observations, strip.photos, pairs.weight, scatter, sigma, nothing)
-    begin = time.process_time()
-    screened_formation.form_screened(screened.orientation, measured, StripFormationSettings(), readmit=True)
+    form_screened(screened.orientation, rays, pairs.weight, strip.photos, StripFormationSettings(), readmit=True)
     settle = time.process_time() - begin
-    return np.array([orient, search, ratios, settle - form])
+    return np.array([orient, search, settle - form])
 
 
 def main(repetitions: int) -> None:
@@ -334,24 +337,24 @@ def main(repetitions: int) -> None:
     for name, row in published_experiment(repetitions).items():
         print(f"{name:19s}{row}")
     print(REFERENCE)
-    print("\nTwo errors in one zone, three points in every other zone: both found, % of the decidable cases")
+    print("\nTwo errors in one zone of a single pair, three points in every other: both found, % of the decidable")
     print(f"(decidable: without noise every other set of up to two points leaves a sum of squares of {POWER_BOUND:g};")
     print(f"chi-square at 0.1 % with 11 degrees of freedom is {chi2_quantile(0.999, 11):.1f})")
     print("zone  points  errors mm  decidable %   par+grubbs       tau        auto  good lost/model (auto)")
     print("\n".join(masked_errors(repetitions)))
-    print("\nMany wrong points, auto")
+    print("\nMany wrong points in a single pair, auto")
     print("points  wrong %  errors mm      found %  good lost %  all right %  suspected %")
     print("\n".join(many_errors(repetitions)))
-    print("\nPairs without gross errors")
-    print("method           pairs touched %   points lost %")
-    print("\n".join(clean_pairs(20 * repetitions)))
+    print("\nStrips of 34 pairs without gross errors")
+    print("method          strips touched % pairs touched %   points lost %")
+    print("\n".join(clean_pairs(repetitions)))
     print("\n999 pairs of 30 points")
     print("(processor time, the fastest of several)")
     print(" wrong %   orientation s   screening s    ratio   screening ms/pair")
     print("\n".join(times()))
     print("\n1000 photos of 30 points, ms of processor time, the fastest of several: relative orientation; pairs")
-    print("searched, scale ratios tested, rays judged and the strip formed again; all three, and over the first")
-    print("  wrong %   orientation       pairs      ratios        rays       all   ratio   ms a pair")
+    print("searched, rays judged and the strip formed again; both, and over the first")
+    print("  wrong %   orientation       pairs        rays       all   ratio   ms a pair")
     print("\n".join(strip_times()))
 
 

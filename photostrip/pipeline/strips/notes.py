@@ -11,6 +11,7 @@ from photostrip.notes import Note
 from photostrip.triangulation.absolute_orientation import WEAK_LIMIT
 from photostrip.triangulation.relative_orientation.orientation import CONDITION_WARNING
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
+from photostrip.triangulation.strip_formation.scale_transfer import FEWEST
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -87,7 +88,8 @@ def junction_notes(strip: Strip, formed: FormedStrip) -> Iterator[Note]:
     junctions = formed.junctions
     count = np.bincount(junctions.junction, junctions.used, len(junctions.factor))
     beyond = np.abs(np.log(junctions.ratio / junctions.factor[junctions.junction])) > junctions.limit
-    doubtful = np.unique(junctions.junction[junctions.used & beyond])
+    beyond &= junctions.used & (count < FEWEST)[junctions.junction]
+    doubtful = np.unique(junctions.junction[beyond])
     for number in doubtful.tolist():
         photo = strip.photos[number + 1]
         text = (

@@ -10,13 +10,13 @@ Source: [001] eq. 139-141.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from photostrip.errors import GeometryError
-from photostrip.triangulation.strip_formation import scale_ratios
-from photostrip.triangulation.strip_formation.scale_ratios import PassPoints
+from photostrip.statistics import normal_quantile
+from photostrip.triangulation.robust import medians, scales
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 
 
 SCALE_TRANSFERS = ("least_squares", "distances")
+ALPHA = 0.01  # probability that a strip without gross errors loses a pass point
+FEWEST = 3  # with two ratios nobody can tell which is wrong
+SMALLEST_SIGMA = 1e-3  # mm, of a y parallax, when the pairs' own residuals have to say it
 
 
 @dataclass(frozen=True)
@@ -53,18 +56,14 @@ class Junctions:
     factor: Floats  # (j,): ratio of the scales of the models, after over before
     spread: Floats  # (j,): relative standard deviation of a single ratio; NaN with one point
 
-    def with_new(self, fresh: Junctions, renewed: Flags) -> Junctions:
-        """Put junctions that were made anew, shape (j,), in the place of these."""
-        kept = ~renewed[self.junction]
-        order = np.argsort(np.concatenate([self.junction[kept], fresh.junction]), kind="stable")
-        rows = {
-            name: np.concatenate([getattr(self, name)[kept], getattr(fresh, name)])[order]
-            for name in ("junction", "before", "after", "point", "ratio", "used", "limit", "weight")
-        }
-        by_junction = {
-            name: np.where(renewed, getattr(fresh, name), getattr(self, name)) for name in ("factor", "spread")
-        }
-        return Junctions(**rows, **by_junction)
+
+class PassPoints(NamedTuple):
+    """Points that two neighbouring models have in common; junction i lies between models i and i+1, at photo i+1."""
+
+    junction: Numbers  # (t,): junction of each row, ascending
+    # before, after: (t,): rows of the point in the pairs' table, in the model before and after the junction
+    before: Numbers
+    after: Numbers
 
 
 def transfer_scale(
@@ -74,7 +73,8 @@ def transfer_scale(
     photos: Sequence[str],
     sigma: Floats | None = None,
     doubtful: Flags | None = None,
-    renewed: Flags | None = None,
+    *,
+    searched: bool = False,
 ) -> Junctions:
     """Scale of every model from the one before it, through the pass points at their common photo.
 
@@ -82,24 +82,31 @@ def transfer_scale(
     sigma: (p,), optional, standard deviation of a y parallax of weight one in each pair, mm; by default from the pairs'
         own residuals.
     doubtful: (m,), optional, rows that must not join models, unless a junction has no other.
-    renewed: (p - 1,), optional, junctions that are wanted; all by default. The others have no rows and the factor NaN.
+    searched: whether the rays have been searched for gross errors: then all pass points count. Before that, those that
+        lie far from the median of their junction are left out.
     Raises GeometryError when no point is common to three photos in a row.
     """
     junctions = orientation.pairs.size - 1
-    wanted = np.ones(junctions, bool) if renewed is None else renewed
-    joined = _pass_points(orientation, vectors, wanted, doubtful)
-    _require_pass_points(joined.junction, wanted, photos)
+    joined = _pass_points(orientation, vectors, doubtful)
     junction, before, after = joined
+    count = np.bincount(junction, minlength=junctions)
+    _require_pass_points(count, photos)
     base, _ = orientation.relative
     # eq. 139-141: distances from the common centre, before over after
     ratio = np.linalg.norm(vectors[before] - base[junction], axis=1) / np.linalg.norm(vectors[after], axis=1)
-    weight = _weights(orientation, vectors, joined, settings)
-    spreads = scale_ratios.spreads(orientation, vectors, joined, sigma)
-    count = int(wanted.sum())
-    number = (np.cumsum(wanted) - 1)[junction]
-    used, limit = scale_ratios.screen(ratio, weight, spreads, number, count)
-    factor, spread = np.full((2, junctions), np.nan)
-    factor[wanted], spread[wanted] = mean_ratios(ratio, weight * used, number, count)
+    depth = depths(vectors[before], base[junction]), depths(vectors[after], base[junction + 1])
+    quality = np.minimum(orientation.pairs.weight[before], orientation.pairs.weight[after])
+    weight = np.ones(len(junction))
+    if settings.scale_transfer == "least_squares":
+        # a distance from the centre is known to sigma_p / p of itself, and p is inverse to the depth along the base
+        weight = quality / (depth[0] ** 2 + depth[1] ** 2)
+    scatter = _scatter(orientation) if sigma is None else sigma
+    # an image coordinate has half the variance of a parallax; that of the common photo acts on both distances
+    coordinate = (scatter[junction] ** 2 + scatter[junction + 1] ** 2) / 4 / quality
+    size = np.sqrt(coordinate * (sum(depth) ** 2 + depth[0] ** 2 + depth[1] ** 2)) / orientation.pairs.focal
+    far, limit = contradictions(ratio, weight, size, junction, junctions)
+    used = np.ones(len(ratio), bool) if searched else ~far
+    factor, spread = mean_ratios(ratio, weight * used, junction, junctions)
     return Junctions(
         junction=junction,
         before=before,
@@ -114,17 +121,47 @@ def transfer_scale(
     )
 
 
-def _pass_points(orientation: Orientation, vectors: Floats, wanted: Flags, doubtful: Flags | None) -> PassPoints:
-    """Points that stand in both models of the wanted junctions."""
-    left_of = np.append(wanted, False)  # (p,): models with a wanted junction behind them
-    near = left_of | np.append(False, wanted)
-    rows = np.flatnonzero(orientation.used & np.isfinite(vectors[:, 0]) & near[orientation.pairs.pair])
-    pair, point = orientation.pairs.pair[rows], orientation.point[rows]
+def contradictions(
+    ratio: Floats, weight: Floats, size: Floats, junction: Numbers, junctions: int
+) -> tuple[Flags, Floats]:
+    """Find the ratios far from the median of their junction, and the largest relative deviation of each that is not.
+
+    The orientations of the two models deform them and make the ratios scatter more than the image coordinates of the
+    points do: how much more, the median deviation in the whole strip tells. Of two ratios none is far, nobody can tell
+    which.
+
+    size: (t,), relative standard deviation of each ratio by its own image coordinates.
+    junction: (t,), junction of each ratio, ascending.
+    """
+    value = np.log(ratio)
+    many = (np.bincount(junction, minlength=junctions) >= FEWEST)[junction]
+    off = np.abs(value - medians(value, weight, junction, junctions)[junction])
+    counts = (many & (off > 0)).astype(float)  # the median itself says nothing
+    scale = float(scales(off / size, counts, np.zeros(len(off), np.intp), 1)[0])
+    limit = normal_quantile(1 - ALPHA / (2 * max(len(off), 1))) * max(1.0, np.nan_to_num(scale)) * size
+    return (off > limit) & many, limit
+
+
+def depths(vectors: Floats, base: Floats) -> Floats:
+    """Distances of points from the base line, from vectors to them and unit vectors of the base (t, 3)."""
+    (x, y, z), (u, v, w) = vectors.T, base.T
+    return np.asarray(np.sqrt((y * w - z * v) ** 2 + (z * u - x * w) ** 2 + (x * v - y * u) ** 2), float)
+
+
+def _scatter(orientation: Orientation) -> Floats:
+    """Estimate the standard deviation of a y parallax from all pairs together."""
+    known = orientation.sigma0[np.isfinite(orientation.sigma0)]
+    value = np.sqrt(2.0) * float(np.median(known)) if len(known) else 0.0
+    return np.full(orientation.pairs.size, max(value, SMALLEST_SIGMA))
+
+
+def _pass_points(orientation: Orientation, vectors: Floats, doubtful: Flags | None) -> PassPoints:
+    """Points that stand in both models of a junction."""
+    rows = np.flatnonzero(orientation.used & np.isfinite(vectors[:, 0]))
     # the table is ordered by pair
-    order = np.argsort(point, kind="stable")
-    rows, pair, point = rows[order], pair[order], point[order]
-    both = (point[1:] == point[:-1]) & (pair[1:] == pair[:-1] + 1) & left_of[pair[:-1]]
-    first = np.flatnonzero(both)
+    rows = rows[np.argsort(orientation.point[rows], kind="stable")]
+    pair, point = orientation.pairs.pair[rows], orientation.point[rows]
+    first = np.flatnonzero((point[1:] == point[:-1]) & (pair[1:] == pair[:-1] + 1))
     before, after, junction = rows[first], rows[first + 1], pair[first]
     if doubtful is not None:
         good = ~(doubtful[before] | doubtful[after])
@@ -135,9 +172,8 @@ def _pass_points(orientation: Orientation, vectors: Floats, wanted: Flags, doubt
     return PassPoints(junction[order], before[order], after[order])
 
 
-def _require_pass_points(junction: Numbers, wanted: Flags, photos: Sequence[str]) -> None:
-    counts = np.bincount(junction, minlength=len(wanted))
-    for number in np.flatnonzero((counts[: len(wanted)] == 0) & wanted).tolist():
+def _require_pass_points(counts: Numbers, photos: Sequence[str]) -> None:
+    for number in np.flatnonzero(counts == 0).tolist():
         names = photos[number : number + 3]
         msg = (
             f"no point is common to photos {names[0]}, {names[1]} and {names[2]}: the models on either side of photo "
@@ -145,19 +181,6 @@ def _require_pass_points(junction: Numbers, wanted: Flags, photos: Sequence[str]
             "are recommended)"
         )
         raise GeometryError(msg, photos=names, code="broken-joint")
-
-
-def _weights(orientation: Orientation, vectors: Floats, joined: PassPoints, settings: StripFormationSettings) -> Floats:
-    """Weights of the ratios: 1 in the textbook form, otherwise by the parallaxes that made the distances."""
-    junction, before, after = joined
-    if settings.scale_transfer == "distances":
-        return np.ones(len(before))
-    base, _ = orientation.relative
-    # A distance from the centre is known to sigma_p / p of itself, and p is inverse to the depth along the base.
-    depth_before = scale_ratios.depths(vectors[before], base[junction])
-    depth_after = scale_ratios.depths(vectors[after], base[junction + 1])
-    quality = np.minimum(orientation.pairs.weight[before], orientation.pairs.weight[after])
-    return quality / (depth_before**2 + depth_after**2)
 
 
 def mean_ratios(ratio: Floats, weight: Floats, junction: Numbers, junctions: int) -> tuple[Floats, Floats]:

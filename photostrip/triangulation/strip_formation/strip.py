@@ -78,24 +78,16 @@ def form_from_pairs(
     photos: Sequence[str],
     sigma: Floats | None = None,
     doubtful: Flags | None = None,
-    earlier: tuple[FormedStrip, Flags] | None = None,
+    *,
+    searched: bool = False,
 ) -> FormedStrip:
     """Form the strip from its oriented pairs, in the frame of the first photo.
 
-    sigma, doubtful: as in ``transfer_scale``.
-    earlier: (p,), optional, the strip as it was formed before some of its pairs changed, and which: only their
-        junctions are made anew.
+    sigma, doubtful, searched: as in ``transfer_scale``.
     Raises GeometryError when a junction is broken or a base is parallel to the strip's Z axis.
     """
-    if earlier is None:
-        models = model_points(orientation)
-        junctions = transfer_scale(orientation, models.vectors, settings, photos, sigma, doubtful)
-    else:
-        before, changed = earlier
-        models = _renewed_models(orientation, before, np.flatnonzero(changed))
-        renewed = np.asarray(changed[:-1] | changed[1:], bool)
-        fresh = transfer_scale(orientation, models.vectors, settings, photos, sigma, doubtful, renewed)
-        junctions = before.junctions.with_new(fresh, renewed)
+    models = model_points(orientation)
+    junctions = transfer_scale(orientation, models.vectors, settings, photos, sigma, doubtful, searched=searched)
     formed = place_models(orientation, models, junctions, orientation.used & models.sound)
     _refuse_vertical_base(np.diff(formed.centers, axis=0) / formed.scale[:, None], photos)
     return formed
@@ -111,14 +103,6 @@ def model_points(orientation: Orientation) -> StereoModels:
     to_base = from_alpha_omega_kappa(al1, 0.0, ka1)
     vectors = np.einsum("mji,mj->mi", to_base[pairs.pair], found.xyz)
     return StereoModels(vectors, found.gap / found.ray_factor)
-
-
-def _renewed_models(orientation: Orientation, formed: FormedStrip, changed: Numbers) -> StereoModels:
-    """Points of all models, computed again for those that changed."""
-    rows = orientation.pairs.rows_of(changed)
-    vectors, gap = formed.vectors.copy(), formed.gap.copy()
-    vectors[rows], gap[rows] = model_points(orientation.take(changed))
-    return StereoModels(vectors, gap)
 
 
 def hand_on_rotations(rotations: Floats) -> Floats:

@@ -16,12 +16,13 @@ from photostrip.errors import EXIT_GEOMETRY, GeometryError
 from photostrip.geometry.rotation import alpha_omega_kappa, from_alpha_omega_kappa
 from photostrip.geometry.similarity import Similarity
 from photostrip.points import PhotoPoints
+from photostrip.statistics import normal_quantile
 from photostrip.triangulation.relative_orientation.orientation import Orientation, orient_again, orient_pairs
 from photostrip.triangulation.relative_orientation.pairs import collect_pairs
-from photostrip.triangulation.strip_formation.scale_ratios import screen
 from photostrip.triangulation.strip_formation.scale_transfer import (
     SCALE_TRANSFERS,
     StripFormationSettings,
+    contradictions,
     mean_ratios,
     transfer_scale,
 )
@@ -449,9 +450,55 @@ def test_the_steep_base_is_named() -> None:
     assert caught.value.photos == ("2", "3")
 
 
-def test_ratios_of_a_junction_stay_out_though_one_only_is_left() -> None:
-    """The junction of three ratios that contradict each other keeps the one that the mean of its own lies at."""
-    ratio, weight = np.array([1.0106, 1.0001, 0.9854]), np.array([0.0032, 0.075, 0.034])
-    spread = np.array([0.0031, 0.00052, 0.00015]), np.array([0.00055, 0.00045, 0.0027])
-    used, _ = screen(ratio, weight, spread, np.zeros(3, int), 1)
-    assert used.sum() == 1
+# ------------------------------------------------------------------------------------------ ratios far from the others
+
+
+def test_a_wrong_ratio_among_three_does_not_reach_the_scale() -> None:
+    ratio = np.array([1.0001, 1.0, 1.01, 1.0, 1.0001])
+    far, limit = contradictions(ratio, np.ones(5), np.full(5, 2e-4), np.array([0, 0, 0, 1, 1]), 2)
+    assert far.tolist() == [False, False, True, False, False]
+    assert limit == pytest.approx(normal_quantile(1 - 0.01 / 10) * 2e-4)  # 1 % of a strip, five ratios, two sides
+
+
+def test_of_two_ratios_none_is_far() -> None:
+    far, _ = contradictions(np.array([1.0, 1.1]), np.ones(2), np.full(2, 1e-4), np.zeros(2, int), 1)
+    assert not far.any()
+
+
+def test_ratios_may_scatter_more_than_their_own_coordinates_do() -> None:
+    rng = np.random.default_rng(1)
+    junction = np.repeat(np.arange(20), 8)
+    ratio = np.exp(rng.normal(0, 4e-4, 160))
+    far, limit = contradictions(ratio, np.ones(160), np.full(160, 2e-4), junction, 20)
+    assert far.sum() <= 1
+    assert limit == pytest.approx(normal_quantile(1 - 0.01 / 320) * 4e-4, rel=0.15)
+
+
+def test_without_ratios_nothing_is_far() -> None:
+    far, limit = contradictions(np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0, int), 0)
+    assert (len(far), len(limit)) == (0, 0)
+
+
+def test_after_a_search_of_the_rays_every_pass_point_counts() -> None:
+    flown = fly(8, 5, sigma=2 * MICROMETRE, extra=40, tilt_deg=0.2)
+    xy = flown.observations.xy.copy()
+    xy[np.flatnonzero(seen(flown, 3, "p2_1")), 0] += 1.0
+    oriented = replace(flown, observations=replace(flown.observations, xy=xy)).oriented()
+    before, after = (
+        form_from_pairs(oriented, StripFormationSettings(), flown.photos, searched=searched).junctions
+        for searched in (False, True)
+    )
+    assert not before.used.all()
+    assert after.used.all()
+    assert np.array_equal(before.limit, after.limit)
+    total = np.bincount(after.junction, after.weight)
+    assert after.factor == pytest.approx(np.bincount(after.junction, after.weight * after.ratio) / total)
+
+
+def test_the_scatter_of_pairs_without_noise_is_a_micrometre() -> None:
+    flown = fly(12, 4, sigma=0.0, extra=30)
+    limit = formed(flown).junctions.limit
+    given = np.full(3, 1e-3)
+    assert np.array_equal(
+        limit, form_from_pairs(flown.oriented(), StripFormationSettings(), flown.photos, given).junctions.limit
+    )

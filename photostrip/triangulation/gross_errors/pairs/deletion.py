@@ -16,13 +16,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.triangulation.gross_errors.pairs.global_test import SMALLEST_REDUNDANCY
+
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
 
 
 LARGEST = 3  # points of a set
 TRIPLES_OF = 24  # points from which sets of three are formed; those of the best sets of two
-DETERMINED = 1e-6  # determinant of M_KK below which a set cannot be told from a change of the elements
 
 
 @lru_cache(maxsize=256)
@@ -47,7 +48,7 @@ def gains(residuals: Floats, matrix: Floats, sets: Numbers) -> Floats:
     m = {(i, j): matrix[number, place[:, :, i], place[:, :, j]] for i in range(k) for j in range(i, k)}
     with np.errstate(divide="ignore", invalid="ignore"):
         determinant, form = _form(v, m)
-        value: Floats = np.where(determinant > DETERMINED, form / determinant, -np.inf)
+        value: Floats = np.where(determinant > SMALLEST_REDUNDANCY**k, form / determinant, -np.inf)
     return value
 
 
@@ -69,8 +70,8 @@ def _form(v: list[Floats], m: dict[tuple[int, int], Floats]) -> tuple[Floats, Fl
 def search(residuals: Floats, matrix: Floats, target: Floats, forbidden: Flags | None = None) -> list[Numbers]:
     """Find for each adjustment the smallest set whose removal brings the sum of squares below its target.
 
-    Empty when no set of up to three does it. ``target`` (g, 3) is the largest sum allowed after one, two and three
-    points are gone, -inf where so many may not go; points ``forbidden`` (g, n) stay.
+    Empty when no set does it. ``target`` (k,) is the largest sum allowed after one to k points are gone, -inf where so
+    many may not go; k is three at most. Points ``forbidden`` (g, n) stay.
     """
     total = (residuals**2).sum(axis=1)
     found = [np.zeros(0, np.intp) for _ in range(len(residuals))]
@@ -80,7 +81,7 @@ def search(residuals: Floats, matrix: Floats, target: Floats, forbidden: Flags |
         # a point that may not go gains nothing in any set
         v = np.where(forbidden, 0.0, residuals)
     sets: Numbers = subsets(residuals.shape[1], 1)
-    for k in range(1, LARGEST + 1):
+    for k in range(1, len(target) + 1):
         if not len(todo) or residuals.shape[1] < k:
             break
         if k > 1:
@@ -91,7 +92,7 @@ def search(residuals: Floats, matrix: Floats, target: Floats, forbidden: Flags |
             gain[forbidden[todo][np.arange(len(todo))[:, None, None], place].any(axis=2)] = -np.inf
         best = gain.argmax(axis=1)
         rows = np.arange(len(todo))
-        enough = total[todo] - gain[rows, best] <= target[todo, k - 1]
+        enough = total[todo] - gain[rows, best] <= target[k - 1]
         for row in np.flatnonzero(enough):
             found[todo[row]] = sets[best[row]] if sets.ndim == 2 else sets[row, best[row]]
         todo = todo[~enough]

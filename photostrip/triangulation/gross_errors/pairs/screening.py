@@ -5,7 +5,7 @@ residuals. Every round takes at most one point from a pair, the worst, and orien
 at once also throws out good points that a bad neighbour has pulled. All pairs go through a round together. No
 rejection leaves a pair or a standard zone without support.
 
-``deletion``, ``robust`` and ``auto`` are in ``screening_search``.
+``deletion``, ``robust`` and ``auto`` are in ``pair_search``.
 
 Source: [004a]; the two-sided form and the order of work are chosen here, see docs/sources.md.
 """
@@ -20,9 +20,11 @@ import numpy as np
 
 from photostrip.errors import InputError
 from photostrip.statistics import grubbs_limit, tau_limit
-from photostrip.triangulation.gross_errors.pairs import pair_global_test, readmission, screening_search
-from photostrip.triangulation.gross_errors.pairs.zones import Support, zones
+from photostrip.triangulation.gross_errors.pairs.global_test import SMALLEST_REDUNDANCY
+from photostrip.triangulation.gross_errors.pairs.pair_search import PairSearch, search
+from photostrip.triangulation.gross_errors.pairs.zones import MINIMUM_LEFT, Support, zones
 from photostrip.triangulation.relative_orientation.orientation import (
+    LEAST_IN_FRONT,
     RelativeSettings,
     orient_again,
     unusable_pairs,
@@ -38,11 +40,8 @@ if TYPE_CHECKING:
 
 METHODS = ("auto", "parallax+grubbs", "tau", "deletion", "robust", "none")
 SEARCHES = {"auto": (True, True), "deletion": (False, True), "robust": (True, False)}  # robust start, sets of points
-GRUBBS_MINIMUM = 7  # below it the test is meaningless: G cannot exceed (n-1)/sqrt(n)
 NEGLIGIBLE = 1e-9  # mm; residuals of error-free data are rounding, not measurements
 LIMIT_FACTOR = 4.0  # a-priori standard deviations of a y parallax
-TAU_REDUNDANCY = 0.01  # a residual with less redundancy says nothing about its point
-MOST_IN_FRONT = 0.5  # share of the points above which a pair stands as it should
 DETECTABLE = 4.13  # shift of a normal variable found in 80 % of cases by a two-sided test at 0.1 %
 
 
@@ -109,41 +108,34 @@ def screen_pairs(
     if settings.screening not in METHODS:
         msg = f"screening method {settings.screening!r} is not available; choose one of {', '.join(METHODS)}"
         raise InputError(msg)
-    start, sets = SEARCHES.get(settings.screening, SEARCHES["auto"])
     sound = np.ones(orientation.pairs.size, bool) if converged is None else converged
     rays = base_rays(orientation.elements, orientation.pairs)
     doubtful = unusable_pairs(orientation, sound, rays)
     behind = ~rays_meet_in_front(*rays)
+    start, sets = SEARCHES.get(settings.screening, SEARCHES["auto"])
     with np.errstate(all="ignore"):
-        scatter, found = screening_search.search(orientation, sigma, start=start, sets=sets, doubtful=doubtful)
+        found = search(orientation, max(np.sqrt(2.0) * sigma, NEGLIGIBLE), doubtful, start=start, sets=sets)
     if settings.screening in SEARCHES:
-        result, log = _readmitted(orientation, scatter, found, behind)
-        if doubtful.any():
-            # a pair that was lost at first and now fits its points has converged after all; any other is refused
-            sound = sound | (doubtful & ~pair_global_test.failing(result, scatter.by_pair))
-            lost = np.flatnonzero(doubtful & unusable_pairs(result, sound))
-            result = result.with_pairs(lost, orientation.take(lost))
+        result, log = _searched(orientation, found, behind)
+        # a pair that was lost at first and now fits its points has converged after all; any other is refused
+        sound = sound | (doubtful & ~found.test.failing(result))
+        lost = np.flatnonzero(doubtful & unusable_pairs(result, sound))
+        result = result.with_pairs(lost, orientation.take(lost))
     else:
         result, log = _sequential(orientation, settings, sigma, behind)
-    masked = pair_global_test.failing(result, scatter.by_pair)
-    return ScreenedPairs(result, _completed(log, result), scatter, masked, sound)
+    masked = found.test.failing(result)
+    return ScreenedPairs(result, _completed(log, result), found.scatter, masked, sound)
 
 
-def _readmitted(
-    orientation: Orientation,
-    scatter: ParallaxScatter,
-    found: screening_search.DeletedPoints,
-    behind: Flags,
-) -> tuple[Orientation, list[PairRejection]]:
-    """Take back what the final elements predict well, take out what lies behind a camera, write the log."""
-    weight = orientation.pairs.weight
-    result, _ = readmission.readmit(found.orientation, found.rows, weight, scatter.by_pair)
-    before = np.nan_to_num(orientation.parallax)
+def _searched(given: Orientation, found: PairSearch, behind: Flags) -> tuple[Orientation, list[PairRejection]]:
+    """Write the log of a search, and take out what lies behind a camera."""
+    result, before = found.orientation, np.nan_to_num(given.parallax)
     log = [
-        PairRejection(int(row), test, float(value), float(limit), float(before[row]))
-        for row, test, value, limit in zip(found.rows, found.tests, found.values, found.limits, strict=True)
+        PairRejection(each.row, each.test, each.value, each.limit, float(before[each.row])) for each in found.removed
     ]
-    result, dropped = _drop_behind(result, _behind_now(orientation, result, behind))
+    if result is not given:
+        behind = ~in_front_of_cameras(result.elements, result.pairs)
+    result, dropped = _drop_behind(result, behind)
     return result, log + dropped
 
 
@@ -177,17 +169,6 @@ def _completed(log: list[PairRejection], result: Orientation) -> tuple[PairRejec
     )
 
 
-def _behind_now(before: Orientation, after: Orientation, behind: Flags) -> Flags:
-    """Points behind a camera, given those of an earlier orientation."""
-    changed = np.flatnonzero((before.elements != after.elements).any(axis=1))
-    if not len(changed):
-        return behind
-    part = after.take(changed)
-    result = behind.copy()
-    result[after.pairs.rows_of(changed)] = ~in_front_of_cameras(part.elements, part.pairs)
-    return result
-
-
 def _drop_behind(orientation: Orientation, behind: Flags) -> tuple[Orientation, list[PairRejection]]:
     """Take out the points that come out behind a camera; no measurement of theirs can be right."""
     pairs, used = orientation.pairs, orientation.used
@@ -195,7 +176,7 @@ def _drop_behind(orientation: Orientation, behind: Flags) -> tuple[Orientation, 
     if not len(rows):
         return orientation, []
     # with most of its points behind, the pair itself is wrong, and refuse_unusable says so
-    most = pairs.sums((~behind & used).astype(float)) > MOST_IN_FRONT * orientation.points_used
+    most = pairs.sums((~behind & used).astype(float)) > LEAST_IN_FRONT * orientation.points_used
     rows = rows[most[pairs.pair[rows]]]
     if not len(rows):
         return orientation, []
@@ -242,7 +223,7 @@ def _grubbs(orientation: Orientation, alpha: float) -> tuple[Floats, Floats]:
     mean = pairs.sums(np.where(used, orientation.parallax, 0.0)) / count
     deviation = np.where(used, orientation.parallax - mean[pairs.pair], 0.0)
     spread = np.sqrt(pairs.sums(deviation**2) / (count - 1))
-    tested = (count >= GRUBBS_MINIMUM) & (spread > NEGLIGIBLE)
+    tested = (count > MINIMUM_LEFT) & (spread > NEGLIGIBLE)
     limits = np.array([grubbs_limit(int(n), alpha) if ok else np.inf for n, ok in zip(count, tested, strict=True)])
     with np.errstate(divide="ignore", invalid="ignore"):
         value = np.abs(deviation) / spread[pairs.pair]
@@ -261,5 +242,5 @@ def _tau(orientation: Orientation, alpha: float) -> tuple[Floats, Floats]:
     sigma = np.sqrt(2.0) * orientation.sigma0[pairs.pair]
     with np.errstate(divide="ignore", invalid="ignore"):
         value = np.abs(orientation.parallax) * np.sqrt(pairs.weight) / (sigma * np.sqrt(orientation.redundancy))
-    value[~(orientation.redundancy > TAU_REDUNDANCY)] = 0.0
+    value[~(orientation.redundancy > SMALLEST_REDUNDANCY)] = 0.0
     return np.where(np.isfinite(value), value, 0.0), limits[pairs.pair]

@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
 ZONES = 6
 MINIMUM_LEFT = 6  # a pair keeps at least one redundant point
-EMPTY_ZONES = 1  # zones that a rejection may leave without a point
-RMS_OF_ROWS = np.sqrt(2 / 3)  # root mean square of y over rows at -a, 0, a, in units of a
 
 
 def zones(elements: Floats, pairs: Pairs) -> Numbers:
@@ -40,7 +38,7 @@ def zones(elements: Floats, pairs: Pairs) -> Numbers:
     used = pairs.weight > 0
     count = np.maximum(pairs.sums(used.astype(float)), 1.0)
     base = pairs.sums(np.where(used, parallax, 0.0)) / count
-    spread = np.sqrt(pairs.sums(np.where(used, y**2, 0.0)) / count) / RMS_OF_ROWS
+    spread = np.sqrt(pairs.sums(np.where(used, y**2, 0.0)) / count * 3 / 2)  # rows at -a, 0, a
     half_base, half_spread = base[pairs.pair] / 2, spread[pairs.pair] / 2
     row = np.where(y > half_spread, 2, np.where(y < -half_spread, 4, 0))
     number: Numbers = (1 + row + (x > half_base)).astype(np.intp)
@@ -73,5 +71,11 @@ class Support:
         """Rows that can go: six points stay, and no zone loses its last point while another one is empty already."""
         enough = self.counts.sum(axis=1) > MINIMUM_LEFT
         last = self.counts[pair, self.zone - 1] <= 1
-        flags: Flags = enough[pair] & (~last | (self.empty[pair] < EMPTY_ZONES))
+        flags: Flags = enough[pair] & (~last | (self.empty[pair] == 0))
         return flags
+
+    def holds_without(self, pair: int, rows: Numbers) -> bool:
+        """Whether a pair keeps six points without some rows, and no second zone becomes empty."""
+        counts = self.counts[pair] - np.bincount(self.zone[rows] - 1, minlength=ZONES)
+        empty = int((counts == 0).sum())
+        return bool(counts.sum() >= MINIMUM_LEFT and empty <= max(1, int(self.empty[pair])))

@@ -14,12 +14,6 @@ from photostrip.pipeline.strips.adjusting import adjust_formed
 from photostrip.pipeline.strips.photos import form_strip
 from photostrip.result.document import document_of
 from photostrip.triangulation.gross_errors.control import control_screening
-from photostrip.triangulation.relative_orientation.orientation import orient_again
-from photostrip.triangulation.relative_orientation.solution import linearised_parallaxes
-from photostrip.triangulation.strip_formation import scale_ratios
-from photostrip.triangulation.strip_formation.scale_ratios import PassPoints
-from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
-from photostrip.triangulation.strip_formation.strip import form_from_pairs, model_points
 from tests.strips import LOCAL, MICROMETRE, control_points, fly, project
 
 if TYPE_CHECKING:
@@ -27,7 +21,6 @@ if TYPE_CHECKING:
 
     from photostrip.pipeline import Result
     from photostrip.points import ControlPoints
-    from photostrip.triangulation.relative_orientation.orientation import Orientation
     from tests.strips import Flown
 
     Floats = NDArray[np.float64]
@@ -50,95 +43,6 @@ def adjusted(strip: Flown, wrong: dict[str, tuple[float, float, float]] | None =
     for name, error in (wrong or {}).items():
         given[name] = given[name] + error
     return triangulate(project(strip, control_points(given, sigma=0.02)), Settings())
-
-
-# ---------------------------------------------------------------------------------------------- scale transfer
-
-
-def test_scale_ratios_scatter_as_propagated() -> None:
-    values = []
-    for seed in range(12):
-        strip = flown(seed)
-        oriented = strip.oriented()
-        sigma = np.full(oriented.pairs.size, np.sqrt(2) * SIGMA)
-        joined = form_from_pairs(oriented, StripFormationSettings(), strip.photos, sigma).junctions
-        vectors = model_points(oriented).vectors
-        rows = PassPoints(joined.junction, joined.before, joined.after)
-        single, model = scale_ratios.spreads(oriented, vectors, rows, sigma)
-        values.append((joined.ratio / joined.factor[joined.junction] - 1) / np.hypot(single, model))
-    # the mean of a joint takes its part away, the points take part in their own orientation
-    assert 0.75 < np.concatenate(values).std() < 1.05
-
-
-def distances(oriented: Orientation, rows: Numbers) -> tuple[Floats, Floats]:
-    """Logarithms of the distances of points from both centres of their model."""
-    vectors = model_points(oriented).vectors
-    base, _ = oriented.relative
-    right = vectors[rows] - base[oriented.pairs.pair[rows]]
-    return np.log(np.linalg.norm(vectors[rows], axis=1)), np.log(np.linalg.norm(right, axis=1))
-
-
-def test_the_spread_by_the_models_is_that_of_differences() -> None:
-    strip = flown(3)
-    oriented = strip.oriented()
-    vectors = model_points(oriented).vectors
-    joined = form_from_pairs(oriented, StripFormationSettings(), strip.photos).junctions
-    rows = PassPoints(joined.junction, joined.before, joined.after)
-    sigma = np.full(oriented.pairs.size, 0.007)
-    slopes = []
-    for side, row in ((1, joined.before), (0, joined.after)):
-        columns = []
-        for element in range(5):
-            step = 1e-6 * np.eye(5)[element]
-            up, down = (
-                distances(replace(oriented, elements=oriented.elements + sign * step), row)[side] for sign in (1, -1)
-            )
-            columns.append((up - down) / 2e-6)
-        slopes.append(np.column_stack(columns))
-    variance = np.zeros(len(joined.junction))
-    for joint in range(oriented.pairs.size - 1):
-        here = joined.junction == joint
-        for slope, model in zip(slopes, (joint, joint + 1), strict=True):
-            own = slope[here] - slope[here].mean(axis=0)
-            _, jacobian = linearised_parallaxes(oriented.elements, oriented.pairs)
-            part = jacobian[:, oriented.pairs.pair == model]
-            variance[here] += np.diag(own @ np.linalg.inv(part @ part.T) @ own.T) * sigma[model] ** 2
-    _, model_spread = scale_ratios.spreads(oriented, vectors, rows, sigma)
-    assert model_spread == pytest.approx(np.sqrt(variance), rel=1e-4)
-
-
-def test_a_strip_formed_again_in_part_is_the_strip_formed_anew() -> None:
-    strip = flown(4)
-    oriented = strip.oriented()
-    sigma = np.full(oriented.pairs.size, np.sqrt(2) * SIGMA)
-    before = form_from_pairs(oriented, StripFormationSettings(), strip.photos, sigma)
-    weight = oriented.pairs.weight.copy()
-    weight[np.flatnonzero(oriented.pairs.pair == 5)[[1, 4]]] = 0.0
-    changed = np.arange(oriented.pairs.size) == 5
-    again = orient_again(oriented, weight, np.flatnonzero(changed))
-    whole = form_from_pairs(again, StripFormationSettings(), strip.photos, sigma)
-    part = form_from_pairs(again, StripFormationSettings(), strip.photos, sigma, earlier=(before, changed))
-    for name in ("centers", "rotations", "scale", "model_xyz", "gap", "point", "xyz", "model_count"):
-        assert np.array_equal(getattr(part, name), getattr(whole, name), equal_nan=True)
-    for name in ("junction", "before", "after", "point", "ratio", "used", "limit", "factor", "spread", "weight"):
-        assert np.array_equal(getattr(part.junctions, name), getattr(whole.junctions, name))
-    assert not np.array_equal(whole.xyz, before.xyz)
-
-
-def test_a_wrong_ratio_among_three_does_not_reach_the_scale() -> None:
-    ratio = np.array([1.0002, 0.9999, 1.01, 1.0, 1.0001])
-    joint = np.array([0, 0, 0, 1, 1])
-    spread = (np.full(5, 2e-4), np.zeros(5))
-    used, limit = scale_ratios.screen(ratio, np.ones(5), spread, joint, 2)
-    assert used.tolist() == [True, True, False, True, True]
-    assert (limit > 3 * 2e-4).all()
-    assert (limit < 5 * 2e-4).all()
-
-
-def test_of_two_ratios_none_is_rejected() -> None:
-    ratio, joint = np.array([1.0, 1.1]), np.array([0, 0])
-    used, _ = scale_ratios.screen(ratio, np.ones(2), (np.full(2, 1e-4), np.zeros(2)), joint, 1)
-    assert used.all()
 
 
 # ----------------------------------------------------------------------------------------------------- control

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -278,6 +279,14 @@ def test_grubbs_needs_seven_points() -> None:
     assert np.all(screening._values(six, "grubbs", 0.05)[1] == np.inf)
     seven = spoiled(clean(10, points=(2, 1, 1, 1, 1, 1)), {0: 3.0})
     assert screening._values(seven, "grubbs", 0.05)[1][0] == pytest.approx(grubbs_limit(7, 0.05))
+
+
+def test_residuals_below_a_millionth_of_a_micrometre_are_rounding() -> None:
+    oriented = clean(10).orient()
+    pattern = np.where(np.arange(16) % 2, 1.0, -1.0) * np.sqrt(15 / 16)  # of a standard deviation of one
+    for size, tested in ((0.8e-9, False), (1.6e-9, True)):
+        limit = screening._values(replace(oriented, parallax=size * pattern), "grubbs", 0.05)[1]
+        assert np.isfinite(limit).all() == tested
 
 
 def test_tau_needs_a_redundancy_of_three() -> None:

@@ -1,0 +1,79 @@
+"""The global test of oriented pairs: whether the scatter of their y parallaxes belongs to the measurements.
+
+Source: derived; [004a] stops at tests of single residuals. See docs/sources.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+
+from photostrip.statistics import chi2_quantile, normal_quantile
+from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from photostrip.arrays import Flags, Floats, Numbers
+    from photostrip.triangulation.relative_orientation.orientation import Orientation
+
+
+ALPHA = 0.01  # probability that a strip without gross errors fails anywhere
+SMALLEST_REDUNDANCY = 0.01  # a residual with less redundancy says nothing about its point
+
+
+@dataclass(frozen=True, eq=False)
+class GlobalTest:
+    """What the y parallaxes of some pairs are tested with."""
+
+    sigma: Floats  # (p,): standard deviation of a y parallax of weight one in each pair, mm
+    level: float  # probability that a pair without gross errors fails one of its two tests
+
+    @classmethod
+    def of(cls, sigma: Floats) -> Self:
+        """Share the level of a strip among its pairs and their two tests."""
+        return cls(sigma, ALPHA / (2 * len(sigma)))
+
+    def take(self, numbers: Numbers) -> GlobalTest:
+        """Take some of the pairs; the level stays that of the whole strip."""
+        return replace(self, sigma=self.sigma[numbers])
+
+    def squares(self, orientation: Orientation) -> Floats:
+        """Value of the test of each pair: v^T W v / sigma^2."""
+        pairs = orientation.pairs
+        total: Floats = pairs.sums(pairs.weight * orientation.parallax**2) / self.sigma**2
+        return total
+
+    def limits(self, count: Numbers) -> Floats:
+        """Critical values: chi-square with count - 5 degrees of freedom; infinite without redundancy."""
+        return _by_number(
+            count, lambda n: chi2_quantile(1 - self.level, n - MINIMUM_POINTS) if n > MINIMUM_POINTS else np.inf
+        )
+
+    def standardised(self, orientation: Orientation) -> Floats:
+        """Parallaxes of the points used in units of their standard deviation, (m,); 0 without redundancy."""
+        pairs, share = orientation.pairs, orientation.redundancy
+        with np.errstate(divide="ignore", invalid="ignore"):
+            value = np.abs(orientation.parallax) * np.sqrt(pairs.weight / share) / self.sigma[pairs.pair]
+        return np.where(orientation.used & np.isfinite(value) & (share > SMALLEST_REDUNDANCY), value, 0.0)
+
+    def largest_limits(self, count: Numbers) -> Floats:
+        """Critical values of the largest standardised residual (Bonferroni)."""
+        return _by_number(count, lambda n: normal_quantile(1 - self.level / (2 * max(n, 1))))
+
+    def failing(self, orientation: Orientation) -> Flags:
+        """Pairs whose sum of squares or largest residual exceeds its limit."""
+        count = orientation.points_used
+        largest = np.maximum.reduceat(self.standardised(orientation), orientation.pairs.starts)
+        bad: Flags = ~(self.squares(orientation) <= self.limits(count)) | (largest > self.largest_limits(count))
+        return bad & (count > MINIMUM_POINTS)
+
+
+def _by_number(count: Numbers, limit: Callable[[int], float]) -> Floats:
+    """Look up a limit for every number of points; each number is asked for once."""
+    table = np.zeros(int(count.max(initial=0)) + 1)
+    for number in np.flatnonzero(np.bincount(np.maximum(count.ravel(), 0))).tolist():
+        table[number] = limit(number)
+    return table[np.maximum(count, 0)]
