@@ -13,7 +13,7 @@ from photostrip.result.adjustment.links import AXES, names_of
 from photostrip.result.numbers import natural, rounded
 from photostrip.result.quantities import DECIMALS_BY_UNIT, record
 from photostrip.triangulation.gross_errors.rays.point_decisions import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY
-from photostrip.triangulation.strip_formation.scale_ratios import depths
+from photostrip.triangulation.strip_formation.scale_transfer import depths
 
 if TYPE_CHECKING:
     from photostrip.pipeline import Result, StripResult

@@ -73,7 +73,7 @@ def form_screened(
     changed = np.unique(of_pairs.pairs.pair[used != of_pairs.used])
     oriented = orient_again(of_pairs, np.where(used, weight, 0.0), changed) if len(changed) else of_pairs
     try:
-        formed = form_from_pairs(oriented, settings, photos, rays.sigma, aside)
+        formed = form_from_pairs(oriented, settings, photos, rays.sigma, aside, searched=True)
     except GeometryError:
         oriented = of_pairs  # nothing would join two models: what joined them before stays
     formed = without_rows(formed, oriented, aside)
