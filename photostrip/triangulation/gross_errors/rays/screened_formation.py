@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.points import PhotoPoints
-    from photostrip.triangulation.gross_errors.pairs.screening import PairRejection
-    from photostrip.triangulation.gross_errors.rays.snooping import Rejection
+    from photostrip.rejection import Rejection
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
     from photostrip.triangulation.strip_formation.strip import FormedStrip
@@ -115,6 +114,6 @@ def _supported(of_pairs: Orientation, used: Flags) -> Flags:
     return result
 
 
-def with_readmitted(rejections: Sequence[PairRejection], used: Flags) -> tuple[PairRejection, ...]:
+def with_readmitted(rejections: Sequence[Rejection], used: Flags) -> tuple[Rejection, ...]:
     """Mark the rejections of pairs that the strip took back; ``used`` (m,) are the rows used in the end."""
     return tuple(replace(each, readmitted=bool(used[each.row])) for each in rejections)
