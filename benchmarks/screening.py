@@ -25,7 +25,8 @@ from photostrip.simulate.simulation import simulate  # noqa: E402
 from photostrip.simulate.spec import Flight, GrossError, Points, Spec  # noqa: E402
 from photostrip.statistics import chi2_quantile  # noqa: E402
 from photostrip.triangulation.gross_errors.pairs import deletion, screening  # noqa: E402
-from photostrip.triangulation.gross_errors.rays import screened_formation  # noqa: E402
+from photostrip.triangulation.gross_errors.rays.screened_formation import form_screened  # noqa: E402
+from photostrip.triangulation.gross_errors.rays.strip_network import StripRays  # noqa: E402
 from photostrip.triangulation.relative_orientation.orientation import RelativeSettings, orient_unchecked  # noqa: E402
 from photostrip.triangulation.relative_orientation.pairs import Pairs, collect_pairs  # noqa: E402
 from photostrip.triangulation.relative_orientation.solution import linearised_parallaxes  # noqa: E402
@@ -320,9 +321,10 @@ def stages(inputs: Inputs) -> Floats:
     spreads = scale_ratios.spreads(screened.orientation, formed.vectors, places, scatter)
     scale_ratios.screen(joined.ratio, np.ones(len(joined.ratio)), spreads, joined.junction, joints)
     ratios = time.process_time() - begin
-    measured = screened_formation.Measurements(observations, strip.photos, pairs.weight, scatter, sigma, nothing)
+    rays = StripRays(observations, strip.positions(observations), scatter, sigma, nothing)
+    settings = StripFormationSettings()
     begin = time.process_time()
-    screened_formation.form_screened(screened.orientation, measured, StripFormationSettings(), readmit=True)
+    form_screened(screened.orientation, rays, pairs.weight, strip.photos, settings, readmit=True)
     settle = time.process_time() - begin
     return np.array([orient, search, ratios, settle - form])
 
