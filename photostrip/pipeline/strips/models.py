@@ -8,12 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import Fault, GeometryError, InputError
-from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.pipeline.overruling import CENTER
 from photostrip.pipeline.results import ModelStages, StripResult
 from photostrip.pipeline.strips import notes
 from photostrip.pipeline.strips.model_notes import link_notes
-from photostrip.triangulation.gross_errors.control import control_significance
 from photostrip.triangulation.independent_models import (
     link_screening,
     linking,
@@ -82,18 +80,13 @@ class LinkedModels:
         targets, xyz = oriented.targets, oriented.at_control
         return model_misclosures.misclosures(targets.turned(xyz), targets.axes(xyz), xyz, oriented.errors.origin)
 
-    def misclosure_covariance(self, oriented: Oriented) -> control_significance.ControlCovariance | None:
-        """Covariance of all misclosures at the control; None where there are too many to form it as a whole."""
-        many = oriented.control.use.sum() > control_significance.LARGEST
-        if many or len(self.formed.photos) > control_significance.LONGEST:
-            return None
-        errors, found, factor = oriented.errors, oriented.misclosures, self.formed.links.factor
-        covariance = model_misclosures.covariance(errors, found, oriented.control_rows, factor)
-        moved = similarity_derivatives(oriented.at_control[found.point], errors.origin)
-        design = np.einsum("wi,wij->wj", found.direction, moved)
-        return control_significance.ControlCovariance(
-            point=found.point, axis=found.axis, design=design, covariance=covariance
-        )
+    def misclosure_covariance(self, oriented: Oriented, found: Misclosures) -> Floats:
+        """Covariance of some misclosures at the control, strip and control together, metres^2."""
+        return model_misclosures.covariance(oriented.errors, found, oriented.control_rows, self.formed.links.factor)
+
+    def control_rays(self, _: Oriented) -> tuple[()]:
+        """Models have no rays."""
+        return ()
 
     def screens_control(self, settings: Settings) -> bool:
         """Whether wrong control is looked for."""
@@ -142,12 +135,11 @@ class LinkedModels:
             depth=float(np.nanmean(centers[:, 2]) - xyz[:, 2].mean()) if known else float("nan"),
             notes=(
                 *link_notes(strip, self.measured, formed),
-                *notes.wrong_control_notes(strip, screened.wrong_control),
+                *notes.wrong_control_notes(strip, screened.screened_control.rejections),
                 *notes.control_notes(strip, oriented.absolute),
                 *notes.polynomial_notes(strip, correction, xyz),
             ),
-            wrong_control=screened.wrong_control,
-            judged_control=screened.judged_control,
+            screened_control=screened.screened_control,
             model_stages=ModelStages(
                 strip=strip,
                 formed=formed,
