@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import PhotostripError
-from photostrip.triangulation.gross_errors.control.control_components import candidates
+from photostrip.triangulation.gross_errors.control.control_components import ROUNDS, candidates
 from photostrip.triangulation.gross_errors.control.control_deletion import adjust
 from photostrip.triangulation.gross_errors.control.control_rejections import (
     Found,
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from photostrip.triangulation.gross_errors.control.strip_at_control import StripAtControl
 
 
-LAID = 10  # times at most that the strip is laid on what is kept
+BENT = 2.5  # standard deviation of unit weight beyond which more is wrong with a strip than its control
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +88,10 @@ def _searched(strip: StripAtControl) -> Found | None:
     several = [_laid(strip, covariance, _at_once, bends=bends) for bends in (True, False)]
     explained = [each for each in several if each.left.explained]
     # of two equally small explanations the one that blames less control
-    return min(explained, key=lambda each: (len(each.out), len(each.coordinates)), default=single)
+    best = min(explained, key=lambda each: (len(each.out), len(each.coordinates)), default=single)
+    if best.left.squares > BENT**2 * best.left.freedom:
+        return Found(single.whole, ())
+    return best
 
 
 def _at_once(whole: JointAdjustment) -> Columns:
@@ -102,7 +105,7 @@ def _laid(
 ) -> Found:
     """Search, lay the strip on what is kept, and search in all control anew, until the same is found."""
     kept = strip.control.use
-    for _ in range(LAID):
+    for _ in range(ROUNDS):
         whole = adjust(strip, strip.misclosures(kept), covariance, bends=bends)
         found = Found(whole, search(whole))
         before, kept = kept, kept_of(strip, found)
