@@ -16,7 +16,6 @@ from photostrip.geodesy.local_frame import IntermediateFrame, mean_position, str
 from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.triangulation import absolute_orientation
 from photostrip.triangulation.gross_errors.control import control_screening
-from photostrip.triangulation.gross_errors.control.control_screening import ScreenedControl
 from photostrip.triangulation.gross_errors.control.strip_at_control import StripAtControl
 
 if TYPE_CHECKING:
@@ -29,6 +28,7 @@ if TYPE_CHECKING:
     from photostrip.pipeline.results import StripResult, StripShape
     from photostrip.points import ControlPoints
     from photostrip.triangulation.error_propagation.control_errors import Misclosures
+    from photostrip.triangulation.gross_errors.control.control_screening import ScreenedControl
     from photostrip.triangulation.gross_errors.control.strip_at_control import ControlRay
     from photostrip.triangulation.polynomial.correction import Polynomial
 

@@ -105,7 +105,7 @@ class FormedPhotos:
         found = []
         for row, place in enumerate(oriented.control_rows.tolist()):
             pair = rays.photo[point == place]
-            if len(pair) == 2:  # noqa: PLR2004
+            if len(pair) == 2:
                 for along, other in (pair, pair[::-1]):
                     ray = oriented.at_control[row] - centers[along]
                     found.append(ControlRay(row, self.strip.photos[other], ray / np.linalg.norm(ray)))

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from photostrip.triangulation.gross_errors.control.control_deletion import Columns, JointAdjustment
 
 
-ROUNDS = 20
+ROUNDS = 10
 
 
 def candidates(whole: JointAdjustment) -> Columns:

@@ -1,12 +1,12 @@
 """Minimum deletion at the control: what the sum of squares loses without coordinates, and the tests made of it.
 
-All misclosures w have the covariance D; a similarity takes its part out. With M = D^-1 - D^-1 A (A^T D^-1 A)^-1 A^T D^-1
-the sum of squares is w^T M w, and without a set K of coordinates it is smaller by (M w)_K^T (M_KK)^-1 (M w)_K, the
-principle of ``pairs.deletion``. The same holds for other errors than those of single coordinates, columns h with h^T M h
-and h^T M w: bends of the strip beyond what its covariance allows, and wrong images of a control point.
+All misclosures w have the covariance D; a similarity, derivatives A, takes its part out. With
+M = D^-1 - D^-1 A (A^T D^-1 A)^-1 A^T D^-1 the sum of squares is w^T M w, and without coordinates K it is smaller
+by (M w)_K^T (M_KK)^-1 (M w)_K, the principle of ``pairs.deletion``. The same holds for other errors, columns h with
+h^T M h and h^T M w: bends of the strip beyond its covariance, and wrong images of a control point.
 
-One multivariate test for each point: plan, height, all, by F in units of the scatter of the others, which is never taken
-for less than the covariance says.
+One multivariate test for each point, plan, height and all, by F in units of the scatter of the others, which is never
+taken for less than the covariance says.
 
 Source: derived; data snooping with correlated observations.
 """
@@ -49,7 +49,8 @@ class Deletion:
     @property
     def spread(self) -> float:
         """Variance factor of the others, at least 1: what is not modelled makes misclosures larger, never smaller."""
-        return max(1.0, (self.squares - self.gain) / (self.freedom - len(self.columns)))
+        rest = self.freedom - len(self.columns)
+        return max(1.0, (self.squares - self.gain) / rest) if rest > 0 else np.inf
 
     @property
     def ratio(self) -> float:

@@ -109,7 +109,7 @@ def reliability(strip: StripAtControl, found: Found) -> tuple[Floats, Floats]:
         where = place.point[part[0]], place.axis[part[0]]
         others = found.whole.without([column for column in found.out if column not in part])
         detectable[where] = np.inf
-        if np.isfinite(tested.gain) and tested.freedom > 1:
+        if np.isfinite(tested.gain) and np.isfinite(tested.spread):
             limit = _limit(tested, found.whole, 1) + normal_quantile(POWER)
             detectable[where] = limit * np.sqrt(tested.spread) * _deviations(others, part)[0]
     return redundancy, detectable
@@ -121,7 +121,7 @@ def _limit(tested: Deletion, whole: JointAdjustment, count: int) -> float:
 
 
 def _deviations(others: JointAdjustment, columns: Columns) -> Floats:
-    """Standard deviations of errors estimated together, metres, for a variance factor of 1."""
+    """Return standard deviations of errors estimated together, metres, for a variance factor of 1."""
     return np.asarray(np.sqrt(others.cofactor(columns).diagonal()) / others.size[list(columns)], float)
 
 
