@@ -126,6 +126,12 @@ def f_sf(f: float, numerator: float, denominator: float) -> float:
     return beta_cdf(denominator / total, denominator / 2, numerator / 2, numerator * f / total)
 
 
+def f_isf(tail: float, numerator: float, denominator: float) -> float:
+    """Quantile of the F distribution with a given upper tail; secants in logarithms, as for Student's t."""
+    excess = lambda s: log(tail) - log(max(f_sf(exp(s), numerator, denominator), TINY))  # noqa: E731
+    return exp(_solve(excess, 1.0, -50.0, 700.0))
+
+
 def chi2_ppf(probability: float, dof: float) -> float:
     """Quantile of chi-square, from the cube-root approximation of Wilson and Hilferty."""
     z = NormalDist().inv_cdf(probability)

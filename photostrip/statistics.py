@@ -6,7 +6,7 @@ from functools import lru_cache
 from math import sqrt
 from statistics import NormalDist
 
-from photostrip.distributions import chi2_ppf, f_sf, t_isf, t_sf
+from photostrip.distributions import chi2_ppf, f_isf, f_sf, t_isf, t_sf
 
 SIGMA_FROM_MEDIAN = 1.4826  # standard deviation over the median of |x|, of a normal distribution
 
@@ -31,6 +31,12 @@ def t_p_value(t: float, dof: float) -> float:
 def f_p_value(f: float, dof_numerator: float, dof_denominator: float) -> float:
     """Upper tail of the F distribution: the probability of a ratio at least as large by chance."""
     return f_sf(f, dof_numerator, dof_denominator)
+
+
+@lru_cache(maxsize=4096)
+def f_quantile(probability: float, dof_numerator: float, dof_denominator: float) -> float:
+    """Quantile of F."""
+    return f_isf(1 - probability, dof_numerator, dof_denominator)
 
 
 @lru_cache(maxsize=4096)

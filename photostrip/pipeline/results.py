@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from photostrip.triangulation.bundle.selection import Selection
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
     from photostrip.triangulation.error_propagation.covariances import CheckTest
-    from photostrip.triangulation.gross_errors.control import control_significance
     from photostrip.triangulation.gross_errors.control.control_rejections import ControlRejection
+    from photostrip.triangulation.gross_errors.control.control_screening import ScreenedControl
     from photostrip.triangulation.gross_errors.pairs import screening
     from photostrip.triangulation.gross_errors.rays.snooping import ScreenedBundle
     from photostrip.triangulation.image_coordinates import corrections
@@ -118,11 +118,14 @@ class StripResult:
     depth: float  # mean distance of the points from the cameras along the viewing direction, metres; NaN if unknown
     notes: tuple[Note, ...]  # what this strip's numbers say beside themselves
     # control coordinates that were not used; ``control`` says so in its ``use``
-    wrong_control: tuple[ControlRejection, ...]
-    # what the covariance of the strip says of each coordinate of ``control``; None without
-    control_tests: control_significance.ControlTests | None = None
+    screened_control: ScreenedControl
     photo_stages: PhotoStages | None = None  # None for independent models
     model_stages: ModelStages | None = None  # None for photos
+
+    @property
+    def wrong_control(self) -> tuple[ControlRejection, ...]:
+        """Control coordinates that were rejected."""
+        return self.screened_control.rejections
 
     @property
     def strip(self) -> Strip | ModelStrip:

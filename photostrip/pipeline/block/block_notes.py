@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 OF_THE_STRIP_METHOD = {  # notes on strips that say nothing of a bundle adjustment
     "control-doubtful",
+    "control-image",
     "control-rejected",
     "covariance-proposed",
     "degree-reduced",

@@ -6,7 +6,7 @@ Source: [001] eq. 142-149.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
 import numpy as np
@@ -16,7 +16,7 @@ from photostrip.geodesy.local_frame import IntermediateFrame, mean_position, str
 from photostrip.geometry.similarity import similarity_derivatives
 from photostrip.pipeline.given_points import rows_of_given
 from photostrip.triangulation import absolute_orientation
-from photostrip.triangulation.gross_errors.control import control_screening, control_significance
+from photostrip.triangulation.gross_errors.control import control_screening
 from photostrip.triangulation.gross_errors.control.strip_at_control import StripAtControl
 
 if TYPE_CHECKING:
@@ -29,7 +29,8 @@ if TYPE_CHECKING:
     from photostrip.pipeline.results import StripResult, StripShape
     from photostrip.points import ControlPoints
     from photostrip.triangulation.error_propagation.control_errors import Misclosures
-    from photostrip.triangulation.gross_errors.control.control_rejections import ControlRejection
+    from photostrip.triangulation.gross_errors.control.control_screening import ScreenedControl
+    from photostrip.triangulation.gross_errors.control.strip_at_control import ControlRay
     from photostrip.triangulation.polynomial.correction import Polynomial
 
 
@@ -71,8 +72,11 @@ class StripStage(Protocol[Errors]):
     def misclosures(self, oriented: OrientedStrip[Errors]) -> Misclosures:
         """Control coordinates that count, with the derivatives of the strip there."""
 
-    def misclosure_covariance(self, oriented: OrientedStrip[Errors]) -> Floats:
-        """Covariance of all misclosures at the control, shape (w, w)."""
+    def misclosure_covariance(self, oriented: OrientedStrip[Errors], found: Misclosures) -> Floats:
+        """Covariance of some misclosures at the control, strip and control together, metres^2."""
+
+    def control_rays(self, oriented: OrientedStrip[Errors]) -> Sequence[ControlRay]:
+        """Rays of the control points that stand on two photos."""
 
     def screens_control(self, settings: Settings) -> bool:
         """Whether wrong control is looked for."""
@@ -143,9 +147,7 @@ class ScreenedStrip(Generic[Errors]):
     """A strip on the control that is not contradicted by the strip and the other control."""
 
     oriented: OrientedStrip[Errors]
-    wrong_control: tuple[ControlRejection, ...] = ()
-    # what the covariance of the strip says of each coordinate of the control; None without
-    control_tests: control_significance.ControlTests | None = None
+    screened_control: ScreenedControl
 
 
 def orient_on_control(
@@ -169,37 +171,25 @@ def reject_wrong_control(oriented: OrientedStrip[Errors], settings: Settings) ->
     """Take out control that the strip and all other control contradict, and lay the strip on what is left."""
     stage, control = oriented.stage, oriented.control
     if not stage.screens_control(settings):
-        return ScreenedStrip(oriented)
-    spacing, breadth = oriented.extent
+        return ScreenedStrip(oriented, control_screening.not_screened(control))
+    found = oriented.misclosures
+    moved = similarity_derivatives(oriented.at_control[found.point], oriented.at_control.mean(axis=0))
     place = StripAtControl(
-        xyz=stage.formed.xyz[oriented.control_rows],
+        control=control,
         frames=oriented.frames,
         intermediate=oriented.intermediate,
-        precision=oriented.precision,
-        spacing=spacing,
-        breadth=breadth,
-        covariance=_covariance_at_control(oriented),
-    )
-    kept, wrong = control_screening.screen_control(control, place)
-    tests = place.tests_by_covariance(control, kept)
-    if wrong:
-        oriented = to_ground(stage, kept, oriented.control_rows, oriented.frames)
-    return ScreenedStrip(oriented, wrong, tests)
-
-
-def _covariance_at_control(oriented: OrientedStrip[Errors]) -> control_significance.ControlCovariance | None:
-    """Covariance of all misclosures at the control; None where there are too many to form it as a whole."""
-    many = oriented.control.use.sum() > control_significance.LARGEST
-    if many or len(oriented.stage.strip.photos) > control_significance.LONGEST:
-        return None
-    found = oriented.misclosures
-    moved = similarity_derivatives(oriented.at_control[found.point], oriented.errors.origin)
-    return control_significance.ControlCovariance(
-        point=found.point,
-        axis=found.axis,
+        xyz=stage.formed.xyz[oriented.control_rows],
+        placed=oriented.at_control,
+        weight=oriented.weights,
+        rays=stage.control_rays(oriented),
+        coordinates=found,
         design=np.einsum("wi,wij->wj", found.direction, moved),
-        covariance=oriented.stage.misclosure_covariance(oriented),
+        covariance=partial(stage.misclosure_covariance, oriented),
     )
+    screened = control_screening.screen_control(place)
+    if screened.rejections:
+        oriented = to_ground(stage, screened.kept, oriented.control_rows, oriented.frames)
+    return ScreenedStrip(oriented, screened)
 
 
 def control_of(formed: StripShape, control: ControlPoints, point_ids: Sequence[str]) -> tuple[ControlPoints, Numbers]:

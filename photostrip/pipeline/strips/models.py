@@ -82,10 +82,13 @@ class LinkedModels:
         targets, xyz = oriented.targets, oriented.at_control
         return model_misclosures.misclosures(targets.turned(xyz), targets.axes(xyz), xyz, oriented.errors.origin)
 
-    def misclosure_covariance(self, oriented: Oriented) -> Floats:
-        """Covariance of all misclosures at the control, shape (w, w)."""
-        factor = self.formed.links.factor
-        return model_misclosures.covariance(oriented.errors, oriented.misclosures, oriented.control_rows, factor)
+    def misclosure_covariance(self, oriented: Oriented, found: Misclosures) -> Floats:
+        """Covariance of some misclosures at the control, strip and control together, metres^2."""
+        return model_misclosures.covariance(oriented.errors, found, oriented.control_rows, self.formed.links.factor)
+
+    def control_rays(self, _: Oriented) -> tuple[()]:
+        """Models have no rays."""
+        return ()
 
     def screens_control(self, settings: Settings) -> bool:
         """Whether wrong control is looked for."""
@@ -134,12 +137,11 @@ class LinkedModels:
             depth=float(np.nanmean(centers[:, 2]) - xyz[:, 2].mean()) if known else float("nan"),
             notes=(
                 *link_notes(strip, self.measured, formed),
-                *notes.wrong_control_notes(strip, screened.wrong_control),
+                *notes.wrong_control_notes(strip, screened.screened_control.rejections),
                 *notes.control_notes(strip, oriented.absolute),
                 *notes.polynomial_notes(strip, correction, xyz),
             ),
-            wrong_control=screened.wrong_control,
-            control_tests=screened.control_tests,
+            screened_control=screened.screened_control,
             model_stages=ModelStages(
                 strip=strip,
                 formed=formed,

@@ -80,7 +80,11 @@ def wrong_control_notes(strip: Strip | ModelStrip, wrong: Sequence[ControlReject
         )
         if each.exchanged_with:
             text += f"; it fits when exchanged with {each.exchanged_with}"
-        yield Note("control-rejected", text, strip=strip.id, points=(each.id,))
+        if each.photo:
+            text += f"; its image in photo {each.photo} is wrong, not its coordinates: they agree along its other ray"
+            yield Note("control-image", text, strip=strip.id, photos=(each.photo,), points=(each.id,))
+        else:
+            yield Note("control-rejected", text, strip=strip.id, points=(each.id,))
 
 
 def junction_notes(strip: Strip, formed: FormedStrip) -> Iterator[Note]:

@@ -12,6 +12,7 @@ from photostrip.pipeline import overruling
 from photostrip.pipeline.results import PhotoStages, StripResult
 from photostrip.pipeline.strips import notes
 from photostrip.triangulation.error_propagation import control_errors, covariances, strip_errors
+from photostrip.triangulation.gross_errors.control.strip_at_control import ControlRay
 from photostrip.triangulation.gross_errors.pairs import screening
 from photostrip.triangulation.gross_errors.rays.screened_formation import StripRays, form_screened, with_readmitted
 from photostrip.triangulation.relative_orientation.orientation import Orientation, orient_unchecked, refuse_unusable
@@ -90,13 +91,25 @@ class FormedPhotos:
         rows = oriented.control_rows
         return control_errors.misclosures(oriented.errors.points, targets.turned(xyz), rows, targets.axes(xyz))
 
-    def misclosure_covariance(self, oriented: Oriented) -> Floats:
-        """Covariance of all misclosures at the control, shape (w, w)."""
-        found = oriented.misclosures
+    def misclosure_covariance(self, oriented: Oriented, found: control_errors.Misclosures) -> Floats:
+        """Covariance of some misclosures at the control, strip and control together, metres^2."""
         # image coordinates are taken as good as stated, or as bad as the pairs have proved
         factor = max(1.0, float(np.median(self.screened.scatter.by_pair)) ** 2 / (2 * self.sigma**2))
-        everything = np.eye(len(found.point))
-        return covariances.of_parameters(oriented.errors, found, everything, factor).parameters * factor
+        strip = covariances.sums_of(oriented.errors, found.rows, np.eye(len(found.point)))
+        return strip * factor + np.diag(found.variance)
+
+    def control_rays(self, oriented: Oriented) -> list[ControlRay]:
+        """Rays of the control points that stand on two photos."""
+        rays, centers = self._rays_in_use(), oriented.absolute.similarity(self.formed.centers)
+        point = np.searchsorted(self.formed.point, self.observations.point[rays.rows])
+        found = []
+        for row, place in enumerate(oriented.control_rows.tolist()):
+            pair = rays.photo[point == place]
+            if len(pair) == 2:
+                for along, other in (pair, pair[::-1]):
+                    ray = oriented.at_control[row] - centers[along]
+                    found.append(ControlRay(row, self.strip.photos[other], ray / np.linalg.norm(ray)))
+        return found
 
     def screens_control(self, settings: Settings) -> bool:
         """Whether wrong control is looked for."""
@@ -141,7 +154,7 @@ class FormedPhotos:
             notes=(
                 *overruling.notes(settings.relative, strip.id, strip.photos),
                 *notes.screening_notes(strip, self.screened, self.sigma),
-                *notes.wrong_control_notes(strip, screened.wrong_control),
+                *notes.wrong_control_notes(strip, screened.screened_control.rejections),
                 *notes.pair_notes(strip, self.orientation),
                 *notes.junction_notes(strip, formed),
                 *notes.control_notes(strip, oriented.absolute),
@@ -150,8 +163,7 @@ class FormedPhotos:
                 *notes.photo_notes(strip, resection),
                 *notes.covariance_notes(strip, oriented.control, covariance),
             ),
-            wrong_control=screened.wrong_control,
-            control_tests=screened.control_tests,
+            screened_control=screened.screened_control,
             photo_stages=PhotoStages(
                 strip=strip,
                 sigma=self.sigma,

@@ -204,6 +204,8 @@ def _from_control(strip: StripResult, wrong: ControlRejection) -> Document:
     reason = "; ".join(f"{axis} by about {sizes[axis]:+.2f} m" for axis in wrong.axes)
     if wrong.exchanged_with:
         reason += f"; fits when exchanged with {wrong.exchanged_with}"
+    if wrong.photo:
+        reason += f"; the wrong ray is that of photo {wrong.photo}: the error lies along the other ray"
     return _entry(
         strip=strip.strip.id,
         point=wrong.id,
@@ -213,6 +215,7 @@ def _from_control(strip: StripResult, wrong: ControlRejection) -> Document:
         limit=wrong.limit,
         size=max((sizes[axis] for axis in wrong.axes), key=abs, default=0.0),
         size_unit="m",
+        blamed=[wrong.photo] if wrong.photo else [],
         reason=f"given coordinates contradict the strip and the other control: {reason}",
     )
 

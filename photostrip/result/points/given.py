@@ -221,9 +221,9 @@ def misclosures_of(result: Result) -> list[Document]:
     found = []
     for strip in result.strips:
         nothing = np.full(strip.control.use.shape, np.nan)
-        tested, correction = strip.control_tests, strip.polynomial
-        detectable = nothing if tested is None else tested.detectable
-        redundancy = nothing if tested is None else np.where(np.isfinite(detectable), tested.redundancy, np.nan)
+        screened, correction = strip.screened_control, strip.polynomial
+        detectable = screened.detectable
+        redundancy = np.where(np.isfinite(detectable), screened.redundancy, np.nan)
         leverage = [
             nothing[:, k] if correction is None or not correction.axes[k].terms else correction.axes[k].leverage
             for k in range(3)

@@ -35,6 +35,16 @@ class Misclosures:
     variance: Floats  # (w,): variance of the given coordinate, metres^2
     rows: ErrorRows  # error of the strip along the axis, d = 1
 
+    def take(self, some: Numbers) -> Misclosures:
+        """Select coordinates."""
+        return Misclosures(
+            point=self.point[some],
+            axis=self.axis[some],
+            direction=self.direction[some],
+            variance=self.variance[some],
+            rows=self.rows.take(some),
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class FitOperator:

@@ -1,22 +1,41 @@
-"""What was rejected of the control, and which points seem to have been exchanged."""
+"""What was rejected of the control, how large its errors are, and what seems to have happened."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from itertools import combinations
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from photostrip.geodesy.frame_spec import GROUND_AXES
-from photostrip.triangulation.gross_errors.control.strip_at_control import tests_by_kept
+from photostrip.statistics import f_quantile, normal_quantile
+from photostrip.triangulation.gross_errors.control.control_deletion import ALPHA, Deletion, adjust
 
 if TYPE_CHECKING:
-    from photostrip.arrays import Floats
-    from photostrip.points import ControlPoints
+    from photostrip.arrays import Flags, Floats
+    from photostrip.triangulation.gross_errors.control.control_deletion import Columns, JointAdjustment
     from photostrip.triangulation.gross_errors.control.strip_at_control import StripAtControl
 
 
-EXCHANGED = 0.2  # misclosures left by an exchange, over those before
+POWER = 0.8  # an error is called detectable when it is found in this share of cases
+
+
+class Found(NamedTuple):
+    """What a search took out."""
+
+    whole: JointAdjustment  # with all control
+    out: Columns  # coordinates and bends
+
+    @property
+    def left(self) -> JointAdjustment:
+        """The adjustment without what was taken out."""
+        return self.whole.without(self.out)
+
+    @property
+    def coordinates(self) -> Columns:
+        """What was taken out of the given coordinates."""
+        return tuple(column for column in self.out if column < self.whole.coordinates)
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,75 +45,134 @@ class ControlRejection:
     id: str
     # which coordinates look wrong: ``"east"``, ``"north"``, ``"up"`` (of the point's ground frame)
     axes: tuple[str, ...]
-    # value, limit: largest test value and its critical value
+    # value, limit: test value, the length of the error in standard deviations, and its critical value
     value: float
     limit: float
     # estimated errors of the coordinates east, north, up, metres: given minus what the others predict
     size: tuple[float, float, float]
-    redundancy: float  # smallest redundancy number of the coordinates rejected
     exchanged_with: str = ""  # the point with which it seems to have been exchanged; empty when there is none
-    # smallest error of the worst coordinate that is found in 80 % of cases, metres; NaN when unknown
+    photo: str = ""  # the photo in which its image is wrong rather than its coordinates; empty when they are
+    # smallest error of the worst coordinate that is found in 80 % of cases, metres
     detectable: float = float("nan")
 
 
-def control_rejections(
-    control: ControlPoints, kept: ControlPoints, strip: StripAtControl
-) -> tuple[ControlRejection, ...]:
-    """List the points with rejected coordinates, with errors as the others predict them and exchanges."""
-    out = control.use & ~kept.use
-    if not out.any():
-        return ()
-    tests = tests_by_kept(control, kept, strip)
-    value, limit, size = tests.value, tests.limit, tests.size
-    partner = _exchanges(control, kept, strip, size)
-    by_covariance = strip.tests_by_covariance(control, kept)
-    detectable = np.full(control.use.shape, np.nan) if by_covariance is None else by_covariance.detectable
-    rows = np.flatnonzero(out.any(axis=1)).tolist()
-    found = []
-    for row in rows:
-        beyond = out[row] & (value[row] > limit[row])
-        # what others that were taken back since then do not contradict any more is named as it was rejected
-        axes = np.flatnonzero(beyond if beyond.any() else out[row])
-        worst = axes[np.nan_to_num(value[row] / limit[row])[axes].argmax()]
-        found.append(
+def kept_of(strip: StripAtControl, found: Found) -> Flags:
+    """Coordinates that stay (n, 3)."""
+    kept = strip.control.use.copy()
+    out = list(found.coordinates)
+    kept[strip.coordinates.point[out], strip.coordinates.axis[out]] = False
+    return kept
+
+
+def control_rejections(strip: StripAtControl, found: Found) -> list[ControlRejection]:
+    """List the points with rejected coordinates."""
+    control, place = strip.control, strip.coordinates
+    _, detectable = reliability(strip, found)
+    partner = _exchanges(strip, found)
+    rejections = []
+    for point in found.whole.points:
+        part = tuple(column for column in point if column in found.coordinates)
+        if not part:
+            continue
+        row = int(place.point[point[0]])
+        photo = _wrong_image(strip, found, point, part)
+        tested = found.whole.test(found.out, part)
+        others = found.whole.without([column for column in found.out if column not in point])
+        size = np.zeros(3)
+        size[place.axis[list(point)]] = -others.estimate(point)
+        single = np.abs(others.estimate(part)) / _deviations(others, part) / np.sqrt(tested.spread)
+        worst = part[int(single.argmax())]
+        beyond = [column for column, value in zip(part, single, strict=True) if value > _limit(tested, found.whole, 1)]
+        rejections.append(
             ControlRejection(
                 id=control.ids[row],
-                axes=tuple(GROUND_AXES[k] for k in axes),
-                value=float(value[row, worst]),
-                limit=float(limit[row, worst]),
-                size=(float(size[row, 0]), float(size[row, 1]), float(size[row, 2])),
-                redundancy=float(tests.redundancy[row, axes].min()),
+                axes=tuple(GROUND_AXES[place.axis[column]] for column in (beyond or part)),
+                value=float(np.sqrt(tested.gain / tested.spread)),
+                limit=_limit(tested, found.whole, len(part)),
+                size=(float(size[0]), float(size[1]), float(size[2])),
                 exchanged_with=partner.get(row, ""),
-                detectable=float(detectable[row, worst]),
+                photo=photo,
+                detectable=float(detectable[row, place.axis[worst]]),
             )
         )
-    return tuple(found)
+    return rejections
 
 
-def _exchanges(control: ControlPoints, kept: ControlPoints, strip: StripAtControl, size: Floats) -> dict[int, str]:
-    """Find pairs of rejected points that fit when their coordinates are exchanged, by trying the exchange."""
-    out = control.use & ~kept.use
-    rows = np.flatnonzero(out[:, :2].any(axis=1)).tolist()
-    found: dict[int, str] = {}
-    for number, one in enumerate(rows):
-        for other in rows[number + 1 :]:
-            if control.frame[one] != control.frame[other] or not (control.use[one] == control.use[other]).all():
-                continue
-            step = (control.enu[other] - control.enu[one])[:2]
-            gaps = np.array([size[one, :2] + step, size[other, :2] - step])
-            before = np.array([size[one, :2], size[other, :2]])
-            # a try is worth while when the exchange takes away most of both errors
-            if np.linalg.norm(gaps) < EXCHANGED * np.linalg.norm(before) and _fit_exchanged(
-                control, kept, strip, (one, other)
-            ):
-                found[one], found[other] = control.ids[other], control.ids[one]
-    return found
+def reliability(strip: StripAtControl, found: Found) -> tuple[Floats, Floats]:
+    """Redundancy numbers of all coordinates, and smallest errors found in 80 % of cases, (n, 3) each."""
+    redundancy, detectable = np.full((2, *strip.control.use.shape), np.nan)
+    left, place = found.left, strip.coordinates
+    share = (left.matrix / np.outer(1 / left.size, 1 / left.size))[: left.coordinates, : left.coordinates]
+    redundancy[place.point, place.axis] = np.einsum("ij,ji->i", share, left.covariance)
+    for part in ((column,) for column in range(left.coordinates)):
+        tested = found.whole.test(found.out, part)
+        where = place.point[part[0]], place.axis[part[0]]
+        others = found.whole.without([column for column in found.out if column not in part])
+        detectable[where] = np.inf
+        if np.isfinite(tested.gain) and np.isfinite(tested.spread):
+            limit = _limit(tested, found.whole, 1) + normal_quantile(POWER)
+            detectable[where] = limit * np.sqrt(tested.spread) * _deviations(others, part)[0]
+    return redundancy, detectable
 
 
-def _fit_exchanged(control: ControlPoints, kept: ControlPoints, strip: StripAtControl, rows: tuple[int, int]) -> bool:
-    """Whether two points agree with all others when each has the coordinates of the other."""
-    order = np.arange(len(control))
-    order[list(rows)] = rows[::-1]
-    exchanged = replace(control, enu=control.enu[order], sigma=control.sigma[order])
-    tests = tests_by_kept(exchanged, kept, strip)
-    return bool((tests.value[list(rows)] <= tests.limit[list(rows)]).all())
+def _limit(tested: Deletion, whole: JointAdjustment, count: int) -> float:
+    """Critical value of the length of an error of some coordinates, in standard deviations."""
+    return float(np.sqrt(count * f_quantile(1 - whole.level, count, tested.freedom - count)))
+
+
+def _deviations(others: JointAdjustment, columns: Columns) -> Floats:
+    """Return standard deviations of errors estimated together, metres, for a variance factor of 1."""
+    return np.asarray(np.sqrt(others.cofactor(columns).diagonal()) / others.size[list(columns)], float)
+
+
+def _wrong_image(strip: StripAtControl, found: Found, point: Columns, part: Columns) -> str:
+    """Name the photo whose image of the point is wrong, not its coordinates.
+
+    An error of the image moves the point along its other ray: that explains all its misclosures, and the rejected
+    coordinates do not.
+    """
+    others = found.whole.without([column for column in found.out if column not in point])
+    everything = others.deletions([point])[0]
+    if len(part) < len(point):
+        alone = others.deletions([part])[0]
+        if _beside(everything, alone).probability > ALPHA:
+            return ""
+    row = strip.coordinates.point[point[0]]
+    photo, best = "", ALPHA
+    for column, ray in enumerate(strip.rays, found.whole.first_ray):
+        if ray.point == row and len(point) > 1:
+            left = _beside(everything, others.deletions([(column,)])[0]).probability
+            if left > best:
+                photo, best = ray.photo, left
+    return photo
+
+
+def _beside(everything: Deletion, some: Deletion) -> Deletion:
+    """Test what all coordinates of a point explain beside some error of it."""
+    return Deletion(
+        columns=everything.columns[len(some.columns) :],
+        gain=everything.gain - some.gain,
+        squares=everything.squares - some.gain,
+        freedom=everything.freedom - len(some.columns),
+    )
+
+
+def _exchanges(strip: StripAtControl, found: Found) -> dict[int, str]:
+    """Find pairs of rejected points that the others predict when each has the coordinates of the other."""
+    control, whole, place = strip.control, found.whole, strip.coordinates
+    kept = kept_of(strip, found)
+    wrong = np.flatnonzero((control.use & ~kept)[:, 0]).tolist()
+    partner: dict[int, str] = {}
+    for one, other in combinations(wrong, 2):
+        if control.frame[one] != control.frame[other] or not (control.use[one] == control.use[other]).all():
+            continue
+        order = np.arange(len(control))
+        order[[one, other]] = other, one
+        exchanged = strip.misclosures(kept, replace(control, enu=control.enu[order]))
+        tried = adjust(strip, exchanged, whole.covariance, bends=whole.first_ray > whole.coordinates)
+        both = tuple(np.flatnonzero(np.isin(place.point, (one, other))).tolist())
+        before = tried.without([column for column in found.out if column not in both])
+        gain = before.squares - before.without(both).squares
+        if Deletion(both, gain, before.squares, before.freedom).probability > whole.level:
+            partner[one], partner[other] = control.ids[other], control.ids[one]
+    return partner

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +12,6 @@ from photostrip.pipeline import Settings, triangulate
 from photostrip.pipeline.strips.adjusting import adjust_formed
 from photostrip.pipeline.strips.photos import form_strip
 from photostrip.result.document import document_of
-from photostrip.triangulation.gross_errors.control import control_screening
 from tests.strips import LOCAL, MICROMETRE, control_points, fly, project
 
 if TYPE_CHECKING:
@@ -108,31 +106,6 @@ def test_rejected_control_stands_in_the_log() -> None:
         assert not row["readmitted"]
     assert "north by about +" in rows["p3_1"]["reason"]
     assert "up by about +" in rows["p6_0"]["reason"]
-
-
-def test_control_that_others_no_longer_contradict_is_named_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A coordinate was rejected; what was taken back after it predicts it within its limit. The log must hold it."""
-    strip = flown()
-    sound = triangulate(
-        project(strip, control_points({n: strip.xyz[strip.at[n]] for n in strip.bands(*STATIONS)}, sigma=0.02)),
-        Settings(),
-    )
-    assert not sound.strips[0].wrong_control
-    monkeypatch.setattr(control_screening, "_readmitted", lambda *given: _without_first(given[1]))
-    result = adjusted(strip, {"p6_0": (0.0, 0.0, 4.0)})
-    found = {each.id: each for each in result.strips[0].wrong_control}
-    first = result.inputs.control.ids[0]
-    assert found[first].axes == ("east", "north", "up")
-    assert found[first].value < found[first].limit
-    assert np.abs(found[first].size).max() < 0.5
-    rows = [row for row in document_of(result)["rejected"] if row["stage"] == "control"]
-    assert {row["point"] for row in rows} == {first, "p6_0"}
-
-
-def _without_first(control: ControlPoints) -> ControlPoints:
-    use = control.use.copy()
-    use[0] = False
-    return replace(control, use=use)
 
 
 # -------------------------------------------------------------------------------------------- much wrong control

@@ -1,0 +1,217 @@
+"""Minimum deletion at the control: what the sum of squares loses without coordinates, and the tests made of it.
+
+All misclosures w have the covariance D; a similarity, derivatives A, takes its part out. With
+M = D^-1 - D^-1 A (A^T D^-1 A)^-1 A^T D^-1 the sum of squares is w^T M w, and without coordinates K it is smaller
+by (M w)_K^T (M_KK)^-1 (M w)_K, the principle of ``pairs.deletion``. The same holds for other errors, columns h with
+h^T M h and h^T M w: bends of the strip beyond its covariance, and wrong images of a control point.
+
+One multivariate test for each point, plan, height and all, by F in units of the scatter of the others, which is never
+taken for less than the covariance says.
+
+Source: derived; data snooping with correlated observations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.statistics import chi2_quantile, f_p_value
+from photostrip.triangulation.gross_errors.pairs.deletion import gains
+from photostrip.triangulation.polynomial import terms
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from photostrip.arrays import Flags, Floats
+    from photostrip.triangulation.gross_errors.control.strip_at_control import StripAtControl
+
+    Columns = tuple[int, ...]
+
+
+ALPHA = 0.01  # of rejecting anything in a strip without wrong control
+LARGEST_SHARE = 0.5  # of the coordinates of plan or of height: nothing is said against a majority
+BENDS = ("XY", "X^2", "X^3")  # what a similarity leaves of the polynomials
+HEIGHT = 2
+
+
+@dataclass(frozen=True)
+class Deletion:
+    """What the sum of squares loses without some columns."""
+
+    columns: Columns
+    gain: float
+    squares: float  # sum of squares with them
+    freedom: int
+
+    @property
+    def spread(self) -> float:
+        """Variance factor of the others, at least 1: what is not modelled makes misclosures larger, never smaller."""
+        rest = self.freedom - len(self.columns)
+        return max(1.0, (self.squares - self.gain) / rest) if rest > 0 else np.inf
+
+    @property
+    def ratio(self) -> float:
+        """Test value, distributed as F."""
+        return self.gain / len(self.columns) / self.spread
+
+    @property
+    def probability(self) -> float:
+        """Probability of a larger test value by chance; 1 where nothing checks the columns."""
+        rest = self.freedom - len(self.columns)
+        return f_p_value(self.ratio, len(self.columns), rest) if rest > 0 and np.isfinite(self.gain) else 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class JointAdjustment:
+    """The misclosures adjusted together; columns are the w coordinates, then the bends, then the rays."""
+
+    w: Floats  # (w,): misclosures, metres
+    covariance: Floats  # (w, w): D
+    design: Floats  # (w, 7): A
+    errors: Floats  # (w, h): H, what the columns do to the misclosures
+    size: Floats  # (h,): square root of the diagonal of H^T D^-1 H, by which the columns are divided below
+    matrix: Floats  # (h, h): H^T M H
+    pull: Floats  # (h,): H^T M w
+    squares: float  # w^T M w
+    freedom: int
+    points: tuple[Columns, ...]  # columns of each control point
+    parts: tuple[Columns, ...]  # columns of plan and of height of each, and of each bend
+    height: Flags  # (w,)
+    first_ray: int  # column of the first ray
+
+    @property
+    def coordinates(self) -> int:
+        """Number of given coordinates, which are the first columns."""
+        return len(self.w)
+
+    @property
+    def hypotheses(self) -> list[Columns]:
+        """Columns of plan, of height and of all coordinates of every point."""
+        return sorted({*self.points, *(part for part in self.parts if part[0] < self.coordinates)})
+
+    @property
+    def level(self) -> float:
+        """Level of a single test: its share of that of the strip."""
+        return ALPHA / max(len(self.hypotheses), 1)
+
+    @property
+    def explained(self) -> bool:
+        """Whether the covariance explains the misclosures: the test of the whole."""
+        return self.freedom > 0 and self.squares <= chi2_quantile(1 - ALPHA, self.freedom)
+
+    def without(self, out: Sequence[int]) -> JointAdjustment:
+        """Delete columns; their rows become zero."""
+        if not len(out):
+            return self
+        rows = list(out)
+        back = self.cofactor(rows) @ self.matrix[rows]
+        matrix, pull = self.matrix - self.matrix[:, rows] @ back, self.pull - self.pull[rows] @ back
+        matrix[rows] = matrix[:, rows] = pull[rows] = 0.0
+        gain = self.pull[rows] @ self.cofactor(rows) @ self.pull[rows]
+        return replace(
+            self,
+            matrix=matrix,
+            pull=pull,
+            squares=max(self.squares - float(gain), 0.0),
+            freedom=self.freedom - len(rows),
+        )
+
+    def estimate(self, columns: Sequence[int]) -> Floats:
+        """Errors of some columns together, of strip minus given, metres."""
+        rows = list(columns)
+        return np.asarray(self.cofactor(rows) @ self.pull[rows], float) / self.size[rows]
+
+    def cofactor(self, columns: Sequence[int]) -> Floats:
+        """Inverse of M_KK."""
+        rows = list(columns)
+        return np.asarray(np.linalg.pinv(self.matrix[np.ix_(rows, rows)], hermitian=True), float)
+
+    def deletions(self, sets: Iterable[Columns]) -> list[Deletion]:
+        """Delete each set by itself."""
+        found = []
+        chosen = list(sets)
+        for count in sorted({len(each) for each in chosen}):
+            same = [each for each in chosen if len(each) == count]
+            gain = gains(self.pull[None], self.matrix[None], np.array(same, np.intp))[0]
+            found += [Deletion(*each, self.squares, self.freedom) for each in zip(same, gain.tolist(), strict=True)]
+        return found
+
+    def allows(self, out: Sequence[int]) -> bool:
+        """Whether what is left is a majority in plan and in height, and checks itself."""
+        gone = self.height[[column for column in out if column < self.coordinates]]
+        heights, plan = LARGEST_SHARE * self.height.sum(), LARGEST_SHARE * (~self.height).sum()
+        return bool(gone.sum() <= heights and (~gone).sum() <= plan and self.freedom > len(out))
+
+    def grown(self, out: Columns = ()) -> Columns:
+        """Delete the most significant hypothesis, test the others again, until none is significant."""
+        left = self.without(out)
+        found = [
+            each
+            for each in left.deletions(self.hypotheses)
+            # F needs more than chi-square does
+            if each.gain > chi2_quantile(1 - self.level, len(each.columns)) * each.spread
+        ]
+        for each in sorted(found, key=lambda each: (each.probability, -each.ratio)):
+            if each.probability < self.level and self.allows((*out, *each.columns)):
+                return self.grown((*out, *each.columns))
+        return out
+
+    def shrunk(self, out: Columns) -> Columns:
+        """Take back what the others predict after all, the least significant part first."""
+        tests = [self.test(out, part) for part in self.parts if set(part) <= set(out)]
+        best = max(tests, key=lambda each: each.probability, default=None)
+        if best is None or best.probability < self.level:
+            return out
+        return self.shrunk(tuple(column for column in out if column not in best.columns))
+
+    def test(self, out: Columns, part: Columns) -> Deletion:
+        """Test a part against what stays, whether it was deleted or not."""
+        return self.without([column for column in out if column not in part]).deletions([part])[0]
+
+
+def adjust(strip: StripAtControl, w: Floats, covariance: Floats, *, bends: bool = False) -> JointAdjustment:
+    """Adjust misclosures w (w,) with their covariance.
+
+    bends: whether the strip may be bent more than its covariance says, by polynomials.
+    """
+    found = strip.coordinates
+    count = len(w)
+    position = strip.placed - strip.placed.mean(axis=0)
+    columns = terms.columns(position / np.maximum(np.abs(position).max(axis=0), 1e-9), BENDS if bends else ())
+    bent = (columns[found.point][:, :, None] * found.direction[:, None, :]).reshape(count, -1)
+    rays = [(found.point == ray.point) * (found.direction @ ray.direction) for ray in strip.rays]
+    errors = np.column_stack([np.eye(count), bent, *rays])
+    size = np.sqrt(np.einsum("ij,ij->j", errors, np.linalg.solve(covariance, errors)))
+    scaled = errors / size
+    projector = projected(covariance, strip.design)
+    points = [np.flatnonzero(found.point == point) for point in np.unique(found.point)]
+    height = found.axis == HEIGHT
+    parts = [rows[height[rows] == which] for rows in points for which in (False, True)]
+    parts += [np.array([count + number]) for number in range(bent.shape[1])]
+    pull = projector @ w
+    return JointAdjustment(
+        w=w,
+        covariance=covariance,
+        design=strip.design,
+        errors=errors,
+        size=size,
+        matrix=scaled.T @ projector @ scaled,
+        pull=scaled.T @ pull,
+        squares=float(w @ pull),
+        freedom=count - strip.design.shape[1],
+        points=tuple(tuple(rows.tolist()) for rows in points),
+        parts=tuple(tuple(rows.tolist()) for rows in parts if len(rows)),
+        height=height,
+        first_ray=count + bent.shape[1],
+    )
+
+
+def projected(covariance: Floats, design: Floats) -> Floats:
+    """M: the weight matrix after a similarity has taken what it can."""
+    weight = np.linalg.inv(covariance)
+    design = design / np.maximum(np.abs(design).max(axis=0), 1e-300)
+    pulled = weight @ design
+    return np.asarray(weight - pulled @ np.linalg.pinv(design.T @ pulled, hermitian=True) @ pulled.T, float)

@@ -1,0 +1,249 @@
+"""Control tested in one adjustment: against least squares written out, and in strips whose truth is known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import settings as examples
+from hypothesis import strategies as st
+from scipy.linalg import cholesky, lstsq, solve_triangular
+from scipy.stats import f as f_distribution
+from scipy.stats import norm
+
+from photostrip.pipeline import Settings, triangulate
+from photostrip.points import ControlPoints
+from photostrip.result.document import document_of
+from photostrip.triangulation.error_propagation.control_errors import Misclosures
+from photostrip.triangulation.error_propagation.derivatives import ErrorRows
+from photostrip.triangulation.gross_errors.control import control_screening, strip_at_control
+from photostrip.triangulation.gross_errors.control.control_deletion import adjust
+from photostrip.triangulation.gross_errors.control.control_rejections import Found, reliability
+from photostrip.triangulation.gross_errors.control.strip_at_control import StripAtControl
+from tests.loops import nonempty
+from tests.strips import MICROMETRE, control_points, fly, project
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from photostrip.pipeline import Result
+    from photostrip.triangulation.gross_errors.control.control_deletion import JointAdjustment
+    from tests.strips import Flown
+
+    Flags = NDArray[np.bool_]
+    Floats = NDArray[np.float64]
+
+SEEDS = st.integers(0, 2**31)
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn(StripAtControl):
+    """Misclosures that are drawn, the same after any similarity."""
+
+    w: Floats
+
+    def misclosures(self, kept: Flags, control: ControlPoints | None = None) -> Floats:  # noqa: ARG002
+        return self.w
+
+
+def drawn(seed: int, points: int = 8, worse: float = 1.0) -> Drawn:
+    """Give correlated misclosures of a similarity of random design."""
+    rng = np.random.default_rng(seed)
+    w = 3 * points
+    root = rng.normal(0, 0.15, (w, w)) + 2 * np.eye(w)
+    design = rng.normal(0, 1, (w, 7)) * [1, 1, 1, 1e3, 1e3, 1e3, 1e2]
+    point, axis = np.repeat(np.arange(points), 3), np.tile(np.arange(3), points)
+    nothing = cast("Any", None)
+    rows = ErrorRows.without_images(point, np.zeros((w, 1, 7)), np.zeros((w, 0, 1, 0)))
+    names = tuple(f"c{number}" for number in range(points))
+    control = ControlPoints(
+        ids=names,
+        enu=np.zeros((points, 3)),
+        use=np.ones((points, 3), bool),
+        check=np.zeros(points, bool),
+        sigma=np.ones((points, 3)),
+        frame=np.zeros(points, np.intp),
+    )
+    return Drawn(
+        control=control,
+        frames=(),
+        intermediate=nothing,
+        xyz=np.zeros((points, 3)),
+        placed=rng.uniform(-1, 1, (points, 3)),
+        weight=np.ones((points, 3)),
+        rays=(),
+        coordinates=Misclosures(point, axis, np.eye(3)[axis], np.ones(w), rows),
+        design=design,
+        covariance=lambda _: np.asarray(root @ root.T),
+        w=worse * (root @ rng.normal(0, 1, w)) + design @ rng.normal(0, 1, 7),
+    )
+
+
+def adjusted_jointly(strip: Drawn) -> JointAdjustment:
+    return adjust(strip, strip.w, strip.covariance(strip.coordinates))
+
+
+def squares(strip: Drawn, out: tuple[int, ...]) -> tuple[float, Floats, Floats]:
+    """Sum of squares with the errors of some coordinates as unknowns, those errors and their standard deviations."""
+    root = cholesky(strip.covariance(strip.coordinates), lower=True)
+    scaled = strip.design / np.abs(strip.design).max(axis=0)
+    design = solve_triangular(root, np.hstack([scaled, np.eye(len(root))[:, out]]), lower=True)
+    white = solve_triangular(root, strip.w, lower=True)
+    estimate, left, *_ = lstsq(design, white)
+    sigma = np.sqrt(np.linalg.inv(design.T @ design).diagonal()) if out else np.zeros(7)
+    return float(left), estimate[7:], sigma[7:]
+
+
+@given(SEEDS)
+@examples(max_examples=25)
+def test_deletion_is_least_squares_with_the_errors_as_unknowns(seed: int) -> None:
+    strip = drawn(seed)
+    whole = adjusted_jointly(strip)
+    assert whole.squares == pytest.approx(squares(strip, ())[0], rel=1e-6)
+    out = (3, 4, 17)
+    for part in ((5,), (0, 1), (21, 22, 23), (3, 4)):
+        others = tuple(column for column in out if column not in part)
+        tested = whole.test(out, part)
+        before = squares(strip, others)[0]
+        after, errors, _ = squares(strip, (*others, *part))
+        assert tested.gain == pytest.approx(before - after, rel=1e-5)
+        assert whole.without(others).estimate(part) == pytest.approx(errors[len(others) :], rel=1e-5)
+        rest = 24 - 7 - len(others) - len(part)
+        value = (before - after) / len(part) / max(1.0, after / rest)
+        assert tested.probability == pytest.approx(f_distribution.sf(value, len(part), rest), rel=1e-5)
+
+
+def test_one_in_a_hundred_is_shared_by_plan_height_and_all_of_every_point() -> None:
+    whole = adjusted_jointly(drawn(1))
+    assert len(whole.hypotheses) == 3 * 8
+    assert whole.level * 24 == pytest.approx(0.01)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("worse", "fewest", "most"), [(1.0, 0, 4), (3.0, 5, 20)])
+def test_good_control_is_called_wrong_no_more_often_than_the_level_says(worse: float, fewest: int, most: int) -> None:
+    """One in a hundred where the variance is estimated; fewer where it is as stated, for it is never taken as less."""
+    alarms = sum(bool(adjusted_jointly(drawn(seed, worse=worse)).grown()) for seed in range(1000))
+    assert fewest <= alarms <= most
+
+
+def test_what_checks_itself_too_little_is_left_alone() -> None:
+    strip = drawn(1, points=3)
+    strip = replace(strip, w=strip.w + 100.0 * (np.arange(9) == 4))
+    found = control_screening.screen_control(strip)
+    assert not found.rejections
+    assert found.kept.use.all()
+
+
+def test_redundancy_numbers_add_up_and_an_error_found_in_four_of_five_cases_is_as_least_squares_says() -> None:
+    strip = drawn(3)
+    whole = adjusted_jointly(strip)
+    redundancy, detectable = reliability(strip, Found(whole, ()))
+    assert redundancy.sum() == pytest.approx(24 - 7, rel=1e-6)
+    after, _, sigma = squares(strip, (5,))
+    limit = np.sqrt(f_distribution.isf(whole.level, 1, 16))
+    assert detectable[1, 2] == pytest.approx((limit + norm.ppf(0.8)) * sigma[0] * max(1, after / 16) ** 0.5, rel=1e-5)
+
+
+def test_a_majority_is_never_rejected() -> None:
+    """Half of the heights may be wrong, not more."""
+    whole = adjusted_jointly(drawn(2, points=12))
+    heights = tuple(range(2, 36, 3))
+    assert whole.allows(heights[:6])
+    assert not whole.allows(heights[:7])
+    assert not whole.allows((0, 1, 3, 4, 6, 7, 9, 10, 12, 13, 15, 16, 18, 19))
+
+
+@pytest.mark.parametrize(("points", "sections"), [(33, 1), (34, 2), (66, 2), (67, 3)])
+def test_long_strips_are_cut_in_sections_of_a_hundred_coordinates(points: int, sections: int) -> None:
+    parts = drawn(1, points=points).sections()
+    assert len(parts) == sections
+    assert sorted(np.concatenate([rows for rows, _ in parts]).tolist()) == list(range(points))
+    for rows, part in nonempty(parts):
+        assert len(part.coordinates.point) == len(part.design) == 3 * len(rows) <= 100
+        assert part.control.ids == tuple(f"c{row}" for row in rows)
+    first = [part.placed[:, 0] for _, part in parts]
+    ends, starts = np.array([x.max() for x in first[:-1]]), np.array([x.min() for x in first[1:]])
+    assert (ends < starts).all()
+
+
+@pytest.mark.parametrize(("worse", "named"), [(1.0, True), (2.0, True), (4.5, False), (20.0, False)])
+def test_nothing_is_said_of_a_strip_that_nothing_explains(worse: float, named: bool) -> None:
+    """Up to 2.5 times the misclosures that its covariance lets expect a large error is found all the same."""
+    strip = drawn(4, points=12, worse=worse)
+    strip = replace(strip, w=strip.w + 200.0 * worse * (np.arange(36) == 8))
+    found = control_screening.screen_control(strip).rejections
+    assert [(each.id, each.axes) for each in found] == ([("c2", ("up",))] if named else [])
+
+
+# ---------------------------------------------------------------------------------------------------------- strips
+
+
+def adjusted(strip: Flown, names: tuple[str, ...], wrong: dict[str, tuple[float, float, float]]) -> Result:
+    rng = np.random.default_rng(7)
+    given_ = {name: strip.xyz[strip.at[name]] + rng.normal(0, 0.02, 3) for name in names}
+    for name, error in wrong.items():
+        given_[name] = given_[name] + error
+    return triangulate(project(strip, control_points(given_, sigma=0.02)), Settings())
+
+
+def flown(seed: int = 1) -> Flown:
+    return fly(seed, 13, sigma=5 * MICROMETRE, extra=60)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("error", [(0.0, 0.0, 6.0), (4.0, 0.0, 0.0), (0.0, -4.0, 0.0)])
+def test_a_wrong_point_without_a_band_mate_is_found(error: tuple[float, float, float]) -> None:
+    strip = flown()
+    names = ("p0_1", "p1_-1", "p4_1", "p5_-1", "p7_0", "p9_1", "p11_-1", "p12_1")
+    found = adjusted(strip, names, {"p7_0": error}).strips[0].wrong_control
+    assert [each.id for each in found] == ["p7_0"]
+    assert found[0].size == pytest.approx(error, abs=1.5)
+    assert not adjusted(strip, names, {}).strips[0].wrong_control
+
+
+def test_a_plan_error_of_two_metres_does_not_pass() -> None:
+    """At 1:10 000 a point of the strip is good to 0.1 m in plan."""
+    strip = flown()
+    found = adjusted(strip, strip.bands(0, 3, 6, 9, 12), {"p6_0": (2.0, 0.0, 0.0)}).strips[0].wrong_control
+    assert [(each.id, each.axes) for each in found] == [("p6_0", ("east",))]
+    assert found[0].detectable < 2.0
+
+
+def test_a_wrong_point_is_found_in_sections_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(strip_at_control, "LARGEST", 27)
+    strip = flown()
+    found = adjusted(strip, strip.bands(0, 3, 6, 9, 12), {"p6_1": (0.0, 0.0, 8.0)}).strips[0].wrong_control
+    assert [(each.id, each.axes) for each in found] == [("p6_1", ("up",))]
+
+
+def test_a_bend_takes_no_good_control() -> None:
+    """A bend that no random error explains: polynomials take it, and the good control stays."""
+    strip = flown()
+    names = strip.bands(0, 3, 6, 9, 12)
+    along = (strip.xyz[:, 0] - strip.xyz[:, 0].mean()) / np.ptp(strip.xyz[:, 0])
+    bent = replace(strip, xyz=strip.xyz + np.column_stack([0 * along, 0 * along, 400.0 * along**2]))
+    assert not adjusted(bent, names, {}).strips[0].wrong_control
+    found = adjusted(bent, names, {"p6_1": (0.0, 0.0, 8.0)}).strips[0].wrong_control
+    assert [each.id for each in found] == ["p6_1"]
+
+
+def test_a_wrong_image_of_a_control_point_on_two_photos_is_named_instead_of_its_coordinates() -> None:
+    """Its other ray leads all along the error; nothing else contradicts it."""
+    strip = flown()
+    o = strip.observations
+    (row,) = np.flatnonzero((o.photo == 0) & (o.point == o.point_ids.index("p0_1")))
+    xy = o.xy.copy()
+    xy[row, 0] += 0.2
+    spoiled = replace(strip, observations=replace(o, xy=xy))
+    result = adjusted(spoiled, strip.bands(0, 3, 6, 9, 12), {})
+    (found,) = result.strips[0].wrong_control
+    assert (found.id, found.photo) == ("p0_1", o.photo_ids[0])
+    assert not result.strips[0].control.use[result.strips[0].control.ids.index("p0_1")].any()
+    told = [note for note in result.notes if note.code in {"control-rejected", "control-image"}]
+    assert [(note.code, note.photos, note.points) for note in told] == [("control-image", (found.photo,), ("p0_1",))]
+    (line,) = [line for line in document_of(result)["rejected"] if line["stage"] == "control"]
+    assert line["blamed"] == [found.photo]
