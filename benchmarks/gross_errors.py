@@ -1,21 +1,29 @@
-"""Whole strips with gross errors: what is found, what is lost, and what the new points are worth afterwards.
+"""Projects with gross errors: what is found, what is lost, and what the new points are worth afterwards.
 
-Run it as ``python benchmarks/gross_errors.py [strips]``. Every simulated strip of 20 photos is adjusted four times: as
-it is, with gross errors in 1 to 5 % of its image points, without those measurements and the wrong control (what could
-be reached at best), and with the errors and the search switched off. Errors are from 5 standard deviations to 50 mm
-(all sizes on a logarithmic scale equally often), along x or y; in a third of the strips one control coordinate is
-wrong too.
+Every simulated project is adjusted four times: as it is, with gross errors in 1 to 5 % of its measurements, with the
+errors and without the search for them, and without those measurements and the wrong control (what could be reached at
+best). Errors are from 5 standard deviations to 50 mm (all sizes on a logarithmic scale equally often), along one axis;
+in a third of the projects one control coordinate is wrong too. Kinds: strips of 20 photos, blocks of 4 strips of 12
+photos by bundle (with GNSS and control at the corners of the strips, or with control along the perimeter), and strips
+of 19 independent models, with errors of their points or of their perspective centres, too. ``clean`` are projects of
+all sizes without errors, ``wrong-control`` strips with two fifths of the control wrong.
 
 An error along the base moves a point that stands on two photos along its other ray, and nothing contradicts it; points
-with a wrong measurement of their own are therefore counted apart.
+with a wrong measurement of their own are therefore left out of the errors.
+
+Usage: python benchmarks/gross_errors.py [PROJECTS] [--kind KIND] [--first-seed N] [--workers N]
 """
 
 from __future__ import annotations
 
+import argparse
 import os
 import sys
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
+from collections import Counter
+from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import product
+from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,70 +38,129 @@ import numpy as np  # noqa: E402
 from photostrip.errors import PhotostripError  # noqa: E402
 from photostrip.formats.output.simulation import inputs_of, settings_of  # noqa: E402
 from photostrip.pipeline import triangulate  # noqa: E402
+from photostrip.pipeline.inputs import CameraPositions  # noqa: E402
 from photostrip.simulate.simulation import simulate  # noqa: E402
-from photostrip.simulate.spec import Control, Flight, GrossError, Points, Spec  # noqa: E402
+from photostrip.simulate.spec import Control, Flight, Gnss, GrossError, Models, Points, Spec  # noqa: E402
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+    from multiprocessing.pool import Pool
+
     from numpy.typing import NDArray
 
-    from photostrip.pipeline import Result, Settings
+    from photostrip.pipeline import Inputs, Result, Settings
+    from photostrip.points import ControlPoints
     from photostrip.simulate.simulation import Simulation
 
     Floats = NDArray[np.float64]
     Flags = NDArray[np.bool_]
 
-SMALLEST, LARGEST = 5.0, 50_000.0  # standard deviations of an image coordinate; micrometres
+SMALLEST, LARGEST = 5.0, 50_000.0  # standard deviations of a measurement; micrometres
 WRONG_SHARE = (0.01, 0.05)
 CONTROL_ERRORS = (0.5, 50.0)  # m
-KINDS = ("without errors", "errors, auto", "errors, none", "errors, known")
-PASS_POINTS = 2  # good ones at a joint, so that a wrong one can be told from them
-CONSPICUOUS = 2.0  # ratio of rms that is printed for a single strip
+MUCH_SHARE, MUCH_ERRORS, MUCH_POINTS = 0.4, (5.0, 100.0), (14, 20)  # of much wrong control; m; control points
+RUNS = ("without errors", "errors, auto", "errors, none", "errors, known")
+CLEAN, AUTO, NONE, KNOWN = RUNS
+SIZES = {6: 2, 20: 2, 60: 4, 200: 8, 1000: 20, 3000: 30}  # photos of clean projects, and strips of the blocks
+LONG = 60  # photos from which clean projects are fewer
+
 STRIP = Spec(
     flight=Flight(photos=20, end_lap_percent=62.0),
     points=Points(rows=3, extra_per_model=8),
     control=Control(layout="bands", bands=7, per_band=3),
 )
+BLOCK = replace(STRIP, flight=replace(STRIP.flight, photos=12, strips=4))
+SCATTERED = replace(
+    STRIP,
+    flight=replace(STRIP.flight, photos=13),
+    control=Control(layout="random", use={"xy": 0.2, "z": 0.2, "xyz": 0.6}, sigma=(0.02, 0.02, 0.02)),
+)
+KINDS = {
+    "strips": STRIP,
+    "gnss": replace(BLOCK, control=Control(layout="corners"), gnss=Gnss()),
+    "perimeter": replace(BLOCK, control=Control(bands=4, per_band=3)),
+    "models": replace(STRIP, models=Models()),
+    "centres": replace(STRIP, models=Models()),  # models with errors in perspective centres, too
+}
+
+
+# -------------------------------------------------------------------------------------------------- projects
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
-    """One strip, adjusted.
+class Project:
+    """A simulated project with its truth."""
 
-    Parameters
-    ----------
-    errors : ndarray, shape (n, 3)
-        Errors of the new points in the intermediate frame, metres.
-    own : ndarray of bool, shape (n,)
-        Points with a wrong measurement of their own.
-    unused : frozenset of tuple
-        Photo and point of the good image points that took no part in anything.
-    good, alone, other_lost, wrong, found : int
-        Good image points, those of them that are alone on their point, unused ones whose point has no wrong ray, wrong
-        image points, those of them that place no point.
-    control_found : bool or None
-        Whether the wrong control coordinate was named; None without one, or when its point has no place in the strip.
-    alarms : int
-        Control points named beside it.
-    supported : bool
-        Whether every standard zone of every pair that has points has a good one, and every joint two.
-    """
+    simulation: Simulation
+    inputs: Inputs
+    settings: Settings
+    names: tuple[str, ...]  # of the measurements, ``photo/point`` or ``model/point``
+    wrong: frozenset[str] = frozenset()  # those of them with a gross error
 
-    errors: Floats
-    own: Flags
-    unused: frozenset[tuple[str, str]]
-    good: int
-    alone: int
-    other_lost: int
-    wrong: int
-    found: int
-    control_found: bool | None
-    alarms: int
-    supported: bool
+    @property
+    def wrong_control(self) -> set[str]:
+        """Control points with a wrong coordinate."""
+        return {error.point for error in self.simulation.truth.errors if error.kind == "control"}
+
+    def without_search(self) -> Settings:
+        """Look for no gross errors."""
+        s = self.settings
+        parts = {name: replace(getattr(s, name), screening="none") for name in ("relative", "links", "bundle")}
+        return replace(s, **parts)
+
+    def without(self, wrong: Iterable[str]) -> Settings:
+        """Leave measurements out."""
+        s, names = self.settings, sorted(wrong)
+        relative, links = replace(s.relative, drop=names), replace(s.links, drop=tuple(names))
+        return replace(s, relative=relative, links=links)
 
 
-def gross_errors(rng: np.random.Generator, image_points: int, sigma_um: float, *, control: bool) -> list[GrossError]:
-    """Draw gross errors for one strip."""
-    number = round(rng.uniform(*WRONG_SHARE) * image_points)
+def project_of(simulation: Simulation, wrong: frozenset[str] = frozenset()) -> Project:
+    """Give what the program is given: blocks are adjusted by bundle, control counts where it should."""
+    spec, inputs, settings = simulation.spec, inputs_of(simulation), settings_of(simulation)
+    if spec.flight.strips > 1:
+        settings = replace(settings, adjustment="bundle")
+        if spec.gnss is None:
+            inputs = replace(inputs, control=on_perimeter(simulation))
+    if spec.gnss is not None and simulation.gnss is not None:
+        photos, shape = simulation.observations.photo_ids, simulation.gnss.shape
+        positions = CameraPositions(
+            photos=photos,
+            frame=simulation.frames[0],
+            enu=simulation.gnss,
+            use=np.ones(shape, bool),
+            sigma=np.broadcast_to(spec.gnss.sigma, shape),
+            time=np.full(len(photos), np.nan),
+        )
+        inputs = replace(inputs, positions=positions)
+    return Project(simulation, inputs, settings, measurements(inputs), wrong)
+
+
+def on_perimeter(simulation: Simulation) -> ControlPoints:
+    """Keep control at the ends of all strips and at the outer edges; the rest are check points."""
+    control, wanted, strips = simulation.control, simulation.spec.control, simulation.spec.flight.strips
+    given = np.flatnonzero(~control.check)  # by strip, along it, then from left to right
+    strip, band, row = np.unravel_index(np.arange(len(given)), (strips, wanted.bands, wanted.per_band))
+    outer = (band == 0) | (band == wanted.bands - 1)
+    outer |= ((strip == 0) & (row == wanted.per_band - 1)) | ((strip == strips - 1) & (row == 0))
+    check = control.check.copy()
+    check[given[~outer]] = True
+    return replace(control, check=check)
+
+
+def measurements(inputs: Inputs) -> tuple[str, ...]:
+    """Name all measurements: image points, or points and centres of models."""
+    if inputs.models is None:
+        o = inputs.observations
+        return tuple(f"{o.photo_ids[i]}/{o.point_ids[k]}" for i, k in zip(o.photo, o.point, strict=True))
+    m = inputs.models.points
+    nodes = (*m.point_ids, *m.photo_ids)
+    return tuple(f"{m.model_ids[i]}/{nodes[k]}" for i, k in zip(m.model, m.node, strict=True))
+
+
+def gross_errors(rng: np.random.Generator, measured: int, sigma_um: float, *, control: bool) -> list[GrossError]:
+    """Draw gross errors for one project."""
+    number = round(rng.uniform(*WRONG_SHARE) * measured)
     sizes = np.exp(rng.uniform(np.log(SMALLEST * sigma_um), np.log(LARGEST), number))
     errors = [GrossError("image", size_um=float(size)) for size in sizes]
     if control:
@@ -101,190 +168,284 @@ def gross_errors(rng: np.random.Generator, image_points: int, sigma_um: float, *
     return errors
 
 
-def adjusted(simulation: Simulation, settings: Settings, wrong_rows: set[tuple[str, str]]) -> Run:
-    """Adjust one strip and compare it with its truth."""
-    result = triangulate(inputs_of(simulation), settings)
-    observations = simulation.observations
-    given = {name for name, check in zip(simulation.control.ids, simulation.control.check, strict=True) if not check}
-    truth = {name: row for row, name in enumerate(simulation.truth.points.ids)}
-    names = [observations.point_ids[number] for number in result.points.number]
-    errors = result.points.cartesian - simulation.truth.points.xyz[[truth[name] for name in names]]
-    new = np.array([name not in given for name in names])
-    injected = wrong_measurements(simulation)
-    spoiled = {name for _, name in wrong_rows}
-    photo = [observations.photo_ids[number] for number in observations.photo]
-    point = [observations.point_ids[number] for number in observations.point]
-    keys = list(zip(photo, point, strict=True))
-    bad = np.array([key in injected for key in keys])
-    used, placing = np.zeros(len(bad), bool), np.zeros(len(bad), bool)
+def pair_of_projects(kind: str, seed: int) -> tuple[Project, Project]:
+    """Simulate a project without errors and the same with errors."""
+    spec = replace(KINDS[kind], seed=seed)
+    rng, plain, control = np.random.default_rng(seed), simulate(spec), seed % 3 == 0
+    if plain.models is None:
+        errors = gross_errors(rng, len(plain.observations), spec.image.sigma_um, control=control)
+        spoiled = simulate(replace(spec, gross_errors=tuple(errors)))
+        wrong = frozenset(f"{error.photo}/{error.point}" for error in spoiled.truth.errors if error.kind == "image")
+        return project_of(plain), project_of(spoiled, wrong)
+    models = plain.models
+    may = np.flatnonzero((models.node < len(models.point_ids)) | (kind == "centres"))
+    errors = gross_errors(rng, len(may), 1000 * float(np.median(models.sigma)), control=control)
+    sizes = np.array([error.size_um / 1000 for error in errors if error.kind == "image"])
+    rows, xyz = rng.permutation(may)[: len(sizes)], models.xyz.copy()
+    xyz[rows, rng.integers(3, size=len(rows))] += sizes * rng.choice([-1.0, 1.0], len(rows))
+    spoiled = simulate(replace(spec, gross_errors=tuple(error for error in errors if error.kind == "control")))
+    project = project_of(replace(spoiled, models=replace(models, xyz=xyz)))
+    return project_of(plain), replace(project, wrong=frozenset(project.names[row] for row in rows.tolist()))
+
+
+# ------------------------------------------------------------------------------------------------ adjustment
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One project, adjusted."""
+
+    errors: Floats  # (n, 3): errors of the new points in the frame of the first strip, metres
+    point: tuple[str, ...]  # their names
+    used: frozenset[str]  # measurements that take part in anything
+    placing: frozenset[str]  # measurements that place a point
+    rejected: frozenset[str]  # control points and camera positions named as wrong
+    control: frozenset[str]  # control points that count and have a place
+
+    def sound(self, wrong: Iterable[str]) -> Floats:
+        """Errors of the points without a wrong measurement of their own."""
+        spoiled = {name.partition("/")[2] for name in wrong}
+        return self.errors[[name not in spoiled for name in self.point]]
+
+
+def adjusted(project: Project, settings: Settings) -> Run:
+    """Adjust a project and compare it with its truth."""
+    result = triangulate(project.inputs, settings)
+    control, truth = project.inputs.control, project.simulation.truth.points
+    given = {name for name, check in zip(control.ids, control.check, strict=True) if not check}
+    names = [result.refined.observations.point_ids[number] for number in result.points.number]
+    new = [row for row, name in enumerate(names) if name not in given]
+    errors = result.points.cartesian - truth.xyz[[truth.index[name] for name in names]]
+    used, placing = taking_part(result, len(project.names))
+    notes = [note for note in result.notes if note.code in {"control-rejected", "position-rejected"}]
+    return Run(
+        errors=(errors @ result.strips[0].intermediate.axes)[new],
+        point=tuple(names[row] for row in new),
+        used=frozenset(project.names[row] for row in np.flatnonzero(used | placing).tolist()),
+        placing=frozenset(project.names[row] for row in np.flatnonzero(placing).tolist()),
+        rejected=frozenset(name for note in notes for name in (*note.points, *note.photos)),
+        control=frozenset(given.intersection(names)),
+    )
+
+
+def taking_part(result: Result, count: int) -> tuple[Flags, Flags]:
+    """Measurements that take part in an orientation or a link, and those that place a point."""
+    used, placing = np.zeros((2, count), bool)
+    if result.bundle is not None:
+        placing[result.bundle.block.rows[result.bundle.screened.selection.images]] = True
+        return used, placing
     for strip in result.strips:
-        oriented = strip.of_photos.orientation
-        placing[strip.of_photos.rows] = True
-        used[oriented.rows[oriented.used].ravel()] = True
-    used |= placing
-    own = np.array([name in spoiled for name in names])[new]
-    wrong_control = [error.point for error in simulation.truth.errors if error.kind == "control"]
-    reported = {name for note in result.notes if note.code == "control-rejected" for name in note.points}
-    placed = {name for strip in result.strips for name in strip.control.ids}
-    named = wrong_control[0] in reported if wrong_control and wrong_control[0] in placed else None
-    alarms = len(reported - set(wrong_control))
-    local = (errors @ result.strips[0].intermediate.axes)[new]
-    lost = ~bad & ~used
-    other = lost & ~np.isin(point, list(spoiled))
-    rays = np.bincount(observations.point[~bad], minlength=len(observations.point_ids))
-    alone = ~bad & (rays[observations.point] == 1)
-    flags = (~bad, alone, other, bad, bad & ~placing)
-    good, single, spared, wrong, found = (int(each.sum()) for each in flags)
-    enough = supported(result, wrong_rows)
-    unused = frozenset(keys[row] for row in np.flatnonzero(lost).tolist())
-    return Run(local, own, unused, good, single, spared, wrong, found, named, alarms, enough)
+        if strip.model_stages is not None:
+            formed = strip.model_stages.formed
+            shared, rows = formed.links.shared, formed.models.row
+            used[rows[np.union1d(shared.before[formed.links.used], shared.after[formed.links.used])]] = True
+            placing[rows[formed.used]] = True
+        else:
+            oriented = strip.of_photos.orientation
+            used[oriented.rows[oriented.used].ravel()] = True
+            placing[strip.of_photos.rows] = True
+    return used, placing
 
 
-def wrong_measurements(simulation: Simulation) -> set[tuple[str, str]]:
-    """Give photo and point of the wrong measurements."""
-    return {(error.photo, error.point) for error in simulation.truth.errors if error.kind == "image"}
+def runs_of(kind: str, seed: int, wanted: Sequence[str] = RUNS) -> tuple[Project, dict[str, Run]]:
+    """Adjust one project without errors, with errors, without search, and without the wrong measurements."""
+    plain, spoiled = pair_of_projects(kind, seed)
+    ways = {
+        CLEAN: (plain, plain.settings),
+        AUTO: (spoiled, spoiled.settings),
+        NONE: (spoiled, spoiled.without_search()),
+        KNOWN: (plain, plain.without(spoiled.wrong)),
+    }
+    runs = {}
+    for name in wanted:
+        try:
+            runs[name] = adjusted(*ways[name])
+        except PhotostripError as error:
+            if name != NONE:
+                print(f"{kind} {seed}, {name}: {error}")
+    return spoiled, runs
 
 
-def supported(result: Result, wrong_rows: set[tuple[str, str]]) -> bool:
-    """Whether the strip has enough good points: in each zone of each pair that has any, and two at each joint."""
-    observations = result.refined.observations
-    for strip in result.strips:
-        pairs, rows, photos = strip.of_photos.orientation.pairs, strip.of_photos.orientation.rows, strip.strip.photos
-        place = 6 * pairs.pair + strip.of_photos.screened.zone - 1
-        names = [observations.point_ids[number] for number in observations.point[rows[:, 0]]]
-        good = [
-            (photos[pair], name) not in wrong_rows and (photos[pair + 1], name) not in wrong_rows
-            for pair, name in zip(pairs.pair, names, strict=True)
-        ]
-        if not set(place.tolist()) <= set(place[np.array(good)].tolist()):
-            return False
-        joined = strip.of_photos.formed.junctions
-        right = np.array(good)[joined.before] & np.array(good)[joined.after]
-        if (np.bincount(joined.junction[right], minlength=len(joined.factor)) < PASS_POINTS).any():
-            return False
-    return True
+# -------------------------------------------------------------------------------------------------- counting
+
+
+WIDTHS = (44, 14, 15, 13, 14, 11, 9, 9)
+HEADS = (
+    ("", "ratio", "by knowledge", "wrong", "good", "control", "control", "clean"),
+    ("", "plan/height", "plan/height", "placing", "lost", "named", "false", "touched"),
+)
+
+
+def line(cells: Sequence[str]) -> str:
+    """One line of the table."""
+    first, *others = zip(cells, WIDTHS, strict=True)
+    return f"{first[0]:{first[1]}s}" + "".join(f"{cell:>{width}s}" for cell, width in others)
+
+
+HEAD = "\n".join(line(cells) for cells in HEADS)
 
 
 @dataclass(eq=False)
-class Table:
-    """Sums over all strips."""
+class Tally:
+    """Sums over all projects of a kind."""
 
-    squares: dict[str, Floats]
-    points: dict[str, int]
-    failed: dict[str, int]
-    counts: dict[str, int]
-    ratios: list[float]
+    squares: dict[str, Floats] = field(default_factory=lambda: {name: np.zeros(3) for name in RUNS})
+    points: Counter[str] = field(default_factory=Counter)
+    counts: Counter[str] = field(default_factory=Counter)
+    ratios: list[float] = field(default_factory=list)
 
-    @classmethod
-    def empty(cls) -> Table:
-        """Begin with nothing."""
-        names = ["good", "lost", "searched away", "alone", "other lost", "wrong", "found", "clean good", "clean lost"]
-        names += ["control", "control found", "alarms", "clean alarms"]
-        return cls(
-            {kind: np.zeros(3) for kind in KINDS},
-            dict.fromkeys(KINDS, 0),
-            dict.fromkeys(KINDS, 0),
-            dict.fromkeys(names, 0),
-            [],
-        )
+    def add(self, project: Project, runs: dict[str, Run]) -> None:
+        """Count one project with errors."""
+        rms = {}
+        for name, run in runs.items():
+            squares = run.sound(project.wrong) ** 2
+            self.squares[name] += squares.sum(axis=0)
+            self.points[name] += len(squares)
+            rms[name] = float(np.sqrt(squares.sum(axis=1).mean()))
+        self.counts.update(f"failed {name}" for name in RUNS if name not in runs)
+        self.counts.update(good=len(project.names) - len(project.wrong), wrong=len(project.wrong))
+        if CLEAN in runs:
+            self.counts.update(clean=1, touched=loses_anything(project, runs[CLEAN]))
+        if AUTO in runs:
+            found, wrong = runs[AUTO], project.wrong_control & runs[AUTO].control
+            self.counts.update(placing=len(found.placing & project.wrong), control=len(wrong))
+            self.counts.update(named=len(wrong & found.rejected), false=len(found.rejected - project.wrong_control))
+            self.counts.update(lost=len(runs[KNOWN].used - found.used) if KNOWN in runs else 0)
+            self.ratios += [rms[AUTO] / rms[CLEAN]] if CLEAN in runs else []
 
-    def add(self, kind: str, run: Run) -> float:
-        """Add one strip; give its rms at sound points."""
-        sound = run.errors[~run.own]
-        self.squares[kind] += (sound**2).sum(axis=0)
-        self.points[kind] += len(sound)
-        if kind == KINDS[1]:
-            self.counts["lost"] += len(run.unused)
-            for name in ("good", "alone", "other_lost", "wrong", "found", "alarms"):
-                self.counts[name.replace("_", " ")] += getattr(run, name)
-            self.counts["control"] += run.control_found is not None
-            self.counts["control found"] += bool(run.control_found)
-        elif kind == KINDS[0]:
-            self.counts["clean good"] += run.good
-            self.counts["clean lost"] += len(run.unused)
-            self.counts["clean alarms"] += run.alarms > 0
-        return float(np.sqrt((sound**2).sum(axis=1).mean()))
+    def rms(self, name: str) -> Floats:
+        """Errors of points along and across the strip and up, metres."""
+        return np.asarray(np.sqrt(self.squares[name] / max(self.points[name], 1)))
 
-    def show(self, strips: int) -> None:
-        """Print everything."""
-        print(f"\n{strips} strips of 20 photos, {STRIP.image.sigma_um:g} um, 1:{STRIP.scale:.0f}")
-        print("                  rms along  across      up   plan ratio  height ratio   strips failed")
-        base = np.sqrt(self.squares[KINDS[0]] / self.points[KINDS[0]])
-        for kind in KINDS:
-            value = np.sqrt(self.squares[kind] / max(self.points[kind], 1))
-            plan, height = np.hypot(*value[:2]) / np.hypot(*base[:2]), value[2] / base[2]
-            row = f"{kind:16s}{value[0]:11.3f}{value[1]:8.3f}{value[2]:8.3f}{plan:13.3f}{height:14.3f}"
-            print(f"{row}{self.failed[kind]:16d}")
-        middle, most = np.quantile(self.ratios, (0.5, 0.95))
+    def ratio(self, name: str) -> tuple[float, float]:
+        """Errors in plan and in height over those without gross errors."""
+        value, base = self.rms(name), self.rms(CLEAN)
+        return float(np.hypot(*value[:2]) / np.hypot(*base[:2])), float(value[2] / base[2])
+
+    def row(self, title: str) -> str:
+        """One line below ``HEAD``."""
         c = self.counts
-        print(f"\nratio of a strip's rms: median {middle:.3f}, 95 % below {most:.3f}, largest {max(self.ratios):.3f}")
-        print(f"wrong image points that place no point: {c['found']} of {c['wrong']}")
-        percent = {name: 100 * c[name] / c["good"] for name in ("lost", "searched away", "alone", "other lost")}
-        print(f"good image points that took no part: {percent['lost']:.2f} %, that is")
-        print(f"    {percent['searched away']:.2f} % that would have taken part if the errors were known")
-        print(f"    {percent['lost'] - percent['searched away']:.2f} % that knowledge cannot use either")
-        print(f"good ones alone on their point: {percent['alone']:.2f} %; lost", end=" ")
-        print(f"of points without a wrong ray: {percent['other lost']:.3f} %")
-        print(f"the same in strips without errors: {c['clean lost']} of {c['clean good']}")
-        print(f"wrong control coordinates named: {c['control found']} of {c['control']}; others named: {c['alarms']}")
-        print(f"strips without errors of which control is named: {c['clean alarms']}\n", flush=True)
+        ratios = ["{:.3f}/{:.3f}".format(*self.ratio(name)) for name in (AUTO, KNOWN)]
+        found = f"{c['placing']} of {c['wrong']}", f"{c['lost']} of {c['good']}", f"{c['named']} of {c['control']}"
+        return line((title, *ratios, *found, str(c["false"]), f"{c['touched']}/{c['clean']}"))
 
 
-def four_runs(seed: int) -> tuple[dict[str, Run], list[str]]:
-    """Adjust one strip without errors, with errors, without search, and without the errors; give what failed, too."""
+def loses_anything(project: Project, run: Run) -> bool:
+    """Whether a measurement places no point, or control or a camera position is named."""
+    return len(run.placing) < len(project.names) or bool(run.rejected)
+
+
+def print_kinds(pool: Pool, kinds: Sequence[str], seeds: range) -> None:
+    """Print the errors of the new points of every kind of project, then what was found and lost."""
+    tallies = {kind: Tally() for kind in kinds}
+    print("project    adjusted         rms along  across      up   plan ratio  height ratio   failed", flush=True)
+    for kind, tally in tallies.items():
+        for project, runs in pool.imap(partial(runs_of, kind), seeds):
+            tally.add(project, runs)
+        for name in RUNS:
+            (plan, height), value = tally.ratio(name), tally.rms(name)
+            row = f"{kind:11s}{name:16s}{value[0]:10.3f}{value[1]:8.3f}{value[2]:8.3f}{plan:13.3f}{height:14.3f}"
+            print(f"{row}{tally.counts[f'failed {name}']:9d}", flush=True)
+    print(f"\n{HEAD}")
+    for kind, tally in tallies.items():
+        print(tally.row(kind))
+    print("\nproject    ratio of a project's rms: median, 95 % below, largest")
+    for kind, tally in tallies.items():
+        middle, most, largest = np.quantile(tally.ratios, (0.5, 0.95, 1.0)) if tally.ratios else 3 * (float("nan"),)
+        print(f"{kind:11s}{middle:32.3f}{most:12.3f}{largest:9.3f}")
+    print(flush=True)
+
+
+# ------------------------------------------------------------------------------- without errors, much wrong control
+
+
+def clean_spec(form: str, photos: int, seed: int) -> Spec:
+    """Give a project of any size: a strip, a strip of models, or a block with GNSS."""
+    flight = replace(STRIP.flight, photos=photos, scale=5000.0, heading_deg=0.0)
+    strip = replace(STRIP, flight=flight, control=Control(every=5), seed=seed)
+    if form == "models":
+        return replace(strip, models=Models())
+    if form == "strips":
+        return strip
+    strips = SIZES[photos]
+    flight = replace(flight, photos=photos // strips, strips=strips)
+    return replace(strip, flight=flight, control=Control(layout="corners"), gnss=Gnss())
+
+
+def clean_run(form: str, photos: int, seed: int) -> tuple[bool, bool, bool]:
+    """Whether a project without errors loses measurements, control, camera positions."""
+    project = project_of(simulate(clean_spec(form, photos, seed)))
+    run = adjusted(project, project.settings)
+    lost = len(run.placing) < len(project.names)
+    return lost, bool(run.rejected & run.control), bool(run.rejected - run.control)
+
+
+def print_clean(pool: Pool, seeds: range) -> None:
+    """Print how many projects without gross errors lose anything."""
+    print("without errors   photos   projects   lose measurements   control   positions   anything")
+    for form, photos in product(("strips", "blocks", "models"), SIZES):
+        some = seeds[: max(2, len(seeds) * LONG // max(photos, LONG))]
+        found = np.array(pool.map(partial(clean_run, form, photos), some, 1))
+        counts = "".join(f"{count:12d}" for count in (*found.sum(axis=0), found.any(axis=1).sum()))
+        print(f"{form:16s}{photos:7d}{len(some):11d}{counts}", flush=True)
+    print(flush=True)
+
+
+def much_wrong(control: ControlPoints, rng: np.random.Generator) -> tuple[ControlPoints, Flags]:
+    """Spoil two fifths of the plan positions and of the heights; also which coordinates are wrong."""
+    given, enu, bad = control.use & ~control.check[:, None], control.enu.copy(), np.zeros(control.use.shape, bool)
+    for row in rng.permutation(np.flatnonzero(given.any(axis=1))).tolist():
+        axes = [axis for axis in ([0, 1], [2]) if given[row, axis[0]]]
+        part = axes[rng.integers(len(axes))]
+        if bad[:, part[0]].sum() + 1 <= MUCH_SHARE * given[:, part[0]].sum():
+            error = rng.normal(size=len(part))
+            enu[row, part] += error / np.linalg.norm(error) * np.exp(rng.uniform(*np.log(MUCH_ERRORS)))
+            bad[row, part] = True
+    return replace(control, enu=enu), bad
+
+
+def much_wrong_run(seed: int) -> tuple[int, int, int, int]:
+    """Adjust a strip with much wrong control: wrong coordinates, those named, others named, and 1 for a failure."""
     rng = np.random.default_rng(seed)
-    clean = replace(STRIP, seed=seed)
-    plain = simulate(clean)
-    errors = gross_errors(rng, len(plain.observations), clean.image.sigma_um, control=seed % 3 == 0)
-    spoiled = simulate(replace(clean, gross_errors=tuple(errors)))
-    runs, failed = {}, []
-    known = [f"{photo}/{point}" for photo, point in sorted(wrong_measurements(spoiled))]
-    for kind, simulation in zip(KINDS, (plain, spoiled, spoiled, plain), strict=True):
-        settings = settings_of(simulation)
-        if kind == KINDS[2]:
-            settings = replace(settings, relative=replace(settings.relative, screening="none"))
-        if kind == KINDS[3]:
-            settings = replace(settings, relative=replace(settings.relative, drop=known))
-        try:
-            runs[kind] = adjusted(simulation, settings, wrong_measurements(spoiled))
-        except PhotostripError as error:
-            failed.append(kind)
-            if kind != KINDS[2]:
-                print(f"strip {seed}, {kind}: {error}")
-    return runs, failed
+    spec = replace(SCATTERED, control=replace(SCATTERED.control, count=int(rng.integers(*MUCH_POINTS))), seed=seed)
+    project = project_of(simulate(spec))
+    control, bad = much_wrong(project.inputs.control, rng)
+    try:
+        result = triangulate(replace(project.inputs, control=control), project.settings)
+    except PhotostripError as error:
+        print(f"wrong control {seed}: {error}")
+        return int(bad.sum()), 0, 0, 1
+    (kept,) = (strip.control for strip in result.strips)
+    rows = [control.ids.index(name) for name in kept.ids]
+    bad, out = bad[rows], control.use[rows] & ~kept.use
+    return int(bad.sum()), int((bad & out).sum()), int((out & ~bad).sum()), 0
 
 
-def _add(tables: tuple[Table, Table], number: list[int], seed: int, runs: dict[str, Run], failed: list[str]) -> None:
-    """Count one strip in the table of all and, when it has enough good points, in that of those."""
-    enough = KINDS[0] in runs and runs[KINDS[0]].supported
-    number[1] += enough
-    for table in tables if enough else tables[:1]:
-        rms = {kind: table.add(kind, run) for kind, run in runs.items()}
-        for kind in failed:
-            table.failed[kind] += 1
-        if KINDS[1] in runs and KINDS[3] in runs:
-            table.counts["searched away"] += len(runs[KINDS[1]].unused - runs[KINDS[3]].unused)
-        if KINDS[1] in rms:
-            table.ratios.append(rms[KINDS[1]] / rms[KINDS[0]])
-    if KINDS[1] in rms and table.ratios[-1] > CONSPICUOUS:
-        print(f"strip {seed}: {table.ratios[-1]:.2f} times the rms without errors; enough good points: {enough}")
+def print_much_wrong(pool: Pool, seeds: range) -> None:
+    """Print how many strips with two fifths of the control wrong lose just that."""
+    wrong, named, others, failed = np.array(pool.map(much_wrong_run, seeds, 1)).T
+    print(f"{MUCH_SHARE:.0%} of the control wrong: {((wrong == named) & (others == 0)).sum()} of {len(seeds)} strips")
+    print(f"lose just that; {named.sum()} of {wrong.sum()} wrong coordinates named, {others.sum()} others;", end=" ")
+    print(f"{failed.sum()} failed\n", flush=True)
 
 
-def main(strips: int) -> None:
-    """Adjust all strips and print the tables: of all, and of those with enough good points."""
-    tables = Table.empty(), Table.empty()
-    number = [strips, 0]
-    seeds = range(1, strips + 1)
-    with ProcessPoolExecutor(os.cpu_count()) as pool:
-        found = pool.map(four_runs, seeds)
-        for seed, (runs, failed) in zip(seeds, found, strict=True):
-            _add(tables, number, seed, runs, failed)
-    for title, table, count in zip(
-        ("All strips", "Strips with a good point in every zone and two at every joint"), tables, number, strict=True
-    ):
-        print(f"\n{title}")
-        table.show(count)
+def main() -> None:
+    """Print the tables that are asked for."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("projects", type=int, nargs="?", default=60, help="projects of each kind (default 60)")
+    parser.add_argument("--kind", choices=[*KINDS, "clean", "wrong-control", "all"], default="all")
+    parser.add_argument("--first-seed", type=int, default=1, help="number of the first project (default 1)")
+    parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes (default: one for each core)")
+    options = parser.parse_args()
+    seeds = range(options.first_seed, options.first_seed + options.projects)
+    with get_context("fork").Pool(options.workers, maxtasksperchild=1) as pool:
+        if kinds := [kind for kind in KINDS if options.kind in {kind, "all"}]:
+            print_kinds(pool, kinds, seeds)
+        if options.kind in {"clean", "all"}:
+            print_clean(pool, seeds)
+        if options.kind in {"wrong-control", "all"}:
+            print_much_wrong(pool, seeds)
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 300)
+    main()

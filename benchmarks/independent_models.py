@@ -182,7 +182,7 @@ def gross_errors(strips: int) -> None:
             found += int(points.node[row]) in gone
             alone += gone == [int(points.node[row])]
             clean = form_models(strip, points, settings)
-            lost += len({each.link for each in clean.links.rejections})
+            lost += len({int(clean.links.shared.link[each.row]) for each in clean.links.rejections})
             links += clean.links.shared.count
         print(
             f"| {size:g} | {100 * found / strips:.0f} % | {100 * alone / strips:.0f} % | {100 * lost / links:.1f} % |"

@@ -50,7 +50,6 @@ from photostrip.simulate.spec import Control, Flight, Points, Spec  # noqa: E402
 from photostrip.triangulation import absolute_orientation  # noqa: E402
 from photostrip.triangulation.gross_errors.control import control_screening  # noqa: E402
 from photostrip.triangulation.gross_errors.pairs import screening  # noqa: E402
-from photostrip.triangulation.gross_errors.rays import strip_screening  # noqa: E402
 from photostrip.triangulation.image_coordinates import corrections  # noqa: E402
 from photostrip.triangulation.polynomial import correction  # noqa: E402
 from photostrip.triangulation.relative_orientation.orientation import orient_pairs  # noqa: E402
@@ -197,7 +196,7 @@ STAGES = (
     ("screening of pairs", screening, "screen_pairs"),
     ("strip formation", of_strips, "form_from_pairs"),
     ("strip formation", screened_formation, "form_from_pairs"),
-    ("screening of the strip", strip_screening, "screen_rays"),
+    ("screening of the strip", screened_formation, "wrong_rays"),
     ("screening of control", control_screening, "screen_control"),
     ("absolute orientation", absolute_orientation, "orient"),
     ("polynomial", correction, "fit"),

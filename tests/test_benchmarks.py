@@ -115,3 +115,50 @@ def test_mutations_prints_changes_and_who_notices_them(monkeypatch: pytest.Monke
     assert len(rows) == 2
     assert any(row.startswith("`geometry/test_") for row in rows)
     assert re.search(rf"^\| all \| 2 \| {sum(row != 'NOT noticed' for row in rows)} \|$", out, re.MULTILINE)
+
+
+def test_gross_errors_prints_two_tables_for_one_project() -> None:
+    out = printed("gross_errors.py", "1", "--kind", "models", "--workers", "1", "--first-seed", "2")
+    assert len(re.findall(r"^models +(?:without errors|errors, \w+)(?: +\d+\.\d{3}){5} +[01]$", out, re.MULTILINE)) == 4
+    assert re.search(
+        r"^models +\d\.\d{3}/\d\.\d{3} +\d\.\d{3}/\d\.\d{3} +\d+ of \d+ +\d+ of \d+ +0 of 0", out, re.MULTILINE
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["perimeter", "wrong-control"])
+def test_gross_errors_finds_nearly_all_and_loses_little(kind: str) -> None:
+    out = printed("gross_errors.py", "1", "--kind", kind, "--workers", "1", "--first-seed", "3")
+    if kind == "wrong-control":
+        assert re.search(r"1 of 1 strips\nlose just that; (\d+) of \1 wrong coordinates named, 0 others; 0 failed", out)
+        return
+    ((plan, height, placing, wrong, lost, good),) = re.findall(
+        rf"^{kind} +(\S+)/(\S+) +\S+ +(\d+) of (\d+) +(\d+) of (\d+)", out, re.MULTILINE
+    )
+    assert max(float(plan), float(height)) < 1.5
+    assert int(placing) < 0.3 * int(wrong)
+    assert int(lost) < 0.02 * int(good)
+
+
+def test_ablation_changes_constants_where_they_are_imported_and_everything_it_switches_off_exists() -> None:
+    program = """
+import sys
+from benchmarks import ablation
+from photostrip.triangulation.bundle.quality import reliability
+from photostrip.triangulation.gross_errors.rays import point_decisions, snooping
+names = [f"{module.rpartition('.')[2]}.{name}" for module, name, _ in ablation.constants()]
+assert "snooping.NEAR" in names and "point_decisions.LIKELIER" in names
+ablation.put(reliability.__name__, "UNCONTROLLED", 0.25)
+assert point_decisions.UNCONTROLLED == reliability.UNCONTROLLED == 0.25
+for make in list(ablation.changes().values()):
+    make()
+assert snooping.NEAR == 0.25
+assert ablation.scaled(0.999, 2.0) == 0.998 and ablation.scaled(3, 0.5) == 2 and ablation.scaled(0.2, 2.0) == 0.4
+"""
+    subprocess.run([sys.executable, "-c", program], check=True, cwd=ROOT)
+
+
+@pytest.mark.slow
+def test_ablation_prints_a_line_for_every_change() -> None:
+    out = printed("ablation.py", "1", "--only", "as it is", "re-admission", "--workers", "1")
+    assert re.findall(r"^(\w[\w -]+\w)  +\d\.\d{3}/", out, re.MULTILINE) == ["as it is", "without re-admission"]

@@ -105,7 +105,6 @@ def test_a_plain_run_loads_no_room_that_it_does_not_enter() -> None:
         "independent_models.linking",
         "covariance_adjustment.adjust",
         "image_coordinates.interior",
-        "bundle.solution",
     )
     assert not {f"photostrip.triangulation.{room}" for room in rooms} & set(names)
     assert not {"photostrip.report.html", "photostrip.cli.jobs.method_comparison", "scipy"} & set(names)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from photostrip.notes import Finding, Note
     from photostrip.pipeline.inputs import Inputs, ModelStrip, Settings, Strip
     from photostrip.points import ControlPoints, PhotoPoints
+    from photostrip.rejection import Rejection
     from photostrip.triangulation import absolute_orientation as absolute
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.quality import reliability, self_calibration, variance_components
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from photostrip.triangulation.gross_errors.control import control_significance
     from photostrip.triangulation.gross_errors.control.control_rejections import ControlRejection
     from photostrip.triangulation.gross_errors.pairs import screening
-    from photostrip.triangulation.gross_errors.rays.snooping import Rejection, ScreenedBundle
+    from photostrip.triangulation.gross_errors.rays.snooping import ScreenedBundle
     from photostrip.triangulation.image_coordinates import corrections
     from photostrip.triangulation.image_coordinates.mark_fit import InteriorOrientation
     from photostrip.triangulation.independent_models.formation import FormedModels
@@ -84,7 +85,7 @@ class PhotoStages:
         return self.screened.orientation
 
     @property
-    def rejections(self) -> tuple[screening.PairRejection, ...]:
+    def rejections(self) -> tuple[Rejection, ...]:
         """Points taken out of pairs."""
         return self.screened.rejections
 

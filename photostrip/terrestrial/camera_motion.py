@@ -8,11 +8,12 @@ fitted to the stable points and tested against zero. A stable point that does no
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.geometry.rotation import alpha_omega_kappa
+from photostrip.rejection import Rejection
 from photostrip.statistics import chi2_quantile
 from photostrip.terrestrial.frame import rays, small_turn
 
@@ -141,15 +142,6 @@ def determined(normal: Floats) -> bool:
     return bool(size[0] > LEAST_RECIPROCAL)
 
 
-class MovedPoint(NamedTuple):
-    """A point, given as stable, that does not fit to the others."""
-
-    point: int  # its number among the stable points
-    # value, limit: squared misclosure against the others, in units of its variance, and what chance allows
-    value: float
-    limit: float
-
-
 @dataclass(frozen=True, eq=False)
 class Motion:
     """What the stable points say of both cameras in one epoch."""
@@ -157,7 +149,8 @@ class Motion:
     # of the left and the right camera; None where the stable points do not determine it
     turns: tuple[Turn | None, Turn | None]
     used: Flags  # (m,): stable points that fit together
-    rejected: tuple[MovedPoint, ...]  # points that do not fit to the others, in order
+    # stable points that do not fit to the others, in order, by their squared misclosures in units of the variances
+    rejected: tuple[Rejection, ...]
 
 
 def find_motion(left: ImagePair, right: ImagePair) -> Motion:
@@ -167,7 +160,7 @@ def find_motion(left: ImagePair, right: ImagePair) -> Motion:
     """
     pairs = (left, right)
     used = np.ones(len(left.before), bool)
-    rejected: list[MovedPoint] = []
+    rejected: list[Rejection] = []
     while True:
         turns = (fit(left, used), fit(right, used))
         worst = _worst(pairs, turns, used)
@@ -175,15 +168,13 @@ def find_motion(left: ImagePair, right: ImagePair) -> Motion:
             return Motion(turns, used, tuple(rejected))
         rejected.append(worst)
         used = used.copy()
-        used[worst.point] = False
+        used[worst.row] = False
 
 
-def _worst(
-    pairs: tuple[ImagePair, ImagePair], turns: tuple[Turn | None, Turn | None], used: Flags
-) -> MovedPoint | None:
+def _worst(pairs: tuple[ImagePair, ImagePair], turns: tuple[Turn | None, Turn | None], used: Flags) -> Rejection | None:
     """Find the point that fits worst to the turns that the others give, if it fits too badly."""
     rows = np.flatnonzero(used)
-    worst: MovedPoint | None = None
+    worst: Rejection | None = None
     for row in rows:
         value, components = 0.0, 0
         for pair, turn in zip(pairs, turns, strict=True):
@@ -193,7 +184,7 @@ def _worst(
             continue
         limit = chi2_quantile(1 - FALSE_REJECTION / len(rows), components)
         if value > limit and (worst is None or value / limit > worst.value / worst.limit):
-            worst = MovedPoint(int(row), value, limit)
+            worst = Rejection(kind="stable", row=int(row), test="chi-square", value=value, limit=limit)
     return worst
 
 

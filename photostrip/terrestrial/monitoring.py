@@ -137,8 +137,8 @@ class Monitoring:
         """Epoch number and id of points that were given as stable and moved."""
         names = [name for name, yes in zip(self.series.points, self.series.stable, strict=True) if yes]
         return [
-            (number, names[point])
+            (number, names[each.row])
             for number, motion in enumerate(self.motions, 1)
             if motion is not None
-            for point, *_ in motion.rejected
+            for each in motion.rejected
         ]

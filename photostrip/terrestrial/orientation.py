@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import GeometryError
+from photostrip.rejection import Rejection
 from photostrip.statistics import chi2_quantile, f_p_value
 from photostrip.terrestrial.frame import (
     GROUND_FROM_HOUSE,
@@ -69,20 +70,6 @@ class OrientationSettings:
     significance: float = 0.05
 
 
-@dataclass(frozen=True, slots=True)
-class PointRejection:
-    """A point that was taken out."""
-
-    point: int
-    test: str  # ``"deletion"`` or ``"stated"``
-    # value, limit: test value and critical value: for ``"deletion"`` the p value and the probability below which it is
-    # rejected, for ``"stated"`` chi-square
-    value: float
-    limit: float
-    # misclosure of its directions against the orientation without it, radians; NaN where not measured
-    residual: tuple[float, float] = (np.nan, np.nan)
-
-
 @dataclass(frozen=True, eq=False)
 class PhotoOrientation:
     """A photo oriented by directions."""
@@ -99,7 +86,9 @@ class PhotoOrientation:
     weighted_sum: float  # weighted sum of squared residuals, chi-square with `dof` degrees of freedom
     dof: int
     condition: float  # condition number of the equations, columns scaled to equal length
-    rejected: tuple[PointRejection, ...] = ()  # points taken out, in order
+    # points taken out, in order; the size is the misclosure of a point's directions against the orientation without it,
+    # radians; the values of the test ``deletion`` are p values, of ``stated`` chi-square
+    rejected: tuple[Rejection, ...] = ()
 
     @property
     def rotation(self) -> Floats:
@@ -157,16 +146,15 @@ def orient(
     used = np.asarray(sightings.measured.any(axis=1), bool)
     _refuse_too_few(sightings, used, names)
     solution = _solve(sightings, used, names, interior)
-    rejected: list[PointRejection] = []
+    rejected: list[Rejection] = []
     while chosen.screening != "none":
         found = _worst(solution, sightings, chosen)
         if found is None:
             break
         used = used.copy()
-        used[found.point] = False
+        used[found.row] = False
         solution = _solve(sightings, used, names, interior)
-        miss = tuple(map(float, solution.residuals[found.point]))
-        rejected.append(replace(found, residual=(miss[0], miss[1])))
+        rejected.append(replace(found, size=tuple(solution.residuals[found.row].tolist())))
     return replace(solution, rejected=tuple(rejected))
 
 
@@ -306,7 +294,7 @@ def _result(
     )
 
 
-def _worst(solution: PhotoOrientation, sightings: Sightings, settings: OrientationSettings) -> PointRejection | None:
+def _worst(solution: PhotoOrientation, sightings: Sightings, settings: OrientationSettings) -> Rejection | None:
     """Find the point that fits worst, if it should be taken out.
 
     The drop of the weighted sum of squares when a point is deleted is v^T (C - A Q A^T)^-1 v, exactly the sum of
@@ -327,8 +315,9 @@ def _worst(solution: PhotoOrientation, sightings: Sightings, settings: Orientati
         worst = int(np.argmax(ratio))
         if ratio[worst] <= 1:
             return None
-        return PointRejection(
-            point=int(rows[worst]),
+        return Rejection(
+            kind="direction",
+            row=int(rows[worst]),
             test="stated",
             value=float(drop[worst]),
             limit=float(limits[worst]),
@@ -340,7 +329,7 @@ def _worst(solution: PhotoOrientation, sightings: Sightings, settings: Orientati
     worst = int(np.lexsort([-drop, p_values])[0])  # of p values that are all zero the largest drop
     if p_values[worst] >= level:
         return None
-    return PointRejection(point=int(rows[worst]), test="deletion", value=float(p_values[worst]), limit=level)
+    return Rejection(kind="direction", row=int(rows[worst]), test="deletion", value=float(p_values[worst]), limit=level)
 
 
 def _drops(solution: PhotoOrientation, sightings: Sightings, rows: Numbers) -> tuple[Floats, Numbers]:

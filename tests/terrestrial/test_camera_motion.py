@@ -133,7 +133,7 @@ def moved(given_: ImagePair, point: int, change: tuple[float, float]) -> ImagePa
 def test_a_stable_point_that_moved_is_found(point: int, turn: tuple[float, float, float]) -> None:
     left, right = moved(pair(turn, 1), point, (0.05, -0.02)), moved(pair((0, 0, 0), 2), point, (0.04, -0.02))
     motion = find_motion(left, right)
-    assert [each[0] for each in motion.rejected] == [point]
+    assert [each.row for each in motion.rejected] == [point]
     assert not motion.used[point]
     assert motion.turns[0] is not None
     assert np.abs((motion.turns[0].values - turn) / motion.turns[0].sigma).max() < 4

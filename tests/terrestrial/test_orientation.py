@@ -179,9 +179,9 @@ def test_a_gross_error_is_found_and_named(method: str, point: int, image: tuple[
     angles = (0.3, 0.1, 0.0)
     found = orient(spoiled(sightings(angles, 5), point, image), F, CENTRE, OrientationSettings(screening=method))
     (rejected,) = found.rejected
-    assert (rejected.point, rejected.test) == (point, method)
+    assert (rejected.row, rejected.test) == (point, method)
     assert not found.used[point]
-    size = np.hypot(*rejected.residual)  # 0.1 mm at a distance of 100 mm and more, in radians
+    size = np.linalg.norm(rejected.size)  # 0.1 mm at a distance of 100 mm and more, in radians
     assert 0.4 * 0.1 / F < size < 1.6 * 0.1 / F
     assert found.sigma0 < 1.6
     np.testing.assert_allclose(found.values, angles, atol=6 * found.sigma.max())
@@ -190,7 +190,7 @@ def test_a_gross_error_is_found_and_named(method: str, point: int, image: tuple[
 def test_two_gross_errors_are_found_one_after_the_other() -> None:
     given_ = spoiled(spoiled(sightings((0.3, 0.1, 0.0), 5), 2, (0.15, 0.0)), 6, (0.0, 0.2))
     found = orient(given_, F, CENTRE)
-    assert [each.point for each in found.rejected] == [6, 2]
+    assert [each.row for each in found.rejected] == [6, 2]
 
 
 def test_without_screening_a_gross_error_stays_and_shows_in_sigma0() -> None:

@@ -241,12 +241,12 @@ def oriented(
     document["points"] = _sighted(sightings, found)
     document["rejected"] = [
         {
-            "point": sightings.ids[each.point],
+            "point": sightings.ids[each.row],
             "test": each.test,
             "value": significant(each.value),
             "limit": significant(each.limit),
-            "lambda_arcsec": rounded(each.residual[0] * ARCSECONDS, ARCSEC),
-            "beta_arcsec": rounded(each.residual[1] * ARCSECONDS, ARCSEC),
+            "lambda_arcsec": rounded(each.size[0] * ARCSECONDS, ARCSEC),
+            "beta_arcsec": rounded(each.size[1] * ARCSECONDS, ARCSEC),
         }
         for each in found.rejected
     ]

@@ -75,22 +75,21 @@ def _given_notes(bundle: Bundle) -> Iterator[Note]:
     for each in bundle.screened.rejections:
         if each.readmitted or each.kind == reliability.IMAGE:
             continue
-        axis = ("east (X)", "north (Y)", "up (Z)")[each.axis]
+        axis = ("east (X)", "north (Y)", "up (Z)")[each.axes[0]]
         reached = (
             f"test value {each.value:.1f}, limit {each.limit:.1f}" if np.isfinite(each.value) else "found in its strip"
         )
         if each.kind == reliability.CONTROL:
             name = problem.point_name(int(problem.control.point[each.row]))
-            text = (
-                f"control point {name} contradicts the photos and the other control: {axis} by about {each.size:+.2f} m"
-            )
+            size = f"{axis} by about {each.worst:+.2f} m"
+            text = f"control point {name} contradicts the photos and the other control: {size}"
             yield Note("control-rejected", f"{text} ({reached}); not used", points=(name,))
             continue
         part = problem.positions if each.kind == reliability.POSITION else problem.attitudes
         photo = problem.photo_name(int(part.photo[each.row]))
         if each.kind == reliability.POSITION:
-            text = f"the given position of photo {photo} does not fit: {axis} by about {each.size:+.2f} m"
+            text = f"the given position of photo {photo} does not fit: {axis} by about {each.worst:+.2f} m"
         else:
-            turn = f"{np.degrees(each.size):+.3f} deg"
-            text = f"the given angles of photo {photo} do not fit: about image axis {each.axis + 1} by {turn}"
+            turn = f"{np.degrees(each.worst):+.3f} deg"
+            text = f"the given angles of photo {photo} do not fit: about image axis {each.axes[0] + 1} by {turn}"
         yield Note("position-rejected", f"{text} ({reached}); not used", photos=(photo,))

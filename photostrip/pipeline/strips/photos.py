@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from photostrip.pipeline.inputs import Settings, Strip
     from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip
     from photostrip.points import PhotoPoints
+    from photostrip.rejection import Rejection
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
-    from photostrip.triangulation.gross_errors.rays.snooping import Rejection
     from photostrip.triangulation.polynomial.correction import Polynomial
 
     Oriented = OrientedStrip[strip_errors.StripErrors]

@@ -13,16 +13,15 @@ from photostrip.result.adjustment.links import AXES, names_of
 from photostrip.result.numbers import natural, rounded
 from photostrip.result.quantities import DECIMALS_BY_UNIT, record
 from photostrip.triangulation.gross_errors.rays.point_decisions import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY
-from photostrip.triangulation.strip_formation.scale_ratios import depths
+from photostrip.triangulation.strip_formation.scale_transfer import depths
 
 if TYPE_CHECKING:
     from photostrip.pipeline import Result, StripResult
     from photostrip.pipeline.results import Bundle
     from photostrip.points import PhotoPoints
+    from photostrip.rejection import Rejection
     from photostrip.result.numbers import Document
     from photostrip.triangulation.gross_errors.control.control_rejections import ControlRejection
-    from photostrip.triangulation.gross_errors.pairs.screening import PairRejection
-    from photostrip.triangulation.gross_errors.rays.snooping import Rejection
 
 
 MICROMETRES = 1000.0  # in a millimetre
@@ -82,16 +81,16 @@ def _entry(**values: object) -> Document:
 def _from_pairs(strip: StripResult, observations: PhotoPoints) -> list[Document]:
     ids, oriented = observations.point_ids, strip.of_photos.orientation
 
-    def place(rejection: PairRejection) -> tuple[int, object]:
+    def place(rejection: Rejection) -> tuple[int, object]:
         return int(oriented.pairs.pair[rejection.row]), natural(ids[oriented.point[rejection.row]])
 
     return [_from_pair(strip, each, observations) for each in sorted(strip.of_photos.rejections, key=place)]
 
 
-def _from_pair(strip: StripResult, rejection: PairRejection, observations: PhotoPoints) -> Document:
+def _from_pair(strip: StripResult, rejection: Rejection, observations: PhotoPoints) -> Document:
     oriented = strip.of_photos.orientation
     pair = int(oriented.pairs.pair[rejection.row])
-    size = rejection.size * MICROMETRES
+    size = rejection.worst * MICROMETRES
     factor = MICROMETRES if rejection.test == "parallax" else 1.0
     blamed = [
         observations.photo_ids[observations.photo[each.row]]
@@ -120,7 +119,7 @@ def _from_pair(strip: StripResult, rejection: PairRejection, observations: Photo
         limit=rejection.limit * factor,
         unit="um" if rejection.test == "parallax" else "",
         parallax_um=size,
-        zone=rejection.zone or None,
+        zone=int(strip.of_photos.screened.zone[rejection.row]),
         size=size,
         readmitted=rejection.readmitted,
         blamed=blamed,
@@ -172,7 +171,7 @@ def _from_rays(strip: StripResult, observations: PhotoPoints) -> list[Document]:
     for each in rejected_by_strip(strip):
         photo = observations.photo_ids[observations.photo[each.row]]
         point = observations.point_ids[observations.point[each.row]]
-        known = bool(np.isfinite(each.size))
+        known = bool(np.isfinite(each.worst))
         entry = _entry(
             strip=strip.strip.id,
             photo=photo,
@@ -182,7 +181,7 @@ def _from_rays(strip: StripResult, observations: PhotoPoints) -> list[Document]:
             value=each.value,
             limit=each.limit,
             zone=int(zone[each.row]) or None,
-            size=each.size * MICROMETRES if known else None,
+            size=each.worst * MICROMETRES if known else None,
             size_unit="um" if known else "",
             blamed=[photo] if each.cause == WRONG_RAY else [],
             reason=REASONS[each.cause],
@@ -221,10 +220,11 @@ def _from_control(strip: StripResult, wrong: ControlRejection) -> Document:
 def _from_links(result: Result, strip: StripResult) -> list[Document]:
     formed, names, found = strip.of_models.formed, strip.of_models.strip.models, []
     for each in formed.links.rejections:
+        link = int(formed.links.shared.link[each.row])
         before, after = formed.links.shared.before[each.row], formed.links.shared.after[each.row]
-        pair = [names[each.link], names[each.link + 1]]
-        parts = ", ".join(f"{axis} {value * MICROMETRES:+.0f}" for axis, value in zip(AXES, each.error, strict=True))
-        size = float(np.linalg.norm(each.error))
+        pair = [names[link], names[link + 1]]
+        parts = ", ".join(f"{axis} {value * MICROMETRES:+.0f}" for axis, value in zip(AXES, each.size, strict=True))
+        size = float(np.linalg.norm(each.size))
         if formed.used[before] == formed.used[after]:
             wrong = "which one is wrong cannot be told, and the mean is made of neither"
         else:
@@ -232,7 +232,7 @@ def _from_links(result: Result, strip: StripResult) -> list[Document]:
             wrong = f"other models agree with {right}: {other} is wrong"
         entry = _entry(
             strip=strip.strip.id,
-            photo=strip.strip.photos[each.link + 1],
+            photo=strip.strip.photos[link + 1],
             point=names_of(result, formed.models.node[[before]])[0],
             stage="link",
             test="link",
@@ -276,13 +276,15 @@ def _after_bundle(found: Bundle, rejected: list[Document]) -> list[Document]:
 def _from_bundle(found: Bundle, each: Rejection) -> Document:
     kind = KINDS[each.kind]
     photo, point = names_of_observation(found.block.problem, each.kind, each.row)
-    size = rounded(each.size * kind.factor, DECIMALS_BY_UNIT[kind.unit])
+    size = rounded(each.worst * kind.factor, DECIMALS_BY_UNIT[kind.unit])
     if each.readmitted:
         reason = "taken back: it fits after the others went"
+    elif each.cause in {TWO_RAYS, SEVERAL_RAYS}:
+        reason = REASONS[each.cause]
     elif size is None:
         reason = "does not fit the other observations"
     else:
-        reason = f"{kind.axes[each.axis]} is wrong by about {size:+g} {kind.unit.replace('um', 'µm')}"
+        reason = f"{kind.axes[each.axes[0]]} is wrong by about {size:+g} {kind.unit.replace('um', 'µm')}"
     return _entry(
         strip=next((strip.strip.id for strip in found.start.strips if photo in strip.strip.photos), ""),
         photo=photo,
@@ -294,6 +296,6 @@ def _from_bundle(found: Bundle, each: Rejection) -> Document:
         size=size,
         size_unit=kind.unit,
         readmitted=each.readmitted,
-        blamed=[photo] if photo is not None and point is not None and not each.readmitted else [],
+        blamed=[photo] if each.cause == WRONG_RAY and not each.readmitted else [],
         reason=reason,
     )

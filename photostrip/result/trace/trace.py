@@ -119,7 +119,7 @@ def _rejected(result: Result, strip: StripResult, number: int) -> list[Document]
             "test": each.test,
             "value": significant(each.value),
             "limit": significant(each.limit),
-            "q": rounded(each.parallax, MILLIMETRES),
+            "q": rounded(each.worst, MILLIMETRES),
             "readmitted": bool(each.readmitted),
         }
         for each in strip.of_photos.rejections

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.rejection import Rejection
 from photostrip.statistics import chi2_quantile
 from photostrip.triangulation.independent_models import linking
 
@@ -33,20 +34,6 @@ CONSPICUOUS = 36.0  # mean square in units of the stated variance that makes a r
 POWER = 21.5  # non-centrality of chi-square with three degrees of freedom found in 80 % of cases at a level of 0.001
 
 
-@dataclass(frozen=True, slots=True)
-class LinkRejection:
-    """A common point that a link does not use."""
-
-    # link, row: link, and row of ``linking.CommonPoints``
-    link: int
-    row: int
-    # value, limit: test value and its critical value
-    value: float
-    limit: float
-    # its difference from what the other points say, mm along the axes of the model before
-    error: tuple[float, float, float]
-
-
 @dataclass(frozen=True, eq=False)
 class ScreenedLinks:
     """Links with their gross errors taken out."""
@@ -57,7 +44,9 @@ class ScreenedLinks:
     # value, limit: (t,), (j,): test values of the rows used, and the critical value of each link
     value: Floats
     limit: Floats
-    rejections: tuple[LinkRejection, ...]  # what was taken out, worst first
+    # rows of ``shared`` that were taken out, worst first; the size is the difference from what the other points of the
+    # link say, mm along the axes of the model before
+    rejections: tuple[Rejection, ...]
     doubtful: tuple[tuple[int, ...], ...]  # rows of which one is wrong and which one cannot be told
     # variance of the model coordinates over what is stated, with which the tests were made; 1 unless contradicted
     factor: float
@@ -83,7 +72,7 @@ def screen_links(shared: CommonPoints, models: StripModels, settings: LinkSettin
 
     Every link has three common rows that are not on one line.
     """
-    used, log = np.ones(len(shared.link), bool), list[LinkRejection]()
+    used, log = np.ones(len(shared.link), bool), list[Rejection]()
     mirrored = reflected(shared, models, used)
     limit = _limits(shared, used, settings.alpha)
     open_links = np.ones(shared.count, bool)
@@ -100,7 +89,9 @@ def screen_links(shared: CommonPoints, models: StripModels, settings: LinkSettin
             link = int(shared.link[row])
             x, y, z = tests.error[row].tolist()
             size = float(tests.value[row] / factor)
-            log.append(LinkRejection(link=link, row=row, value=size, limit=float(limit[link]), error=(x, y, z)))
+            log.append(
+                Rejection(kind="link", row=row, test="link", value=size, limit=float(limit[link]), size=(x, y, z))
+            )
         used = used.copy()
         used[worst] = False
     value = tests.value / factor

@@ -115,7 +115,7 @@ def test_a_gross_error_is_named_and_left_out(kind: str, size: float) -> None:
     rejected = found.links.rejections
     assert [found.models.node[found.links.shared.before[each.row]] for each in rejected] == [true.node[row]]
     assert true.node[row] not in found.node  # in two models, and nothing says which is wrong
-    assert np.linalg.norm(rejected[0].error) > 0.7 * size  # mm of the model before, whose scale differs
+    assert np.linalg.norm(rejected[0].size) > 0.7 * size  # mm of the model before, whose scale differs
     for each in (clean, found):
         ground = np.concatenate([true.points, true.centers])[each.node]
         off = Similarity.from_points(each.node_xyz, ground).residuals(each.node_xyz, ground)
@@ -147,7 +147,7 @@ def test_good_points_are_rejected_as_rarely_as_stated() -> None:
     for seed in range(40):
         true = truth(10, 4, seed)
         formed = formed_of(true.measured(np.random.default_rng(seed).normal(size=(len(true.model), 3))))
-        gone += len({each.link for each in formed.links.rejections})
+        gone += len({int(formed.links.shared.link[each.row]) for each in formed.links.rejections})
         links += formed.links.shared.count
     assert links == 360
     assert gone <= 11  # 3.6 are expected at the level of 0.01; more than 11 have a probability of 0.001

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import InputError
+from photostrip.rejection import Rejection
 from photostrip.statistics import grubbs_limit, tau_limit
 from photostrip.triangulation.gross_errors.pairs.global_test import SMALLEST_REDUNDANCY
 from photostrip.triangulation.gross_errors.pairs.pair_search import PairSearch, search
@@ -45,30 +46,12 @@ LIMIT_FACTOR = 4.0  # a-priori standard deviations of a y parallax
 DETECTABLE = 4.13  # shift of a normal variable found in 80 % of cases by a two-sided test at 0.1 %
 
 
-@dataclass(frozen=True, slots=True)
-class PairRejection:
-    """One point taken out of a pair."""
-
-    row: int
-    # ``"in front"``, ``"parallax"``, ``"grubbs"``, ``"tau"``, ``"deletion"`` (global test), ``"robust"`` or
-    # ``"residual"``
-    test: str
-    # value, limit: test value and critical value; mm for a parallax, otherwise without unit
-    value: float
-    limit: float
-    parallax: float  # residual y parallax in mm when it was rejected
-    zone: int = 0  # standard zone of the point, 1 to 6; 0 when unknown
-    # estimated error of the y parallax in mm: what the pair, oriented without the point, leaves of it
-    size: float = float("nan")
-    readmitted: bool = False  # whether the point was taken back in the end
-
-
 @dataclass(frozen=True, eq=False)
 class ScreenedPairs:
     """Oriented pairs after the search for gross errors, and how far errors can be seen in them."""
 
     orientation: Orientation  # pairs oriented without the rejected points
-    rejections: tuple[PairRejection, ...]  # what was rejected, in order; re-admitted points are marked
+    rejections: tuple[Rejection, ...]  # rows of pairs that were rejected, in order; with the error of the y parallax
     scatter: ParallaxScatter  # standard deviations of a y parallax of weight one
     # (p,): pairs that fail the global test with nothing left to reject: errors that hide each other are suspected
     masked: Flags
@@ -127,12 +110,10 @@ def screen_pairs(
     return ScreenedPairs(result, _completed(log, result), found.scatter, masked, sound)
 
 
-def _searched(given: Orientation, found: PairSearch, behind: Flags) -> tuple[Orientation, list[PairRejection]]:
+def _searched(given: Orientation, found: PairSearch, behind: Flags) -> tuple[Orientation, list[Rejection]]:
     """Write the log of a search, and take out what lies behind a camera."""
-    result, before = found.orientation, np.nan_to_num(given.parallax)
-    log = [
-        PairRejection(each.row, each.test, each.value, each.limit, float(before[each.row])) for each in found.removed
-    ]
+    result = found.orientation
+    log = [_rejection(each.row, each.test, each.value, each.limit) for each in found.removed]
     if result is not given:
         behind = ~in_front_of_cameras(result.elements, result.pairs)
     result, dropped = _drop_behind(result, behind)
@@ -141,7 +122,7 @@ def _searched(given: Orientation, found: PairSearch, behind: Flags) -> tuple[Ori
 
 def _sequential(
     orientation: Orientation, settings: RelativeSettings, sigma: float, behind: Flags
-) -> tuple[Orientation, list[PairRejection]]:
+) -> tuple[Orientation, list[Rejection]]:
     """Test single residuals, one stage after the other."""
     result, log = _drop_behind(orientation, behind)
     limit = settings.parallax_limit if settings.parallax_limit is not None else LIMIT_FACTOR * sigma * np.sqrt(2.0)
@@ -156,20 +137,18 @@ def _sequential(
     return result, log
 
 
-def _completed(log: list[PairRejection], result: Orientation) -> tuple[PairRejection, ...]:
+def _completed(log: list[Rejection], result: Orientation) -> tuple[Rejection, ...]:
     """Add to each rejection what only the final orientation can say."""
-    if not log:
-        return ()
-    used = result.used
-    numbers = np.unique(result.pairs.pair[[each.row for each in log]])
-    part, rows = result.take(numbers), result.pairs.rows_of(numbers)
-    number = dict(zip(rows.tolist(), zones(part.elements, part.pairs).tolist(), strict=True))
-    return tuple(
-        replace(r, zone=number[r.row], size=float(result.parallax[r.row]), readmitted=bool(used[r.row])) for r in log
-    )
+    parallax, used = result.parallax, result.used
+    return tuple(replace(each, size=(float(parallax[each.row]),), readmitted=bool(used[each.row])) for each in log)
 
 
-def _drop_behind(orientation: Orientation, behind: Flags) -> tuple[Orientation, list[PairRejection]]:
+def _rejection(row: int, test: str, value: float, limit: float) -> Rejection:
+    """One point of a pair; values in mm for the test ``parallax``, otherwise without unit."""
+    return Rejection(kind="parallax", row=int(row), test=test, value=float(value), limit=float(limit))
+
+
+def _drop_behind(orientation: Orientation, behind: Flags) -> tuple[Orientation, list[Rejection]]:
     """Take out the points that come out behind a camera; no measurement of theirs can be right."""
     pairs, used = orientation.pairs, orientation.used
     rows = np.flatnonzero(behind & used)
@@ -178,7 +157,7 @@ def _drop_behind(orientation: Orientation, behind: Flags) -> tuple[Orientation, 
     rows = rows[most[pairs.pair[rows]]]
     if not len(rows):
         return orientation, []
-    log = [PairRejection(int(row), "in front", np.nan, np.nan, float(orientation.parallax[row])) for row in rows]
+    log = [_rejection(row, "in front", np.nan, np.nan) for row in rows.tolist()]
     return _without(orientation, rows), log
 
 
@@ -188,10 +167,10 @@ def _without(orientation: Orientation, rows: Numbers) -> Orientation:
     return orient_again(orientation, weight, np.unique(orientation.pairs.pair[rows]))
 
 
-def _stage(orientation: Orientation, test: str, bound: float) -> tuple[Orientation, list[PairRejection]]:
+def _stage(orientation: Orientation, test: str, bound: float) -> tuple[Orientation, list[Rejection]]:
     """Repeat one test, worst point first, until no pair has anything to reject."""
     result = orientation
-    log: list[PairRejection] = []
+    log: list[Rejection] = []
     while True:
         value, limit = _values(result, test, bound)
         value[~result.used] = -np.inf
@@ -203,7 +182,7 @@ def _stage(orientation: Orientation, test: str, bound: float) -> tuple[Orientati
             return result, log
         _, first = np.unique(result.pairs.pair[rows], return_index=True)  # of equal values the first
         rows = rows[first]
-        log += [PairRejection(int(r), test, float(value[r]), float(limit[r]), float(result.parallax[r])) for r in rows]
+        log += [_rejection(row, test, value[row], limit[row]) for row in rows.tolist()]
         result = _without(result, rows)
 
 

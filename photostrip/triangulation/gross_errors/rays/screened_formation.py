@@ -19,8 +19,7 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.points import PhotoPoints
-    from photostrip.triangulation.gross_errors.pairs.screening import PairRejection
-    from photostrip.triangulation.gross_errors.rays.snooping import Rejection
+    from photostrip.rejection import Rejection
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
     from photostrip.triangulation.strip_formation.strip import FormedStrip
@@ -73,7 +72,7 @@ def form_screened(
     changed = np.unique(of_pairs.pairs.pair[used != of_pairs.used])
     oriented = orient_again(of_pairs, np.where(used, weight, 0.0), changed) if len(changed) else of_pairs
     try:
-        formed = form_from_pairs(oriented, settings, photos, rays.sigma, aside)
+        formed = form_from_pairs(oriented, settings, photos, rays.sigma, aside, searched=True)
     except GeometryError:
         oriented = of_pairs  # nothing would join two models: what joined them before stays
     formed = without_rows(formed, oriented, aside)
@@ -115,6 +114,6 @@ def _supported(of_pairs: Orientation, used: Flags) -> Flags:
     return result
 
 
-def with_readmitted(rejections: Sequence[PairRejection], used: Flags) -> tuple[PairRejection, ...]:
+def with_readmitted(rejections: Sequence[Rejection], used: Flags) -> tuple[Rejection, ...]:
     """Mark the rejections of pairs that the strip took back; ``used`` (m,) are the rows used in the end."""
     return tuple(replace(each, readmitted=bool(used[each.row])) for each in rejections)

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.rejection import Rejection
 from photostrip.statistics import normal_quantile
 from photostrip.triangulation.bundle import robust
 from photostrip.triangulation.bundle.observations.collinearity import PHOTO
@@ -39,21 +40,6 @@ if TYPE_CHECKING:
 
 SEARCH_ROUNDS = 200  # of testing and taking out; each takes out one error of every neighbourhood
 NEAR = 0.5  # test value of what may go in a round, in units of the worst on the same photos
-
-
-@dataclass(frozen=True)
-class Rejection:
-    """One observation that was taken out."""
-
-    kind: str  # ``image``, ``control``, ``position`` or ``attitude``
-    row: int
-    axis: int  # the coordinate beyond the limit: 0, 1 or 2. A ray goes out as a whole
-    test: str  # name of the test; ``start`` for what took no part from the start and does not fit
-    value: float
-    limit: float
-    size: float  # what error would explain the residual: mm, metres or radians
-    cause: str = ""  # of a ray: ``WRONG_RAY``, ``TWO_RAYS`` or ``SEVERAL_RAYS``
-    readmitted: bool = False  # whether it came back
 
 
 def _limit(problem: BundleProblem, solution: BundleSolution, settings: BundleSettings) -> Limit:
@@ -157,7 +143,7 @@ class _Search:
         images[rows] = False
         for row in rows.tolist():
             self.out[reliability.IMAGE, row, 0] = Rejection(
-                kind=reliability.IMAGE, row=row, axis=0, test="robust", value=unknown, limit=unknown, size=unknown
+                kind=reliability.IMAGE, row=row, test="robust", value=unknown, limit=unknown
             )
         return supported(self.problem, replace(selection, images=images))
 
@@ -169,8 +155,9 @@ class _Search:
             if not worst:
                 return done
             for each in worst:
-                self.out[each.kind, each.row, each.axis] = each
-                selection = selection.without(each.kind, each.row, each.axis)
+                axis = 0 if each.kind == reliability.IMAGE else each.axes[0]
+                self.out[each.kind, each.row, axis] = each
+                selection = selection.without(each.kind, each.row, axis)
             selection = supported(self.problem, selection)
         return self.adjust(selection)
 
@@ -188,11 +175,11 @@ class _Search:
                 given = Rejection(
                     kind=group.kind,
                     row=int(row),
-                    axis=int(axis),
+                    axes=(int(axis),),
                     test=self.settings.test,
                     value=float(value[row, axis]),
                     limit=limit.value,
-                    size=float(group.gross[row, axis]),
+                    size=tuple(group.gross[row].tolist()),
                 )
         if given and given.value >= rays.max(initial=0.0):
             return [given]
@@ -228,11 +215,11 @@ class _Search:
             Rejection(
                 kind=reliability.IMAGE,
                 row=int(rows[place]),
-                axis=int(axis[place]),
+                axes=(int(axis[place]),),
                 test=self.settings.test,
                 value=decision.value / limit.unit,
                 limit=limit.value,
-                size=float(size[place, axis[place]]),
+                size=tuple(size[place].tolist()),
                 cause=decision.cause,
             )
             for place in np.flatnonzero(out).tolist()
@@ -335,13 +322,16 @@ class _Search:
         known = {row for kind, row, _ in self.out if kind == reliability.IMAGE}
         for row in np.flatnonzero(~done.selection.images & ~begin.images).tolist():
             if row not in known:
-                nothing = Rejection(
-                    kind=reliability.IMAGE, row=row, axis=0, test="start", value=unknown, limit=limit, size=unknown
-                )
+                nothing = Rejection(kind=reliability.IMAGE, row=row, test="start", value=unknown, limit=limit)
                 yield replace(self.latest.get(row, nothing), test="start")
         for row, axis in np.argwhere(~begin.control & np.isfinite(self.problem.control.sigma)).tolist():
             if not done.selection.control[row, axis]:
-                error = -float(done.solution.control_residuals[row, axis])
                 yield Rejection(
-                    kind=reliability.CONTROL, row=row, axis=axis, test="start", value=np.nan, limit=limit, size=error
+                    kind=reliability.CONTROL,
+                    row=row,
+                    axes=(axis,),
+                    test="start",
+                    value=unknown,
+                    limit=limit,
+                    size=tuple((-done.solution.control_residuals[row]).tolist()),
                 )

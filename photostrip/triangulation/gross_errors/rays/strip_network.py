@@ -16,12 +16,13 @@ from photostrip.triangulation.bundle.observations.problem import (
 )
 from photostrip.triangulation.bundle.selection import Selection
 from photostrip.triangulation.bundle.settings import BundleSettings
-from photostrip.triangulation.gross_errors.rays.snooping import Rejection, screen_bundle
+from photostrip.triangulation.gross_errors.rays.snooping import screen_bundle
 from photostrip.triangulation.resection.collinearity import project
 from photostrip.triangulation.strip_formation.strip import mean_points
 
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Numbers
+    from photostrip.rejection import Rejection
     from photostrip.triangulation.gross_errors.rays.screened_formation import StripRays
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.strip import FormedStrip

@@ -134,7 +134,7 @@ def test_two_equal_errors_in_a_corner_zone_come_out_although_the_third_point_loo
     out = ~found.orientation.used.reshape(50, 18)
     assert out[:, 6:8].all()
     assert out.sum() <= 102
-    assert {r.zone for r in found.rejections if not r.readmitted} == {3}
+    assert {int(found.zone[r.row]) for r in found.rejections if not r.readmitted} == {3}
     by_tau = ~examined(pairs, RelativeSettings(screening="tau")).orientation.used.reshape(50, 18)
     assert not by_tau[:, 6:8].all(axis=1).any()
 

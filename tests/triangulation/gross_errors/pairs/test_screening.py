@@ -21,13 +21,13 @@ from tests.vectors import cases, section
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from photostrip.triangulation.gross_errors.pairs.screening import PairRejection
+    from photostrip.rejection import Rejection
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from tests.vectors import Vector
 
     Floats = NDArray[np.float64]
     Flags = NDArray[np.bool_]
-    Log = tuple[PairRejection, ...]
+    Log = tuple[Rejection, ...]
 
 SIGMA = 5 * MICROMETRE
 ZONES = (2, 2, 3, 3, 3, 3)  # points of the six zones in the published experiment
@@ -176,7 +176,7 @@ def test_one_large_error_is_found_alone(method: str) -> None:
     assert rows_of(log) == [20]
     entry = log[0]
     assert entry.value > entry.limit > 0
-    assert entry.parallax == oriented.parallax[20]
+    assert entry.worst == found.parallax[20]  # what the pair leaves of it without the point
     assert not found.used[20]
     assert found.points_used.tolist() == [16, 15, 16, 16, 16]
     assert np.abs(found.parallax[found.used]).max() < 6 * SIGMA

@@ -76,8 +76,8 @@ def test_the_wrong_ray_across_the_base_is_named_and_the_point_kept(photo: str, p
     result = adjusted(strip)
     assert found_in(strip, result) == {(photo, "p4_1"): WRONG_RAY}, place
     (wrong,) = result.strips[0].of_photos.wrong_rays
-    assert wrong.axis == 1
-    assert wrong.size == pytest.approx(0.4, abs=0.05)
+    assert wrong.axes == (1,)
+    assert wrong.worst == pytest.approx(0.4, abs=0.05)
     assert "p4_1" not in result.not_determined
     row = list(result.points.number).index(strip.at["p4_1"])
     assert result.points.rays[row] == 2

@@ -1,0 +1,37 @@
+"""One observation that a test took out: the same value for y parallaxes, rays, control, links and directions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+NAN = float("nan")
+
+
+@dataclass(frozen=True)
+class Rejection:
+    """What was taken out, by which test, and what would explain it."""
+
+    # ``parallax``, ``image``, ``control``, ``position``, ``attitude``, ``link``, ``direction`` or ``stable``
+    kind: str
+    row: int  # which observation of its kind, as the search that tested it numbers them
+    test: str
+    # value, limit: test value and critical value; NaN where there was no test
+    value: float
+    limit: float
+    axes: tuple[int, ...] = ()  # coordinates that are wrong; empty: all of the observation
+    # estimated errors of its coordinates: mm, metres or radians; empty where nothing can be said
+    size: tuple[float, ...] = ()
+    cause: str = ""  # of a ray: whether it is known to be the wrong one of its point
+    readmitted: bool = False  # whether it came back in the end
+    other: str = ""  # the point with which a control point seems to have been exchanged
+    photo: str = ""  # the photo whose image of a control point is wrong, and not its coordinates
+    # redundancy, detectable: smallest redundancy number of the coordinates taken out; smallest error of the worst that
+    # is found in 80 % of cases
+    redundancy: float = NAN
+    detectable: float = NAN
+
+    @property
+    def worst(self) -> float:
+        """The largest estimated error of the coordinates that are wrong; NaN where nothing can be said."""
+        sizes = [self.size[axis] for axis in self.axes or range(len(self.size))] if self.size else []
+        return max(sizes, key=abs, default=NAN)
