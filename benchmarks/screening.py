@@ -25,7 +25,7 @@ from photostrip.simulate.simulation import simulate  # noqa: E402
 from photostrip.simulate.spec import Flight, GrossError, Points, Spec  # noqa: E402
 from photostrip.statistics import chi2_quantile  # noqa: E402
 from photostrip.triangulation.gross_errors.pairs import deletion, screening  # noqa: E402
-from photostrip.triangulation.gross_errors.rays.screened_formation import (
+from photostrip.triangulation.gross_errors.rays.screened_formation import (  # noqa: E402
     StripRays,
     form_screened,
 )
