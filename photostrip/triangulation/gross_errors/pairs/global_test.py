@@ -1,4 +1,4 @@
-"""The global test of oriented pairs: whether the scatter of their y parallaxes belongs to the measurements.
+"""The global test of oriented pairs, and the scatter of y parallaxes that it is made with.
 
 Source: derived; [004a] stops at tests of single residuals. See docs/sources.md.
 """
@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from photostrip.statistics import chi2_quantile, normal_quantile
+from photostrip.statistics import SIGMA_FROM_MEDIAN, chi2_quantile, normal_quantile
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
+from photostrip.triangulation.robust import MEDIAN_SPREAD
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 
 ALPHA = 0.01  # probability that a strip without gross errors fails anywhere
 SMALLEST_REDUNDANCY = 0.01  # a residual with less redundancy says nothing about its point
+# scale of residuals of which a fifth are large over that of the others: normal_quantile(13/16) * 1.4826
+FIFTH_WRONG = 1.315
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +72,32 @@ class GlobalTest:
         largest = np.maximum.reduceat(self.standardised(orientation), orientation.pairs.starts)
         bad: Flags = ~(self.squares(orientation) <= self.limits(count)) | (largest > self.largest_limits(count))
         return bad & (count > MINIMUM_POINTS)
+
+
+@dataclass(frozen=True, eq=False)
+class ParallaxScatter:
+    """Standard deviations of a y parallax of weight one that the tests are made with."""
+
+    # from the residuals of all pairs of the strip, robust, mm; NaN when they did not contradict the stated one
+    found: float
+    by_pair: Floats  # (p,): those in force, mm
+
+    @classmethod
+    def of(cls, orientation: Orientation, stated: float, spoiled: float = FIFTH_WRONG) -> ParallaxScatter:
+        """Decide on the scatter of a strip whose pairs are oriented on points that agree with one another.
+
+        ``stated`` is that of a y parallax, mm. It holds unless the median residual of the whole strip proves more, even
+        if wrong points among them should make that ``spoiled`` times too large.
+        """
+        pairs, share = orientation.pairs, np.nan_to_num(orientation.redundancy)
+        tested = orientation.used & (share > SMALLEST_REDUNDANCY)
+        found = np.nan
+        if tested.any():
+            sizes = np.abs(orientation.parallax[tested]) * np.sqrt(pairs.weight[tested] / share[tested])
+            scale = SIGMA_FROM_MEDIAN * float(np.median(sizes))
+            proof = 1.0 + normal_quantile(1.0 - ALPHA) * MEDIAN_SPREAD / np.sqrt(float(share[tested].sum()))
+            found = scale if scale > spoiled * proof * stated else np.nan
+        return cls(found, np.full(pairs.size, max(stated, np.nan_to_num(found))))
 
 
 def _by_number(count: Numbers, limit: Callable[[int], float]) -> Floats:

@@ -18,8 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.triangulation.gross_errors.pairs import deletion
-from photostrip.triangulation.gross_errors.pairs.global_test import GlobalTest
-from photostrip.triangulation.gross_errors.pairs.parallax_scatter import FIFTH_WRONG, ParallaxScatter
+from photostrip.triangulation.gross_errors.pairs.global_test import FIFTH_WRONG, GlobalTest, ParallaxScatter
 from photostrip.triangulation.gross_errors.pairs.zones import MINIMUM_LEFT, Support
 from photostrip.triangulation.relative_orientation.orientation import assess_pairs, orient_again
 from photostrip.triangulation.relative_orientation.robust import RobustElements, orient_robustly
@@ -29,6 +28,9 @@ from photostrip.triangulation.robust import TUNING, scales
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.triangulation.relative_orientation.orientation import Orientation
+
+
+AT_ONCE = 64  # pairs, for the sake of memory; it changes no result
 
 
 class Removal(NamedTuple):
@@ -124,8 +126,8 @@ class _Log:
         spare, count = support.spare(part.pairs.pair), part.points_used
         size, most = test.standardised(part), test.largest_limits(count)
         weight, pairs = part.pairs.weight.copy(), part.pairs.pair
-        for number in np.unique(count[todo]).tolist():
-            some = todo[count[todo] == number]
+        for some in _alike(todo, count):
+            number = int(count[some[0]])
             rows = np.flatnonzero(np.isin(pairs, some) & part.used).reshape(len(some), number)
             residual, matrix = _studentised(part, jacobian, rows, test.sigma[some])
             left = number - np.arange(1, largest + 1)
@@ -133,8 +135,8 @@ class _Log:
             found = deletion.search(residual, matrix, target, ~spare[rows])
             total, limit = (residual**2).sum(axis=1), test.limits(np.array([number]))[0]
             for place, (pair, chosen) in enumerate(zip(some.tolist(), found, strict=True)):
-                if len(chosen) and support.holds_without(pair, rows[place, chosen]):
-                    gone = rows[place, chosen]
+                gone = rows[place, chosen]
+                if len(gone) and support.holds_without(pair, gone):
                     self._remove(weight, gone, "deletion", float(total[place]), float(limit))
                 elif worst:
                     row = rows[place, np.where(spare[rows[place]], size[rows[place]], -np.inf).argmax()]
@@ -163,6 +165,12 @@ class _Log:
     def _remove(self, weight: Floats, rows: Numbers, test: str, value: float, limit: float) -> None:
         weight[rows] = 0.0
         self.removed.extend(Removal(row, test, value, limit) for row in rows.tolist())
+
+
+def _alike(todo: Numbers, count: Numbers) -> list[Numbers]:
+    """Split pairs into some at a time with equal numbers of points."""
+    groups = [todo[count[todo] == number] for number in np.unique(count[todo])]
+    return [some for group in groups for some in np.array_split(group, 1 + len(group) // AT_ONCE)]
 
 
 def _agreeing(part: Orientation, found: RobustElements) -> Orientation:

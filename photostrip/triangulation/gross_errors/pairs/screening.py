@@ -35,7 +35,7 @@ from photostrip.triangulation.relative_orientation.solution import base_rays, in
 
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.triangulation.gross_errors.pairs.parallax_scatter import ParallaxScatter
+    from photostrip.triangulation.gross_errors.pairs.global_test import ParallaxScatter
     from photostrip.triangulation.relative_orientation.orientation import Orientation
 
 
@@ -152,8 +152,6 @@ def _drop_behind(orientation: Orientation, behind: Flags) -> tuple[Orientation, 
     """Take out the points that come out behind a camera; no measurement of theirs can be right."""
     pairs, used = orientation.pairs, orientation.used
     rows = np.flatnonzero(behind & used)
-    if not len(rows):
-        return orientation, []
     # with most of its points behind, the pair itself is wrong, and refuse_unusable says so
     most = pairs.sums((~behind & used).astype(float)) > LEAST_IN_FRONT * orientation.points_used
     rows = rows[most[pairs.pair[rows]]]
@@ -197,8 +195,7 @@ def _values(orientation: Orientation, test: str, bound: float) -> tuple[Floats, 
 
 def _grubbs(orientation: Orientation, alpha: float) -> tuple[Floats, Floats]:
     """Deviation from the pair's mean residual in units of its standard deviation."""
-    pairs, used = orientation.pairs, orientation.used
-    count = orientation.points_used
+    pairs, used, count = orientation.pairs, orientation.used, orientation.points_used
     mean = pairs.sums(np.where(used, orientation.parallax, 0.0)) / count
     deviation = np.where(used, orientation.parallax - mean[pairs.pair], 0.0)
     spread = np.sqrt(pairs.sums(deviation**2) / (count - 1))
@@ -211,12 +208,10 @@ def _grubbs(orientation: Orientation, alpha: float) -> tuple[Floats, Floats]:
 
 def _tau(orientation: Orientation, alpha: float) -> tuple[Floats, Floats]:
     """Studentised residual: each in units of its own standard deviation."""
-    pairs = orientation.pairs
-    count = orientation.points_used
-    unknowns = MINIMUM_POINTS
-    tested = (count - unknowns >= 3) & (orientation.sigma0 > NEGLIGIBLE)
+    pairs, count = orientation.pairs, orientation.points_used
+    tested = (count - MINIMUM_POINTS >= 3) & (orientation.sigma0 > NEGLIGIBLE)
     limits = np.array(
-        [tau_limit(int(n), unknowns, alpha) if ok else np.inf for n, ok in zip(count, tested, strict=True)]
+        [tau_limit(int(n), MINIMUM_POINTS, alpha) if ok else np.inf for n, ok in zip(count, tested, strict=True)]
     )
     sigma = np.sqrt(2.0) * orientation.sigma0[pairs.pair]
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 
 from photostrip.statistics import chi2_quantile, normal_quantile
 from photostrip.triangulation.gross_errors.pairs import deletion, screening
-from photostrip.triangulation.gross_errors.pairs.global_test import GlobalTest
-from photostrip.triangulation.gross_errors.pairs.parallax_scatter import ParallaxScatter
+from photostrip.triangulation.gross_errors.pairs.global_test import GlobalTest, ParallaxScatter
 from photostrip.triangulation.relative_orientation import robust
 from photostrip.triangulation.relative_orientation.orientation import RelativeSettings, orient_unchecked
 from photostrip.triangulation.robust import falling_weights
