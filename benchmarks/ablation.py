@@ -22,7 +22,7 @@ from itertools import product
 from multiprocessing import get_context
 from pathlib import Path
 from types import FunctionType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from anywhere, installed or not
 
@@ -30,11 +30,11 @@ from photostrip.threads import limit_threads
 
 limit_threads()  # as the command does, before numpy is imported
 
-import numpy as np  # noqa: E402
 
 from benchmarks.gross_errors import AUTO, CLEAN, HEAD, KNOWN, Run, Tally, loses_anything, runs_of  # noqa: E402
 from photostrip.pipeline.strips.absolute import ScreenedStrip  # noqa: E402
 from photostrip.triangulation import gross_errors as search  # noqa: E402
+from photostrip.triangulation.gross_errors.control.control_screening import not_screened  # noqa: E402
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -77,12 +77,16 @@ def scaled(value: float, factor: float) -> float:
 
 def without_rays() -> None:
     """Find nothing along the strip."""
-    put(f"{search.__name__}.rays.screened_formation", "wrong_rays", lambda *_: None)
+    put(f"{search.__name__}.rays.strip_network", "wrong_rays", lambda *_: None)
 
 
 def without_control() -> None:
     """Believe all control."""
-    put("photostrip.pipeline.strips.absolute", "reject_wrong_control", lambda oriented, _: ScreenedStrip(oriented))
+
+    def believed(oriented: Any, _: object) -> object:  # noqa: ANN401 (a strip of photos or models)
+        return ScreenedStrip(oriented, not_screened(oriented.control))
+
+    put("photostrip.pipeline.strips.absolute", "reject_wrong_control", believed)
 
 
 def without_readmission() -> None:
@@ -91,8 +95,7 @@ def without_readmission() -> None:
     uses = pkgutil.resolve_name(f"{home}:_uses")
     put(home, "_uses", lambda *given, **_: uses(*given, readmit=False))
     put(f"{search.__name__}.rays.snooping:_Search", "fitting", lambda *_: None)
-    put(f"{search.__name__}.pairs.readmission", "readmit", lambda pairs, *_: (pairs, np.zeros(0, np.intp)))
-    put(f"{search.__name__}.control.control_screening", "_readmitted", lambda _, kept, __: kept)
+    put(f"{search.__name__}.control.control_deletion:JointAdjustment", "shrunk", lambda _, out: out)
 
 
 def changes() -> dict[str, Callable[[], None]]:
