@@ -42,11 +42,9 @@ SEARCH_ROUNDS = 200  # of testing and taking out; each takes out one error of ev
 NEAR = 0.5  # test value of what may go in a round, in units of the worst on the same photos
 
 
-def _limit(problem: BundleProblem, solution: BundleSolution, settings: BundleSettings) -> Limit:
+def _limit(solution: BundleSolution, settings: BundleSettings) -> Limit:
     """Limit of standardised residuals: never sharper than the stated standard deviations allow."""
-    parts = problem.images, problem.control, problem.positions, problem.attitudes
-    count = sum(int(np.isfinite(part.sigma).sum()) for part in parts)
-    alpha = settings.level / max(count, 1) if settings.alpha is None else settings.alpha
+    alpha = settings.level / max(solution.redundancy, 1) if settings.alpha is None else settings.alpha
     stated = Limit(normal_quantile(1 - alpha / 2), alpha, 1.0)
     if settings.test != "tau" or solution.redundancy < 1:
         return stated
@@ -76,7 +74,7 @@ class ScreenedBundle:
             selection=selection,
             solution=solution,
             precision=cofactors_of(solution),
-            limit=_limit(chosen, solution, settings),
+            limit=_limit(solution, settings),
         )
 
     @cached_property
