@@ -61,7 +61,9 @@ class Links(Section):
         "How gross errors are searched for: `auto` (points of each link one after the other) or `none`",
         DEFAULTS.links.screening,
     )
-    alpha: Fraction = key("Probability of rejecting a good point of a link without gross errors", DEFAULTS.links.alpha)
+    alpha: Fraction = key(
+        "Probability of rejecting anything in the links of a strip without gross errors", DEFAULTS.links.alpha
+    )
     keep: list[Id] = key("Coordinates, `model/point` or `model/photo`, that are used whatever the test says", [])
     drop: list[Id] = key("Coordinates, `model/point` or `model/photo`, that are left out", [])
 

@@ -121,10 +121,8 @@ def _scatter(tests: PointTests, solved: SolvedLinks) -> float:
 
 
 def _limits(shared: CommonPoints, used: Flags, alpha: float) -> Floats:
-    """Critical value of each link: the level is shared out among its points."""
-    count = np.maximum(np.bincount(shared.link[used], minlength=shared.count), 1)
-    by_count = {number: chi2_quantile(1 - alpha / number, 3) for number in np.unique(count).tolist()}
-    return np.array([by_count[number] for number in count.tolist()], float).reshape(shared.count)
+    """Critical value of each link: the level is shared out among all common points of the strip."""
+    return np.full(shared.count, chi2_quantile(1 - alpha / max(int(used.sum()), 1), 3))
 
 
 def _worst(

@@ -12,7 +12,7 @@ class LinkSettings:
     """How models are joined by similarities."""
 
     screening: str = "auto"  # ``"auto"`` or ``"none"``
-    alpha: float = 0.001  # probability of rejecting a good point of a link without gross errors
+    alpha: float = 0.01  # probability of rejecting anything in the links of a strip without gross errors
     # keep, drop: coordinates, ``model/point`` or ``model/photo``, that take part whatever the test says, or not at all
     keep: tuple[str, ...] = ()
     drop: tuple[str, ...] = ()

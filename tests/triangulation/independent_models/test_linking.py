@@ -218,6 +218,13 @@ def test_a_mirrored_model_is_named(models: tuple[str, ...]) -> None:
     assert ", ".join(models) in told.value.faults[0].message
 
 
+@pytest.mark.parametrize("models", [2, 9])
+def test_the_level_is_one_percent_of_a_whole_strip(models: int) -> None:
+    true = truth(models, 4, 3)
+    links = formed_of(true.measured(np.random.default_rng(3).normal(size=(len(true.model), 3)))).links
+    assert links.limit == pytest.approx(chi2.isf(0.01 / len(links.shared.link), 3), rel=1e-9)
+
+
 @pytest.mark.slow
 def test_detectable_errors_are_found_in_four_of_five_cases() -> None:
     true = truth(1 + 1, 4, 3)
