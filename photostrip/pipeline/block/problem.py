@@ -275,7 +275,10 @@ def _begin(
         )
         miss = (np.abs(images.xy - computed) / images.sigma).max(axis=1)
     known = miss[np.isfinite(miss)]
-    far = max(LEAST_FAR, FAR * float(np.median(known)) if len(known) else 0.0)
+    far = np.full(len(miss), max(LEAST_FAR, FAR * float(np.median(known)) if len(known) else 0.0))
+    loose = np.isin(images.point, images.point[start.rough[images.photo]]) & np.isfinite(miss)
+    if loose.any():  # what an orientation that is only given approximately misses says nothing of the rays
+        far[loose] = np.maximum(far[loose], FAR * np.median(miss[loose]))
     whole = Selection.everything(problem)
     given = whole.control.copy()
     axes = list(GROUND_AXES)

@@ -96,7 +96,7 @@ class _Builder:
         if isinstance(event, yaml.DocumentStartEvent):
             self._document(place)
         elif isinstance(event, yaml.AliasEvent):
-            self._put(self._meant(event.anchor, place))
+            self._put(self._meant(event.anchor or "", place))
         elif isinstance(event, yaml.ScalarEvent):
             node = Node(self._text(event, place), place)
             self._properties(event, node)
