@@ -58,7 +58,7 @@ def prior(problem: BundleProblem) -> Floats:
     """A-priori sigmas of the common parameters."""
     sigma, positions = problem.cameras.sigma, problem.positions
     own = np.zeros(0) if sigma is None else sigma[sigma > 0.0]
-    drifts = [np.repeat(s[s > 0.0], 3) for s in (positions.offset_sigma, positions.drift_sigma)]
+    drifts = [s[s > 0.0] for s in (positions.offset_sigma, positions.drift_sigma)]
     return np.concatenate([own, *drifts])
 
 
@@ -98,10 +98,10 @@ def _bent(problem: BundleProblem, common: Floats, camera: NDArray[np.intp]) -> t
 def _place_misfits(positions: PositionObservations, centers: Floats, rotations: Floats, drifts: Floats) -> Floats:
     if not len(positions):
         return np.zeros((0, 3))
-    values = iter(drifts.reshape(-1, 3))
-    none = np.zeros(3)
-    offset = np.array([*(next(values) if s > 0 else none for s in positions.offset_sigma), none])
-    drift = np.array([*(next(values) if s > 0 else none for s in positions.drift_sigma), none])
+    values = iter(drifts)
+    none = [0.0] * 3
+    offset = np.array([*([next(values) if s > 0 else 0.0 for s in row] for row in positions.offset_sigma), none])
+    drift = np.array([*([next(values) if s > 0 else 0.0 for s in row] for row in positions.drift_sigma), none])
     antenna = centers[positions.photo] + np.einsum("nij,nj->ni", rotations[positions.photo], positions.lever)
     residual = np.einsum("nij,nj->ni", positions.axes, antenna - positions.xyz)
     residual -= offset[positions.group] + drift[positions.group] * positions.time[:, None]

@@ -76,11 +76,13 @@ def heights_of(observations: PhotoPoints, inputs: Inputs, settings: Settings, gr
 
         adjusted = adjust_block(inputs, settings, observations, control, ground)
         strips, points = adjusted.strips, adjusted.points.cartesian
+        singles = () if adjusted.bundle is None else adjusted.bundle.singles
     else:
         formed = form_photos(inputs, observations, settings)
         strips = tuple(adjust_formed(stage, control, ground.control, settings) for stage in formed)
-        points = mean_points(strips).xyz
-    centers = np.concatenate([strip.intermediate.cartesian_from_intermediate(strip.centers) for strip in strips])
+        points, singles = mean_points(strips).xyz, ()
+    of_strips = [strip.intermediate.cartesian_from_intermediate(strip.centers) for strip in strips]
+    centers = np.concatenate([*of_strips, *(single.center[None] for single in singles)])
     frame = ground.control[0] if ground.control else ground.output
     return Heights(float(_heights(centers, frame).mean()), float(_heights(points, frame).mean()))
 

@@ -75,8 +75,9 @@ class CameraPositions:
     time: Floats  # (n,): time of exposure; NaN without one
     # antenna from the perspective centre along the image axes (x right, y up, z towards the viewer), metres
     lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    # what the positions of one strip share beside the truth: ``"none"``, ``"offset"`` or ``"drift"``
+    # what the positions of one group share beside the truth: ``"none"``, ``"offset"`` or ``"drift"``
     correction: str = "none"
+    group: str = "strip"  # or ``"block"``
 
 
 @dataclass(frozen=True, eq=False)

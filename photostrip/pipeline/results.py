@@ -220,6 +220,7 @@ class BlockStart:
     centers: Floats
     rotations: Floats
     points: Floats  # (q, 3): all points of the observations; NaN where one has no coordinates
+    rough: Flags  # (m,): photos that stand as they were given, with too few known points to orient them
     free: bool  # whether nothing ties the block to the ground: its frame and scale are those of the first strip
 
     def rows_of(self, photos: Sequence[str]) -> Numbers:
@@ -250,6 +251,12 @@ class SinglePhoto:
     # center, rotation: (3,), (3, 3): its orientation in the project's Cartesian frame
     center: Floats
     rotation: Floats
+    depth: float  # mean distance of its points along the viewing direction, metres
+
+    @property
+    def scale_number(self) -> float:
+        """Denominator of the photo scale."""
+        return self.depth / (self.strip.camera.principal_distance / 1000)
 
 
 @dataclass(frozen=True, eq=False)

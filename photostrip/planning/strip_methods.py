@@ -247,6 +247,6 @@ def _positions(strip: IdealStrip, layout: ControlLayout) -> bundle.PositionObser
         lever=np.zeros((count, 3)),
         group=np.zeros(count, np.intp),
         time=np.linspace(-1.0, 1.0, count),
-        offset_sigma=np.array([np.inf if layout.gnss_offset else 0.0]),
-        drift_sigma=np.zeros(1),
+        offset_sigma=np.full((1, 3), np.inf if layout.gnss_offset else 0.0),
+        drift_sigma=np.zeros((1, 3)),
     )

@@ -266,6 +266,7 @@ def camera_positions(
         time=read.time[rows],
         lever_arm=given.lever_arm,
         correction=given.correction,
+        group=given.group,
     )
 
 

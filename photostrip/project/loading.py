@@ -29,6 +29,7 @@ from photostrip.project.conversion import (
 )
 from photostrip.project.hints import hints
 from photostrip.project.models import check_models, measured_models
+from photostrip.project.pixel_size import with_pixel_sizes
 from photostrip.project.places import places_of
 from photostrip.project.resolved import completed, text_of
 from photostrip.project.schema.cameras import Camera as CameraBlock
@@ -190,7 +191,7 @@ def _inputs(
     project: ProjectFile, tables: Tables, root: Node, placed_models: Mapping[int, Sequence[str]]
 ) -> tuple[Inputs, list[Note]]:
     """Turn a project without faults into what the pipeline takes."""
-    known = cameras(project)
+    known, derived = with_pixel_sizes(project, tables.fiducials, cameras(project), root)
     photos = {str(photo): known[strip.camera] for strip in project.strips if strip.camera for photo in strip.photos}
     control = [read for read in tables.control if read is not None]
     if len(control) != len(project.control):
@@ -213,7 +214,7 @@ def _inputs(
         orientations=given_orientations(tables.orientations, project.orientations, photos),
         models=models,
     )
-    return inputs, list(hints(project, tables, root))
+    return inputs, [*hints(project, tables, root), *derived]
 
 
 def _observations(project: ProjectFile, tables: Tables, photos: dict[str, Camera]) -> PhotoPoints:

@@ -130,6 +130,8 @@ def _curvature(result: Result) -> Document:
         size, how = 0.0, "none: the local frame is taken as truly Cartesian"
     else:
         a, b = result.output.ellipsoid or (6378137.0, 6356752.3)
-        reach = max(float(np.linalg.norm(s.xyz[:, :2], axis=1).max(initial=0.0)) for s in result.strips)
+        whole = result.points.cartesian - result.points.cartesian.mean(axis=0)  # of single photos, which are no strips
+        parts = [strip.xyz[:, :2] for strip in result.strips] or [whole]
+        reach = max(float(np.linalg.norm(part, axis=1).max(initial=0.0)) for part in parts)
         size, how = reach**2 / (a + b), "carried by the frames: coordinates go through geocentric space"
     return {"asked": wanted, "treatment": how, "largest": size}

@@ -93,7 +93,10 @@ def summary_of(result: Result, found: Differences) -> Document:
     found = of_used(result, found)
     control = result.inputs.control
     roles = {"control": ~control.check & control.use.any(axis=1), "check": control.check}
-    values = _of_models(result) if result.model_strips else _of_photos(result)
+    if result.model_strips:
+        values = _of_models(result)
+    else:
+        values = _of_photos(result) if result.photo_strips else _of_singles(result)
     for role, rows in roles.items():
         values[f"{role}_rms"] = _by_axis(rms, found.axes[rows])
         values[f"{role}_rms_um"] = _by_axis(rms, found.axes[rows] / found.scale[rows, None] * 1e6)
@@ -120,6 +123,21 @@ def _of_photos(result: Result) -> Document:
         "flying_height": _mean_of_strips(result, [strip.depth for strip in result.strips]),
     }
     return values if result.bundle is None else values | image_fit(result.bundle) | {"sigma0_pairs_um": sigma0_um}
+
+
+def _of_singles(result: Result) -> Document:
+    """Sum up a bundle of photos that are strips of their own each: there are no pairs and no parallaxes."""
+    if result.bundle is None:
+        msg = "single photos without a bundle adjustment"
+        raise TypeError(msg)
+    singles, sigma = result.bundle.singles, result.bundle.screened.problem.images.sigma
+    return {
+        "sigma_given_um": 1000.0 * rms(sigma.ravel()),
+        "max_parallax_um": None,
+        "photo_scale": float(np.mean([single.scale_number for single in singles])),
+        "flying_height": float(np.mean([single.depth for single in singles])),
+        **image_fit(result.bundle),
+    }
 
 
 def _of_models(result: Result) -> Document:

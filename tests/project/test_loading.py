@@ -237,6 +237,38 @@ def test_measured_marks_replace_the_origin(tmp_path: Path) -> None:
     assert image_points(project.load())["1001", "P1"] == pytest.approx((0.21, 0.405), abs=NANOMETRE)
 
 
+def test_marks_tell_the_size_of_a_pixel(tmp_path: Path) -> None:
+    """A scanner's step: the marks lie 212 mm apart and 212 pixels; without it the key was asked for."""
+    project = sample(tmp_path, MARKED_FILES)
+    project.change("project.yaml", "unit: mm\n  y_axis: up\n  sigma: 0.005", "unit: px\n  y_axis: down\n  sigma: 0.5")
+    project.change("project.yaml", "    format: [230, 230]\n", "")
+    table = (tmp_path / "fiducials.csv").read_text(encoding="utf-8").splitlines()
+    scanned = [
+        f"{photo},{mark},{50 * float(x)},{50 * float(y)}" for photo, mark, x, y in (r.split(",") for r in table[1:])
+    ]
+    project.write("fiducials.csv", "\n".join([table[0], *scanned]))
+    loaded = project.load()
+    (note,) = [note for note in loaded.hints if note.code == "pixel-size-derived"]
+    assert (
+        note.message == "camera RC30 has no pixel_size: a pixel is 20 µm by the calibrated fiducial marks of 4 photos"
+    )
+    assert (note.key, note.line) == ("cameras.RC30.pixel_size", 5)
+    inputs = loaded.inputs
+    assert inputs.fiducials is not None
+    np.testing.assert_allclose(inputs.fiducials.xy[0], [106.1, 106.0], rtol=1e-5)
+    np.testing.assert_allclose(inputs.observations.sigma, 0.5 * 0.02, rtol=1e-5)
+
+
+def test_marks_in_one_place_do_not_tell_it(tmp_path: Path) -> None:
+    project = sample(tmp_path, MARKED_FILES)
+    project.change("project.yaml", "unit: mm\n  y_axis: up\n  sigma: 0.005", "unit: px\n  y_axis: down\n  sigma: 0.5")
+    project.change("project.yaml", "    format: [230, 230]\n", "")
+    table = (tmp_path / "fiducials.csv").read_text(encoding="utf-8").splitlines()
+    project.write("fiducials.csv", "\n".join([table[0], *(",".join([*r.split(",")[:2], "7,7"]) for r in table[1:])]))
+    (line,) = project.lines()
+    assert "cameras.RC30.pixel_size: the fiducial marks do not tell the size of a pixel" in line
+
+
 def test_marks_may_have_a_unit_of_their_own(tmp_path: Path) -> None:
     project = sample(tmp_path, MARKED_FILES)
     old, new = "{file: fiducials.csv}", "{file: fiducials.csv, unit: um, y_axis: down, sigma: 3}"

@@ -169,12 +169,25 @@ def _bundle(
         parameters=parameters,
         correlations=correlations,
         singles=tuple(
-            SinglePhoto(strip, solution.centers[row] + block.origin, solution.rotations[row])
+            SinglePhoto(
+                strip=strip,
+                center=solution.centers[row] + block.origin,
+                rotation=solution.rotations[row],
+                depth=_depth(solution, row),
+            )
             for strip, row in zip(single, rows, strict=True)
         ),
         photo_covariances=precision.photos * unit**2,
         unit=unit,
     )
+
+
+def _depth(solution: BundleSolution, photo: int) -> float:
+    """Mean distance of the points that a photo shows from it, along the viewing direction, metres; NaN without any."""
+    images = solution.prepared.problem.images
+    points = solution.points[images.point[images.photo == photo]]
+    away = (solution.centers[photo] - points) @ solution.rotations[photo][:, 2]
+    return float(away.mean()) if len(away) else float("nan")
 
 
 def _correlations(solution: BundleSolution, cofactors: Cofactors) -> tuple[Correlation, ...]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from photostrip.geodesy.frame_spec import GROUND_AXES
+from photostrip.geodesy.frame_spec import CARTESIAN_AXES, GROUND_AXES
 from photostrip.geometry.rotation import angle_rates, from_angles
 from photostrip.pipeline import overruling
 from photostrip.pipeline.results import BlockProblem
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 FAR = 10.0  # times the median: a ray of no pair that misses its point by more waits outside at first
 LEAST_FAR = 50.0  # in standard deviations
-NO_CORRECTION, DRIFT = "none", "drift"
+NO_CORRECTION, DRIFT, BLOCK = "none", "drift", "block"
 
 
 def build(
@@ -73,7 +73,8 @@ def build(
         photo_ids=start.photos,
         point_ids=observations.point_ids,
         camera_ids=tuple(dict.fromkeys(strip.camera.name for strip in inputs.strips)),
-        group_ids=tuple(strip.id for strip in inputs.strips),
+        group_ids=_group_names(inputs),
+        position_axes=GROUND_AXES if _is_level(ground.positions) else CARTESIAN_AXES,
     )
     level = {
         "control": tuple(
@@ -186,25 +187,41 @@ def _measured(
     near = start.centers[photo] + np.einsum("nij,nj->ni", start.rotations[photo], lever)
     ids = [f"of photo {name}" for name in positions.photos]
     xyz, axes, sigma = given_positions(positions.enu, positions.use, positions.sigma, frame, near, ids)
-    strip_of = np.repeat(np.arange(len(inputs.strips)), [len(strip.photos) for strip in inputs.strips])
-    strip, count = strip_of[photo], len(inputs.strips)
+    group, count = _groups(inputs, positions)[photo], 1 if positions.group == BLOCK else len(inputs.strips)
     time = positions.time if np.isfinite(positions.time).all() else photo.astype(float)
-    members = np.bincount(strip, minlength=count)
-    mean = np.bincount(strip, time, count) / np.maximum(members, 1)
+    # only a coordinate that is in use somewhere has an offset; a drift needs two of them
+    members = np.zeros((count, 3), np.intp)
+    np.add.at(members, group, positions.use)
+    mean = np.bincount(group, time, count) / np.maximum(np.bincount(group, minlength=count), 1)
     wanted = np.where((members > 0) & (positions.correction != NO_CORRECTION), np.inf, 0.0)
     drift = np.where((members > 1) & (positions.correction == DRIFT), np.inf, 0.0)
-    group = strip if positions.correction != NO_CORRECTION else np.full(len(photo), -1)
     return PositionObservations(
         photo=photo,
         xyz=xyz - origin,
         axes=axes,
         sigma=sigma,
         lever=lever,
-        group=group,
-        time=time - mean[strip],
+        group=group if positions.correction != NO_CORRECTION else np.full(len(photo), -1),
+        time=time - mean[group],
         offset_sigma=wanted,
         drift_sigma=drift,
     )
+
+
+def _groups(inputs: Inputs, positions: CameraPositions) -> Numbers:
+    """Return the number of the group of each photo, whose positions share offset and drift."""
+    strips = np.repeat(np.arange(len(inputs.strips)), [len(strip.photos) for strip in inputs.strips])
+    return np.zeros_like(strips) if positions.group == BLOCK else strips
+
+
+def _group_names(inputs: Inputs) -> tuple[str, ...]:
+    if inputs.positions is not None and inputs.positions.group == BLOCK:
+        return ("of the block",)
+    return tuple(strip.id for strip in inputs.strips)
+
+
+def _is_level(frame: GroundFrame | None) -> bool:
+    return frame is None or frame.kind != "geocentric"
 
 
 def _level_positions(
@@ -275,7 +292,10 @@ def _begin(
         )
         miss = (np.abs(images.xy - computed) / images.sigma).max(axis=1)
     known = miss[np.isfinite(miss)]
-    far = max(LEAST_FAR, FAR * float(np.median(known)) if len(known) else 0.0)
+    far = np.full(len(miss), max(LEAST_FAR, FAR * float(np.median(known)) if len(known) else 0.0))
+    loose = np.isin(images.point, images.point[start.rough[images.photo]]) & np.isfinite(miss)
+    if loose.any():  # what an orientation that is only given approximately misses says nothing of the rays
+        far[loose] = np.maximum(far[loose], FAR * np.median(miss[loose]))
     whole = Selection.everything(problem)
     given = whole.control.copy()
     axes = list(GROUND_AXES)

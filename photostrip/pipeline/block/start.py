@@ -9,7 +9,7 @@ strip gives frame and scale. Single photos are resected on what is known by then
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -162,16 +162,28 @@ def _together(
         centers = strip.intermediate.cartesian_from_intermediate(strip.of_photos.resection.centers)
         turned = strip.intermediate.cartesian_rotations(strip.of_photos.resection.rotations)
         oriented |= {photo: (c, r) for photo, c, r in zip(strip.strip.photos, centers, turned, strict=True)}
+    rough: set[str] = set()
     singles = {strip.photos[0]: strip.camera.principal_distance for strip in inputs.strips if len(strip.photos) == 1}
     if singles:
         with_control = _with_control(points, observations, known)
         for photo, focal in singles.items():
-            oriented[photo] = _single(photo, focal, with_control, observations, known)
+            center, rotation, solved = _single(photo, focal, with_control, observations, known)
+            oriented[photo] = center, rotation
+            if not solved:
+                rough.add(photo)
     names = tuple(photo for strip in inputs.strips for photo in strip.photos)
     centers = np.array([oriented[name][0] for name in names])
     rotations = np.array([oriented[name][1] for name in names])
     points = _rest(inputs, observations, (centers, rotations), _with_control(points, observations, known))
-    return BlockStart(strips=strips, photos=names, centers=centers, rotations=rotations, points=points, free=free)
+    return BlockStart(
+        strips=strips,
+        photos=names,
+        centers=centers,
+        rotations=rotations,
+        points=points,
+        rough=np.array([name in rough for name in names], bool),
+        free=free,
+    )
 
 
 def _mean_points(strips: Sequence[StripResult], count: int) -> Floats:
@@ -193,22 +205,47 @@ def _with_control(points: Floats, observations: PhotoPoints, known: Known) -> Fl
     return found
 
 
-def _single(photo: str, focal: float, points: Floats, observations: PhotoPoints, known: Known) -> tuple[Floats, Floats]:
+class _SingleStart(NamedTuple):
     """Orientation of a photo that is a strip of its own."""
+
+    center: Floats
+    rotation: Floats
+    solved: bool  # false where it is the given one, for want of points
+
+
+def _single(photo: str, focal: float, points: Floats, observations: PhotoPoints, known: Known) -> _SingleStart:
+    """Orient a photo that is a strip of its own on what is known, from its given orientation or in closed form."""
     number = observations.photo_ids.index(photo)
     rows = np.flatnonzero((observations.photo == number) & np.isfinite(points[observations.point, 0]))
     xy, xyz = observations.xy[rows], points[observations.point[rows]]
-    given = photo in known.centers and photo in known.rotations
+    if photo in known.centers and photo in known.rotations:
+        given = known.centers[photo], known.rotations[photo]
+        found = _resected(xy, xyz, focal, given)
+        if found.solved:
+            return found
+        try:  # a given orientation that is too far off
+            found = _resected(xy, xyz, focal, approximate(xy, xyz, focal))
+        except GeometryError:
+            return _SingleStart(*given, solved=False)
+        return found if found.solved else _SingleStart(*given, solved=False)
     try:
-        begin = (known.centers[photo], known.rotations[photo]) if given else approximate(xy, xyz, focal)
+        begin = approximate(xy, xyz, focal)
     except GeometryError as error:
         message = (
             f"photo {photo}, a strip of its own, cannot be oriented on points known from the other photos: {error}"
         )
         raise GeometryError(message, photos=(photo,), code="strip-not-tied") from error
-    f, one = np.array([focal]), np.zeros(len(rows), np.intp)
-    found = resect(xy, xyz, one, f, (begin[0][None], begin[1][None]))
-    return found.centers[0], found.rotations[0]
+    return _resected(xy, xyz, focal, begin)._replace(solved=True)
+
+
+def _resected(xy: Floats, points: Floats, focal: float, begin: tuple[Floats, Floats]) -> _SingleStart:
+    """Resect one photo; not solved either where it would look away from its points."""
+    one = np.zeros(len(xy), np.intp)
+    with np.errstate(all="ignore"):  # a start far off sends the iteration anywhere
+        found = resect(xy, points, one, np.array([focal]), (begin[0][None], begin[1][None]))
+    center, rotation = found.centers[0], found.rotations[0]
+    before = bool((((points - center) @ rotation)[:, 2] < 0).all())
+    return _SingleStart(center, rotation, solved=bool(found.solved[0]) and before)
 
 
 def _rest(inputs: Inputs, observations: PhotoPoints, oriented: tuple[Floats, Floats], points: Floats) -> Floats:

@@ -98,6 +98,8 @@ class EvidenceStrip:
 
 def form(strip: Strip, observations: PhotoPoints, settings: Settings) -> EvidenceStrip | None:
     """Form a strip as far as that goes, for evidence alone; None when a pair or a junction cannot be determined."""
+    if len(strip.photos) < 2:
+        return None  # a single photo of a block has no pairs
     try:
         pairs = collect_pairs(observations, strip.photos, strip.camera.principal_distance)
         first, converged = orient_unchecked(pairs)

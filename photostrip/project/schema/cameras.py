@@ -52,7 +52,7 @@ class Camera(Section):
     principal_distance: Positive = key("Principal distance", unit="mm")
     principal_point: Pair = key("Principal point in the system of the image coordinates", (0.0, 0.0), unit="mm")
     format: tuple[Positive, Positive] | None = key("Width and height of the photo; needed for pixels", None, unit="mm")
-    pixel_size: Positive | None = key("Size of a pixel; needed for pixels", None, unit="mm")
+    pixel_size: Positive | None = key("Size of a pixel; needed for pixels without fiducial marks", None, unit="mm")
     fiducials: Annotated[dict[str, Pair], BeforeValidator(if_empty)] = key(
         "Coordinates of the fiducial marks, by mark: calibrated, or nominal beside `fiducial_distances`", {}, unit="mm"
     )

@@ -81,6 +81,9 @@ class CameraPositions(GivenList):
         " linear in `time`; without times in the number of the photo)",
         "none",
     )
+    group: Annotated[str, *choice(("strip", "block"))] = key(
+        "What has one `correction` in common: each `strip`, or the whole `block`", "strip"
+    )
 
 
 class Angles(Section):

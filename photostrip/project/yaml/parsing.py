@@ -1,7 +1,8 @@
 """YAML text to a tree of texts with their places, over the events of PyYAML.
 
-What makes YAML files hard to trust is refused: keys that stand twice, aliases, merge keys, tags, several documents in
-one file. What the parser refuses is reported in the words of the user.
+What makes YAML files hard to trust is refused: keys that stand twice, merge keys, tags, several documents in one file.
+Aliases stand for what their anchors name, as programs write shared lists; what they make of a file counts towards its
+size. What the parser refuses is reported in the words of the user.
 """
 
 from __future__ import annotations
@@ -86,6 +87,7 @@ class _Builder:
         self.sound = True
         self.open: list[Node] = []
         self.key: list[tuple[str, Place] | None] = []  # for each open node the key that waits for its value
+        self.named: dict[str, Node] = {}  # by anchor
         self.documents = self.values = 0
 
     def take(self, event: yaml.Event) -> None:
@@ -94,15 +96,15 @@ class _Builder:
         if isinstance(event, yaml.DocumentStartEvent):
             self._document(place)
         elif isinstance(event, yaml.AliasEvent):
-            self._refuse(place, f"the alias *{event.anchor} cannot be used", "alias", "write the value itself")
-            self.sound = False
-            self._put(Node("", place))
+            self._put(self._meant(event.anchor or "", place))
         elif isinstance(event, yaml.ScalarEvent):
-            self._properties(event, place)
-            self._put(Node(self._text(event, place), place))
+            node = Node(self._text(event, place), place)
+            self._properties(event, node)
+            self._put(node)
         elif isinstance(event, yaml.SequenceStartEvent | yaml.MappingStartEvent):
-            self._properties(event, place)
-            self._open(Node([] if isinstance(event, yaml.SequenceStartEvent) else {}, place))
+            node = Node([] if isinstance(event, yaml.SequenceStartEvent) else {}, place)
+            self._properties(event, node)
+            self._open(node)
         elif isinstance(event, yaml.SequenceEndEvent | yaml.MappingEndEvent):
             self.open.pop()
             self.key.pop()
@@ -116,13 +118,44 @@ class _Builder:
             message = "a second document (`---`) begins"
             raise InputError(place.fault(message, "yaml", expected="one project in one file"))
 
-    def _properties(self, event: Any, place: Place) -> None:  # noqa: ANN401 (three kinds of event, without a type)
-        """Refuse anchors and tags: a value is what is typed, where it is typed."""
+    def _properties(self, event: Any, node: Node) -> None:  # noqa: ANN401 (three kinds of event, without a type)
+        """Remember what an anchor names; refuse tags: a value is what is typed."""
         if event.anchor is not None:
-            self._refuse(place, f"the anchor &{event.anchor} cannot be used", "anchor", "remove it")
+            self.named[event.anchor] = node
         if event.tag is not None:
             tag = event.tag.replace("tag:yaml.org,2002:", "!!")
-            self._refuse(place, f"the tag {shown(tag)} cannot be used", "tag", "remove it")
+            self._refuse(node.place, f"the tag {shown(tag)} cannot be used", "tag", "remove it")
+
+    def _meant(self, anchor: str, place: Place) -> Node:
+        """Return a copy of what an alias stands for."""
+        node = self.named.get(anchor)
+        if node is not None and not any(each is node for each in self.open):
+            return self._copied(node, place, len(self.open))
+        what = f"the alias *{shown(anchor)} stands for " + ("nothing" if node is None else "something it is part of")
+        fix = f"name a value with &{shown(anchor)} before, or put * between quotation marks" if node is None else ""
+        self._refuse(place, what, "alias", fix or "write the value itself")
+        self.sound = False
+        return Node("", place)
+
+    def _copied(self, node: Node, place: Place, depth: int) -> Node:
+        """Copy a value to another place, what is in it keeps its own."""
+        self._count(node, depth)
+        if isinstance(node.value, str):
+            return Node(node.value, place)
+        if isinstance(node.value, list):
+            return Node([self._copied(each, each.place, depth + 1) for each in node.value], place)
+        entries = {key: self._copied(each, each.place, depth + 1) for key, each in node.value.items()}
+        return Node(entries, place, dict(node.keys))
+
+    def _count(self, node: Node, depth: int) -> None:
+        """Refuse what no person would write."""
+        self.values += 1
+        if self.values > MOST_VALUES:
+            message = f"the file has more than {MOST_VALUES} values"
+            raise InputError(Fault(message, "file-size", self.file, expected="a project"))
+        if depth >= DEEPEST and not isinstance(node.value, str):
+            message = f"values are nested more than {DEEPEST} deep"
+            raise InputError(node.place.fault(message, "yaml", expected="a project"))
 
     def _text(self, event: yaml.ScalarEvent, place: Place) -> str:
         text: str = event.value
@@ -136,16 +169,10 @@ class _Builder:
         self._put(node)
         self.open.append(node)
         self.key.append(None)
-        if len(self.open) > DEEPEST:
-            message = f"values are nested more than {DEEPEST} deep"
-            raise InputError(node.place.fault(message, "yaml", expected="a project"))
 
     def _put(self, node: Node) -> None:
         """Return a new value its place in the tree."""
-        self.values += 1
-        if self.values > MOST_VALUES:
-            message = f"the file has more than {MOST_VALUES} values"
-            raise InputError(Fault(message, "file-size", self.file, expected="a project"))
+        self._count(node, len(self.open))
         if not self.open:
             self.root = node
             return
@@ -217,7 +244,6 @@ _PROBLEMS = (
     ("unknown escape", "a backslash between double quotation marks begins an escape",
      "use single quotation marks, or / in paths"),
     ("could not find expected ':'", "a line without a colon", "write `key: value`, with a blank after the colon"),
-    ("undefined alias", "an alias cannot be used", "write the value itself; put * between quotation marks"),
 )  # fmt: skip
 
 

@@ -137,6 +137,8 @@ def _cameras(root: Node) -> Iterator[Fault]:
     used = {strip.word("camera") for strip in root.list_at("strips")}
     pixels = "px" in {root.word("observations", "unit"), root.word("fiducial_measurements", "unit")}
     marked = root.has("fiducial_measurements")
+    units = {root.word("observations", "unit"), root.word("fiducial_measurements", "unit") or "px"}
+    scanned = marked and units == {"px"}  # marks that are measured in pixels as the points are tell their size
     origin = root.word("observations", "origin") or ("top-left" if root.word("observations", "unit") == "px" else "")
     cornered = origin in {"top-left", "first-pixel"} and not marked
     for name, camera in root.mapping_at("cameras").items():
@@ -151,7 +153,8 @@ def _cameras(root: Node) -> Iterator[Fault]:
             message = f"fiducial marks are measured, but camera {shown(name)} has none"
             fix = "give their calibrated coordinates, or remove fiducial_measurements"
             yield fault_at(root, (*path, "fiducials"), message, "missing-key", fix=fix)
-        if (pixels or origin == "first-pixel") and "pixel_size" not in camera.entries:
+        told = scanned and marks is not None
+        if (pixels or origin == "first-pixel") and not told and "pixel_size" not in camera.entries:
             message = f"coordinates are measured in pixels, but camera {shown(name)} has no pixel_size"
             expected = "the size of a pixel in mm"
             yield fault_at(root, (*path, "pixel_size"), message, "missing-key", expected=expected)

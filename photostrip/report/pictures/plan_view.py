@@ -38,7 +38,10 @@ def plan_of(document: Document) -> Plan:
     """Return the plan of a result in metres, turned so that its first strip runs to the right."""
     grid = _Grid(document)
     photos = document["photos"]
-    first = [photo for photo in photos if photo["strip"] == document["strips"][0]["id"]]
+    # single photos are strips of their own, which ``strips`` does not hold: they are drawn as one
+    names = [strip["id"] for strip in document["strips"]]
+    flown = [[photo for photo in photos if photo["strip"] == name] for name in names] or [photos]
+    first = flown[0]
     start, end = grid.place(first[0]), grid.place(first[-1])
     length = math.hypot(end[0] - start[0], end[1] - start[1]) or 1.0
     along = ((end[0] - start[0]) / length, (end[1] - start[1]) / length)
@@ -63,10 +66,7 @@ def plan_of(document: Document) -> Plan:
     given = {row["id"]: row for row in document["control"] if row["measured"]}
     spots = [spot(row, row["role"], given.get(row["id"])) for row in document["points"]]
     spots.sort(key=lambda each: ("new", "check", "control").index(each.role))
-    strips = [
-        [spot(photo, "photo") for photo in photos if photo["strip"] == strip["id"]] for strip in document["strips"]
-    ]
-    return Plan(spots, strips, turned(0.0, 1.0))
+    return Plan(spots, [[spot(photo, "photo") for photo in each] for each in flown], turned(0.0, 1.0))
 
 
 def _ellipse(row: Document, turned: Any) -> tuple[float, float, float] | None:  # noqa: ANN401 (a function)

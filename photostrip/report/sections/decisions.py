@@ -77,7 +77,8 @@ def _screening(document: Document, settings: Document) -> Iterator[tuple[str, st
 def _heights(document: Document, settings: Document) -> Iterator[tuple[str, str]]:
     wanted = [name for name, key in (("refraction", "refraction"), ("curvature", "earth_radius")) if settings.get(key)]
     if wanted and (settings["flying_height"] is None or settings["ground_height"] is None):
-        heights = ", ".join(f"{short(strip['flying_height'])} m" for strip in document["strips"])
+        known = document["strips"] or [document["summary"]]
+        heights = ", ".join(f"{short(each['flying_height'])} m" for each in known)
         without = "it" if len(wanted) == 1 else "them"
         label = f"heights for {' and '.join(wanted)}"
         yield label, f"from a first run without {without}; flying height above ground {heights}"

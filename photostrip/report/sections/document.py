@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 def sections_of(document: Document, *, everything: bool = False) -> tuple[Section, ...]:
     """Return the sections of the accuracy report."""
-    several = len(document["strips"]) > 1
+    several = document["counts"]["strips"] > 1
     return (
         verdict_section(document, everything=everything),
         *findings_sections(document),
@@ -56,10 +56,11 @@ def _of_the_strips(document: Document, *, everything: bool) -> Iterator[Section]
     if of_models(document):
         yield links_section(document, everything=everything)
         yield models_section(document, everything=everything)
-    else:
+    elif document["models"]:
         yield relative_section(document, everything=everything)
         yield junction_section(document, everything=everything)
-    yield absolute_section(document)
+    if document["absolute"]:
+        yield absolute_section(document)
     if document.get("polynomials"):
         yield polynomial_section(document, everything=everything)
     if "covariance" in document:

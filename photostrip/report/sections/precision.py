@@ -27,7 +27,7 @@ def precision_section(document: Document, *, everything: bool) -> Section:
         "adjustment. They hold for random errors: what a lens, the film or the refraction does to a whole strip is "
         "not in them."
     )
-    facts = [(f"{measured} coordinates", _basis(block["basis"]))]
+    facts = [(f"{measured} coordinates", _basis(block["basis"] if document["strips"] else block["basis"][:1]))]
     for name, meaning in PARTS:
         part = block["points"][name]
         facts.append(
@@ -37,7 +37,8 @@ def precision_section(document: Document, *, everything: bool) -> Section:
             )
         )
     facts += _check(block.get("check"))
-    tables = (_worst(document), _along(document, block["along"], everything=everything))
+    along = [_along(document, block["along"], everything=everything)] if block["along"] else []
+    tables = (_worst(document), *along)
     return Section("Precision", (Words(text), Facts(tuple(facts)), *tables))
 
 

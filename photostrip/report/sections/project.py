@@ -109,6 +109,11 @@ def counts_section(document: Document) -> Section:
     if len(strips) == 1:
         rows.append((f"{scale_word(document)} scale", _scale(strips[0])))
         return Section("Counts", (Facts(tuple(rows)),))
+    if not strips:  # single photos, which form none
+        summary = document["summary"]
+        scale = f"1:{summary['photo_scale']:.0f}, flying height {fixed(summary['flying_height'], 0)} m above ground"
+        rows.append(("photo scale", scale))
+        return Section("Counts", (Facts(tuple(rows)),))
     return Section("Counts", (Facts(tuple(rows)), tabulated(strips, STRIPS)))
 
 

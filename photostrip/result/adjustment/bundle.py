@@ -168,7 +168,7 @@ def _corrections(found: Bundle) -> Iterator[Document]:
     """Return offsets and drifts of the camera positions of the strips: the last of the common unknowns."""
     problem, solution, precision = found.screened.problem, found.screened.solution, found.screened.precision
     names, given = problem.common_names(), (problem.positions.offset_sigma, problem.positions.drift_sigma)
-    for number in range(len(names) - sum(3 * int((sigma > 0).sum()) for sigma in given), len(names)):
+    for number in range(len(names) - sum(int((sigma > 0).sum()) for sigma in given), len(names)):
         sigma = float(np.sqrt(precision.common[number, number])) * found.unit
         yield {"name": names[number], "value": solution.common[number], "sigma": sigma}
 

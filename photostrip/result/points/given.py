@@ -127,12 +127,13 @@ def _held(result: Result) -> Flags:
 def _scale(result: Result, held: Flags) -> Floats:
     """Return the denominator of the photo scale at every given point, mean over its strips; NaN where it has none.
 
-    In a bundle a point of no strip, seen on single photos, has that of all strips.
+    In a bundle a point of no strip, seen on single photos, has that of all strips; without any, of all photos.
     """
     of_strips = np.array([strip.scale_number for strip in result.strips])
     scale = (held.T @ of_strips) / np.maximum(held.sum(axis=0), 1)
     if result.bundle is not None and result.precision is not None:
-        scale = np.where(held.any(axis=0), scale, np.mean(of_strips) if len(of_strips) else np.nan)
+        of_singles = np.array([single.scale_number for single in result.bundle.singles])
+        scale = np.where(held.any(axis=0), scale, np.mean(of_strips if len(of_strips) else of_singles))
     return np.where(scale > 0, scale, np.nan)
 
 

@@ -130,7 +130,8 @@ def precision_of(result: Result) -> Document:
         "basis": [
             {"strip": strip.strip.id, "sigma_um": value * 1000.0, "basis": basis}
             for strip, value, basis in zip(result.strips, precision.sigma, precision.basis, strict=True)
-        ],
+        ]
+        or _basis_of_singles(result),
         "points": {name: _summed(column, names) for name, column in zip(("plan", "height"), sigma.T, strict=True)},
         "along": [
             row
@@ -140,6 +141,16 @@ def precision_of(result: Result) -> Document:
     }
     check = _check(result)
     return {"precision": record("precision", block | ({"check": check} if check else {}))}
+
+
+def _basis_of_singles(result: Result) -> list[Document]:
+    """Say for each photo that is a strip of its own what its covariances rest on."""
+    if result.bundle is None:
+        return []
+    bundle = result.bundle
+    sigma_um = 1000.0 * float(np.median(bundle.block.problem.images.sigma)) * bundle.unit
+    basis = "a-priori" if bundle.unit == 1.0 else "a-posteriori"
+    return [{"strip": each.strip.id, "sigma_um": sigma_um, "basis": basis} for each in bundle.singles]
 
 
 def _summed(sigma: Floats, names: list[str]) -> Document:

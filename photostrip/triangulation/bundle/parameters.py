@@ -76,7 +76,7 @@ def prepare(problem: BundleProblem) -> PreparedProblem:
     """Find what does not change during the adjustment: structure, calibrated parameters, a-priori sigmas."""
     calibrated = calibration.parameters(problem.cameras)
     drifts = (problem.positions.offset_sigma, problem.positions.drift_sigma)
-    sigmas = [calibrated.sigma, *(np.repeat(sigma[sigma > 0.0], 3) for sigma in drifts)]
+    sigmas = [calibrated.sigma, *(sigma[sigma > 0.0] for sigma in drifts)]
     return PreparedProblem(
         problem=problem, structure=band_structure(problem), calibrated=calibrated, prior=np.concatenate(sigmas)
     )

@@ -55,7 +55,8 @@ def solve(problem: BundleProblem) -> BundleSolution:
     defects.refuse_repeated(problem)
     prepared = prepare(problem)
     free = datum.is_free(problem)
-    state, steps = _iterate(prepared, free=free)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # starts far off: such steps are refused
+        state, steps = _iterate(prepared, free=free)
     return _solution(prepared, state, steps, free=free)
 
 

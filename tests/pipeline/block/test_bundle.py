@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from photostrip.pipeline import Inputs
+    from photostrip.pipeline.inputs import CameraPositions
     from photostrip.simulate import Simulation
 
 pytestmark = pytest.mark.usefixtures("_no_findings")
@@ -67,6 +68,12 @@ def test_without_noise_the_truth_comes_back(title: str) -> None:
     assert np.abs(centers - simulation.truth.centers).max() < MICROMETRE
 
 
+def heights(given: CameraPositions) -> CameraPositions:
+    """Positions of which the heights alone count; the plan is not given at all, as by a statoscope."""
+    plan = np.array([True, True, False])
+    return replace(given, enu=np.where(plan, np.nan, given.enu), use=np.tile(~plan, (len(given.photos), 1)))
+
+
 TIED: dict[str, Callable[[Simulation], Inputs]] = {
     "corners only": lambda s: with_control(s, corners(s)),
     "positions only": lambda s: replace(with_control(s, []), positions=positions(s)),
@@ -83,6 +90,23 @@ TIED: dict[str, Callable[[Simulation], Inputs]] = {
     "orientations, alpha": lambda s: replace(
         with_control(s, []), orientations=orientations(s, observed=True, system="alpha-omega-kappa")
     ),
+    "one offset of the block": lambda s: replace(
+        with_control(s, corners(s)[:1]),
+        positions=replace(positions(s, shift=np.array([3.0, 2.0, 1.0]), correction="offset"), group="block"),
+    ),
+    "one drift of the block": lambda s: replace(
+        with_control(s, corners(s)),
+        positions=replace(
+            positions(s, shift=np.arange(18)[:, None] * np.array([0.1, -0.2, 0.05]), correction="drift"), group="block"
+        ),
+    ),
+    "heights of the cameras with offset": lambda s: replace(
+        with_control(s, corners(s)), positions=heights(positions(s, shift=20.0, correction="offset"))
+    ),
+    "heights of the cameras with drift": lambda s: replace(
+        with_control(s, corners(s)),
+        positions=heights(positions(s, shift=0.3 * np.arange(18.0)[:, None] - 7.0, correction="drift")),
+    ),
 }
 
 
@@ -92,7 +116,8 @@ def test_whatever_ties_the_photos_to_the_ground(title: str) -> None:
     simulation = simulate(BLOCK)
     result = adjusted(simulation, TIED[title](simulation))
     # three metres of the grid are not three metres everywhere: its scale changes by 1e-6 over the block
-    assert np.abs(errors(simulation, result)).max() < (10 if title in {"offset", "drift"} else 1) * MICROMETRE
+    allowed = 10 if title in {"offset", "drift"} else 20 if "of the block" in title else 1
+    assert np.abs(errors(simulation, result)).max() < allowed * MICROMETRE
     assert not any(note.code == "free-network" for note in result.notes)
 
 
@@ -105,11 +130,11 @@ def test_offset_and_drift_are_found_as_they_are() -> None:
     )
     document = document_of(adjusted(simulation, inputs))
     found = {each["name"]: each["value"] for each in document["bundle"]["corrections"]}
-    for axis in (1, 2, 3):
+    for axis, name in enumerate(("east", "north", "up")):
         # what is added to the given positions, the offset in mid-strip; metres of the ground, not of the grid
-        assert found[f"positions A: drift {axis}"] == pytest.approx(-step[axis - 1], rel=1e-3)
-        assert found[f"positions A: offset {axis}"] == pytest.approx(-(axis + 2.5 * step[axis - 1]), rel=1e-3)
-        assert abs(found[f"positions B: offset {axis}"]) < 1e-4
+        assert found[f"positions A: drift {name}"] == pytest.approx(-step[axis], rel=1e-3)
+        assert found[f"positions A: offset {name}"] == pytest.approx(-(axis + 1 + 2.5 * step[axis]), rel=1e-3)
+        assert abs(found[f"positions B: offset {name}"]) < 1e-4
 
 
 def test_approximate_orientations_give_the_frame_and_no_more() -> None:
@@ -226,3 +251,32 @@ def test_stated_standard_deviations_that_are_wrong_are_told() -> None:
     observations = replace(inputs.observations, sigma=inputs.observations.sigma / 2)
     result = adjusted(simulation, replace(inputs, observations=observations))
     assert any(note.code == "unit-weight" and "too small" in note.message for note in result.notes)
+
+
+@pytest.mark.parametrize(
+    ("group", "correction", "names"),
+    [
+        ("strip", "offset", ["positions A: offset up", "positions B: offset up"]),
+        ("block", "offset", ["positions of the block: offset up"]),
+        ("block", "drift", ["positions of the block: offset up", "positions of the block: drift up"]),
+    ],
+)
+def test_heights_have_an_offset_in_height_alone(group: str, correction: str, names: list[str]) -> None:
+    simulation = simulate(exact(flight=Flight(photos=5, strips=2)))
+    given = replace(heights(positions(simulation, shift=4.0, correction=correction)), group=group)
+    result = adjusted(simulation, replace(with_control(simulation, corners(simulation)), positions=given))
+    corrections = document_of(result)["bundle"]["corrections"]
+    assert [row["name"] for row in corrections] == names
+    assert corrections[0]["value"] == pytest.approx(-4.0, abs=1e-5)
+
+
+def test_a_strip_whose_positions_are_switched_off_has_no_offset() -> None:
+    simulation = simulate(exact(flight=Flight(photos=5, strips=2)))
+    given = positions(simulation, shift=4.0, correction="drift")
+    use = given.use.copy()
+    use[5:] = False
+    use[1:5, 0] = False  # of a single coordinate an offset, no drift
+    inputs = replace(with_control(simulation, corners(simulation)), positions=replace(given, use=use))
+    corrections = document_of(adjusted(simulation, inputs))["bundle"]["corrections"]
+    names = [row["name"].removeprefix("positions A: ") for row in corrections]
+    assert names == ["offset east", "offset north", "offset up", "drift north", "drift up"]

@@ -91,8 +91,8 @@ def test_keys_know_their_place() -> None:
         ("a: 1\n b: 2", 2, "colon"),
         ("- a\nb: 1", 2, "does not fit"),
         (" a: 1\nb: 2", 2, "does not fit"),
-        ("a: *b", 1, "alias"),
-        ("a: &b c", 1, "anchor"),
+        ("a: *b", 1, "alias *b stands for nothing"),
+        ("a: &b\n  c: *b", 2, "alias *b stands for something it is part of"),
         ("<<: a", 1, "merge"),
         ("a: 1\na: 2", 2, "second time"),
         ("a: 1\n' a ': 2", 2, "second time"),
@@ -154,3 +154,22 @@ def test_a_bracket_at_the_end_of_the_text_is_told_with_its_column() -> None:
     _, findings = read("[")
     (fault,) = findings.faults
     assert (fault.line, fault.column) == (1, 1)
+
+
+def test_an_alias_is_what_its_anchor_names() -> None:
+    root, findings = read("a: &photos [x, {k: v}]\nb: *photos\nc: {d: *photos, e: &photos 7, f: *photos}")
+    assert not findings.faults
+    assert root is not None
+    shared = ["x", {"k": "v"}]
+    assert root.plain == {"a": shared, "b": shared, "c": {"d": shared, "e": "7", "f": "7"}}
+    assert root.place_of(("b",)).line == 2  # where it is used
+
+
+def test_a_project_that_a_script_dumped_is_read() -> None:
+    photos = ["101", "102"]
+    text = yaml.safe_dump({"strips": [{"photos": photos}], "order": photos})
+    assert "&id001" in text
+    root, findings = read(text)
+    assert not findings.faults
+    assert root is not None
+    assert root.plain == {"strips": [{"photos": photos}], "order": photos}

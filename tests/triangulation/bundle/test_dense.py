@@ -67,8 +67,8 @@ def with_everything() -> BundleProblem:
         lever=lever,
         group=np.array([0, 0, 0, 1, 1, -1]),
         time=np.arange(m, dtype=float) - 2.5,
-        offset_sigma=np.array([np.inf, np.inf]),
-        drift_sigma=np.array([0.0, 1.0]),
+        offset_sigma=np.array([[np.inf, np.inf, np.inf], [0.0, np.inf, 2.0]]),
+        drift_sigma=np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 1.0]]),
     )
     attitudes = AttitudeObservations(
         np.arange(1, m),

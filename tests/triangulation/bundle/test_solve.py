@@ -163,15 +163,15 @@ def test_positions_with_lever_arm_offset_and_drift_replace_control() -> None:
         lever=lever,
         group=group,
         time=time,
-        offset_sigma=np.full(2, np.inf),
-        drift_sigma=np.array([np.inf, 0.0]),
+        offset_sigma=np.full((2, 3), np.inf),
+        drift_sigma=np.array([[np.inf] * 3, [0.0] * 3]),
     )
     solution = solve(replace(problem, positions=positions, control=_some(problem, 4)))
     np.testing.assert_allclose(solution.common, np.concatenate([offset.ravel(), drift[0]]), atol=1e-5)
     assert np.abs(solution.points - truth.points)[seen_points(problem)].max() < 10 * MICROMETRE
     names = replace(problem, positions=positions, group_ids=("A", "B")).common_names()
-    assert names[:2] == ("positions A: offset 1", "positions A: offset 2")
-    assert names[-1] == "positions A: drift 3"
+    assert names[:2] == ("positions A: offset east", "positions A: offset north")
+    assert names[-1] == "positions A: drift up"
 
 
 def test_the_camera_comes_out_of_the_measurements() -> None:

@@ -36,15 +36,16 @@ class LinearisedOrientations:
 
 
 def drift_columns(positions: PositionObservations, first: int) -> tuple[Numbers, Numbers]:
-    """First of three columns of offset and of drift of each group among the common parameters, each (groups + 1,).
+    """Columns of the components of offset and of drift of each group among the common parameters, each (groups + 1, 3).
 
     ``first`` common parameters stand before them; -1: not a parameter, as for the group -1 at the end.
     """
     columns = []
     for sigma in (positions.offset_sigma, positions.drift_sigma):
         used = sigma > 0.0
-        columns.append(np.append(np.where(used, first + 3 * (np.cumsum(used) - 1), -1), -1))
-        first += 3 * int(used.sum())
+        number = np.where(used, first + np.cumsum(used).reshape(used.shape) - 1, -1)
+        columns.append(np.concatenate([number, np.full((1, 3), -1)]))
+        first += int(used.sum())
     return columns[0], columns[1]
 
 
@@ -63,9 +64,8 @@ def positions_at(
     factors = (np.ones(len(positions)), positions.time)
     for columns, factor in zip(drift_columns(positions, calibrated), factors, strict=True):
         column = columns[positions.group]
-        rows = np.flatnonzero(column >= 0)
-        for axis in range(3):
-            by_common[rows, axis, column[rows] + axis] = -factor[rows]
+        rows, axis = np.nonzero(column >= 0)
+        by_common[rows, axis, column[rows, axis]] = -factor[rows]
     residual += by_common @ common
     return LinearisedOrientations(
         photo=positions.photo, residual=residual, by_photo=by_photo, by_common=by_common, weight=1.0 / positions.sigma

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.geodesy.frame_spec import GROUND_AXES
+
 if TYPE_CHECKING:
     from photostrip.arrays import Floats, Numbers
 
@@ -92,11 +94,11 @@ class PositionObservations:
     group: Numbers = field(default_factory=_no_numbers)
     # (g,): what the drift is multiplied with: time or place along the strip, best centred
     time: Floats = field(default_factory=_no_rows)
-    # offset_sigma, drift_sigma: (groups,): a-priori standard deviations of each of the three components of a group's
-    # offset (metres) and drift (metres per unit of time) about zero; infinite: free; 0: there is none. They are what
-    # has to be added to what is given
-    offset_sigma: Floats = field(default_factory=_no_rows)
-    drift_sigma: Floats = field(default_factory=_no_rows)
+    # offset_sigma, drift_sigma: (groups, 3): a-priori standard deviations of the three components of a group's offset
+    # (metres) and drift (metres per unit of time) about zero; infinite: free; 0: there is none. They are what has to be
+    # added to what is given
+    offset_sigma: Floats = field(default_factory=lambda: _no_rows(3))
+    drift_sigma: Floats = field(default_factory=lambda: _no_rows(3))
 
     def __len__(self) -> int:
         return len(self.photo)
@@ -151,6 +153,7 @@ class BundleProblem:
     point_ids: tuple[str, ...] = ()
     camera_ids: tuple[str, ...] = ()
     group_ids: tuple[str, ...] = ()
+    position_axes: tuple[str, str, str] = GROUND_AXES  # names of the rows of ``positions.axes``
 
     @property
     def photos(self) -> int:
@@ -174,7 +177,7 @@ class BundleProblem:
         """Names of the parameters that many photos share, in the order of ``BundleSolution.common``.
 
         First calibration parameters (``camera RC30: k1``), then offsets and drifts of positions (``positions A: offset
-        1``; the component counts along the rows of the axes).
+        east``; the component counts along the rows of the axes).
         """
         names = []
         if self.cameras.sigma is not None:
@@ -182,7 +185,7 @@ class BundleProblem:
                 name = self.camera_ids[camera] if self.camera_ids else f"number {camera}"
                 names += [f"camera {name}: {CALIBRATION[k]}" for k in np.flatnonzero(row > 0.0)]
         for title, sigma in (("offset", self.positions.offset_sigma), ("drift", self.positions.drift_sigma)):
-            for group in np.flatnonzero(sigma > 0.0).tolist():
+            for group, axis in np.argwhere(sigma > 0.0).tolist():
                 name = self.group_ids[group] if self.group_ids else f"group {group}"
-                names += [f"positions {name}: {title} {axis}" for axis in (1, 2, 3)]
+                names.append(f"positions {name}: {title} {self.position_axes[axis]}")
         return tuple(names)

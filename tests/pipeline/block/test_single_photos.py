@@ -1,0 +1,104 @@
+"""Blocks of photos that are strips of their own each: no pairs, no models, and yet every output."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from photostrip.compare import compare_results
+from photostrip.errors import GeometryError
+from photostrip.formats.output.result_files import result_files
+from photostrip.formats.output.simulation import inputs_of, settings_of
+from photostrip.pipeline import Inputs, Strip, triangulate
+from photostrip.report import sections_of
+from photostrip.report.html import to_html
+from photostrip.result.document import document_of
+from photostrip.result.trace.trace import trace_of
+from photostrip.simulate import Control, Flight, Ground, Simulation, Spec
+from tests.pipeline.blocks import adjusted, errors, exact, orientations, simulate, with_control
+
+MICROMETRE = 1e-6  # metres
+MANY = Control(noise=(0.0, 0.0, 0.0), layout="bands", bands=6, per_band=3)
+
+
+def singles(simulation: Simulation, inputs: Inputs | None = None) -> Inputs:
+    """Cut every strip into its photos."""
+    inputs = inputs_of(simulation) if inputs is None else inputs
+    strips = [Strip(photo, strip.camera, (photo,)) for strip in inputs.strips for photo in strip.photos]
+    return replace(inputs, strips=tuple(strips))
+
+
+@pytest.mark.parametrize("crs", ["EPSG:32633", "geocentric", "local"])
+def test_single_photos_on_full_control_come_back_to_the_truth(crs: str) -> None:
+    simulation = simulate(exact(flight=Flight(photos=6), control=MANY, ground=Ground(crs=crs)))
+    result = adjusted(simulation, singles(simulation))
+    assert np.abs(errors(simulation, result)).max() < MICROMETRE
+    document = document_of(result)
+    assert document["counts"]["strips"] == 6
+    assert document["models"] == document["strips"] == document["parallaxes"] == []
+    assert document["summary"]["photo_scale"] == pytest.approx(10_000, rel=0.02)
+    assert document["summary"]["flying_height"] == pytest.approx(1530, rel=0.02)
+    assert [row["strip"] for row in document["precision"]["basis"]] == [photo["id"] for photo in document["photos"]]
+
+
+def test_every_output_knows_single_photos() -> None:
+    simulation = simulate(replace(Spec(), flight=Flight(photos=6), control=replace(MANY, noise=(0.05, 0.05, 0.08))))
+    result = adjusted(simulation, singles(simulation))
+    document = document_of(result)
+    for everything in (False, True):
+        titles = [section.title for section in sections_of(document, everything=everything)]
+        assert "Bundle adjustment" in titles
+        assert "Relative orientation" not in titles
+    assert to_html(document).count("<svg") >= 2
+    assert set(result_files(document)) > {"points.csv", "photos.csv", "reliability.csv"}
+    assert trace_of(result)["strips"] == []
+    assert compare_results(document, document)["status"] == "same"
+
+
+def test_refraction_takes_its_heights_from_single_photos_too() -> None:
+    simulation = simulate(exact(flight=Flight(photos=6), control=MANY))
+    asked = settings_of(simulation)
+    asked = replace(asked, adjustment="bundle", refinement=replace(asked.refinement, refraction=True))
+    assert np.isfinite(triangulate(singles(simulation), asked).points.cartesian).all()
+
+
+@pytest.mark.parametrize("screening", ["snooping", "none"])
+@pytest.mark.parametrize(("metres", "degrees"), [(50.0, 2.0), (500.0, 8.0)])
+def test_approximate_orientations_far_off_are_a_start_and_no_more(
+    screening: str, metres: float, degrees: float
+) -> None:
+    """Photos begin hundreds of metres off; no ray may be left out for that, and control in closed form helps."""
+    simulation = simulate(exact(flight=Flight(photos=6), control=MANY))
+    given = orientations(simulation, observed=False)
+    noise = np.random.default_rng(4)
+    given = replace(
+        given,
+        enu=given.enu + noise.normal(0.0, metres, given.enu.shape),
+        angles=given.angles + np.radians(noise.normal(0.0, degrees, given.angles.shape)),
+    )
+    inputs = replace(singles(simulation), orientations=given)
+    result = adjusted(simulation, inputs, screening=screening)
+    assert np.abs(errors(simulation, result)).max() < MICROMETRE
+
+
+@pytest.mark.parametrize("screening", ["snooping", "none"])
+def test_approximate_heights_below_the_ground_are_a_start_too(screening: str) -> None:
+    """The photos are oriented on their control in closed form then."""
+    simulation = simulate(exact(flight=Flight(photos=6), control=MANY))
+    given = orientations(simulation, observed=False)
+    given = replace(given, enu=given.enu - np.array([0.0, 0.0, 2000.0]))
+    result = adjusted(simulation, replace(singles(simulation), orientations=given), screening=screening)
+    assert np.abs(errors(simulation, result)).max() < MICROMETRE
+
+
+def test_single_photos_that_nothing_holds_are_refused_by_name() -> None:
+    """The search for what the data say against themselves formed pairs of one photo."""
+    simulation = simulate(exact(flight=Flight(photos=2), control=replace(MANY, bands=2)))
+    names = simulation.control.ids[:1]
+    inputs = replace(
+        singles(simulation, with_control(simulation, names)), orientations=orientations(simulation, observed=False)
+    )
+    with pytest.raises(GeometryError, match="does not determine"):
+        adjusted(simulation, inputs)
