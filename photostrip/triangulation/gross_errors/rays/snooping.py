@@ -65,10 +65,12 @@ class ScreenedBundle:
     rounds: int = 1
 
     @classmethod
-    def of(cls, problem: BundleProblem, selection: Selection, settings: BundleSettings) -> ScreenedBundle:
+    def of(
+        cls, problem: BundleProblem, selection: Selection, settings: BundleSettings, *, rough: bool = False
+    ) -> ScreenedBundle:
         """Adjust a selection."""
         chosen = selected(problem, selection)
-        solution = solve(chosen)
+        solution = solve(chosen, rough=rough)
         return cls(
             problem=chosen,
             selection=selection,
@@ -84,16 +86,23 @@ class ScreenedBundle:
 
 
 def screen_bundle(
-    problem: BundleProblem, begin: Selection, settings: BundleSettings, kept: Flags | None = None
+    problem: BundleProblem,
+    begin: Selection,
+    settings: BundleSettings,
+    kept: Flags | None = None,
+    *,
+    rough: bool = False,
 ) -> ScreenedBundle:
     """Adjust a problem and take its gross errors out.
 
     ``begin`` takes part at first, the rest is put in at the end where it fits; the rays ``kept`` (n,) stay in whatever
     the tests say.
+
+    rough: adjust as well as the tests need it.
     """
     if settings.screening == "none":
         return ScreenedBundle.of(problem, supported(problem, Selection.everything(problem)), settings)
-    search = _Search(problem, settings, np.zeros(len(problem.images), bool) if kept is None else kept)
+    search = _Search(problem, settings, np.zeros(len(problem.images), bool) if kept is None else kept, rough=rough)
     chosen = supported(problem, begin)
     if settings.screening == "robust":
         chosen = search.robust(chosen)
@@ -106,8 +115,8 @@ def screen_bundle(
 class _Search:
     """What is remembered from round to round."""
 
-    def __init__(self, problem: BundleProblem, settings: BundleSettings, kept: Flags) -> None:
-        self.problem, self.settings = problem, settings
+    def __init__(self, problem: BundleProblem, settings: BundleSettings, kept: Flags, *, rough: bool) -> None:
+        self.problem, self.settings, self.rough = problem, settings, rough
         images = problem.images
         self.by_point = np.lexsort((images.photo, images.point))
         self.first = np.searchsorted(images.point[self.by_point], np.arange(problem.points + 1))
@@ -124,7 +133,7 @@ class _Search:
 
     def adjust(self, selection: Selection) -> ScreenedBundle:
         """Adjust a selection, and start from there the next time."""
-        done = ScreenedBundle.of(self.problem, selection, self.settings)
+        done = ScreenedBundle.of(self.problem, selection, self.settings, rough=self.rough)
         self.problem = restarted(self.problem, done.solution)
         self.rounds += 1
         return done

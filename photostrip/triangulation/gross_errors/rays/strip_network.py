@@ -41,7 +41,7 @@ def wrong_rays(oriented: Orientation, formed: FormedStrip, rays: StripRays) -> t
     every = Selection.everything(problem)
     begin = Selection(images=~far, control=every.control, positions=every.positions, attitudes=every.attitudes)
     try:
-        found = screen_bundle(problem, begin, BundleSettings(), np.isin(rows, rays.kept))
+        found = screen_bundle(problem, begin, BundleSettings(), np.isin(rows, rays.kept), rough=True)
     except GeometryError:
         return None
     return tuple(replace(each, row=int(rows[each.row])) for each in found.rejections if not each.readmitted)
