@@ -19,6 +19,7 @@ import numpy as np
 
 from photostrip.statistics import chi2_quantile
 from photostrip.triangulation.bundle.quality.reliability import UNCONTROLLED
+from photostrip.triangulation.gross_errors.pairs.deletion import LARGEST
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
 
 
 LIKELIER = 9.0  # difference of two sums of squares that tells sets of rays apart: a likelihood ratio of 90
-LARGEST_SET = 3  # rays
 ROUNDING = 1e-9  # keeps a point that holds its photos alone from stopping the others
 WRONG_RAY, TWO_RAYS, SEVERAL_RAYS = "ray", "pair", "rays"
 """What was found at a point: its wrong rays; two rays that contradict each other; several of which any may be wrong."""
@@ -81,7 +81,7 @@ def decide(point: PointRays, limit: Limit) -> Decision:
     if value <= limit.value * limit.unit:
         return Decision(np.zeros(r, bool), "", value, size)
     total, unit = float(gap @ weight @ gap), limit.unit**2
-    for count in range(1, min(r, LARGEST_SET) + 1):
+    for count in range(1, min(r, LARGEST) + 1):
         if freedom - 2 * count < 1:
             break
         left, sets, errors = _without(total, pulled, normal, list(combinations(range(r), count)))
@@ -94,7 +94,7 @@ def decide(point: PointRays, limit: Limit) -> Decision:
                 return Decision(np.isin(np.arange(r), sets[best]), WRONG_RAY, value, size)
             break
     else:
-        count = min(r, LARGEST_SET)
+        count = min(r, LARGEST)
     if freedom > 1:
         for number in np.argsort(-left, kind="stable"):  # the likeliest set with each ray says its error
             size[sets[number]] = errors[number]

@@ -38,10 +38,6 @@ if TYPE_CHECKING:
     from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
 
-SEARCH_ROUNDS = 200  # of testing and taking out; each takes out one error of every neighbourhood
-NEAR = 0.5  # test value of what may go in a round, in units of the worst on the same photos
-
-
 def _limit(solution: BundleSolution, settings: BundleSettings) -> Limit:
     """Limit of standardised residuals: never sharper than the stated standard deviations allow."""
     alpha = settings.level / max(solution.redundancy, 1) if settings.alpha is None else settings.alpha
@@ -156,17 +152,14 @@ class _Search:
 
     def clean(self, selection: Selection) -> ScreenedBundle:
         """Test and take out until nothing is beyond the limit."""
-        for _ in range(SEARCH_ROUNDS):
-            done = self.adjust(selection)
-            worst = self._worst(done)
-            if not worst:
-                return done
+        done = self.adjust(selection)
+        while worst := self._worst(done):
             for each in worst:
                 axis = 0 if each.kind == reliability.IMAGE else each.axes[0]
                 self.out[each.kind, each.row, axis] = each
                 selection = selection.without(each.kind, each.row, axis)
-            selection = supported(self.problem, selection)
-        return self.adjust(selection)
+            done = self.adjust(supported(self.problem, selection))
+        return done
 
     def _worst(self, done: ScreenedBundle) -> list[Rejection]:
         """Return the worst rays of every neighbourhood, or the worst given coordinate where that is worse."""
@@ -200,12 +193,12 @@ class _Search:
         return np.where(self.spared | (worst <= limit.value), 0.0, worst)
 
     def _worst_nearby(self, selection: Selection, value: Floats) -> Flags:
-        """Doubtful points that are not much better than the worst on their photos."""
+        """Doubtful points of which no other on the same photos is worse."""
         photo, point = self.problem.images.photo[selection.images], self.problem.images.point[selection.images]
         on_photo, near = np.zeros(self.problem.photos), np.zeros(self.problem.points)
         np.maximum.at(on_photo, photo, value[point])
         np.maximum.at(near, point, on_photo[photo])
-        return np.asarray((value > 0.0) & (value >= NEAR * near), bool)
+        return np.asarray((value > 0.0) & (value >= near), bool)
 
     def _wrong_rays(self, done: ScreenedBundle, point: int, limit: Limit) -> list[Rejection]:
         """Return the rays of a point that must go; all where none of them alone does it."""
