@@ -1,6 +1,6 @@
-"""Gross errors of rays: measurements that the strip as a whole contradicts.
+"""Gross errors of rays: measurements that a strip or block as a whole contradicts.
 
-``screened_formation`` forms the strip again until nothing changes; ``strip_screening`` adjusts ``windows`` of a few
-photos (``window_points``, ``window_adjustment``) and predicts every point by all others; ``ray_decisions`` says which
-of its rays is wrong. Source: derived, see docs/sources.md.
+``screened_formation`` forms a strip, has all its rays tested and forms it again; ``strip_network`` makes a bundle of
+them, ``snooping`` adjusts and tests a bundle, ``point_decisions`` finds the fewest rays of a point without which the
+others agree. Source: [Baarda 1968], [Pope 1976]; the decisions are derived, see docs/sources.md.
 """
