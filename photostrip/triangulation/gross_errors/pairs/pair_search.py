@@ -13,10 +13,11 @@ Source: derived; the order of work is chosen here, see docs/sources.md.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photostrip.rejection import Rejection
 from photostrip.triangulation.gross_errors.pairs import deletion
 from photostrip.triangulation.gross_errors.pairs.global_test import FIFTH_WRONG, GlobalTest, ParallaxScatter
 from photostrip.triangulation.gross_errors.pairs.zones import MINIMUM_LEFT, Support
@@ -33,24 +34,20 @@ if TYPE_CHECKING:
 AT_ONCE = 64  # pairs, for the sake of memory; it changes no result
 
 
-class Removal(NamedTuple):
-    """One point that a search took out."""
-
-    row: int
-    test: str  # ``"deletion"`` (global test), ``"robust"`` or ``"residual"``
-    # value, limit: test value and critical value
-    value: float
-    limit: float
-
-
 @dataclass(frozen=True, eq=False)
 class PairSearch:
     """What a search for gross errors took out of pairs, and what it was made with."""
 
     orientation: Orientation  # pairs oriented without the points taken out
-    removed: tuple[Removal, ...]
+    # rows of the pairs, by the test ``deletion`` (global test), ``robust`` or ``residual``
+    removed: tuple[Rejection, ...]
     scatter: ParallaxScatter
     test: GlobalTest
+
+
+def rejection(row: int, test: str, value: float, limit: float) -> Rejection:
+    """One point of a pair; values in mm for the test ``parallax``, otherwise without unit."""
+    return Rejection(kind="parallax", row=int(row), test=test, value=float(value), limit=float(limit))
 
 
 def search(
@@ -100,7 +97,7 @@ def search(
             break
     part = orient_again(part, part.pairs.weight, np.arange(len(failed)))
     rows = given.pairs.rows_of(failed)
-    removed = tuple(each._replace(row=int(rows[each.row])) for each in log.removed)
+    removed = tuple(replace(each, row=int(rows[each.row])) for each in log.removed)
     return PairSearch(given.with_pairs(failed, part), removed, scatter, test)
 
 
@@ -108,7 +105,7 @@ def search(
 class _Log:
     """Points taken out so far, and the ways to take out more."""
 
-    removed: list[Removal]
+    removed: list[Rejection]
 
     def without_sets(
         self,
@@ -164,7 +161,7 @@ class _Log:
 
     def _remove(self, weight: Floats, rows: Numbers, test: str, value: float, limit: float) -> None:
         weight[rows] = 0.0
-        self.removed.extend(Removal(row, test, value, limit) for row in rows.tolist())
+        self.removed.extend(rejection(row, test, value, limit) for row in rows.tolist())
 
 
 def _alike(todo: Numbers, count: Numbers) -> list[Numbers]:

@@ -19,10 +19,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photostrip.errors import InputError
-from photostrip.rejection import Rejection
 from photostrip.statistics import grubbs_limit, tau_limit
 from photostrip.triangulation.gross_errors.pairs.global_test import SMALLEST_REDUNDANCY
-from photostrip.triangulation.gross_errors.pairs.pair_search import PairSearch, search
+from photostrip.triangulation.gross_errors.pairs.pair_search import PairSearch, rejection, search
 from photostrip.triangulation.gross_errors.pairs.zones import MINIMUM_LEFT, Support, zones
 from photostrip.triangulation.relative_orientation.orientation import (
     LEAST_IN_FRONT,
@@ -35,6 +34,7 @@ from photostrip.triangulation.relative_orientation.solution import base_rays, in
 
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Floats, Numbers
+    from photostrip.rejection import Rejection
     from photostrip.triangulation.gross_errors.pairs.global_test import ParallaxScatter
     from photostrip.triangulation.relative_orientation.orientation import Orientation
 
@@ -113,11 +113,10 @@ def screen_pairs(
 def _searched(given: Orientation, found: PairSearch, behind: Flags) -> tuple[Orientation, list[Rejection]]:
     """Write the log of a search, and take out what lies behind a camera."""
     result = found.orientation
-    log = [_rejection(each.row, each.test, each.value, each.limit) for each in found.removed]
     if result is not given:
         behind = ~in_front_of_cameras(result.elements, result.pairs)
     result, dropped = _drop_behind(result, behind)
-    return result, log + dropped
+    return result, [*found.removed, *dropped]
 
 
 def _sequential(
@@ -143,11 +142,6 @@ def _completed(log: list[Rejection], result: Orientation) -> tuple[Rejection, ..
     return tuple(replace(each, size=(float(parallax[each.row]),), readmitted=bool(used[each.row])) for each in log)
 
 
-def _rejection(row: int, test: str, value: float, limit: float) -> Rejection:
-    """One point of a pair; values in mm for the test ``parallax``, otherwise without unit."""
-    return Rejection(kind="parallax", row=int(row), test=test, value=float(value), limit=float(limit))
-
-
 def _drop_behind(orientation: Orientation, behind: Flags) -> tuple[Orientation, list[Rejection]]:
     """Take out the points that come out behind a camera; no measurement of theirs can be right."""
     pairs, used = orientation.pairs, orientation.used
@@ -157,7 +151,7 @@ def _drop_behind(orientation: Orientation, behind: Flags) -> tuple[Orientation, 
     rows = rows[most[pairs.pair[rows]]]
     if not len(rows):
         return orientation, []
-    log = [_rejection(row, "in front", np.nan, np.nan) for row in rows.tolist()]
+    log = [rejection(row, "in front", np.nan, np.nan) for row in rows.tolist()]
     return _without(orientation, rows), log
 
 
@@ -182,7 +176,7 @@ def _stage(orientation: Orientation, test: str, bound: float) -> tuple[Orientati
             return result, log
         _, first = np.unique(result.pairs.pair[rows], return_index=True)  # of equal values the first
         rows = rows[first]
-        log += [_rejection(row, test, value[row], limit[row]) for row in rows.tolist()]
+        log += [rejection(row, test, value[row], limit[row]) for row in rows.tolist()]
         result = _without(result, rows)
 
 
