@@ -72,7 +72,7 @@ class StripStage(Protocol[Errors]):
     def misclosures(self, oriented: OrientedStrip[Errors]) -> Misclosures:
         """Control coordinates that count, with the derivatives of the strip there."""
 
-    def misclosure_covariance(self, oriented: OrientedStrip[Errors], found: Misclosures) -> Floats:
+    def misclosure_covariance(self, oriented: OrientedStrip[Errors], some: Numbers) -> Floats:
         """Covariance of some misclosures at the control, strip and control together, metres^2."""
 
     def control_rays(self, oriented: OrientedStrip[Errors]) -> Sequence[ControlRay]:

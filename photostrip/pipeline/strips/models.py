@@ -25,7 +25,7 @@ from photostrip.triangulation.independent_models.formation import FormedModels, 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from photostrip.arrays import Flags, Floats
+    from photostrip.arrays import Flags, Floats, Numbers
     from photostrip.geometry.similarity import Similarity
     from photostrip.pipeline.inputs import ModelStrip, Settings
     from photostrip.pipeline.strips.absolute import OrientedStrip, ScreenedStrip
@@ -82,9 +82,10 @@ class LinkedModels:
         targets, xyz = oriented.targets, oriented.at_control
         return model_misclosures.misclosures(targets.turned(xyz), targets.axes(xyz), xyz, oriented.errors.origin)
 
-    def misclosure_covariance(self, oriented: Oriented, found: Misclosures) -> Floats:
+    def misclosure_covariance(self, oriented: Oriented, some: Numbers) -> Floats:
         """Covariance of some misclosures at the control, strip and control together, metres^2."""
-        return model_misclosures.covariance(oriented.errors, found, oriented.control_rows, self.formed.links.factor)
+        found, rows = oriented.misclosures.take(some), oriented.control_rows
+        return model_misclosures.covariance(oriented.errors, found, rows, self.formed.links.factor)
 
     def control_rays(self, _: Oriented) -> tuple[()]:
         """Models have no rays."""

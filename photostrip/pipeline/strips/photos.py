@@ -91,8 +91,9 @@ class FormedPhotos:
         rows = oriented.control_rows
         return control_errors.misclosures(oriented.errors.points, targets.turned(xyz), rows, targets.axes(xyz))
 
-    def misclosure_covariance(self, oriented: Oriented, found: control_errors.Misclosures) -> Floats:
+    def misclosure_covariance(self, oriented: Oriented, some: Numbers) -> Floats:
         """Covariance of some misclosures at the control, strip and control together, metres^2."""
+        found = oriented.misclosures.take(some)
         # image coordinates are taken as good as stated, or as bad as the pairs have proved
         factor = max(1.0, float(np.median(self.screened.scatter.by_pair)) ** 2 / (2 * self.sigma**2))
         strip = covariances.sums_of(oriented.errors, found.rows, np.eye(len(found.point)))

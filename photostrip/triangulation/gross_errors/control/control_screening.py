@@ -79,7 +79,7 @@ def not_screened(control: ControlPoints) -> ScreenedControl:
 
 def _searched(strip: StripAtControl) -> Found | None:
     """Search for what is wrong in a section; None where its control does not check itself."""
-    covariance = strip.covariance(strip.coordinates)
+    covariance = strip.covariance(np.arange(len(strip.coordinates.point)))
     if len(covariance) <= strip.design.shape[1]:
         return None
     single = _laid(strip, covariance, lambda whole: whole.shrunk(whole.grown()))

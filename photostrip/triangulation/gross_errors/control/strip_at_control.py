@@ -48,7 +48,7 @@ class StripAtControl:
     rays: Sequence[ControlRay]
     coordinates: Misclosures  # the w coordinates that count
     design: Floats  # (w, 7): their derivatives by a similarity
-    covariance: Callable[[Misclosures], Floats]  # of some of them, strip and control together, (w, w), metres^2
+    covariance: Callable[[Numbers], Floats]  # of some of them, strip and control together, (w, w), metres^2
 
     def sections(self) -> list[tuple[Numbers, StripAtControl]]:
         """Cut the control along the strip into parts of equal size; rows of each, and the strip there."""
@@ -72,6 +72,7 @@ class StripAtControl:
             rays=[ray._replace(point=int(place[ray.point])) for ray in self.rays if place[ray.point] >= 0],
             coordinates=replace(self.coordinates.take(inside), point=place[self.coordinates.point[inside]]),
             design=self.design[inside],
+            covariance=lambda some: self.covariance(inside[some]),
         )
 
     def misclosures(self, kept: Flags, control: ControlPoints | None = None) -> Floats:

@@ -83,12 +83,12 @@ def drawn(seed: int, points: int = 8, worse: float = 1.0) -> Drawn:
 
 
 def adjusted_jointly(strip: Drawn) -> JointAdjustment:
-    return adjust(strip, strip.w, strip.covariance(strip.coordinates))
+    return adjust(strip, strip.w, strip.covariance(np.arange(len(strip.design))))
 
 
 def squares(strip: Drawn, out: tuple[int, ...]) -> tuple[float, Floats, Floats]:
     """Sum of squares with the errors of some coordinates as unknowns, those errors and their standard deviations."""
-    root = cholesky(strip.covariance(strip.coordinates), lower=True)
+    root = cholesky(strip.covariance(np.arange(len(strip.design))), lower=True)
     scaled = strip.design / np.abs(strip.design).max(axis=0)
     design = solve_triangular(root, np.hstack([scaled, np.eye(len(root))[:, out]]), lower=True)
     white = solve_triangular(root, strip.w, lower=True)
