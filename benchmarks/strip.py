@@ -189,6 +189,7 @@ pipeline = import_module("photostrip.pipeline.run")  # the module; the package g
 of_strips = import_module("photostrip.pipeline.strips.photos")
 common = import_module("photostrip.pipeline.common_points")
 screened_formation = import_module("photostrip.triangulation.gross_errors.rays.screened_formation")
+strip_network = import_module("photostrip.triangulation.gross_errors.rays.strip_network")
 STAGES = (
     ("image coordinates", corrections, "refine"),
     ("collecting pairs", of_strips, "collect_pairs"),
@@ -196,7 +197,7 @@ STAGES = (
     ("screening of pairs", screening, "screen_pairs"),
     ("strip formation", of_strips, "form_from_pairs"),
     ("strip formation", screened_formation, "form_from_pairs"),
-    ("screening of the strip", screened_formation, "wrong_rays"),
+    ("screening of the strip", strip_network, "wrong_rays"),
     ("screening of control", control_screening, "screen_control"),
     ("absolute orientation", absolute_orientation, "orient"),
     ("polynomial", correction, "fit"),

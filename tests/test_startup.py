@@ -107,7 +107,17 @@ def test_a_plain_run_loads_no_room_that_it_does_not_enter() -> None:
         "image_coordinates.interior",
     )
     assert not {f"photostrip.triangulation.{room}" for room in rooms} & set(names)
-    assert not {"photostrip.report.html", "photostrip.cli.jobs.method_comparison", "scipy"} & set(names)
+    assert not {"photostrip.report.html", "photostrip.cli.jobs.method_comparison"} & set(names)
+
+
+def test_a_strip_without_gross_errors_is_run_without_the_bundle_and_scipy() -> None:
+    names = python(
+        "import sys\nfrom photostrip.cli.main import main\n"
+        "drop = '--set=processing.relative.drop=[1007/1007-1, 1015/1015-7]'\n"
+        "assert main(['run', 'sample_data/simulated-20/project.yaml', drop, '--quiet']) == 0\nprint(*sys.modules)"
+    ).split()
+    assert "photostrip.triangulation.polynomial.correction" in names
+    assert not {"photostrip.triangulation.bundle.solution", "scipy"} & set(names)
 
 
 # ---------------------------------------------------------------------------------------------------- the table

@@ -63,7 +63,7 @@ processing:
   bundle:
     screening: snooping
     test: tau
-    alpha: 0.001
+    level: 0.05
     power: 0.8
     variance_components: false
     self_calibration: []

@@ -75,7 +75,8 @@ def _screening(screening: Document) -> str:
         return "not searched for"
     out = ", ".join(f"{number} of {NAMES[kind]}" for kind, number in screening["rejected"].items() if number)
     test = {"tau": "tau test", "baarda": "Baarda's test"}[screening["test"]]
-    text = f"{screening['method']}, {test}, level {screening['alpha']:g}, limit {fixed(screening['limit'], 2)}: "
+    level = f"level {screening['alpha']:.2g} for one observation"
+    text = f"{screening['method']}, {test}, {level}, limit {fixed(screening['limit'], 2)}: "
     return f"{text}{out or 'none'} rejected, {screening['readmitted']} re-admitted"
 
 

@@ -56,7 +56,7 @@ def _of_the_strips(document: Document, *, everything: bool) -> Iterator[Section]
     if of_models(document):
         yield links_section(document, everything=everything)
         yield models_section(document, everything=everything)
-    elif document["models"]:
+    elif len(document["models"]) > 0:
         yield relative_section(document, everything=everything)
         yield junction_section(document, everything=everything)
     if document["absolute"]:

@@ -97,7 +97,7 @@ def project_rows(document: Document) -> list[tuple[str, str]]:
     settings = document["settings"]["links"]
     text = str(settings["screening"])
     if text == "auto":
-        text = f"each common point as a whole, level {settings['alpha']:g} for a link"
+        text = f"each common point as a whole, level {settings['alpha']:g} for the strip"
     named = [f"{name} {', '.join(settings[name])}" for name in ("keep", "drop") if settings[name]]
     return [("screening", "; ".join([text, *named])), ("links", "a similarity in space from model to model")]
 

@@ -35,6 +35,8 @@ ALPHA = 0.01  # of rejecting anything in a strip without wrong control
 LARGEST_SHARE = 0.5  # of the coordinates of plan or of height: nothing is said against a majority
 BENDS = ("XY", "X^2", "X^3")  # what a similarity leaves of the polynomials
 HEIGHT = 2
+# The covariance of a strip takes most of a bend; what is left tells it all the same, as far as there are digits.
+ROUNDING = float(np.sqrt(np.finfo(float).eps))
 
 
 @dataclass(frozen=True)
@@ -135,7 +137,7 @@ class JointAdjustment:
         chosen = list(sets)
         for count in sorted({len(each) for each in chosen}):
             same = [each for each in chosen if len(each) == count]
-            gain = gains(self.pull[None], self.matrix[None], np.array(same, np.intp))[0]
+            gain = gains(self.pull[None], self.matrix[None], np.array(same, np.intp), ROUNDING)[0]
             found += [Deletion(*each, self.squares, self.freedom) for each in zip(same, gain.tolist(), strict=True)]
         return found
 

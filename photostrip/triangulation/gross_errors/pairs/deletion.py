@@ -32,7 +32,7 @@ def subsets(n: int, k: int) -> Numbers:
     return np.array(list(combinations(range(n), k)), np.intp).reshape(-1, k)
 
 
-def gains(residuals: Floats, matrix: Floats, sets: Numbers) -> Floats:
+def gains(residuals: Floats, matrix: Floats, sets: Numbers, least: float = SMALLEST_REDUNDANCY) -> Floats:
     """Compute what the sum of squares loses when sets of points are taken out: v_K^T (M_KK)^-1 v_K, shape (g, s).
 
     -inf for a set whose errors cannot be told from a change of the elements.
@@ -40,6 +40,7 @@ def gains(residuals: Floats, matrix: Floats, sets: Numbers) -> Floats:
     residuals: (g, n), residuals v of g adjustments of n points each, in units of their a-priori standard deviation.
     matrix: (g, n, n), the matrices M of residuals from errors.
     sets: (s, k) or (g, s, k), sets of k = 1, 2 or 3 points, the same for all adjustments or different ones.
+    least: redundancy, in the mean of the set, from which on something can be told.
     """
     number = np.arange(len(residuals))[:, None]
     place = np.broadcast_to(sets, (len(residuals), *sets.shape[-2:]))
@@ -48,7 +49,7 @@ def gains(residuals: Floats, matrix: Floats, sets: Numbers) -> Floats:
     m = {(i, j): matrix[number, place[:, :, i], place[:, :, j]] for i in range(k) for j in range(i, k)}
     with np.errstate(divide="ignore", invalid="ignore"):
         determinant, form = _form(v, m)
-        value: Floats = np.where(determinant > SMALLEST_REDUNDANCY**k, form / determinant, -np.inf)
+        value: Floats = np.where(determinant > least**k, form / determinant, -np.inf)
     return value
 
 

@@ -23,6 +23,7 @@ from photostrip.triangulation.gross_errors.rays.point_decisions import (
     decide,
 )
 from photostrip.triangulation.resection.collinearity import derivatives
+from tests.loops import nonempty
 
 SIGMA = 0.005  # mm
 ALPHA = 0.01
@@ -94,7 +95,7 @@ def test_sums_of_squares_without_rays_are_those_of_adjustments_without_them() ->
     left, _, errors = point_decisions._without(
         float(gap @ weight @ gap), basis @ weight @ gap, basis @ weight @ basis.T, sets
     )
-    for value, (ray,), ((error,),) in zip(left, sets, [each[None] for each in errors], strict=True):
+    for value, (ray,), ((error,),) in nonempty(zip(left, sets, [each[None] for each in errors], strict=True)):
         rows = np.arange(10) // 2 != ray
         design, misfit = point.by_point[rows], point.misfit[rows]
         xyz = np.linalg.lstsq(design, misfit, rcond=None)[0]
