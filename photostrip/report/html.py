@@ -11,6 +11,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from photostrip.errors import Fault, InputError
+from photostrip.report.commands.methods import methods_sections
 from photostrip.report.page.parts import Document, Facts, Table, Words
 from photostrip.report.pictures.strip import strip_pictures
 from photostrip.report.sections.document import sections_of, title_of
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from photostrip.report.page.parts import Part, Section
+    from photostrip.report.pictures.svg import Picture
 
 INSTALL = "pip install 'photostrip[report]'"
 
@@ -36,18 +38,28 @@ def check_html(key: str = "--html") -> None:
 
 def to_html(document: Document, *, everything: bool = False) -> str:
     """Return the report of a result as one HTML file: style and pictures are in it, no script, no link to elsewhere."""
+    sections = sections_of(document, everything=everything)
+    return _page(title_of(document), document["version"], sections, strip_pictures(document))
+
+
+def methods_html(document: Document) -> str:
+    """Return a comparison of methods as one HTML file."""
+    return _page(f"Methods: {document['name']}", document["version"], methods_sections(document), [])
+
+
+def _page(title: str, version: str, sections: Iterable[Section], drawn: Iterable[Picture]) -> str:
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
     folder = resources.files("photostrip.report") / "templates"
     environment = Environment(autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True)
     template = environment.from_string((folder / "report.html").read_text(encoding="utf-8"))
-    pictures = [each._replace(svg=Markup(each.svg)) for each in strip_pictures(document)]  # noqa: S704 (escaped there)
+    pictures = [each._replace(svg=Markup(each.svg)) for each in drawn]  # noqa: S704 (escaped there)
     return template.render(
-        title=title_of(document),
-        version=document["version"],
+        title=title,
+        version=version,
         style=Markup((folder / "report.css").read_text(encoding="utf-8").strip()),  # noqa: S704 (ours)
-        sections=list(_sections(sections_of(document, everything=everything))),
+        sections=list(_sections(sections)),
         pictures=pictures,
     )
 

@@ -36,6 +36,7 @@ CONVERGED = 1e-10  # of the strip's half length; the next step would be its squa
 LAST_AXES_UPDATE = 2  # iteration; afterwards the directions of the ground axes no longer change
 RANK_LIMIT = 1e-3  # smallest over largest singular value: a motion of the strip of which the control sees a thousandth
 WEAK_LIMIT = 1 / 8  # well spread control has about 1; at an eighth errors of the control grow eightfold somewhere
+OFF_LINE = 0.1  # breadth of given coordinates on a line over that of the strip's points, as parts of their lengths
 IDS_NAMED = 6  # in a message
 PLAN, HEIGHT = slice(0, 2), 2
 
@@ -154,6 +155,7 @@ def orient(
     """
     _refuse_too_few(targets.control)
     similarity = _start(strip, targets, weight)
+    _refuse_given_on_line(strip, targets.of(similarity(strip)), targets.control)
     half = max(float(np.ptp(similarity(strip), axis=0).max()) / 2, 1e-6)
     axes = targets.axes(similarity(strip))
     for iteration in range(1, ITERATIONS + 1):
@@ -171,6 +173,8 @@ def orient(
         if np.abs(step).max() < CONVERGED * half:
             break
     if similarity.rotation[2, 2] < 0:
+        if collinearity(targets.of(similarity(strip))) < WEAK_LIMIT**2:
+            raise _on_line(targets.control)  # a line fits upside down as well as upright
         message = "the strip fits the control only upside down: the control coordinates are left-handed"
         expected = "the axes in the order of the columns, [north, east, up] where X is north"
         raise InputError(Fault(message, code="left-handed-control", key="control.axes", expected=expected))
@@ -200,6 +204,25 @@ def _refuse_too_few(control: ControlPoints) -> None:
     if plan >= 2 and height == 2:
         msg += f": the rotation about the line of control points {heights[0]} and {heights[1]} stays free"
     raise GeometryError(msg, points=control.ids, code="too-little-control")
+
+
+def _refuse_given_on_line(strip: Floats, given: Floats, control: ControlPoints) -> None:
+    """Refuse control whose given coordinates lie on one line, although the strip has its points beside it.
+
+    strip, given: (n, 3), strip coordinates and targets of the control points. Where the points of the strip lie on a
+    line as well, the rank of the design decides.
+    """
+    spread = collinearity(given)
+    if spread < RANK_LIMIT**2 < collinearity(strip) and spread < OFF_LINE**2 * collinearity(strip):
+        raise _on_line(control)
+
+
+def _on_line(control: ControlPoints) -> GeometryError:
+    message = (
+        "absolute orientation: the control does not determine the rotation about the line of control points "
+        f"{listed(control.ids, IDS_NAMED)}: their given coordinates lie on it"
+    )
+    return GeometryError(message, points=control.ids, code="control-deficient")
 
 
 def _start(strip: Floats, targets: Targets, weight: Floats) -> Similarity:

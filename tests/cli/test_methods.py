@@ -64,6 +64,42 @@ def test_a_method_that_is_refused_is_told(capsys: pytest.CaptureFixture[str], tm
     assert "control" in err
 
 
+def test_a_method_that_does_not_take_the_project_is_told_with_its_reason(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """Single photos are for bundles only: the project itself is refused by three methods of four."""
+    spec = "photostrip_simulation: 1\nname: singles\nflight: {photos: 3}\ncontrol: {bands: 3, per_band: 3}\n"
+    (tmp_path / "sim.yaml").write_text(spec, encoding="utf-8")
+    assert main(["simulate", str(tmp_path / "sim.yaml"), "-o", str(tmp_path / "in")]) == 0
+    project = tmp_path / "in" / "project.yaml"
+    text = project.read_text(encoding="utf-8")
+    start, end = text.index("strips:"), text.index("observations:")
+    strips = "".join(f'  - {{id: S{n}, camera: film, photos: ["100{n}"]}}\n' for n in (1, 2, 3))
+    project.write_text(f"{text[:start]}strips:\n{strips}{text[end:]}", encoding="utf-8")
+    capsys.readouterr()
+    code, out, err = run(
+        capsys, str(project), "--compare-methods", "--format", "json", "-o", str(tmp_path / "out"), "--html"
+    )
+    assert (code, "error" in err) == (0, False)
+    document = json.loads(out)
+    assert document["name"] == "singles"
+    status = {row["adjustment"]: row["status"] for row in document["methods"]}
+    assert {name for name, each in status.items() if each == "refused"} == {*ADJUSTMENTS} - {"bundle"}
+    for row in nonempty([row for row in document["methods"] if row["status"] == "refused"]):
+        assert "there is only one photo" in row["reason"]
+    assert document["best"]["plan"] == "bundle"
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["bundle", "methods.html"]
+    assert (tmp_path / "out" / "bundle" / "report.html").is_file()
+    page = (tmp_path / "out" / "methods.html").read_text(encoding="utf-8")
+    assert "Methods: singles" in page
+    assert "there is only one photo" in page
+
+
+def test_html_of_a_comparison_needs_a_folder(capsys: pytest.CaptureFixture[str]) -> None:
+    code, _, err = run(capsys, PROJECT, "--compare-methods", "--html")
+    assert (code, "--output" in err) == (2, True)
+
+
 def test_options_that_do_not_go_together(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     arguments = ["--compare-methods", "-o", str(tmp_path), "--depfile", str(tmp_path / "d")]
     code, _, err = run(capsys, PROJECT, *arguments)

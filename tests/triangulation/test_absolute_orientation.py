@@ -385,6 +385,29 @@ def test_left_handed_control_is_refused_with_the_way_out(use: dict[str, str], fl
     assert "[north, east, up]" in fault.expected
 
 
+# --------------------------------------------------------------------------- given coordinates on one line
+
+
+def lined(seed: int, noise: float, use: Sequence[str] = "ABE") -> Case:
+    """Coordinates that lie on one line, given for points that do not."""
+    one = case(dict.fromkeys(use, "xyz"))
+    along = np.linspace(-3000.0, 4000.0, len(use))[:, None] * np.array([0.8, 0.6, 0.001]) + np.array([0.0, 0.0, 50.0])
+    enu = along + noise * np.random.default_rng(seed).normal(size=along.shape)
+    control = control_points(dict(zip(use, enu, strict=True)), dict.fromkeys(use, "xyz"))
+    return Case(one.strip, targets(control, origin=enu.mean(axis=0)), one.truth)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05, 1.0])
+@pytest.mark.parametrize("seed", range(6))
+def test_control_given_on_one_line_is_weak_geometry_and_not_left_handed(seed: int, noise: float) -> None:
+    """Strips fitted it upside down as often as upright; nothing said that the third rotation was anybody's guess."""
+    with pytest.raises(GeometryError, match="rotation about the line of control points A, B, E: their given") as caught:
+        lined(seed, noise).orient()
+    assert caught.value.code == "control-deficient"
+    assert caught.value.exit_code == EXIT_GEOMETRY
+    assert caught.value.points == ("A", "B", "E")
+
+
 # ------------------------------------------------------------------------------ within a whole strip
 
 

@@ -55,7 +55,7 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
     if methods:
         from photostrip.cli.jobs.method_comparison import compare_methods
 
-        return compare_methods(project, assignments or [], output, form, width, messages, quiet=quiet)
+        return compare_methods(project, assignments or [], output, form, width, messages, html=html)
     with failures_as(form), progress(sys.stderr, quiet=quiet) as waiting:
         if html:
             from photostrip.report.html import check_html, to_html
@@ -92,6 +92,6 @@ def _refuse_contradictions(
         raise typer.BadParameter("report.html needs a folder: give --output as well", param_hint="--html")
     if trace is not None:
         form_of(trace, "--trace")
-    if methods and (depfile is not None or trace is not None or html):
-        message = "a comparison of methods has no --depfile, no --trace and no --html"
+    if methods and (depfile is not None or trace is not None):
+        message = "a comparison of methods has no --depfile and no --trace"
         raise typer.BadParameter(message, param_hint="--compare-methods")

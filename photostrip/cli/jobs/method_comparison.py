@@ -9,7 +9,7 @@ from photostrip.cli.failures import failures_as
 from photostrip.cli.stdout import Format, print_json, print_sections
 from photostrip.errors import EXIT_DONE, GeometryError, InputError
 from photostrip.formats.output.result_files import result_files
-from photostrip.formats.text.writing import write_files
+from photostrip.formats.text.writing import write_files, write_text
 from photostrip.pipeline import ADJUSTMENTS
 from photostrip.project.loading import adjust_project, load_project
 from photostrip.report.commands.methods import methods_sections
@@ -34,32 +34,41 @@ def compare_methods(
     width: int | None,
     messages: Messages,
     *,
-    quiet: bool,
+    html: bool,
 ) -> int:
     """Adjust a project in every way there is and print what is left at its check points.
 
-    In the output folder each adjustment gets a folder of its name. When none succeeds, the first failure is raised.
+    In the output folder each adjustment gets a folder of its name, with `html` each its report and all of them
+    ``methods.html``. An adjustment that refuses the project, or its key in the project file, is named with its reason;
+    when none succeeds, the first failure is raised.
     """
     found: dict[str, Document | PhotostripError] = {}
     name = ""
-    with failures_as(form), progress(sys.stderr, quiet=quiet) as waiting:
+    with failures_as(form), progress(sys.stderr, quiet=messages.quiet) as waiting:
+        if html:
+            from photostrip.report.html import check_html, methods_html, to_html
+
+            check_html()
         for adjustment in ADJUSTMENTS:
             waiting.at(f"adjusting: {adjustment}")
-            loaded = load_project(project, [*assignments, f"processing.adjustment={adjustment}"])
-            name = loaded.inputs.name
             try:
+                loaded = load_project(project, [*assignments, f"processing.adjustment={adjustment}"])
                 result = loaded.result(adjust_project(loaded))
             except (GeometryError, InputError) as error:
                 found[adjustment] = error
                 continue
+            name = loaded.inputs.name
             found[adjustment] = document = document_of(result, loaded.remarks)
             if output is not None:
-                write_files(output / adjustment, result_files(document, loaded.resolved))
+                pages = {"report.html": to_html(document, everything=messages.verbose)} if html else {}
+                write_files(output / adjustment, pages | result_files(document, loaded.resolved))
                 messages.say(f"wrote the result of {adjustment} to {output / adjustment}")
         failures = [each for each in found.values() if not isinstance(each, dict)]
         if len(failures) == len(found):
             raise failures[0]
-    document = methods_document(name, found)
+        document = methods_document(name, found)
+        if html and output is not None:
+            write_text(output / "methods.html", methods_html(document))
     if form is Format.JSON:
         print_json(document)
     else:
