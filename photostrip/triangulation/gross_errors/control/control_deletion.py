@@ -138,7 +138,10 @@ class JointAdjustment:
         for count in sorted({len(each) for each in chosen}):
             same = [each for each in chosen if len(each) == count]
             gain = gains(self.pull[None], self.matrix[None], np.array(same, np.intp), ROUNDING)[0]
-            found += [Deletion(*each, self.squares, self.freedom) for each in zip(same, gain.tolist(), strict=True)]
+            found += [
+                Deletion(columns=columns, gain=value, squares=self.squares, freedom=self.freedom)
+                for columns, value in zip(same, gain.tolist(), strict=True)
+            ]
         return found
 
     def allows(self, out: Sequence[int]) -> bool:

@@ -173,6 +173,7 @@ def _exchanges(strip: StripAtControl, found: Found) -> dict[int, str]:
         both = tuple(np.flatnonzero(np.isin(place.point, (one, other))).tolist())
         before = tried.without([column for column in found.out if column not in both])
         gain = before.squares - before.without(both).squares
-        if Deletion(both, gain, before.squares, before.freedom).probability > whole.level:
+        exchange = Deletion(columns=both, gain=gain, squares=before.squares, freedom=before.freedom)
+            if exchange.probability > whole.level:
             partner[one], partner[other] = control.ids[other], control.ids[one]
     return partner

@@ -68,13 +68,18 @@ def screen_control(strip: StripAtControl) -> ScreenedControl:
     order = {name: row for row, name in enumerate(strip.control.ids)}
     rejections.sort(key=lambda each: order[each.id])
     use[[order[each.id] for each in rejections if each.photo]] = False
-    return ScreenedControl(replace(strip.control, use=use), tuple(rejections), redundancy, detectable)
+    return ScreenedControl(
+        kept=replace(strip.control, use=use),
+        rejections=tuple(rejections),
+        redundancy=redundancy,
+        detectable=detectable,
+    )
 
 
 def not_screened(control: ControlPoints) -> ScreenedControl:
     """Keep all control."""
     unknown = np.full(control.use.shape, np.nan)
-    return ScreenedControl(control, (), unknown, unknown)
+    return ScreenedControl(kept=control, rejections=(), redundancy=unknown, detectable=unknown)
 
 
 def _searched(strip: StripAtControl) -> Found | None:

@@ -72,7 +72,7 @@ def search(
     failed = np.flatnonzero(test.failing(given) | doubtful)
     if not len(failed):
         scatter = ParallaxScatter.of(given, stated, spoiled)
-        return PairSearch(given, (), scatter, GlobalTest.of(scatter.by_pair))
+        return PairSearch(orientation=given, removed=(), scatter=scatter, test=GlobalTest.of(scatter.by_pair))
     part, part_test, log = given.take(failed), test.take(failed), _Log([])
     found = orient_robustly(part.pairs, part_test.sigma, deletion.LARGEST)
     robust = assess_pairs(found.elements, part.pairs, part.iterations)
@@ -98,7 +98,7 @@ def search(
     part = orient_again(part, part.pairs.weight, np.arange(len(failed)))
     rows = given.pairs.rows_of(failed)
     removed = tuple(replace(each, row=int(rows[each.row])) for each in log.removed)
-    return PairSearch(given.with_pairs(failed, part), removed, scatter, test)
+    return PairSearch(orientation=given.with_pairs(failed, part), removed=removed, scatter=scatter, test=test)
 
 
 @dataclass(frozen=True, eq=False)

@@ -107,7 +107,13 @@ def screen_pairs(
     else:
         result, log = _sequential(orientation, settings, sigma, behind)
     masked = found.test.failing(result)
-    return ScreenedPairs(result, _completed(log, result), found.scatter, masked, sound)
+    return ScreenedPairs(
+        orientation=result,
+        rejections=_completed(log, result),
+        scatter=found.scatter,
+        masked=masked,
+        converged=sound,
+    )
 
 
 def _searched(given: Orientation, found: PairSearch, behind: Flags) -> tuple[Orientation, list[Rejection]]:

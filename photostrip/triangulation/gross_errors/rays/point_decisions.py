@@ -66,7 +66,7 @@ class Decision:
 def undecided(rays: int) -> Decision:
     """Leave out all rays of a point, which meet nowhere."""
     cause = TWO_RAYS if rays == 2 else SEVERAL_RAYS
-    return Decision(np.ones(rays, bool), cause, float("nan"), np.full((rays, 2), np.nan))
+    return Decision(out=np.ones(rays, bool), cause=cause, value=float("nan"), size=np.full((rays, 2), np.nan))
 
 
 def decide(point: PointRays, limit: Limit) -> Decision:
@@ -79,7 +79,7 @@ def decide(point: PointRays, limit: Limit) -> Decision:
     value = float(tests[share > UNCONTROLLED].max(initial=0.0))
     size = np.full((r, 2), np.nan)
     if value <= limit.value * limit.unit:
-        return Decision(np.zeros(r, bool), "", value, size)
+        return Decision(out=np.zeros(r, bool), cause="", value=value, size=size)
     total, unit = float(gap @ weight @ gap), limit.unit**2
     for count in range(1, min(r, LARGEST) + 1):
         if freedom - 2 * count < 1:
@@ -91,7 +91,8 @@ def decide(point: PointRays, limit: Limit) -> Decision:
             others = np.delete(left, best)
             if (others > np.minimum(bound, left[best] + LIKELIER * unit)).all():
                 size[sets[best]] = errors[best]
-                return Decision(np.isin(np.arange(r), sets[best]), WRONG_RAY, value, size)
+                wrong = np.isin(np.arange(r), sets[best])
+                return Decision(out=wrong, cause=WRONG_RAY, value=value, size=size)
             break
     else:
         count = min(r, LARGEST)
@@ -100,7 +101,7 @@ def decide(point: PointRays, limit: Limit) -> Decision:
             size[sets[number]] = errors[number]
     elif r == 2:
         size = np.column_stack([np.zeros(2), 0.5 * pulled[1::2] / share[1::2]])  # half of the y parallax each
-    return Decision(np.ones(r, bool), TWO_RAYS if r == 2 else SEVERAL_RAYS, value, size)
+    return Decision(out=np.ones(r, bool), cause=TWO_RAYS if r == 2 else SEVERAL_RAYS, value=value, size=size)
 
 
 class _Misclosures(NamedTuple):

@@ -72,7 +72,7 @@ def _free_network(
     far[at[~(size <= limit)]] = True
     far[at[np.isin(rows, rays.kept)]] = False
     problem = BundleProblem(
-        images=ImageObservations(photo, at.astype(np.intp), o.xy[rows], sigma),
+        images=ImageObservations(photo=photo, point=at.astype(np.intp), xy=o.xy[rows], sigma=sigma),
         cameras=BundleCameras(np.zeros(len(formed.centers), np.intp), focal),
         start=StartValues(formed.centers, formed.rotations, xyz),
     )
