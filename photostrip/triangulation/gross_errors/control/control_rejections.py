@@ -174,6 +174,6 @@ def _exchanges(strip: StripAtControl, found: Found) -> dict[int, str]:
         before = tried.without([column for column in found.out if column not in both])
         gain = before.squares - before.without(both).squares
         exchange = Deletion(columns=both, gain=gain, squares=before.squares, freedom=before.freedom)
-            if exchange.probability > whole.level:
+        if exchange.probability > whole.level:
             partner[one], partner[other] = control.ids[other], control.ids[one]
     return partner
