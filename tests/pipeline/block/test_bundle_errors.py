@@ -116,7 +116,7 @@ def test_a_wrong_camera_position_is_named() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("alpha", "share"), [(None, 0.0), (0.001, 0.006)])
 def test_good_measurements_stay(alpha: float | None, share: float) -> None:
-    """The level is that of the whole adjustment; with one for each observation a point on two photos loses both rays."""
+    """The level is that of the whole adjustment; with one for each, a point on two photos loses both rays."""
     out = total = 0
     for seed in range(6):
         result = adjusted(simulate(replace(BLOCK, seed=seed)), alpha=alpha)
