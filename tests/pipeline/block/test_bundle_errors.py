@@ -114,15 +114,16 @@ def test_a_wrong_camera_position_is_named() -> None:
 
 
 @pytest.mark.slow
-def test_good_measurements_stay() -> None:
-    """Without gross errors about one ray in five hundred goes, as two tests of level 0.001 each let expect."""
+@pytest.mark.parametrize(("alpha", "share"), [(None, 0.0), (0.001, 0.006)])
+def test_good_measurements_stay(alpha: float | None, share: float) -> None:
+    """The level is that of the whole adjustment; with one for each, a point on two photos loses both rays."""
     out = total = 0
     for seed in range(6):
-        result = adjusted(simulate(replace(BLOCK, seed=seed)))
+        result = adjusted(simulate(replace(BLOCK, seed=seed)), alpha=alpha)
         assert result.bundle is not None
         out += int((~result.bundle.screened.selection.images).sum())
         total += len(result.bundle.screened.selection.images)
-    assert out < 0.006 * total
+    assert out <= share * total
 
 
 def test_what_the_user_keeps_stays() -> None:
