@@ -55,4 +55,4 @@ def _quoted(text: str) -> str:
 
 
 def _clean(text: str) -> str:
-    return visible(FORBIDDEN.sub("?", text))
+    return FORBIDDEN.sub("?", visible(text))
