@@ -4,6 +4,9 @@ Run it as ``python benchmarks/fuzz.py [cases] [seed]``; 10 000 cases are usual. 
 one to four things were done: characters and bytes put in, values, lines and columns exchanged, files cut off or saved
 as other programs do. Half of them are checked, half are run with a result. The exit code is 1 when a case ends with a
 traceback, another exit code than 0, 1, 2 and 3, a changed input, half a result, or takes longer than 10 s.
+
+``python benchmarks/fuzz.py results [cases] [seed]`` gives edited results to ``report`` and ``compare`` instead, 2000 of
+them: each is printed, or refused with the name of its file, and no control character reaches the terminal.
 """
 
 from __future__ import annotations
@@ -19,15 +22,36 @@ from random import Random
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # run from anywhere, installed or not
 
+from tests.edited_results import COMMANDS, edited, faults_of
 from tests.fuzzing import damaged, emptied, projects, tried
+from tests.reports import RESULT, saved
 
 CASES, SEED = 10_000, 1
+RESULTS = 2000  # edited results
 MEMORY_MB = 600  # of the process, with all cases one after the other
 SHOWN = 10
 
 
+def edited_results(arguments: list[str]) -> int:
+    """Give edited results to ``report`` and ``compare``, and print how many ended as they must not."""
+    number, seed = (int(each) for each in (*arguments, *(str(each) for each in (RESULTS, SEED)[len(arguments) :])))
+    begin = time.perf_counter()
+    wrong: list[str] = []
+    with tempfile.TemporaryDirectory() as place:
+        right = Path(place) / "right.json"
+        right.write_bytes(RESULT.read_bytes())
+        for each in range(number):
+            random = Random(f"{seed} {each}")  # noqa: S311 (no secret)
+            wrong += faults_of(edited(saved(), random), right, Path(place), random.choice(COMMANDS))
+    print(f"{number} edited results, seed {seed}, {time.perf_counter() - begin:.0f} s")
+    print(f"wrong: {len(wrong)}", *wrong[:SHOWN], sep="\n  ")
+    return 1 if wrong else 0
+
+
 def main(arguments: list[str]) -> int:
     """Try the cases and print the table."""
+    if arguments[:1] == ["results"]:
+        return edited_results(arguments[1:])
     number, seed = (int(each) for each in (*arguments, *(str(each) for each in (CASES, SEED)[len(arguments) :])))
     codes: Counter[tuple[str, int]] = Counter()
     seconds: list[float] = []

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import typer
 
 from photostrip.cli.stdout import print_json, print_sections
+from photostrip.visible import visible
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -44,7 +45,7 @@ class Rendering:
         if form == "json":
             print_json(document)
         elif form == "csv":
-            sys.stdout.write(self.table(document))
+            sys.stdout.write(visible(self.table(document)))
         else:
             print_sections(*self.report(document), markdown=form == "md")
 

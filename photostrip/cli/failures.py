@@ -15,6 +15,7 @@ import typer
 
 from photostrip.cli.stdout import Format, ascii_only
 from photostrip.errors import EXIT_INPUT, EXIT_INTERNAL, Fault, GeometryError, InputError
+from photostrip.visible import visible, visible_json
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -45,10 +46,10 @@ def exit_code_of(error: BaseException, *, debug: bool) -> int:
             messages, code = [f"{place}{error.strerror or error}"], EXIT_INPUT
         case _:
             hint = "" if debug else "; --debug shows where"
-            sys.stderr.write(f"internal error (a bug): {type(error).__name__}: {error}{hint}\n")
+            sys.stderr.write(f"internal error (a bug): {type(error).__name__}: {visible(str(error))}{hint}\n")
             return EXIT_INTERNAL
     for message in messages:
-        sys.stderr.write(f"error: {message}\n")
+        sys.stderr.write(f"error: {visible(message)}\n")
     if isinstance(error, InputError | GeometryError) and error.findings:
         from photostrip.report.page.messages import finding_of, line_of
 
@@ -84,5 +85,5 @@ def failures_as(form: str) -> Iterator[None]:
         else:
             document = messages.as_document(findings, failure.exit_code)
             text = json.dumps(document, ensure_ascii=ascii_only(), indent=1)
-            sys.stdout.write(f"{text}\n")
+            sys.stdout.write(f"{visible_json(text)}\n")
         raise typer.Exit(failure.exit_code) from error

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, cast
 
 from photostrip import __version__
 from photostrip.cli.command_table import COMMANDS, COMPLETION, usage
+from photostrip.visible import visible
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -131,7 +132,7 @@ def _call(name: str, arguments: list[str]) -> int:
 
 
 def _complain(message: str) -> None:
-    sys.stderr.write(f"error: {message}\n")
+    sys.stderr.write(f"error: {visible(message)}\n")
 
 
 if __name__ == "__main__":

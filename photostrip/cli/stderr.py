@@ -6,6 +6,8 @@ import sys
 import time
 from dataclasses import dataclass, field
 
+from photostrip.visible import visible
+
 
 @dataclass
 class Messages:
@@ -18,7 +20,7 @@ class Messages:
     def say(self, text: str) -> None:
         """Say something that everybody should know."""
         if not self.quiet:
-            sys.stderr.write(f"{text}\n")
+            sys.stderr.write(f"{visible(text)}\n")
 
     def step(self, text: str) -> None:
         """Say what was done, and the seconds since the step before."""

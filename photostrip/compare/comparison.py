@@ -13,6 +13,7 @@ from photostrip.compare.members import members_of, missing_and_new
 from photostrip.compare.quantities import Quantity, quantities_of
 from photostrip.compare.tolerances import SETS, UNITS, SetTolerance, Tolerances
 from photostrip.errors import Fault, InputError
+from photostrip.result.reading import incomplete
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -54,11 +55,10 @@ def compare_results(
     try:
         rows = list(_compared(document, baseline, tolerances))
         sets = [_set(kind, document, baseline, tolerances) for kind in SETS]
-    except (AttributeError, LookupError, TypeError, ValueError) as error:
-        what = f"key {error} is missing" if isinstance(error, KeyError) else f"a value is of another kind ({error})"
-        message = f"cannot be compared: {what}"
+        name = document["name"]
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         fix = "run the project again, or renew the baseline with --update"
-        raise InputError(Fault(message, "result-incomplete", files[0], expected="two whole results", fix=fix)) from None
+        raise incomplete(error, _at_fault(document, files), "compared", fix) from None
     kinds = [_kind(kind, rows, tolerances) for kind in UNITS]
     differences = sorted((row for row in rows if row["differs"]), key=_rank)
     different = bool(differences) or any(each["differs"] for each in sets)
@@ -66,12 +66,24 @@ def compare_results(
         "photostrip_compare": SCHEMA,
         "result": files[0],
         "baseline": files[1],
-        "name": document["name"],
+        "name": name,
         "status": "different" if different else "same",
         "kinds": kinds,
         "sets": sets,
         "differences": [_without_verdict(row) for row in differences],
     }
+
+
+def _at_fault(document: Document, files: tuple[str, str]) -> str:
+    """Return the file that kept two results from being compared: the result, or else the baseline."""
+    try:
+        list(quantities_of(document))
+        _ = document["name"]
+        for kind in SETS:
+            members_of(document, kind)
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError):
+        return files[0]
+    return files[1]
 
 
 def _require_comparable(document: Document, baseline: Document, files: tuple[str, str]) -> None:

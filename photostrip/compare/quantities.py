@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple, TypeGuard
 
-from photostrip.result.quantities import quantity_at
+from photostrip.result.description import quantity_at
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

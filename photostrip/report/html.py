@@ -15,6 +15,7 @@ from photostrip.report.commands.methods import methods_sections
 from photostrip.report.page.parts import Document, Facts, Table, Words
 from photostrip.report.pictures.strip import strip_pictures
 from photostrip.report.sections.document import sections_of, title_of
+from photostrip.visible import visible
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -55,13 +56,14 @@ def _page(title: str, version: str, sections: Iterable[Section], drawn: Iterable
     environment = Environment(autoescape=True, undefined=StrictUndefined, keep_trailing_newline=True)
     template = environment.from_string((folder / "report.html").read_text(encoding="utf-8"))
     pictures = [each._replace(svg=Markup(each.svg)) for each in drawn]  # noqa: S704 (escaped there)
-    return template.render(
+    page: str = template.render(
         title=title,
         version=version,
         style=Markup((folder / "report.css").read_text(encoding="utf-8").strip()),  # noqa: S704 (ours)
         sections=list(_sections(sections)),
         pictures=pictures,
     )
+    return visible(page)
 
 
 def _sections(sections: Iterable[Section]) -> Iterator[Document]:

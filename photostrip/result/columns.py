@@ -6,7 +6,8 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
-from photostrip.result.quantities import Quantity, angle_decimals, coordinate_decimals, table_at
+from photostrip.result.description import Quantity, table_at
+from photostrip.result.quantities import angle_decimals, coordinate_decimals
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -1,109 +1,36 @@
-"""Every key of result.json described once, in ``quantities.txt``; the records of the document are rounded by it."""
+"""The records of the document of a result, rounded as their keys are described."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cache
-from itertools import pairwise, product
-from pathlib import Path
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from photostrip.result.description import Quantity, table_at
 from photostrip.result.numbers import DEGREES, GEOGRAPHIC, GROUND, MICROMETRES, RADIANS, Plain, rounded, significant
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import ArrayLike
 
+    from photostrip.result.description import Table
     from photostrip.result.numbers import Document
 
-KINDS = {"text", "word", "count", "flag", "any"}
-BRACES = re.compile(r"\{([^}]*)\}")
 # Decimals of a value whose unit stands beside it; without a unit it is a ratio.
 DECIMALS_BY_UNIT = {"": 2, "um": MICROMETRES, "ppm": 1, "m": GROUND, "deg": DEGREES}
 
 
-@dataclass(frozen=True, slots=True)
-class Quantity:
-    """The value of a key, or each number of the list that stands there."""
-
-    meaning: str
-    kind: str  # text, word (one of a few), count, flag, number, any (described elsewhere)
-    unit: str = ""  # m, um, deg, ...; empty for ratios; frame: that of its coordinates; angle: that of its angles
-    decimals: int | None = None
-    digits: int | None = None  # significant ones, where a number has no natural size
-    unit_key: str = ""  # key of the same record that names the unit
-
-    @classmethod
-    def of(cls, form: str, meaning: str) -> Quantity:
-        """Read a form, as ``um 2``, ``ratio 4 digits``, ``by unit``, ``any m`` or ``text``."""
-        kind, *rest = form.split()
-        if kind in KINDS:
-            return cls(meaning, kind, "".join(rest))
-        if kind == "by":
-            return cls(meaning, "number", unit_key=rest[0])
-        places, unit = int(rest[0]), "" if kind == "ratio" else kind
-        if rest[1:]:
-            return cls(meaning, "number", unit, digits=places)
-        return cls(meaning, "number", unit, decimals=places)
-
-    def rounded(self, value: ArrayLike, unit: str = "") -> Plain:
-        """Return a value, or an array of them, as it is written; None for a number that is not finite."""
-        decimals = DECIMALS_BY_UNIT[unit] if self.unit_key else self.decimals
-        if decimals is not None:
-            return rounded(value, decimals)
-        if self.digits is not None:
-            return significant(value, self.digits)
-        return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
-
-
-Table = dict[str, "Quantity | Table"]
-
-
-@cache
-def described() -> Table:
-    """Read the description: what stands under each key of a result; the records of a list are described once."""
-    found: Table = {}
-    block = ""
-    for line in Path(__file__).with_suffix(".txt").read_text(encoding="utf-8").splitlines():
-        if line.startswith("["):
-            block = line[1:-1]
-        elif line and not line.startswith("#"):
-            key, form, meaning = line.split(" | ")
-            for path in _expanded(f"{block}.{key}" if block else key):
-                *above, last = path.split(".")
-                table_at(".".join(above), found)[last] = Quantity.of(form, meaning)
-    return found
-
-
-def _expanded(path: str) -> Iterator[str]:
-    """Write ``{a b}.c`` out as ``a.c`` and ``b.c``."""
-    fixed = BRACES.split(path)
-    for names in product(*(choice.split() for choice in fixed[1::2])):
-        yield "".join(part for pair in zip(fixed[::2], (*names, ""), strict=True) for part in pair)
-
-
-def table_at(path: str, within: Table | None = None) -> Table:
-    """Return what is described below a block, as ``strips`` or ``precision.along``; empty when nothing is."""
-    found = described() if within is None else within
-    for key in path.split(".") if path else ():
-        below = found.setdefault(key, {})
-        if isinstance(below, Quantity):
-            raise KeyError(path)
-        found = below
-    return found
-
-
-def quantity_at(path: str) -> Quantity | None:
-    """Find a key by the keys that lead to it; what stands below a key that is described as a whole belongs to it."""
-    found: Quantity | Table | None = described()
-    for key in path.split("."):
-        found = found.get(key) if isinstance(found, dict) else found
-    return found if isinstance(found, Quantity) else None
+def rounded_as(entry: Quantity, value: ArrayLike, unit: str = "") -> Plain:
+    """Return a value, or an array of them, as its key is written; None for a number that is not finite."""
+    decimals = DECIMALS_BY_UNIT[unit] if entry.unit_key else entry.decimals
+    if decimals is not None:
+        return rounded(value, decimals)
+    if entry.digits is not None:
+        return significant(value, entry.digits)
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 
 def coordinate_decimals(kind: str, axes: Sequence[str]) -> list[int]:
@@ -129,7 +56,7 @@ def _written(entry: Quantity | Table, value: Any, beside: Mapping[str, Any]) -> 
     if value is None:
         return None
     if isinstance(entry, Quantity):
-        return entry.rounded(value, beside.get(entry.unit_key, ""))
+        return rounded_as(entry, value, beside.get(entry.unit_key, ""))
     return [_record(entry, each) for each in value] if isinstance(value, list) else _record(entry, value)
 
 
@@ -154,7 +81,7 @@ def _cells(entry: Quantity | Table, column: Any, size: int) -> Sequence[Plain]: 
     if not isinstance(column, list | tuple | np.ndarray):
         return [column] * size
     if isinstance(entry, Quantity):
-        cells: Sequence[Plain] = entry.rounded(column)
+        cells: Sequence[Plain] = rounded_as(entry, column)
         return cells
     return [None if each is None else _record(entry, each) for each in column]
 

@@ -73,7 +73,7 @@ def test_of_too_many_projects_the_worst_are_shown() -> None:
 def test_a_line_of_the_log() -> None:
     first, second, third = lines(good(), FAULTY, good(status="failed", exit_code=1, messages=["sigma0 is 3"]))
     assert outcome_line(first) == "strip 0.yaml: good, rms 0.163 m in plan at check points"
-    assert outcome_line(second) == "strip 1.yaml: faulty: a.csv:3: no <such> photo & \x01 (and 1 more)"
+    assert outcome_line(second) == "strip 1.yaml: faulty: a.csv:3: no <such> photo & \\x01 (and 1 more)"
     assert outcome_line(third) == "strip 2.yaml: failed: sigma0 is 3"
 
 
@@ -85,7 +85,7 @@ def test_the_summary_is_true_xml_and_json() -> None:
         ("strip 1.yaml", ["error"]),
         ("strip 2.yaml", ["skipped"]),
     ]
-    assert suite[1][0].text == "a.csv:3: no <such> photo & ?\nempty"
+    assert suite[1][0].text == "a.csv:3: no <such> photo & \\x01\nempty"
     summary = json.loads(summary_json(told, 2))
     assert summary["projects"] == told
     assert (summary["finished"], summary["counts"]) == (False, {"faulty": 1, "good": 1, "not run": 1})

@@ -12,7 +12,9 @@ import pytest
 from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline import Settings
 from photostrip.result.columns import photos_csv, points_csv, rejected_csv, reliability_csv
-from photostrip.result.quantities import Quantity, described, quantity_at
+from photostrip.result.description import Quantity, described, quantity_at
+from photostrip.result.quantities import rounded_as
+from photostrip.result.reading import faults_of
 from photostrip.simulate import Models, simulate
 from tests.loops import nonempty
 from tests.renew_golden import SAMPLES, baseline
@@ -22,7 +24,7 @@ from tests.source_tree import ROOT
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from photostrip.result.quantities import Table
+    from photostrip.result.description import Table
 
     Document = dict[str, Any]
 
@@ -44,14 +46,15 @@ def leaves(value: object, path: str = "") -> Iterator[tuple[str, object, str]]:
 
 def faults(document: Document) -> set[str]:
     """Give the keys that are not described, and those that are not written as they are described."""
-    found = set()
+    again = json.loads(json.dumps(document))
+    found = {f"{fault.key} could not be read again: {fault}" for fault in faults_of(again, "result.json")}
     for path, value, unit in leaves(document):
         quantity = quantity_at(path)
         if value in (None, [], {}):  # a part that is missing
             continue
         if quantity is None or not quantity.meaning:
             found.add(f"{path} is not described")
-        elif quantity.kind == "number" and quantity.rounded(value, unit) != value:  # type: ignore[arg-type]
+        elif quantity.kind == "number" and rounded_as(quantity, value, unit) != value:  # type: ignore[arg-type]
             found.add(f"{path} has other decimals: {value}")
         elif quantity.kind in {"text", "word", "flag", "count"} and re.search(r"\d\.\d", json.dumps(value)):
             found |= set() if isinstance(value, str | list) and quantity.kind == "text" else {f"{path} is a number"}

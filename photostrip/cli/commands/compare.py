@@ -40,6 +40,8 @@ def compare(
     from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE
     from photostrip.formats.output.result_json import read_result
     from photostrip.project.tolerance_profile import load_tolerances
+    from photostrip.result.reading import faults_instead
+    from photostrip.visible import visible
 
     file = result / "result.json" if result.is_dir() else result
     place = baseline_job.place_of(baseline, update=update)
@@ -47,11 +49,12 @@ def compare(
         allowed = Tolerances() if tolerances is None else load_tolerances(tolerances)[0]
         document = read_result(str(file))
         if update:
-            changes = baseline_job.update(document, file, place, allowed)
+            changes = visible(baseline_job.update(document, file, place, allowed))
             sys.stderr.write("" if quiet else f"{changes}\n")
             return EXIT_DONE
         found = compare_results(document, baseline_job.read(place), allowed, (str(file), str(place)))
-    _print(found, place, form, width, quiet=quiet, verbose=verbose)
+        with faults_instead(str(file), "compared"):
+            _print(found, place, form, width, quiet=quiet, verbose=verbose)
     return EXIT_TOLERANCE if found["status"] == "different" else EXIT_DONE
 
 

@@ -33,17 +33,18 @@ def report(
     from photostrip.formats.output.result_json import read_result
     from photostrip.formats.text.writing import write_text
     from photostrip.report import require_complete
+    from photostrip.result.reading import faults_instead
 
     file = str(result / "result.json" if result.is_dir() else result)
     document = read_result(file)
     require_complete(document, file)
-    if output is None:
-        print_result(document, form or Format.TEXT, width, quiet=quiet, verbose=verbose)
-        return
-    if form is None and output.suffix.lower() == HTML:
-        from photostrip.report.html import check_html, to_html
+    with faults_instead(file, "reported"):
+        if output is None:
+            print_result(document, form or Format.TEXT, width, quiet=quiet, verbose=verbose)
+        elif form is None and output.suffix.lower() == HTML:
+            from photostrip.report.html import check_html, to_html
 
-        check_html("--output")
-        write_text(output, to_html(document, everything=verbose))
-        return
-    write_text(output, report_text(document, form or form_of(output), width, quiet=quiet, verbose=verbose))
+            check_html("--output")
+            write_text(output, to_html(document, everything=verbose))
+        else:
+            write_text(output, report_text(document, form or form_of(output), width, quiet=quiet, verbose=verbose))

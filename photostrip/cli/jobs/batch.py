@@ -22,6 +22,7 @@ from photostrip.report.page import messages, text
 from photostrip.report.page.numbers import counted
 from photostrip.report.page.parts import Document
 from photostrip.report.page.progress import batch_table
+from photostrip.visible import visible, visible_json
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -154,9 +155,9 @@ def print_summary(
     """Print the summary on stdout."""
     match form:
         case BatchFormat.CSV:
-            sys.stdout.write(formats.summary_csv(outcomes))
+            sys.stdout.write(visible(formats.summary_csv(outcomes)))
         case BatchFormat.JSON:
-            sys.stdout.write(formats.summary_json(outcomes, code, ascii_only=ascii_only()))
+            sys.stdout.write(visible_json(formats.summary_json(outcomes, code, ascii_only=ascii_only())))
         case BatchFormat.JUNIT:
             sys.stdout.write(batch_junit(outcomes))
         case BatchFormat.GITHUB:

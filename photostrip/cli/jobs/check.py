@@ -11,6 +11,7 @@ from photostrip.cli.stdout import Format, ascii_only, print_sections
 from photostrip.report.commands.check import check_sections, verdict
 from photostrip.report.page import messages
 from photostrip.report.page.text import to_markdown
+from photostrip.visible import visible, visible_json
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,7 +25,7 @@ def print_checked(found: Sequence[Checked], form: Format, width: int | None, *, 
     """Print what was found in some projects, in the order in which the user named them."""
     if form is Format.JSON:
         text = json.dumps(document_of(found), ensure_ascii=ascii_only(), indent=1)
-        sys.stdout.write(f"{text}\n")
+        sys.stdout.write(f"{visible_json(text)}\n")
     elif form is Format.GITHUB:
         sys.stdout.write(messages.annotated(finding for each in found for finding in findings_of(each)))
     else:
@@ -64,10 +65,10 @@ def _print_one(checked: Checked, form: Format, width: int | None, *, quiet: bool
     if form is Format.MD:
         marked = "".join(f"- {line}\n" for line in lines)
         page = to_markdown("", sections) if sections else ""
-        sys.stdout.write(f"# {head}\n\n{marked}\n{page}")
+        sys.stdout.write(visible(f"# {head}\n\n{marked}\n{page}"))
         return
     # not wrapped: an editor or grep finds `file:line:column:` at the beginning of a line
-    sys.stdout.write("".join(f"{line}\n" for line in (head, *lines)))
+    sys.stdout.write(visible("".join(f"{line}\n" for line in (head, *lines))))
     if sections:
         sys.stdout.write("\n")
         print_sections("", sections, width, markdown=False)

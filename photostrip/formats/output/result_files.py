@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from photostrip.result.columns import Column
+    from photostrip.result.description import Quantity
     from photostrip.result.numbers import Document
-    from photostrip.result.quantities import Quantity
 
 NEEDS_QUOTES = re.compile(r'[",\r\n]|^\s|\s$')
 BY_UNIT_DECIMALS = 2  # of numbers whose unit stands in another column

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from photostrip.errors import Fault, InputError
 from photostrip.formats.text.files import MEGABYTE, decode, read_bytes, refuse
+from photostrip.result.reading import faults_of
+from photostrip.visible import visible_json
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -27,7 +29,8 @@ def to_json(document: Document, *, ascii_only: bool = False) -> str:
     Each element of a list of records stands on a line of its own, so that results can be compared line by line.
     """
     encode = _encode_ascii if ascii_only else _encode
-    return "{\n" + ",\n".join(f"{encode(key)}: {_block(value, encode)}" for key, value in document.items()) + "\n}\n"
+    body = ",\n".join(f"{encode(key)}: {_block(value, encode)}" for key, value in document.items())
+    return visible_json(f"{{\n{body}\n}}\n")
 
 
 def _block(value: Plain, encode: Callable[[Plain], str]) -> str:
@@ -53,6 +56,8 @@ def read_result(file: str) -> Document:
         raise InputError(
             Fault(message=message, code="result-json", file=file, line=error.lineno, column=error.colno, fix=fix)
         ) from None
+    except ValueError:  # Python reads 4300 digits
+        refuse(file, "result-json", "holds a number with thousands of digits", expected="a result.json of photostrip")
     except RecursionError:
         refuse(file, "result-json", "is nested too deeply", expected="a result.json of photostrip")
     if not isinstance(document, dict) or "photostrip_result" not in document:
@@ -61,8 +66,14 @@ def read_result(file: str) -> Document:
         refuse(
             file,
             "result-schema",
-            f"has the result format {document['photostrip_result']!r}",
+            f"has the result format {document['photostrip_result']!a:.40}",
             expected=str(SCHEMA),
             fix="run the project again with this version of photostrip",
         )
+    try:
+        faults = faults_of(document, file)
+    except RecursionError:
+        refuse(file, "result-json", "is nested too deeply", expected="a result.json of photostrip")
+    if faults:
+        raise InputError(faults)
     return document

@@ -6,6 +6,8 @@ import re
 from typing import TYPE_CHECKING, NamedTuple
 from xml.sax.saxutils import escape, quoteattr
 
+from photostrip.visible import visible
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
@@ -53,4 +55,4 @@ def _quoted(text: str) -> str:
 
 
 def _clean(text: str) -> str:
-    return FORBIDDEN.sub("?", text)
+    return FORBIDDEN.sub("?", visible(text))

@@ -7,6 +7,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 from photostrip.report.page.parts import Facts, Table, Words
+from photostrip.visible import visible
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -49,7 +50,7 @@ def clamp(width: int) -> int:
 def lay_out(title: str, sections: Iterable[Section], width: int, *, ascii_only: bool = False) -> list[Line]:
     """Lay out a report: no line is wider than the page, none ends in a blank; an empty title is not printed."""
     page = clamp(width)
-    plain: Plain = plain_ascii if ascii_only else str
+    plain: Plain = (lambda text: visible(plain_ascii(text))) if ascii_only else visible
     lines = [Line(line, "title") for line in wrapped(plain(title), page)] if title else []
     for section in sections:
         if lines:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from photostrip.errors import Fault, GeometryError, InputError
 from photostrip.notes import Finding
+from photostrip.visible import visible
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -97,12 +98,12 @@ def line_of(finding: Document) -> str:
     values = {name: finding[name] for name in names}
     if "evidence" in finding:  # the codes of the gate are for people, too: they can be accepted
         values["message"] = f"{finding['code']} {finding['message']}"
-    return f"{finding['severity']}: {Fault(**values)}"
+    return visible(f"{finding['severity']}: {Fault(**values)}")
 
 
 def annotated(findings: Iterable[Document]) -> str:
     """Return findings as annotations of GitHub Actions: ``::error file=...,line=...,title=...::what is wrong``."""
-    return "".join(f"{_annotation(each)}\n" for each in findings)
+    return "".join(f"{visible(_annotation(each))}\n" for each in findings)
 
 
 def _annotation(finding: Document) -> str:

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from photostrip.report.page.layout import cells, cut
+from photostrip.visible import visible
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -46,7 +47,7 @@ class Progress:
         turn = TURNS[int(seconds / STEP) % len(TURNS)]
         count = f" {self.done} of {self.total}" if self.total else ""
         head, tail = f"{turn}{count} ", f" {seconds:.0f} s"
-        return head + cut(self.text, max(width - cells(head + tail) - 1, 0), "...") + tail
+        return head + cut(visible(self.text), max(width - cells(head + tail) - 1, 0), "...") + tail
 
     def run(self) -> None:
         """Show the line again and again until the work is done."""
@@ -151,7 +152,7 @@ class BatchTable:
         if self._live is not None:
             self._live.console.print(text, soft_wrap=True)
         else:
-            self.stream.write(f"{text}\n")
+            self.stream.write(f"{visible(text)}\n")
             self.stream.flush()
 
     def head(self, seconds: float) -> str:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from photostrip.report.page.layout import USUAL, lay_out, plain_ascii
 from photostrip.report.page.parts import Facts, Table, Words
+from photostrip.visible import visible
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -33,7 +34,7 @@ def to_markdown(title: str, sections: Iterable[Section], *, ascii_only: bool = F
 
 def _safe(text: str) -> str:
     """Keep signs of Markdown in ids and sentences from being read as such."""
-    return text.translate(BEFORE)
+    return visible(text).translate(BEFORE)
 
 
 def _block(part: Part) -> Iterator[str]:

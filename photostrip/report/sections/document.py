@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from photostrip.errors import Fault, InputError
 from photostrip.report.page.parts import Document, Section, Words
 from photostrip.report.sections.bundle import bundle_sections
 from photostrip.report.sections.covariance import covariance_section
@@ -30,6 +29,7 @@ from photostrip.report.sections.strip import (
     relative_section,
 )
 from photostrip.report.sections.verdict import accuracy, headline, verdict_section
+from photostrip.result.reading import faults_instead
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -56,7 +56,7 @@ def _of_the_strips(document: Document, *, everything: bool) -> Iterator[Section]
     if of_models(document):
         yield links_section(document, everything=everything)
         yield models_section(document, everything=everything)
-    elif len(document["models"]) > 0:
+    elif len(document["models"]) > 0:  # single photos have none
         yield relative_section(document, everything=everything)
         yield junction_section(document, everything=everything)
     if document["absolute"]:
@@ -99,14 +99,9 @@ def chosen_sections(document: Document, *, quiet: bool = False, everything: bool
 
 def require_complete(document: Document, file: str) -> None:
     """Refuse a document whose file a user has cut or edited so that it cannot be reported."""
-    try:
+    with faults_instead(file, "reported"):
         title_of(document)
         sections_of(document, everything=True)
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-        what = f"key {error} is missing" if isinstance(error, KeyError) else f"a value is of another kind ({error})"
-        message = f"cannot be reported: {what}"
-        fix = "run the project again"
-        raise InputError(Fault(message, "result-incomplete", file, expected="a whole result.json", fix=fix)) from None
 
 
 def title_of(document: Document) -> str:

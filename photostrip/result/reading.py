@@ -1,0 +1,160 @@
+"""A result that is read again, checked against the description of its keys: a user may have edited the file.
+
+Every value is of the kind that its key is described with, every number is finite and every text can be written.
+"""
+
+from __future__ import annotations
+
+import math
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from photostrip.errors import Fault, InputError
+from photostrip.result.description import Quantity, described
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from photostrip.result.description import Table
+
+LARGEST_NUMBER = 1e100  # its square is a number yet
+LARGEST_COUNT = 10**15
+MOST_FAULTS = 20
+DEEPEST = 50  # lists and blocks in each other
+WORDS = {"text": "a text", "word": "a text", "count": "a whole number", "flag": "true or false", "number": "a number"}
+
+
+def faults_of(document: dict[str, Any], file: str) -> list[Fault]:
+    """Return what keeps a document from being a result: wrong kinds of values, each with its key.
+
+    Keys that are missing are not among them: a baseline holds a part of a result only.
+    """
+    found: list[Fault] = []
+    for key, message, expected in _wrong(document, described(), ""):
+        found.append(Fault(message, "result-value", file, key=key, expected=expected, fix="run the project again"))
+        if len(found) == MOST_FAULTS:
+            break
+    return found
+
+
+Wrong = tuple[str, str, str]  # key, what is wrong with it, what is expected there
+
+
+def _wrong(block: dict[str, Any], table: Table, path: str) -> Iterator[Wrong]:
+    """Check the keys of a block; of keys that are not described, what all values have in common."""
+    for key, value in block.items():
+        if _unwritable(key):
+            yield path, f"holds the key {key!a}, which cannot be written", "a name"
+            continue
+        below, entry = f"{path}.{key}" if path else key, table.get(key)
+        if value is None:
+            continue
+        if isinstance(entry, dict):
+            yield from _wrong_block(value, entry, below)
+        elif entry is None or entry.kind == "any":
+            yield from _wrong_anything(value, below, 0)
+        else:
+            yield from _wrong_value(value, entry, below)
+
+
+def _wrong_block(value: object, table: Table, path: str) -> Iterator[Wrong]:
+    if isinstance(value, dict):
+        yield from _wrong(value, table, path)
+    elif isinstance(value, list):
+        for number, record in enumerate(value):
+            if isinstance(record, dict):
+                yield from _wrong(record, table, f"{path}[{number}]")
+            else:
+                yield f"{path}[{number}]", f"holds {_shown(record)}", "a block of keys"
+    else:
+        yield path, f"holds {_shown(value)}", "a block of keys, or a list of them"
+
+
+def _wrong_value(value: object, entry: Quantity, path: str) -> Iterator[Wrong]:
+    if not entry.many:
+        if not _is(value, entry.kind):
+            yield path, f"holds {_shown(value)}", WORDS[entry.kind]
+    elif not isinstance(value, list):
+        yield path, f"holds {_shown(value)}", "a list"
+    else:
+        yield from _wrong_list(value, entry, path)
+
+
+def _wrong_list(values: list[Any], entry: Quantity, path: str) -> Iterator[Wrong]:
+    for number, value in enumerate(values):
+        if isinstance(value, list):  # a matrix, row by row
+            yield from _wrong_list(value, entry, f"{path}[{number}]")
+        elif value is not None and not _is(value, entry.kind):
+            yield f"{path}[{number}]", f"holds {_shown(value)}", WORDS[entry.kind]
+
+
+def _wrong_anything(value: object, path: str, depth: int) -> Iterator[Wrong]:
+    """Check a value that is not described: its numbers are finite, its texts can be written."""
+    if depth > DEEPEST:
+        yield path, "is nested too deeply", "a value"
+    elif isinstance(value, dict):
+        for key, each in value.items():
+            if _unwritable(key):
+                yield path, f"holds the key {key!a}, which cannot be written", "a name"
+            else:
+                yield from _wrong_anything(each, f"{path}.{key}", depth + 1)
+    elif isinstance(value, list):
+        for number, each in enumerate(value):
+            yield from _wrong_anything(each, f"{path}[{number}]", depth + 1)
+    elif isinstance(value, str):
+        if _unwritable(value):
+            yield path, f"holds {_shown(value)}", WORDS["text"]
+    elif value is not None and not isinstance(value, bool) and not _is(value, "number"):
+        yield path, f"holds {_shown(value)}", WORDS["number"]
+
+
+def _is(value: object, kind: str) -> bool:
+    if kind in {"text", "word"}:
+        return isinstance(value, str) and not _unwritable(value)
+    if kind == "flag":
+        return isinstance(value, bool)
+    if isinstance(value, bool):
+        return False
+    if kind == "count":
+        return isinstance(value, int) and abs(value) <= LARGEST_COUNT
+    if isinstance(value, int):
+        return abs(value) <= LARGEST_NUMBER
+    return isinstance(value, float) and math.isfinite(value) and abs(value) <= LARGEST_NUMBER
+
+
+def _unwritable(text: str) -> bool:
+    """Whether a text has halves of characters (surrogates) in it."""
+    return not text.isascii() and any("\ud800" <= sign <= "\udfff" for sign in text)
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, dict):
+        return "a block of keys"
+    if isinstance(value, list):
+        return "a list"
+    if isinstance(value, str):
+        return f"the text {value[:40]!a}" if _unwritable(value) else f"the text {value[:40]!r}"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int) and abs(value) > LARGEST_COUNT:
+        return "a whole number that is too large"
+    return f"{value}"
+
+
+@contextmanager
+def faults_instead(file: str, doing: str) -> Iterator[None]:
+    """Turn what a document lacks, or has too much of, into a fault of its file: a user has cut or edited it.
+
+    doing: ``reported`` or ``compared``.
+    """
+    try:
+        yield
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        raise incomplete(error, file, doing) from None
+
+
+def incomplete(error: Exception, file: str, doing: str, fix: str = "run the project again") -> InputError:
+    """Return the fault of a file whose document is not whole."""
+    what = f"key {error} is missing" if isinstance(error, KeyError) else f"a value is of another kind ({error})"
+    message = f"cannot be {doing}: {what}"
+    return InputError(Fault(message, "result-incomplete", file, expected="a whole result.json", fix=fix))

@@ -1,0 +1,95 @@
+"""``report`` and ``compare`` of results that were edited: faults with file and key, never a traceback."""
+
+from __future__ import annotations
+
+import json
+from random import Random
+from typing import TYPE_CHECKING
+
+import pytest
+
+from photostrip.cli.main import main
+from photostrip.errors import InputError
+from photostrip.formats.output.result_json import read_result, to_json
+from tests.edited_results import COMMANDS, ESCAPE, edited, faults_of
+from tests.reports import RESULT, saved
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+CASES = 60
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
+def test_edited_results_are_printed_or_refused(command: tuple[str, ...], tmp_path: Path) -> None:
+    right = tmp_path / "right.json"
+    right.write_bytes(RESULT.read_bytes())
+    wrong = []
+    for number in range(CASES // len(COMMANDS)):
+        edit = edited(saved(), Random(f"{command} {number}"))
+        wrong += faults_of(edit, right, tmp_path, command)
+    assert wrong == []
+
+
+@pytest.mark.parametrize(
+    ("key", "text", "words"),
+    [
+        ("summary.sigma0_um", "NaN", "holds nan; expected a number"),
+        ("summary.sigma0_um", "-Infinity", "holds -inf; expected a number"),
+        ("summary.sigma0_um", "1e999", "holds inf; expected a number"),
+        ("summary.sigma0_um", "[1, 2]", "holds a list; expected a number"),
+        ("counts.photos", "1" + "0" * 400, "holds a whole number that is too large; expected a whole number"),
+        ("counts.photos", "true", "holds true; expected a whole number"),
+        ("name", '"\\ud800"', "holds the text '\\ud800'; expected a text"),
+        ("points[0].id", "7", "holds 7; expected a text"),
+        ("photos[1].rotation", "0.5", "holds 0.5; expected a list"),
+        ("residuals[0].vx_um[2]", '"3"', "holds the text '3'; expected a number"),
+        ("control[2].measured", '"yes"', "holds the text 'yes'; expected true or false"),
+        ("strips[0]", "3", "holds 3; expected a block of keys"),
+        ("frame", "3", "holds 3; expected a block of keys, or a list of them"),
+        ("settings.relative", "[NaN]", "holds nan; expected a number"),
+    ],
+)
+def test_a_wrong_value_is_refused_with_file_and_key(key: str, text: str, words: str, tmp_path: Path) -> None:
+    document = json.loads(RESULT.read_text(encoding="utf-8"))
+    place = document
+    *above, last = key.replace("[", ".[").split(".")
+    for part in above:
+        place = place[int(part[1:-1])] if part.startswith("[") else place[part]
+    place[int(last[1:-1]) if last.startswith("[") else last] = "@"
+    file = tmp_path / "result.json"
+    file.write_text(json.dumps(document).replace('"@"', text), encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        read_result(str(file))
+    (fault,) = caught.value.faults
+    assert (fault.code, fault.file) == ("result-value", str(file))
+    assert fault.key == ("settings.relative[0]" if key == "settings.relative" else key)
+    assert words in str(fault)
+
+
+def test_digits_by_the_thousand_are_refused(tmp_path: Path) -> None:
+    file = tmp_path / "result.json"
+    file.write_text('{"photostrip_result": ' + "1" * 5000 + "}", encoding="utf-8")
+    with pytest.raises(InputError, match="thousands of digits"):
+        read_result(str(file))
+
+
+def test_control_characters_are_shown_and_never_sent(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    document = json.loads(RESULT.read_text(encoding="utf-8"))
+    document["name"] += ESCAPE
+    document["control"][0]["id"] = ESCAPE
+    file = tmp_path / "result.json"
+    file.write_text(to_json(document), encoding="utf-8")
+    assert read_result(str(file))["control"][0]["id"] == ESCAPE
+    for form in ("text", "md", "github", "json"):
+        assert main(["report", str(file), "--format", form]) == 0
+        out = capsys.readouterr().out
+        assert not {"\x1b", "\x07", "\x9b", "\x7f", "\u202e"} & set(out)
+        assert form == "github" or ("\\u001b[2J" if form == "json" else "x1b") in out
+
+
+def test_what_the_user_types_is_shown_too(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "no\x1b[31m.yaml"]) == 2
+    err = capsys.readouterr().err
+    assert "\x1b" not in err
+    assert "no\\x1b[31m.yaml" in err
