@@ -185,6 +185,7 @@ def reject_wrong_control(oriented: OrientedStrip[Errors], settings: Settings) ->
         coordinates=found,
         design=np.einsum("wi,wij->wj", found.direction, moved),
         covariance=partial(stage.misclosure_covariance, oriented),
+        share=1.0,
     )
     screened = control_screening.screen_control(place)
     if screened.rejections:

@@ -17,6 +17,7 @@ from photostrip.pipeline.strips.models import form_models, link_strip
 from photostrip.report.sections.document import sections_of
 from photostrip.result.document import document_of
 from photostrip.simulate import Control, Flight, Ground, Models, Points, Spec, simulate
+from photostrip.triangulation.gross_errors.control import strip_at_control
 from photostrip.triangulation.independent_models import model_errors, perspective_centers
 from photostrip.triangulation.independent_models.settings import LinkSettings
 from photostrip.triangulation.polynomial import correction
@@ -122,7 +123,10 @@ def test_centers_may_be_missing() -> None:
         assert len(sections_of(document)) > 10
 
 
-def test_a_wrong_control_point_is_named() -> None:
+@pytest.mark.parametrize("coordinates", [100, 27])
+def test_a_wrong_control_point_is_named(monkeypatch: pytest.MonkeyPatch, coordinates: int) -> None:
+    """In sections, too."""
+    monkeypatch.setattr(strip_at_control, "LARGEST", coordinates)
     given = truth(8, 3, 4)
     noise = np.random.default_rng(1).normal(size=(len(given.model), 3))
     whole = inputs(given, given.measured(noise), bands=5)

@@ -79,6 +79,7 @@ class JointAdjustment:
     pull: Floats  # (h,): H^T M w
     squares: float  # w^T M w
     freedom: int
+    alpha: float  # of rejecting anything of these
     points: tuple[Columns, ...]  # columns of each control point
     parts: tuple[Columns, ...]  # columns of plan and of height of each, and of each bend
     height: Flags  # (w,)
@@ -96,13 +97,13 @@ class JointAdjustment:
 
     @property
     def level(self) -> float:
-        """Level of a single test: its share of that of the strip."""
-        return ALPHA / max(len(self.hypotheses), 1)
+        """Level of a single test: its share of that of all."""
+        return self.alpha / max(len(self.hypotheses), 1)
 
     @property
     def explained(self) -> bool:
         """Whether the covariance explains the misclosures: the test of the whole."""
-        return self.freedom > 0 and self.squares <= chi2_quantile(1 - ALPHA, self.freedom)
+        return self.freedom > 0 and self.squares <= chi2_quantile(1 - self.alpha, self.freedom)
 
     def without(self, out: Sequence[int]) -> JointAdjustment:
         """Delete columns; their rows become zero."""
@@ -207,6 +208,7 @@ def adjust(strip: StripAtControl, w: Floats, covariance: Floats, *, bends: bool 
         pull=scaled.T @ pull,
         squares=float(w @ pull),
         freedom=count - strip.design.shape[1],
+        alpha=ALPHA * strip.share,
         points=tuple(tuple(rows.tolist()) for rows in points),
         parts=tuple(tuple(rows.tolist()) for rows in parts if len(rows)),
         height=height,

@@ -49,6 +49,7 @@ class StripAtControl:
     coordinates: Misclosures  # the w coordinates that count
     design: Floats  # (w, 7): their derivatives by a similarity
     covariance: Callable[[Numbers], Floats]  # of some of them, strip and control together, (w, w), metres^2
+    share: float  # of a section in the coordinates of the whole strip
 
     def sections(self) -> list[tuple[Numbers, StripAtControl]]:
         """Cut the control along the strip into parts of equal size; rows of each, and the strip there."""
@@ -73,6 +74,7 @@ class StripAtControl:
             coordinates=replace(self.coordinates.take(inside), point=place[self.coordinates.point[inside]]),
             design=self.design[inside],
             covariance=lambda some: self.covariance(inside[some]),
+            share=len(inside) / len(self.design),
         )
 
     def misclosures(self, kept: Flags, control: ControlPoints | None = None) -> Floats:

@@ -77,7 +77,8 @@ def drawn(seed: int, points: int = 8, worse: float = 1.0) -> Drawn:
         rays=(),
         coordinates=Misclosures(point, axis, np.eye(3)[axis], np.ones(w), rows),
         design=design,
-        covariance=lambda _: np.asarray(root @ root.T),
+        covariance=lambda some: np.asarray(root @ root.T)[np.ix_(some, some)],
+        share=1.0,
         w=worse * (root @ rng.normal(0, 1, w)) + design @ rng.normal(0, 1, 7),
     )
 
@@ -130,6 +131,15 @@ def test_good_control_is_called_wrong_no_more_often_than_the_level_says(worse: f
     assert fewest <= alarms <= most
 
 
+def test_sections_share_the_level() -> None:
+    level = 0.0
+    for _, part in nonempty(drawn(1, points=67).sections()):
+        count = np.arange(len(part.design))
+        whole = adjust(part, np.zeros(len(count)), part.covariance(count))
+        level += whole.level * len(whole.hypotheses)
+    assert level == pytest.approx(0.01)
+
+
 def test_what_checks_itself_too_little_is_left_alone() -> None:
     strip = drawn(1, points=3)
     strip = replace(strip, w=strip.w + 100.0 * (np.arange(9) == 4))
@@ -159,12 +169,15 @@ def test_a_majority_is_never_rejected() -> None:
 
 @pytest.mark.parametrize(("points", "sections"), [(33, 1), (34, 2), (66, 2), (67, 3)])
 def test_long_strips_are_cut_in_sections_of_a_hundred_coordinates(points: int, sections: int) -> None:
-    parts = drawn(1, points=points).sections()
+    strip = drawn(1, points=points)
+    parts, whole = strip.sections(), strip.covariance(np.arange(3 * points))
     assert len(parts) == sections
     assert sorted(np.concatenate([rows for rows, _ in parts]).tolist()) == list(range(points))
     for rows, part in nonempty(parts):
         assert len(part.coordinates.point) == len(part.design) == 3 * len(rows) <= 100
         assert part.control.ids == tuple(f"c{row}" for row in rows)
+        coordinates = (3 * rows[:, None] + np.arange(3)).ravel()
+        assert (part.covariance(np.arange(3 * len(rows))) == whole[np.ix_(coordinates, coordinates)]).all()
     first = [part.placed[:, 0] for _, part in parts]
     ends, starts = np.array([x.max() for x in first[:-1]]), np.array([x.min() for x in first[1:]])
     assert (ends < starts).all()
