@@ -38,9 +38,11 @@ if TYPE_CHECKING:
     from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
 
 
-def _limit(solution: BundleSolution, settings: BundleSettings) -> Limit:
+def _limit(problem: BundleProblem, solution: BundleSolution, settings: BundleSettings) -> Limit:
     """Limit of standardised residuals: never sharper than the stated standard deviations allow."""
-    alpha = settings.level / max(solution.redundancy, 1) if settings.alpha is None else settings.alpha
+    parts = problem.images, problem.control, problem.positions, problem.attitudes
+    tests = sum(int(np.isfinite(part.sigma).sum()) for part in parts)
+    alpha = settings.level / max(tests, 1) if settings.alpha is None else settings.alpha
     stated = Limit(normal_quantile(1 - alpha / 2), alpha, 1.0)
     if settings.test != "tau" or solution.redundancy < 1:
         return stated
@@ -72,7 +74,7 @@ class ScreenedBundle:
             selection=selection,
             solution=solution,
             precision=cofactors_of(solution),
-            limit=_limit(solution, settings),
+            limit=_limit(chosen, solution, settings),
         )
 
     @cached_property
