@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 # Bottom to top. A room is a module or a folder directly below photostrip/.
 LAYERS = (
     {"arrays", "errors", "notes", "threads", "distributions"},
-    {"points", "camera", "statistics", "geometry", "geodesy"},
+    {"points", "camera", "statistics", "geometry", "geodesy", "rejection"},
     {"triangulation", "terrestrial"},
     {"simulate"},
     {"planning"},

@@ -10,7 +10,6 @@ one whose grid file is missing.
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from photostrip.errors import Fault, InputError, PhotostripError
@@ -50,14 +49,6 @@ def tie_frames(
     if not wanted:
         raise InputError(Fault("no ground frame is given", code="crs-missing", expected="a control list with its crs"))
     target = output if output is not None else specs[0]
-    frames = _tied(tuple(wanted), target, directory)
-    return [frames[spec] for spec in specs], frames[target]
-
-
-@lru_cache(maxsize=8)  # loading a project ties its frames to check them, the run after it to use them
-def _tied(
-    wanted: tuple[tuple[str, FrameSpec], ...], target: FrameSpec, directory: Path | None
-) -> dict[FrameSpec, GroundFrame]:
     faults: list[Fault] = []
     parts = _read_all(wanted, directory, faults)
     if not faults:
@@ -65,11 +56,11 @@ def _tied(
     frames = {} if faults else _build_all(wanted, parts, target, faults)
     if faults:
         raise InputError(faults)
-    return frames
+    return [frames[spec] for spec in specs], frames[target]
 
 
 def _read_all(
-    wanted: Sequence[tuple[str, FrameSpec]], directory: Path | None, faults: list[Fault]
+    wanted: list[tuple[str, FrameSpec]], directory: Path | None, faults: list[Fault]
 ) -> dict[FrameSpec, CrsParts]:
     """Read each distinct frame once, collecting what is wrong with it."""
     parts: dict[FrameSpec, CrsParts] = {}
@@ -89,9 +80,7 @@ def _read_all(
     return parts
 
 
-def _check_together(
-    wanted: Sequence[tuple[str, FrameSpec]], parts: dict[FrameSpec, CrsParts], faults: list[Fault]
-) -> None:
+def _check_together(wanted: list[tuple[str, FrameSpec]], parts: dict[FrameSpec, CrsParts], faults: list[Fault]) -> None:
     """Find what can only be seen when the frames are put side by side."""
     first_path, first = wanted[0]
     for path, spec in wanted[1:]:
@@ -107,7 +96,7 @@ def _check_together(
 
 
 def _build_all(
-    wanted: Sequence[tuple[str, FrameSpec]], parts: dict[FrameSpec, CrsParts], target: FrameSpec, faults: list[Fault]
+    wanted: list[tuple[str, FrameSpec]], parts: dict[FrameSpec, CrsParts], target: FrameSpec, faults: list[Fault]
 ) -> dict[FrameSpec, GroundFrame]:
     """Make the frames; frames of one foreign datum share one shift, so that it is chosen once for all."""
     frames: dict[FrameSpec, GroundFrame] = {}
