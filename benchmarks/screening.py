@@ -25,10 +25,8 @@ from photostrip.simulate.simulation import simulate  # noqa: E402
 from photostrip.simulate.spec import Flight, GrossError, Points, Spec  # noqa: E402
 from photostrip.statistics import chi2_quantile  # noqa: E402
 from photostrip.triangulation.gross_errors.pairs import deletion, screening  # noqa: E402
-from photostrip.triangulation.gross_errors.rays.screened_formation import (  # noqa: E402
-    StripRays,
-    form_screened,
-)
+from photostrip.triangulation.gross_errors.rays.screened_formation import form_screened  # noqa: E402
+from photostrip.triangulation.gross_errors.rays.strip_rays import StripRays  # noqa: E402
 from photostrip.triangulation.relative_orientation.orientation import RelativeSettings, orient_unchecked  # noqa: E402
 from photostrip.triangulation.relative_orientation.pairs import Pairs, collect_pairs  # noqa: E402
 from photostrip.triangulation.relative_orientation.solution import linearised_parallaxes  # noqa: E402

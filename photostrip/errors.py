@@ -11,11 +11,12 @@ Readers collect faults and raise one ``InputError`` for all of them; mathematics
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator
 
     from photostrip.notes import Finding
 
@@ -93,3 +94,22 @@ class GeometryError(PhotostripError):
         self.photos = tuple(photos)
         self.points = tuple(points)
         self.code = code
+
+
+@contextmanager
+def faults_instead(file: str, doing: str) -> Iterator[None]:
+    """Turn what a document lacks, or has too much of, into a fault of its file: a user has cut or edited it.
+
+    doing: ``reported`` or ``compared``.
+    """
+    try:
+        yield
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        raise incomplete(error, file, doing) from None
+
+
+def incomplete(error: Exception, file: str, doing: str, fix: str = "run the project again") -> InputError:
+    """Return the fault of a file whose document is not whole."""
+    what = f"key {error} is missing" if isinstance(error, KeyError) else f"a value is of another kind ({error})"
+    message = f"cannot be {doing}: {what}"
+    return InputError(Fault(message, "result-incomplete", file, expected="a whole result.json", fix=fix))

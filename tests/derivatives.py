@@ -9,7 +9,7 @@ import numpy as np
 
 from photostrip.formats.output.simulation import inputs_of
 from photostrip.pipeline import Settings, triangulate
-from photostrip.pipeline.precision.photo_precision import Propagation, propagation
+from photostrip.pipeline.precision.photo_precision import propagation
 from photostrip.pipeline.strips.absolute import OrientedStrip
 from photostrip.pipeline.strips.photos import FormedPhotos
 from photostrip.simulate.simulation import simulate
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from photostrip.geodesy.local_frame import IntermediateFrame
     from photostrip.pipeline import Inputs, Result
+    from photostrip.pipeline.precision.check_points import Propagation
     from photostrip.triangulation.error_propagation.derivatives import ErrorRows
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 

@@ -12,8 +12,7 @@ from photostrip.compare.ground import difference_in_plan_and_height, plan_and_he
 from photostrip.compare.members import members_of, missing_and_new
 from photostrip.compare.quantities import Quantity, quantities_of
 from photostrip.compare.tolerances import SETS, UNITS, SetTolerance, Tolerances
-from photostrip.errors import Fault, InputError
-from photostrip.result.reading import incomplete
+from photostrip.errors import Fault, InputError, incomplete
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence

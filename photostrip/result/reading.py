@@ -6,10 +6,9 @@ Every value is of the kind that its key is described with, every number is finit
 from __future__ import annotations
 
 import math
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from photostrip.errors import Fault, InputError
+from photostrip.errors import Fault
 from photostrip.result.description import Quantity, described
 
 if TYPE_CHECKING:
@@ -139,22 +138,3 @@ def _shown(value: object) -> str:
     if isinstance(value, int) and abs(value) > LARGEST_COUNT:
         return "a whole number that is too large"
     return f"{value}"
-
-
-@contextmanager
-def faults_instead(file: str, doing: str) -> Iterator[None]:
-    """Turn what a document lacks, or has too much of, into a fault of its file: a user has cut or edited it.
-
-    doing: ``reported`` or ``compared``.
-    """
-    try:
-        yield
-    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
-        raise incomplete(error, file, doing) from None
-
-
-def incomplete(error: Exception, file: str, doing: str, fix: str = "run the project again") -> InputError:
-    """Return the fault of a file whose document is not whole."""
-    what = f"key {error} is missing" if isinstance(error, KeyError) else f"a value is of another kind ({error})"
-    message = f"cannot be {doing}: {what}"
-    return InputError(Fault(message, "result-incomplete", file, expected="a whole result.json", fix=fix))

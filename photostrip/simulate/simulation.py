@@ -18,8 +18,8 @@ from photostrip.simulate.film import sheets
 from photostrip.simulate.flight import fly
 from photostrip.simulate.gross import spoil_control, spoil_images
 from photostrip.simulate.ground import surface, world
-from photostrip.simulate.imaging import bent, project, shown
-from photostrip.simulate.placement import place
+from photostrip.simulate.imaging import bent, project
+from photostrip.simulate.placement import place, shown
 from photostrip.simulate.plotter import TruePlaces, plotted
 from photostrip.simulate.validation import LARGEST_ARC, faults_of
 from photostrip.triangulation.image_coordinates.corrections import distort

@@ -37,10 +37,9 @@ def compare(
     from photostrip.cli.failures import failures_as
     from photostrip.cli.jobs import baseline as baseline_job
     from photostrip.compare import Tolerances, compare_results
-    from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE
+    from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE, faults_instead
     from photostrip.formats.output.result_json import read_result
     from photostrip.project.tolerance_profile import load_tolerances
-    from photostrip.result.reading import faults_instead
     from photostrip.visible import visible
 
     file = result / "result.json" if result.is_dir() else result

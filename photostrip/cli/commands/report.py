@@ -30,10 +30,10 @@ def report(
     It is the report that `photostrip run` printed. FILE may end in .txt, .md, .html or .json. The exit code does not
     depend on the tolerances: the report of a failed result is a report.
     """
+    from photostrip.errors import faults_instead
     from photostrip.formats.output.result_json import read_result
     from photostrip.formats.text.writing import write_text
     from photostrip.report import require_complete
-    from photostrip.result.reading import faults_instead
 
     file = str(result / "result.json" if result.is_dir() else result)
     document = read_result(file)

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
     from photostrip.arrays import Floats, Numbers
     from photostrip.geodesy.ground_frame import GroundFrame
-    from photostrip.pipeline.precision.photo_precision import Propagation
     from photostrip.pipeline.results import StripResult
     from photostrip.points import ControlPoints, PhotoPoints
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
@@ -26,6 +25,19 @@ if TYPE_CHECKING:
 
 
 LARGEST = 100  # check points of a strip that are tested together, spread over it
+
+
+@dataclass(frozen=True, eq=False)
+class Propagation:
+    """Rows of derivatives of one strip in its intermediate frame, and what the fit to the control takes away."""
+
+    errors: StripErrors
+    control: control_errors.Misclosures  # control coordinates that count
+    fit: control_errors.FitOperator
+    influence: Floats  # (q, 3, t): points by the parameters of the fit
+    photos: ErrorRows  # photos that could be oriented
+    photo_influence: Floats  # (k, 6, t): the same of them
+    oriented: Numbers  # (k,): their places in the strip
 
 
 class CheckPoints(NamedTuple):

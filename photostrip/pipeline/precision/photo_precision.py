@@ -2,40 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photostrip.pipeline.precision import check_points
+from photostrip.pipeline.precision.check_points import Propagation
 from photostrip.pipeline.precision.strip_precision import StripPrecision
 from photostrip.triangulation.error_propagation import control_errors, covariances, photo_errors
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from photostrip.arrays import Floats, Numbers
+    from photostrip.arrays import Floats
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.precision.check_points import CheckPoints
     from photostrip.pipeline.results import StripResult
     from photostrip.pipeline.strips.absolute import OrientedStrip
     from photostrip.points import ControlPoints, PhotoPoints
     from photostrip.triangulation.covariance_adjustment.adjust import CovarianceAdjustment
-    from photostrip.triangulation.error_propagation.derivatives import ErrorRows
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
-
-
-@dataclass(frozen=True, eq=False)
-class Propagation:
-    """Rows of derivatives of one strip in its intermediate frame, and what the fit to the control takes away."""
-
-    errors: StripErrors
-    control: control_errors.Misclosures  # control coordinates that count
-    fit: control_errors.FitOperator
-    influence: Floats  # (q, 3, t): points by the parameters of the fit
-    photos: ErrorRows  # photos that could be oriented
-    photo_influence: Floats  # (k, 6, t): the same of them
-    oriented: Numbers  # (k,): their places in the strip
 
 
 def of_photos(

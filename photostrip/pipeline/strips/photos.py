@@ -14,7 +14,8 @@ from photostrip.pipeline.strips import notes
 from photostrip.triangulation.error_propagation import control_errors, covariances, strip_errors
 from photostrip.triangulation.gross_errors.control.strip_at_control import ControlRay
 from photostrip.triangulation.gross_errors.pairs import screening
-from photostrip.triangulation.gross_errors.rays.screened_formation import StripRays, form_screened, with_readmitted
+from photostrip.triangulation.gross_errors.rays.screened_formation import form_screened, with_readmitted
+from photostrip.triangulation.gross_errors.rays.strip_rays import StripRays
 from photostrip.triangulation.relative_orientation.orientation import Orientation, orient_unchecked, refuse_unusable
 from photostrip.triangulation.relative_orientation.pairs import collect_pairs
 from photostrip.triangulation.resection.resection import Resection, resect, with_residuals

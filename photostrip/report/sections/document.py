@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from photostrip.errors import faults_instead
 from photostrip.report.page.parts import Document, Section, Words
 from photostrip.report.sections.bundle import bundle_sections
 from photostrip.report.sections.covariance import covariance_section
@@ -29,7 +30,6 @@ from photostrip.report.sections.strip import (
     relative_section,
 )
 from photostrip.report.sections.verdict import accuracy, headline, verdict_section
-from photostrip.result.reading import faults_instead
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -17,23 +17,12 @@ from photostrip.triangulation.strip_formation.strip import form_from_pairs, with
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from photostrip.arrays import Flags, Floats, Numbers
-    from photostrip.points import PhotoPoints
+    from photostrip.arrays import Flags, Floats
     from photostrip.rejection import Rejection
+    from photostrip.triangulation.gross_errors.rays.strip_rays import StripRays
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.scale_transfer import StripFormationSettings
     from photostrip.triangulation.strip_formation.strip import FormedStrip
-
-
-@dataclass(frozen=True, eq=False)
-class StripRays:
-    """All rays of a strip."""
-
-    observations: PhotoPoints
-    position: Numbers  # (n,): place in the strip of the photo of every image point; -1 for photos of other strips
-    sigma: Floats  # (p,): standard deviations of a y parallax of weight one in each pair, mm
-    stated: float  # standard deviation of an image coordinate of weight one, mm
-    kept: Numbers  # rows that the user keeps: their points are not tested
 
 
 class ScreenedStrip(NamedTuple):

@@ -23,7 +23,7 @@ from photostrip.triangulation.strip_formation.strip import mean_points
 if TYPE_CHECKING:
     from photostrip.arrays import Flags, Numbers
     from photostrip.rejection import Rejection
-    from photostrip.triangulation.gross_errors.rays.screened_formation import StripRays
+    from photostrip.triangulation.gross_errors.rays.strip_rays import StripRays
     from photostrip.triangulation.relative_orientation.orientation import Orientation
     from photostrip.triangulation.strip_formation.strip import FormedStrip
 
