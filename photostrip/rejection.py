@@ -23,12 +23,6 @@ class Rejection:
     size: tuple[float, ...] = ()
     cause: str = ""  # of a ray: whether it is known to be the wrong one of its point
     readmitted: bool = False  # whether it came back in the end
-    other: str = ""  # the point with which a control point seems to have been exchanged
-    photo: str = ""  # the photo whose image of a control point is wrong, and not its coordinates
-    # redundancy, detectable: smallest redundancy number of the coordinates taken out; smallest error of the worst that
-    # is found in 80 % of cases
-    redundancy: float = NAN
-    detectable: float = NAN
 
     @property
     def worst(self) -> float:

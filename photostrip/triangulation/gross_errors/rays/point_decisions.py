@@ -65,8 +65,8 @@ class Decision:
 
 def undecided(rays: int) -> Decision:
     """Leave out all rays of a point, which meet nowhere."""
-    cause = TWO_RAYS if rays == 2 else SEVERAL_RAYS
-    return Decision(out=np.ones(rays, bool), cause=cause, value=float("nan"), size=np.full((rays, 2), np.nan))
+    unknown = np.full((rays, 2), np.nan)
+    return Decision(out=np.ones(rays, bool), cause=cause_of_all(rays), value=float("nan"), size=unknown)
 
 
 def decide(point: PointRays, limit: Limit) -> Decision:
@@ -81,10 +81,12 @@ def decide(point: PointRays, limit: Limit) -> Decision:
     if value <= limit.value * limit.unit:
         return Decision(out=np.zeros(r, bool), cause="", value=value, size=size)
     total, unit = float(gap @ weight @ gap), limit.unit**2
+    left, sets, errors = _without(total, pulled, normal, [(ray,) for ray in range(r)])
     for count in range(1, min(r, LARGEST) + 1):
         if freedom - 2 * count < 1:
-            break
-        left, sets, errors = _without(total, pulled, normal, list(combinations(range(r), count)))
+            break  # nothing would check the rays that are left
+        if count > 1:
+            left, sets, errors = _without(total, pulled, normal, list(combinations(range(r), count)))
         best = int(left.argmin())
         bound = chi2_quantile(1 - limit.alpha, freedom - 2 * count) * unit
         if left[best] <= bound:
@@ -94,14 +96,17 @@ def decide(point: PointRays, limit: Limit) -> Decision:
                 wrong = np.isin(np.arange(r), sets[best])
                 return Decision(out=wrong, cause=WRONG_RAY, value=value, size=size)
             break
+    if r == 2 and freedom == 1:
+        size = np.column_stack([np.zeros(2), 0.5 * pulled[1::2] / share[1::2]])  # half of the y parallax each
     else:
-        count = min(r, LARGEST)
-    if freedom > 1:
         for number in np.argsort(-left, kind="stable"):  # the likeliest set with each ray says its error
             size[sets[number]] = errors[number]
-    elif r == 2:
-        size = np.column_stack([np.zeros(2), 0.5 * pulled[1::2] / share[1::2]])  # half of the y parallax each
-    return Decision(out=np.ones(r, bool), cause=TWO_RAYS if r == 2 else SEVERAL_RAYS, value=value, size=size)
+    return Decision(out=np.ones(r, bool), cause=cause_of_all(r), value=value, size=size)
+
+
+def cause_of_all(rays: int) -> str:
+    """Why all rays of a point go; the only one, against the control of its point, is the wrong one."""
+    return {1: WRONG_RAY, 2: TWO_RAYS}.get(rays, SEVERAL_RAYS)
 
 
 class _Misclosures(NamedTuple):

@@ -25,7 +25,15 @@ from photostrip.triangulation.bundle.quality.cofactors import JointCofactors, co
 from photostrip.triangulation.bundle.quality.self_calibration import image_shift
 from photostrip.triangulation.bundle.selection import Selection, restarted, selected, supported
 from photostrip.triangulation.bundle.solve import solve
-from photostrip.triangulation.gross_errors.rays.point_decisions import Decision, Limit, PointRays, decide, undecided
+from photostrip.triangulation.gross_errors.rays.point_decisions import (
+    SEVERAL_RAYS,
+    Decision,
+    Limit,
+    PointRays,
+    cause_of_all,
+    decide,
+    undecided,
+)
 from photostrip.triangulation.resection.collinearity import derivatives, project
 from photostrip.triangulation.strip_formation.non_neighbours import meeting
 
@@ -207,10 +215,11 @@ class _Search:
         rows = self.rays_of(point)
         rows = rows[done.selection.images[rows]]
         decision = self._decided(done, rows, limit, done.solution.points[point])
-        out = decision.out if decision.out.any() else np.ones(len(rows), bool)
-        return self._rejected(rows, out, decision, limit)
+        if not decision.out.any():  # within rounding of the limit
+            decision = replace(decision, out=np.ones(len(rows), bool), cause=cause_of_all(len(rows)))
+        return self._rejected(rows, decision, limit)
 
-    def _rejected(self, rows: Numbers, out: Flags, decision: Decision, limit: Limit) -> list[Rejection]:
+    def _rejected(self, rows: Numbers, decision: Decision, limit: Limit) -> list[Rejection]:
         size = decision.size * self.problem.images.sigma[rows]
         axis = np.nan_to_num(np.abs(size)).argmax(axis=1)
         return [
@@ -224,7 +233,7 @@ class _Search:
                 size=tuple(size[place].tolist()),
                 cause=decision.cause,
             )
-            for place in np.flatnonzero(out).tolist()
+            for place in np.flatnonzero(decision.out).tolist()
         ]
 
     def _decided(self, done: ScreenedBundle, rows: Numbers, limit: Limit, xyz: Floats) -> Decision:
@@ -268,7 +277,7 @@ class _Search:
             placed = images[rows].sum() > 1
             place = done.solution.points[number] if placed else self._meeting(done.solution, rows)
             decision = self._decided(done, rows, limit, place)
-            self.latest |= {each.row: each for each in self._rejected(rows, decision.out, decision, limit)}
+            self.latest |= {each.row: each for each in self._rejected(rows, decision, limit)}
             if number not in self.back and (~decision.out & ~images[rows]).any():
                 self.back.add(number)
                 xyz[number] = place
@@ -324,7 +333,9 @@ class _Search:
         known = {row for kind, row, _ in self.out if kind == reliability.IMAGE}
         for row in np.flatnonzero(~done.selection.images & ~begin.images).tolist():
             if row not in known:
-                nothing = Rejection(kind=reliability.IMAGE, row=row, test="start", value=unknown, limit=limit)
+                nothing = Rejection(
+                    kind=reliability.IMAGE, row=row, test="start", value=unknown, limit=limit, cause=SEVERAL_RAYS
+                )
                 yield replace(self.latest.get(row, nothing), test="start")
         for row, axis in np.argwhere(~begin.control & np.isfinite(self.problem.control.sigma)).tolist():
             if not done.selection.control[row, axis]:

@@ -134,19 +134,39 @@ def test_two_rays_that_do_not_meet_are_both_left_out() -> None:
     assert found.size[:, 1] == pytest.approx([15.0, -15.0], abs=2.0)  # half of the y parallax each
 
 
+def with_control(point: PointRays, axes: slice) -> PointRays:
+    """Give the point some of its three coordinates."""
+    known = np.eye(3)[axes] * 1e5
+    return replace(
+        point,
+        misfit=np.append(point.misfit, np.zeros(len(known))),
+        by_point=np.concatenate([point.by_point, known]),
+        by_photos=np.concatenate([point.by_photos, np.zeros((len(known), 6 * point.rays))]),
+        inside=np.append(point.inside, np.zeros(len(known), bool)),
+    )
+
+
 def test_control_says_which_of_two_rays_is_wrong() -> None:
     point = spoiled(a_point(5, 2), {(0, 0): 30.0})
     assert not decide(point, limit()).out.any()  # an error along the base shows nowhere
-    given_ = replace(
-        point,
-        misfit=np.append(point.misfit, np.zeros(3)),
-        by_point=np.concatenate([point.by_point, np.eye(3) * 1e5]),
-        by_photos=np.concatenate([point.by_photos, np.zeros((3, 12))]),
-        inside=np.append(point.inside, np.zeros(3, bool)),
-    )
-    found = decide(given_, limit())
+    found = decide(with_control(point, slice(0, 3)), limit())
     assert found.out.tolist() == [True, False]
     assert found.size[0, 0] == pytest.approx(30.0, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("rays", "axes", "cause"),
+    [
+        pytest.param(1, slice(0, 3), WRONG_RAY, id="one ray, given in full"),
+        pytest.param(2, slice(2, 3), TWO_RAYS, id="two rays, given in height"),
+    ],
+)
+def test_little_control_finds_an_error_and_cannot_tell_the_ray(rays: int, axes: slice, cause: str) -> None:
+    found = decide(with_control(spoiled(a_point(5, rays), {(0, 1): 40.0}), axes), limit())
+    assert found.out.all()
+    assert found.cause == cause
+    assert found.size.shape == (rays, 2)
+    assert np.isfinite(found.size).all()
 
 
 @pytest.mark.parametrize(("wrong", "cause"), [(1, WRONG_RAY), (2, WRONG_RAY), (3, WRONG_RAY), (4, SEVERAL_RAYS)])

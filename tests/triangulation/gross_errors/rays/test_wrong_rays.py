@@ -10,6 +10,8 @@ import pytest
 from hypothesis import strategies as st
 
 from photostrip.pipeline import Settings, triangulate
+from photostrip.result.document import document_of
+from photostrip.triangulation.gross_errors.rays import point_decisions, snooping
 from photostrip.triangulation.gross_errors.rays.point_decisions import SEVERAL_RAYS, TWO_RAYS, WRONG_RAY
 from photostrip.triangulation.strip_formation import non_neighbours
 from tests.strips import MICROMETRE, control_points, fly, project
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from photostrip.pipeline import Result
+    from photostrip.triangulation.gross_errors.rays.point_decisions import Decision, Limit, PointRays
     from tests.strips import Flown
 
     Floats = NDArray[np.float64]
@@ -104,6 +107,19 @@ def test_an_error_along_the_base_takes_the_place_and_leaves_the_parallaxes() -> 
     assert "p4_1" in result.not_determined
     oriented = result.strips[0].of_photos.orientation
     assert oriented.used[oriented.point == strip.at["p4_1"]].all()
+
+
+def test_a_point_within_rounding_of_the_limit_goes_with_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The test of the whole adjustment and that of the point alone may differ in the last digit."""
+
+    def never(point: PointRays, limit: Limit) -> Decision:
+        return replace(point_decisions.decide(point, limit), out=np.zeros(point.rays, bool), cause="")
+
+    monkeypatch.setattr(snooping, "decide", never)
+    strip = spoiled(flown(), {("105", "p4_1"): (0.0, 0.4)})
+    result = adjusted(strip)
+    assert set(found_in(strip, result).values()) == {SEVERAL_RAYS}
+    assert {each["point"] for each in document_of(result)["rejected"] if each["reason"]} == {"p4_1"}
 
 
 def test_two_wrong_points_of_a_corner_do_not_cost_the_good_one() -> None:
