@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import typer
 
@@ -16,9 +16,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from photostrip.notes import Note
-    from photostrip.report.page.parts import Section
+    from photostrip.report.page.parts import Document, Section
 
-Document = dict[str, Any]
 Form = Literal["text", "md", "json", "csv"]
 
 FORMS: dict[str, Form] = {".json": "json", ".csv": "csv", ".md": "md", ".txt": "text"}  # by the ending of a file

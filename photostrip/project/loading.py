@@ -13,20 +13,7 @@ from photostrip.geodesy.crs import grid_names
 from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline import Inputs, ModelStrip, Settings, triangulate
 from photostrip.points import PhotoPoints
-from photostrip.project.conversion import (
-    ImageSystem,
-    camera_positions,
-    cameras,
-    certificate_of,
-    control_points,
-    first_frame,
-    frame_spec,
-    given_orientations,
-    output_spec,
-    photo_points,
-    settings,
-    strips,
-)
+from photostrip.project import conversion
 from photostrip.project.hints import hints
 from photostrip.project.models import check_models, measured_models
 from photostrip.project.pixel_size import with_pixel_sizes
@@ -134,7 +121,7 @@ def load_project(path: Path, overrides: Sequence[str] = ()) -> Project:
     grids = tuple(dict.fromkeys(grid for spec in specs for grid in grid_names(spec.crs)))
     return Project(
         inputs=inputs,
-        settings=settings(project),
+        settings=conversion.settings(project),
         path=path,
         files=(*map(Path, reading.files), *(path.parent / grid for grid in grids if (grid_folder / grid).is_file())),
         resolved=text_of(project),
@@ -163,7 +150,7 @@ def _check_certificates(root: Node) -> Iterator[Fault]:
         if given is None:
             continue  # the schema says what is wrong with it
         try:
-            certificate_of(given)
+            conversion.certificate_of(given)
         except InputError as error:
             yield from (at_own_key(fault, root, "cameras", name) for fault in error.faults)
 
@@ -176,12 +163,12 @@ def _check_frames(root: Node, directory: Path) -> Iterator[Fault]:
     blocks += [("camera_positions", CameraPositionsBlock, root.find("camera_positions"))]
     blocks += [("orientations", Orientations, root.find("orientations"))]
     given = {name: valid_section(kind, node) for name, kind, node in blocks if node is not None}
-    specs = {name: frame_spec(each) for name, each in given.items() if each is not None}
+    specs = {name: conversion.frame_spec(each) for name, each in given.items() if each is not None}
     output = valid_section(Output, root.find("output"))
     if not specs or len(specs) != len(given) or output is None:
         return  # the schema says what is wrong with them
     try:
-        target = output_spec(output, next(iter(specs.values())))
+        target = conversion.output_spec(output, next(iter(specs.values())))
         tie_frames(list(specs.values()), target, directory=directory, keys=list(specs))
     except InputError as error:
         yield from (at_own_key(fault, root) for fault in error.faults)
@@ -191,27 +178,27 @@ def _inputs(
     project: ProjectFile, tables: Tables, root: Node, placed_models: Mapping[int, Sequence[str]]
 ) -> tuple[Inputs, list[Note]]:
     """Turn a project without faults into what the pipeline takes."""
-    known, derived = with_pixel_sizes(project, tables.fiducials, cameras(project), root)
+    known, derived = with_pixel_sizes(project, tables.fiducials, conversion.cameras(project), root)
     photos = {str(photo): known[strip.camera] for strip in project.strips if strip.camera for photo in strip.photos}
     control = [read for read in tables.control if read is not None]
     if len(control) != len(project.control):
         raise InputError("a table of the project is missing")
-    frames = tuple(frame_spec(each) for each in project.control)
-    first = first_frame(project)
-    output = output_spec(project.output, first)
+    frames = tuple(conversion.frame_spec(each) for each in project.control)
+    first = conversion.first_frame(project)
+    output = conversion.output_spec(project.output, first)
     models = _models(project, tables, placed_models)
     inputs = Inputs(
         name=str(project.name),
-        strips=strips(project, known) if models is None else (),
+        strips=conversion.strips(project, known) if models is None else (),
         observations=_observations(project, tables, photos)
         if models is None
         else PhotoPoints.naming(models.points.point_ids),
-        control=control_points(control, project.control),
+        control=conversion.control_points(control, project.control),
         frames=frames,
         output=(output or first) if not frames else None if output == first else output,
         fiducials=_fiducials(project, tables, photos),
-        positions=camera_positions(tables.positions, project.camera_positions, photos),
-        orientations=given_orientations(tables.orientations, project.orientations, photos),
+        positions=conversion.camera_positions(tables.positions, project.camera_positions, photos),
+        orientations=conversion.given_orientations(tables.orientations, project.orientations, photos),
         models=models,
     )
     return inputs, [*hints(project, tables, root), *derived]
@@ -222,10 +209,10 @@ def _observations(project: ProjectFile, tables: Tables, photos: dict[str, Camera
     given = project.observations
     if given is None or tables.observations is None:
         raise InputError("a table of the project is missing")
-    system = ImageSystem(
+    system = conversion.ImageSystem(
         unit=given.unit, y_axis=given.y_axis or "up", origin=given.origin or "center", sigma=given.sigma
     )
-    return photo_points(tables.observations, system, photos)
+    return conversion.photo_points(tables.observations, system, photos)
 
 
 def _models(project: ProjectFile, tables: Tables, placed_models: Mapping[int, Sequence[str]]) -> MeasuredModels | None:
@@ -245,5 +232,5 @@ def _fiducials(project: ProjectFile, tables: Tables, photos: dict[str, Camera]) 
     if given is None or tables.fiducials is None:
         return None
     unit = given.unit or (project.observations.unit if project.observations is not None else "mm")
-    system = ImageSystem(unit=unit, y_axis=given.y_axis or "up", origin="center", sigma=given.sigma)
-    return photo_points(tables.fiducials, system, photos)
+    system = conversion.ImageSystem(unit=unit, y_axis=given.y_axis or "up", origin="center", sigma=given.sigma)
+    return conversion.photo_points(tables.fiducials, system, photos)

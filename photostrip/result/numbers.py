@@ -19,12 +19,13 @@ Document = dict[str, Any]
 
 GROUND = 4  # decimals of metres
 GEOGRAPHIC = 10  # decimals of degrees: 0.01 mm
-MICROMETRES = 2  # decimals
+IMAGE = 2  # decimals of micrometres
 DEGREES = 6  # decimals; 0.02 mm at 1 km
 RADIANS = 9
 ROTATION = 12  # decimals of direction cosines
 SIGNIFICANT = 4  # digits of what has no natural size
 EXACT = 12  # digits of what others compute with
+MICROMETRES = 1000.0  # in a millimetre
 PER_RADIAN = {"deg": 180 / np.pi, "gon": 200 / np.pi, "rad": 1.0}  # units of angles
 DIGITS = re.compile("([0-9]+)")
 
@@ -53,7 +54,7 @@ def significant(values: ArrayLike, digits: int = SIGNIFICANT) -> Plain:
 
 def micrometres(millimetres: ArrayLike) -> Plain:
     """Return millimetres of the image as rounded micrometres."""
-    return rounded(np.asarray(millimetres, float) * 1000.0, MICROMETRES)
+    return rounded(np.asarray(millimetres, float) * MICROMETRES, IMAGE)
 
 
 def natural(name: str) -> tuple[list[str | tuple[int, str]], str]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photostrip.result.description import Quantity, table_at
-from photostrip.result.numbers import DEGREES, GEOGRAPHIC, GROUND, MICROMETRES, RADIANS, Plain, rounded, significant
+from photostrip.result.numbers import DEGREES, GEOGRAPHIC, GROUND, IMAGE, RADIANS, Plain, rounded, significant
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from photostrip.result.numbers import Document
 
 # Decimals of a value whose unit stands beside it; without a unit it is a ratio.
-DECIMALS_BY_UNIT = {"": 2, "um": MICROMETRES, "ppm": 1, "m": GROUND, "deg": DEGREES}
+DECIMALS_BY_UNIT = {"": 2, "um": IMAGE, "ppm": 1, "m": GROUND, "deg": DEGREES}
 
 
 def rounded_as(entry: Quantity, value: ArrayLike, unit: str = "") -> Plain:

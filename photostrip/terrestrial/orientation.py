@@ -15,15 +15,7 @@ import numpy as np
 from photostrip.errors import GeometryError
 from photostrip.rejection import Rejection
 from photostrip.statistics import chi2_quantile, f_p_value
-from photostrip.terrestrial.frame import (
-    GROUND_FROM_HOUSE,
-    angles_of,
-    direction_gradient,
-    directions_of,
-    ground_from_photo,
-    rays,
-    vectors_of,
-)
+from photostrip.terrestrial import frame
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -93,7 +85,7 @@ class PhotoOrientation:
     @property
     def rotation(self) -> Floats:
         """Photo to ground, shape (3, 3)."""
-        return ground_from_photo(*self.values[:3])
+        return frame.ground_from_photo(*self.values[:3])
 
     @property
     def sigma(self) -> Floats:
@@ -190,15 +182,15 @@ def _solve(sightings: Sightings, used: Flags, names: tuple[str, ...], interior: 
 
 def _start(sightings: Sightings, used: Flags, interior: Floats) -> Floats:
     """Angles from the rotation that brings the rays closest to the directions; level where that is not determined."""
-    ray = rays(sightings.xz - interior[1:], interior[0])
+    ray = frame.rays(sightings.xz - interior[1:], interior[0])
     both = used & sightings.measured.all(axis=1)
     if both.sum() >= LEAST_POINTS:
         unit = ray[both] / np.linalg.norm(ray[both], axis=1, keepdims=True)
-        left, size, right = np.linalg.svd(vectors_of(sightings.directions[both]).T @ unit)
+        left, size, right = np.linalg.svd(frame.vectors_of(sightings.directions[both]).T @ unit)
         if size[1] > 1e-9 * size[0]:  # two different directions
             sign = np.diag([1.0, 1.0, np.linalg.det(left @ right)])
-            return angles_of(left @ sign @ right)
-    across = directions_of(ray @ GROUND_FROM_HOUSE.T)[:, 0]
+            return frame.angles_of(left @ sign @ right)
+    across = frame.directions_of(ray @ frame.GROUND_FROM_HOUSE.T)[:, 0]
     turned = (sightings.directions[:, 0] - across)[used & sightings.measured[:, 0]]
     if not len(turned):
         return np.zeros(3)
@@ -208,14 +200,14 @@ def _start(sightings: Sightings, used: Flags, interior: Floats) -> Floats:
 def _linearised(sightings: Sightings, values: Floats, active: Numbers) -> _System:
     """Directions of all points under the present orientation, and their derivatives."""
     alpha, omega, kappa, f = values[:4]
-    turn = ground_from_photo(alpha, omega, kappa)
-    ray = rays(sightings.xz - values[4:], f)
+    turn = frame.ground_from_photo(alpha, omega, kappa)
+    ray = frame.rays(sightings.xz - values[4:], f)
     ground = ray @ turn.T
-    gradient = direction_gradient(ground)
+    gradient = frame.direction_gradient(ground)
     # the roll turns the ray about the photo's third axis, the elevation about the ground's x axis before the azimuth
-    about_vertical = ground_from_photo(alpha) @ GROUND_FROM_HOUSE.T  # adds alpha to every azimuth
+    about_vertical = frame.ground_from_photo(alpha) @ frame.GROUND_FROM_HOUSE.T  # adds alpha to every azimuth
     roll = np.cross([0.0, 0.0, 1.0], ray) @ turn.T
-    tilt = np.cross([1.0, 0.0, 0.0], ray @ ground_from_photo(0.0, omega, kappa).T) @ about_vertical.T
+    tilt = np.cross([1.0, 0.0, 0.0], ray @ frame.ground_from_photo(0.0, omega, kappa).T) @ about_vertical.T
     by_photo = gradient @ turn
     design = np.empty((len(ray), 2, 6))
     design[:, :, 0] = [1.0, 0.0]  # alpha is added to every azimuth
@@ -223,7 +215,7 @@ def _linearised(sightings: Sightings, values: Floats, active: Numbers) -> _Syste
     design[:, :, 2] = np.einsum("nij,nj->ni", gradient, roll)
     design[:, :, 3] = -by_photo[:, :, 2]
     design[:, :, 4:] = -by_photo[:, :, :2]
-    miss = sightings.directions - directions_of(ground)
+    miss = sightings.directions - frame.directions_of(ground)
     miss[:, 0] = (miss[:, 0] + np.pi) % (2 * np.pi) - np.pi
     return _System(design[:, :, active], miss, _weights(sightings, by_photo[:, :, :2]))
 
@@ -278,7 +270,7 @@ def _result(
     hat = np.einsum("niu,uv,njv,njk->nik", system.design, cofactors, system.design, system.weight)
     redundancy = np.where(sightings.measured & used[:, None], 1.0 - hat[:, [0, 1], [0, 1]], np.nan)
     values = values.copy()
-    values[:3] = angles_of(ground_from_photo(*values[:3]))
+    values[:3] = frame.angles_of(frame.ground_from_photo(*values[:3]))
     return PhotoOrientation(
         names=names,
         values=values[active],

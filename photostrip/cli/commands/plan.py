@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from photostrip.errors import Fault
+    from photostrip.report.page.parts import Document
 
-Document = dict[str, Any]
 Options = dict[str, tuple[str, str | None]]  # by the key that it sets: name of an option, and its value
 
 HELP_NAMES = {"help_option_names": ["--help", "-h"]}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from photostrip import __version__
 from photostrip.formats.output.csv_text import to_csv
@@ -11,7 +11,7 @@ from photostrip.formats.output.csv_text import to_csv
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-Document = dict[str, Any]
+    from photostrip.result.numbers import Document
 
 SCHEMA = 1
 COLUMNS = (

@@ -12,21 +12,8 @@ from photostrip.formats.measured.terrestrial import DIRECTION_POINTS, IMAGE_POIN
 from photostrip.formats.output.terrestrial_directions import Attitude, Theodolite
 from photostrip.formats.text.findings import Findings
 from photostrip.formats.text.numbers import NotANumber, number, shown
+from photostrip.project.terrestrial import ranges
 from photostrip.project.terrestrial.cameras import preset, read_presets
-from photostrip.project.terrestrial.ranges import (
-    COORDINATE,
-    DEGREES,
-    DIRECTION_SIGMA,
-    FORMAT,
-    GON,
-    IMAGE_SIGMA,
-    IMAGE_SIGMA_UM,
-    MILLIMETRES,
-    PRINCIPAL_DISTANCE,
-    RADIANS,
-    refuse_outside,
-    within,
-)
 from photostrip.terrestrial.frame import ARCSECONDS, Phototheodolite, ground_from_photo, photo_from_directions
 from photostrip.terrestrial.orientation import FREE, Sightings
 
@@ -57,12 +44,12 @@ def chosen_camera(
         raise InputError(Fault("nothing says which camera it is", "no-camera", key="--camera", expected=expected))
     chosen = Phototheodolite("camera", 0.0) if camera is None else preset(camera, read_presets(presets), "--camera")
     if principal_distance is not None:
-        distance = within("--principal-distance", principal_distance, PRINCIPAL_DISTANCE)
+        distance = ranges.within("--principal-distance", principal_distance, ranges.PRINCIPAL_DISTANCE)
         chosen = replace(chosen, principal_distance=distance)
     if principal_point is not None:
-        chosen = replace(chosen, principal_point=_pair_within("--principal-point", principal_point, COORDINATE))
+        chosen = replace(chosen, principal_point=_pair_within("--principal-point", principal_point, ranges.COORDINATE))
     if photo_format is not None:
-        chosen = replace(chosen, format=_pair_within("--photo-format", photo_format, FORMAT))
+        chosen = replace(chosen, format=_pair_within("--photo-format", photo_format, ranges.FORMAT))
     return chosen
 
 
@@ -76,14 +63,14 @@ def required_format(camera: Phototheodolite) -> tuple[float, float]:
 
 def image_sigma(sigma_um: float) -> float:
     """Return the standard deviation of an image coordinate in mm."""
-    return within("--sigma-um", sigma_um, IMAGE_SIGMA_UM) / 1000
+    return ranges.within("--sigma-um", sigma_um, ranges.IMAGE_SIGMA_UM) / 1000
 
 
 def theodolite_sigmas(horizontal: float, vertical: float | None, rounds: int) -> Theodolite:
     """Return the standard deviations of directions in one round, in arcseconds, and the number of rounds."""
-    horizontal = within("--sigma-arcsec", horizontal, DIRECTION_SIGMA)
+    horizontal = ranges.within("--sigma-arcsec", horizontal, ranges.DIRECTION_SIGMA)
     if vertical is not None:
-        within("--vertical-arcsec", vertical, DIRECTION_SIGMA)
+        ranges.within("--vertical-arcsec", vertical, ranges.DIRECTION_SIGMA)
     return Theodolite(horizontal, horizontal if vertical is None else vertical, rounds)
 
 
@@ -99,15 +86,15 @@ def pair(option: str, text: str) -> tuple[float, float]:
 
 
 def _pair_within(option: str, text: str, limits: Range) -> tuple[float, float]:
-    first, second = (within(option, each, limits) for each in pair(option, text))
+    first, second = (ranges.within(option, each, limits) for each in pair(option, text))
     return first, second
 
 
 def attitude(alpha: float, omega: float, kappa: float, unit: str) -> Attitude:
     """Return the attitude of a camera by its angles in deg or gon; one that looks straight up or down is refused."""
     for option, value in (("--alpha", alpha), ("--omega", omega), ("--kappa", kappa)):
-        within(option, value, DEGREES if unit == "deg" else GON)
-    angles = (alpha * RADIANS[unit], omega * RADIANS[unit], kappa * RADIANS[unit])
+        ranges.within(option, value, ranges.DEGREES if unit == "deg" else ranges.GON)
+    angles = (alpha * ranges.RADIANS[unit], omega * ranges.RADIANS[unit], kappa * ranges.RADIANS[unit])
     if abs(np.cos(angles[1])) < GIMBAL:
         message = f"with {omega:g} {unit} the camera looks straight up or down, which leaves it without an azimuth"
         raise InputError(Fault(message, "range", key="--omega", expected="an elevation below 90 degrees"))
@@ -125,14 +112,14 @@ class Points(NamedTuple):
 
 def image_points(file: str | None, at: Sequence[str], unit: str) -> Points:
     """Read image points from a table ``point,x,z``, or from the command line."""
-    points = _points(file, at, IMAGE_POINTS, COORDINATE.scaled(MILLIMETRES[unit], unit))
-    return points._replace(values=points.values * MILLIMETRES[unit])
+    points = _points(file, at, IMAGE_POINTS, ranges.COORDINATE.scaled(ranges.MILLIMETRES[unit], unit))
+    return points._replace(values=points.values * ranges.MILLIMETRES[unit])
 
 
 def direction_points(file: str | None, at: Sequence[str], camera: Phototheodolite, looking: Attitude) -> Points:
     """Read directions from a table ``point,lambda,beta`` or the command line; refuse what the photo cannot show."""
-    points = _points(file, at, DIRECTION_POINTS, DEGREES.scaled(1.0, looking.unit))
-    directions = points.values * RADIANS[looking.unit]
+    points = _points(file, at, DIRECTION_POINTS, ranges.DEGREES.scaled(1.0, looking.unit))
+    directions = points.values * ranges.RADIANS[looking.unit]
     steep = np.abs(directions[:, 1]) > STEEPEST
     behind = np.isnan(photo_from_directions(directions, camera.principal_distance, looking.rotation)).any(axis=1)
     faults = []
@@ -162,13 +149,13 @@ def _points(file: str | None, at: Sequence[str], layout: Sequence[Column], limit
     if file is None:
         values = np.array([pair("--at", text) for text in at])
         for each in values.ravel():
-            within("--at", each, limits)
+            ranges.within("--at", each, limits)
         return Points(ids=tuple(map(str, range(1, len(at) + 1))), values=values, notes=(), table=None)
     findings = Findings()
     read = read_points(file, layout, findings)
     if read is None:
         raise InputError(findings.faults)
-    refuse_outside(read, names, limits, findings)
+    ranges.refuse_outside(read, names, limits, findings)
     findings.stop()
     return Points(ids=tuple(read.cells("point")), values=read.columns(*names), notes=tuple(findings.notes), table=read)
 
@@ -191,17 +178,17 @@ def read_sightings(file: str, options: SightingOptions) -> tuple[Sightings, tupl
     read = read_points(file, SIGHTINGS, findings)
     if read is None:
         raise InputError(findings.faults)
-    scale, ids = MILLIMETRES[options.unit], tuple(read.cells("point"))
-    refuse_outside(read, ("x", "z"), COORDINATE, findings, scale=scale, unit=options.unit)
-    refuse_outside(read, ("sx", "sz"), IMAGE_SIGMA, findings, scale=scale, unit=options.unit)
-    refuse_outside(read, ("s_lambda", "s_beta"), DIRECTION_SIGMA, findings)
-    refuse_outside(read, ("lambda",), DEGREES, findings, unit=options.angles)
+    scale, ids = ranges.MILLIMETRES[options.unit], tuple(read.cells("point"))
+    ranges.refuse_outside(read, ("x", "z"), ranges.COORDINATE, findings, scale=scale, unit=options.unit)
+    ranges.refuse_outside(read, ("sx", "sz"), ranges.IMAGE_SIGMA, findings, scale=scale, unit=options.unit)
+    ranges.refuse_outside(read, ("s_lambda", "s_beta"), ranges.DIRECTION_SIGMA, findings)
+    ranges.refuse_outside(read, ("lambda",), ranges.DEGREES, findings, unit=options.angles)
     directions = read.columns("lambda", "beta")
     for row in np.flatnonzero(np.isnan(directions).all(axis=1)):
         if not findings.number(file):
             message = f"neither direction to point {ids[row]} is given"
             findings.add(read.fault(int(row), "lambda", message, "no-direction", expected="lambda, beta or both"))
-    for row in np.flatnonzero(np.abs(np.nan_to_num(directions[:, 1])) * RADIANS[options.angles] > STEEPEST):
+    for row in np.flatnonzero(np.abs(np.nan_to_num(directions[:, 1])) * ranges.RADIANS[options.angles] > STEEPEST):
         message = f"{directions[row, 1]:g} {options.angles} is not below the zenith"
         expected = "an elevation between -90 and 90 degrees, not a zenith distance"
         findings.add(read.fault(int(row), "beta", message, "range", expected=expected))
@@ -211,7 +198,7 @@ def read_sightings(file: str, options: SightingOptions) -> tuple[Sightings, tupl
     sightings = Sightings(
         ids=ids,
         xz=read.columns("x", "z") * scale,
-        directions=directions * RADIANS[options.angles],
+        directions=directions * ranges.RADIANS[options.angles],
         sigma_xz=np.where(np.isnan(image), options.sigma, image),
         sigma_directions=np.where(np.isnan(angular), usual, angular) / ARCSECONDS,
     )

@@ -9,15 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.errors import Fault
-from photostrip.formats.measured.terrestrial import (
-    COORDINATES,
-    PSEUDO_PARALLAXES,
-    SIDES,
-    EpochTable,
-    read_coordinates,
-    read_pseudo_parallaxes,
-    reference_values,
-)
+from photostrip.formats.measured import terrestrial
 from photostrip.formats.text.findings import counted, listed, suggestion
 from photostrip.notes import Note
 from photostrip.points import locate
@@ -29,7 +21,7 @@ if TYPE_CHECKING:
     from photostrip.formats.text.findings import Findings
 
 
-LAYOUTS = {"coordinates": COORDINATES, "pseudo_parallaxes": PSEUDO_PARALLAXES}
+LAYOUTS = {"coordinates": terrestrial.COORDINATES, "pseudo_parallaxes": terrestrial.PSEUDO_PARALLAXES}
 REFERENCE, SECOND = "first", "second"  # names of epochs that have none
 FEWEST_EPOCHS = 2
 
@@ -60,7 +52,7 @@ def read_series(file: str, table: Table, centre: Floats, wanted: Wanted, finding
 
     centre: (2, 2), principal points of the left and right camera in mm, z up.
     """
-    reader = read_coordinates if table.kind == "coordinates" else read_pseudo_parallaxes
+    reader = terrestrial.read_coordinates if table.kind == "coordinates" else terrestrial.read_pseudo_parallaxes
     read = reader(file, findings)
     if read is None or findings.number(file):
         return None
@@ -87,7 +79,7 @@ def read_series(file: str, table: Table, centre: Floats, wanted: Wanted, finding
     )
 
 
-def _epochs(read: EpochTable, kind: str, wanted: Wanted, findings: Findings) -> tuple[str, ...]:
+def _epochs(read: terrestrial.EpochTable, kind: str, wanted: Wanted, findings: Findings) -> tuple[str, ...]:
     """Return the epochs in order and refuse those that are not measured."""
     known = read.epochs
     if kind != "coordinates":  # the reference epoch has no rows of its own
@@ -123,7 +115,7 @@ def _epochs(read: EpochTable, kind: str, wanted: Wanted, findings: Findings) -> 
     return epochs
 
 
-def _stable(read: EpochTable, stable: tuple[str, ...], findings: Findings) -> Flags:
+def _stable(read: terrestrial.EpochTable, stable: tuple[str, ...], findings: Findings) -> Flags:
     """Mark the points that are taken not to move, and refuse those that are not measured."""
     for number, name in enumerate(stable):
         if name not in read.points:
@@ -142,7 +134,7 @@ class _Measured(NamedTuple):
 
 
 def _from_coordinates(
-    read: EpochTable, table: Table, centre: Floats, epochs: tuple[str, ...], findings: Findings
+    read: terrestrial.EpochTable, table: Table, centre: Floats, epochs: tuple[str, ...], findings: Findings
 ) -> _Measured | None:
     """Coordinates of each epoch have errors of their own and share none."""
     sigma = _filled(read, ("sx", "sz"), table.sigma, "sigma", findings)
@@ -150,7 +142,7 @@ def _from_coordinates(
         return None
     number = locate(read.epochs, epochs)[read.epoch]
     rows = np.flatnonzero(number >= 0)
-    shape = (len(epochs), len(read.points), len(SIDES), 2)
+    shape = (len(epochs), len(read.points), len(terrestrial.SIDES), 2)
     coordinates, of_epoch = np.full(shape, np.nan), np.ones(shape)
     where = (number[rows], read.point[rows], read.side[rows])
     flip = np.array([1.0, -1.0 if table.z_axis == "down" else 1.0])
@@ -162,13 +154,13 @@ def _from_coordinates(
 
 
 def _from_pseudo_parallaxes(
-    read: EpochTable, table: Table, centre: Floats, epochs: tuple[str, ...], findings: Findings
+    read: terrestrial.EpochTable, table: Table, centre: Floats, epochs: tuple[str, ...], findings: Findings
 ) -> _Measured | None:
     """Pseudo-parallaxes have errors of their own; those of the reference photos all epochs share."""
     sigma = _filled(read, ("sigma",), table.sigma, "sigma", findings)
     usual = table.sigma if table.sigma_d is None else table.sigma_d
     sigma_d = _filled(read, ("sigma_d",), usual, "sigma_d", findings)
-    reference = reference_values(read, findings)
+    reference = terrestrial.reference_values(read, findings)
     if sigma is None or sigma_d is None or findings.number(read.table.file):
         return None
     scale = MILLIMETRES[table.unit] * np.array([1.0, -1.0 if table.z_axis == "down" else 1.0] * 2)
@@ -190,7 +182,7 @@ def _from_pseudo_parallaxes(
 
 
 def _filled(
-    read: EpochTable, columns: tuple[str, ...], usual: float | None, key: str, findings: Findings
+    read: terrestrial.EpochTable, columns: tuple[str, ...], usual: float | None, key: str, findings: Findings
 ) -> Floats | None:
     """Give standard deviations row by row, in the unit of the table."""
     sigma = read.table.columns(*columns)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from photostrip.geodesy.frame_spec import GROUND_AXES
-from photostrip.result.numbers import rms
+from photostrip.result.numbers import MICROMETRES, rms
 from photostrip.result.quantities import record
 from photostrip.triangulation.bundle.quality import reliability
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 
 SHOWN = 10  # observations named as the weakest and as the worst
-MICROMETRES = 1000.0  # in a millimetre
 RELIABILITY = ("redundancy_x", "redundancy_y", "test_x", "test_y", "detectable_x_um", "detectable_y_um")
 
 

@@ -13,15 +13,9 @@ import numpy as np
 from photostrip.distributions import gamma_cdf
 from photostrip.geometry.similarity import SIMILARITY_PARAMETERS, similarity_derivatives
 from photostrip.statistics import normal_quantile
+from photostrip.triangulation.covariance_adjustment import system
 from photostrip.triangulation.covariance_adjustment.block_tridiagonal import InverseRow
 from photostrip.triangulation.covariance_adjustment.conditions import CONTROL, DISTANCE, centers_of
-from photostrip.triangulation.covariance_adjustment.system import (
-    PaddedRows,
-    SameImages,
-    products,
-    rank_in_model,
-    same_images,
-)
 from photostrip.triangulation.error_propagation.covariances import images_with_components, local_covariances
 from photostrip.triangulation.error_propagation.derivatives import COMPONENTS, ELEMENTS, ErrorRows
 
@@ -29,7 +23,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from photostrip.arrays import Floats, Numbers
-    from photostrip.triangulation.covariance_adjustment.system import System
     from photostrip.triangulation.error_propagation.strip_errors import StripErrors
 
 
@@ -79,7 +72,7 @@ class AdjustmentTest:
         return beyond[np.argsort(-np.abs(self.normalised[beyond]), kind="stable")]
 
 
-def predict(found: System, tables: Sequence[ErrorRows]) -> tuple[list[Predicted], Floats]:
+def predict(found: system.System, tables: Sequence[ErrorRows]) -> tuple[list[Predicted], Floats]:
     """Predict the errors of points and photos, and say how well they are known.
 
     With b the column of a row: its covariances with the conditions and its coefficients of the unknowns, e = b^T
@@ -143,23 +136,23 @@ def photo_rows(errors: StripErrors) -> ErrorRows:
 class _Columns:
     """Columns b of rows that are ordered by their first models, block by block."""
 
-    found: System
+    found: system.System
     rows: ErrorRows
-    padded: PaddedRows
+    padded: system.PaddedRows
     by_unknowns: Floats  # (n, d, 7): by the unknowns of the first model
-    shared: SameImages  # image points in common with conditions, ordered by rows
+    shared: system.SameImages  # image points in common with conditions, ordered by rows
 
     @classmethod
-    def of(cls, found: System, rows: ErrorRows) -> Self:
-        rank = rank_in_model(rows.first, found.errors.models)
-        shared = same_images(rows, found.conditions.rows)
+    def of(cls, found: system.System, rows: ErrorRows) -> Self:
+        rank = system.rank_in_model(rows.first, found.errors.models)
+        shared = system.same_images(rows, found.conditions.rows)
         order = np.argsort(shared.first, kind="stable")
         return cls(
             found=found,
             rows=rows,
-            padded=PaddedRows.of(found.errors, rows, rank, found.padded.by_component.shape[2]),
+            padded=system.PaddedRows.of(found.errors, rows, rank, found.padded.by_component.shape[2]),
             by_unknowns=rows.by_similarity @ found.conditions.local.to_common[rows.first],
-            shared=SameImages(shared.first[order], shared.second[order], shared.value[order, :, 0]),
+            shared=system.SameImages(shared.first[order], shared.second[order], shared.value[order, :, 0]),
         )
 
     def of_block(self, number: int) -> tuple[slice, Floats]:
@@ -201,7 +194,7 @@ class _Columns:
             inside = (model + apart >= 0) & (model + apart < models)
             if not inside.any():
                 continue
-            values = products(self.padded, self.found.padded, model[inside], apart)
+            values = system.products(self.padded, self.found.padded, model[inside], apart)
             for place, value in zip(np.flatnonzero(inside).tolist(), values, strict=True):
                 other, count = model[place] + apart, (ends[place + 1] - ends[place]) * size
                 block, top, height = other // layout.width - number + 1, layout.start[other], layout.unknown[other]
@@ -213,7 +206,7 @@ class _Columns:
             columns[1, unknown : unknown + SIMILARITY_PARAMETERS, left:right] = by_unknowns.T
 
 
-def influence(found: System, rows: ErrorRows, chosen: Numbers) -> Floats:
+def influence(found: system.System, rows: ErrorRows, chosen: Numbers) -> Floats:
     """Differentiate predicted errors by the misclosures of conditions: b^T K^-1 e, shape (n, d, c).
 
     The system is solved for the columns of the n rows or for the unit vectors of the c conditions, whichever are fewer.
@@ -242,7 +235,7 @@ def influence(found: System, rows: ErrorRows, chosen: Numbers) -> Floats:
     return result
 
 
-def tested(found: System, cofactors: Floats, count: int) -> AdjustmentTest:
+def tested(found: system.System, cofactors: Floats, count: int) -> AdjustmentTest:
     """Test the adjustment as a whole, w^T lambda, and each control coordinate, lambda / sqrt(q).
 
     ``cofactors`` (n,) are those of the correlates, ``count`` is the number of control coordinates.

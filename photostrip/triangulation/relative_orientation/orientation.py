@@ -14,15 +14,8 @@ import numpy as np
 from photostrip.errors import GeometryError
 from photostrip.geometry.rotation import from_alpha_omega_kappa
 from photostrip.points import take_rows
+from photostrip.triangulation.relative_orientation import solution
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS, Pairs
-from photostrip.triangulation.relative_orientation.solution import (
-    base_rays,
-    iterate_elements,
-    linearised_parallaxes,
-    normal_matrices,
-    rays_meet_in_front,
-    solve_elements,
-)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -128,7 +121,7 @@ def orient_pairs(pairs: Pairs, photos: Sequence[str]) -> Orientation:
 
 def orient_unchecked(pairs: Pairs) -> tuple[Orientation, Flags]:
     """Relative orientation of all pairs, whatever comes of it, and whether the iteration of each converged."""
-    solved = solve_elements(pairs)
+    solved = solution.solve_elements(pairs)
     return assess_pairs(solved.elements, pairs, solved.iterations), solved.converged
 
 
@@ -136,10 +129,10 @@ def orient_again(orientation: Orientation, weight: Floats, numbers: Numbers) -> 
     """Orient pairs whose weights changed, given by ascending numbers, again; `weight` (m,) is that of all rows."""
     pairs = replace(orientation.pairs, weight=weight)
     part = pairs.take(numbers)
-    elements, converged, steps = iterate_elements(orientation.elements[numbers], part)
+    elements, converged, steps = solution.iterate_elements(orientation.elements[numbers], part)
     if not converged.all():
         lost = np.flatnonzero(~converged)
-        elements[lost], _, steps[lost] = solve_elements(part.take(lost))
+        elements[lost], _, steps[lost] = solution.solve_elements(part.take(lost))
     fresh = assess_pairs(elements, part, orientation.iterations[numbers] + steps)
     return replace(orientation, pairs=pairs).with_pairs(numbers, fresh)
 
@@ -150,8 +143,8 @@ def assess_pairs(elements: Floats, pairs: Pairs, iterations: Numbers) -> Orienta
     With N = J^T W J, Q = inv(N): sigma_q^2 = q^T W q / (n - 5), r_i = 1 - w_i j_i^T Q j_i.
     """
     with np.errstate(all="ignore"):
-        q, jacobian = linearised_parallaxes(elements, pairs)
-        normal = normal_matrices(jacobian, pairs)
+        q, jacobian = solution.linearised_parallaxes(elements, pairs)
+        normal = solution.normal_matrices(jacobian, pairs)
         condition = condition_numbers(normal)
         regular = condition < CONDITION_LIMIT
         normal[~regular] = np.eye(5)
@@ -197,8 +190,8 @@ def unusable_pairs(result: Orientation, converged: Flags, rays: tuple[Floats, Fl
     rays: (3, m) each, optional, rays of their points in the base frame, when they are known already.
     """
     pairs = result.pairs
-    left, right = base_rays(result.elements, pairs) if rays is None else rays
-    front = rays_meet_in_front(left, right) & result.used
+    left, right = solution.base_rays(result.elements, pairs) if rays is None else rays
+    front = solution.rays_meet_in_front(left, right) & result.used
     share = pairs.sums(front.astype(float)) / np.maximum(result.points_used, 1)
     bad: Flags = ~converged | ~(result.condition <= CONDITION_LIMIT) | (share <= LEAST_IN_FRONT)
     return bad | (_mean_parallaxes(result, left, right) < SMALLEST_PARALLAX * pairs.focal)
@@ -230,7 +223,7 @@ def _reason(pair: Orientation, *, converged: bool) -> tuple[str, str]:
             "all common points lie on one line of the photo; points in at least the corners of the overlap are needed",
             "points-on-a-line",
         )
-    parallax = float(_mean_parallaxes(pair, *base_rays(pair.elements, pair.pairs))[0])
+    parallax = float(_mean_parallaxes(pair, *solution.base_rays(pair.elements, pair.pairs))[0])
     if parallax < SMALLEST_PARALLAX * pair.pairs.focal:
         return (
             f"the x parallax is only {parallax:.3f} mm: the photos have no base; the same photo twice?",

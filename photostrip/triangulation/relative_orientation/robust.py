@@ -11,17 +11,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from photostrip.triangulation.relative_orientation import solution
 from photostrip.triangulation.relative_orientation.pairs import MINIMUM_POINTS
-from photostrip.triangulation.relative_orientation.solution import (
-    LARGEST_STEP,
-    RIDGE,
-    Linearised,
-    gauss_newton_steps,
-    in_front_of_cameras,
-    linearised_parallaxes,
-    reduced_angles,
-    y_parallaxes,
-)
 from photostrip.triangulation.robust import TUNING, falling_weights, medians, scales
 
 if TYPE_CHECKING:
@@ -58,15 +49,17 @@ def solve(start: Floats, pairs: Pairs, sigma: Floats) -> RobustElements:
     elements = start.copy()
     for _ in range(STEPS):
         with np.errstate(all="ignore"):
-            q, jacobian = linearised_parallaxes(elements, pairs)
+            q, jacobian = solution.linearised_parallaxes(elements, pairs)
         q = np.where(np.isfinite(q), q, 1e6)
         jacobian = np.where(np.isfinite(jacobian), jacobian, 0.0)
         size = np.abs(q) * np.sqrt(pairs.weight)
         scale = np.maximum(sigma, scales(size, pairs.weight, pairs.pair, pairs.size))
         weight = pairs.weight * falling_weights(size / scale[pairs.pair])
-        change, _ = gauss_newton_steps(Linearised(q, jacobian), replace(pairs, weight=weight), RIDGE, LARGEST_STEP)
+        change, _ = solution.gauss_newton_steps(
+            solution.Linearised(q, jacobian), replace(pairs, weight=weight), solution.RIDGE, solution.LARGEST_STEP
+        )
         elements = elements + change
-    return RobustElements(reduced_angles(elements), scale)
+    return RobustElements(solution.reduced_angles(elements), scale)
 
 
 def orient_robustly(pairs: Pairs, sigma: Floats, few: int) -> RobustElements:
@@ -89,15 +82,15 @@ def orient_robustly(pairs: Pairs, sigma: Floats, few: int) -> RobustElements:
 def _agreeing(elements: Floats, pairs: Pairs, sigma: Floats) -> Floats:
     """Count the points of each pair that agree with its elements and lie in front of its cameras."""
     with np.errstate(all="ignore"):
-        size = np.abs(y_parallaxes(elements, pairs)) * np.sqrt(pairs.weight) / sigma[pairs.pair]
-        good = (size <= TUNING) & (pairs.weight > 0) & in_front_of_cameras(elements, pairs)
+        size = np.abs(solution.y_parallaxes(elements, pairs)) * np.sqrt(pairs.weight) / sigma[pairs.pair]
+        good = (size <= TUNING) & (pairs.weight > 0) & solution.in_front_of_cameras(elements, pairs)
     return pairs.sums(good.astype(float))
 
 
 def _least_median(elements: Floats, pairs: Pairs) -> Floats:
     """Elements by the set of five points, solved to the first order, that leaves the least median parallax."""
     with np.errstate(all="ignore"):
-        q, jacobian = linearised_parallaxes(elements, pairs)
+        q, jacobian = solution.linearised_parallaxes(elements, pairs)
     result = elements.copy()
     for number in range(pairs.size):
         rows = np.flatnonzero((pairs.pair == number) & (pairs.weight > 0) & np.isfinite(q))
@@ -114,6 +107,6 @@ def _best_step(design: Floats, residual: Floats) -> Floats:
     n = len(residual)
     draws = np.argsort(np.random.default_rng(n).random((SETS, n)), axis=1)[:, :MINIMUM_POINTS]
     steps = -(np.linalg.pinv(design[draws]) @ residual[draws][:, :, None])[:, :, 0]
-    steps = np.where(np.abs(steps).max(axis=1, keepdims=True) < LARGEST_STEP, steps, 0.0)
+    steps = np.where(np.abs(steps).max(axis=1, keepdims=True) < solution.LARGEST_STEP, steps, 0.0)
     left = np.sort(np.abs(residual + steps @ design.T), axis=1)
     return np.asarray(steps[left[:, n // 2].argmin()], float)
