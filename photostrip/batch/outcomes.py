@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from photostrip.errors import EXIT_GEOMETRY, EXIT_INPUT, EXIT_INTERNAL, EXIT_TOLERANCE, Fault, InputError
+from photostrip.errors import EXIT_GEOMETRY, EXIT_INPUT, EXIT_INTERNAL, Fault, InputError
 from photostrip.report.page.messages import findings_of, line_of
+from photostrip.result.verdict import FAILED, GOOD, LOOK, UNVERIFIED, exit_code
 
 if TYPE_CHECKING:
     from photostrip.errors import GeometryError
     from photostrip.report.page.parts import Document
 
-# How a project can end beside the verdicts of a result (good, look, failed), and the exit code of each.
+# How a project can end beside the verdicts of a result (good, unverified, look, failed), and the exit code of each.
 FAULTY, UNWRITTEN, WEAK = "faulty", "unwritten", "weak"
 BROKEN, TIMEOUT, MEMORY, NOT_RUN = "crashed", "timeout", "memory", "not run"
 EXIT_CODES = {
-    "good": 0,
-    "look": 0,
-    "failed": EXIT_TOLERANCE,
+    **{status: exit_code(status, strict=False) for status in (GOOD, UNVERIFIED, LOOK, FAILED)},
     FAULTY: EXIT_INPUT,
     UNWRITTEN: EXIT_INPUT,
     WEAK: EXIT_GEOMETRY,
@@ -48,7 +47,7 @@ def outcome_of(document: Document, findings: list[Document]) -> Document:
         "rms_at": role,
         "rms_plan_m": summary[role]["plan"]["rms"],
         "rms_height_m": summary[role]["height"]["rms"],
-        "messages": document["verdict"]["look_at"],
+        "messages": [document["verdict"]["verification"]] if status == UNVERIFIED else document["verdict"]["look_at"],
         "findings": [each for each in findings if each["severity"] == "error"],
     }
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from photostrip.batch.outcomes import FAULTY, UNWRITTEN, failure, not_run
 from photostrip.batch.tasks import Answer, Task
 from photostrip.errors import Fault, InputError
+from photostrip.result.verdict import VERDICTS, exit_code
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -81,7 +82,7 @@ class Run:
     """One batch: which projects must be computed, what is written, what became of each.
 
     Without a folder nothing is written; with ``force`` what is unchanged is computed, too, and results of other
-    projects are replaced.
+    projects are replaced; with ``strict`` every verdict but good has an exit code.
     """
 
     def __init__(
@@ -91,8 +92,10 @@ class Run:
         folder: ResultFolder | None = None,
         *,
         force: bool,
+        strict: bool = False,
     ) -> None:
-        self.projects, self.overrides, self.folder, self.force = projects, tuple(overrides), folder, force
+        self.projects, self.overrides, self.folder = projects, tuple(overrides), folder
+        self.force, self.strict = force, strict
         self.batch = Batch([named(not_run(), chosen, written=folder is not None) for chosen in projects])
 
     def go(self, executor: Executor, listener: Listener, stop: Stop) -> Batch:
@@ -147,13 +150,15 @@ class Run:
 
     def _note(self, chosen: ChosenProject, outcome: Document, answer: Answer | None, listener: Listener) -> None:
         line = named(outcome, chosen, written=self.folder is not None)
+        if outcome["status"] in VERDICTS:
+            line["exit_code"] = exit_code(outcome["status"], strict=self.strict)
         self.batch.outcomes[chosen.number] = line
         listener.finished(line, answer)
 
 
 def named(outcome: Document, chosen: ChosenProject, *, written: bool) -> Document:
     """Put the names of a project before its line of the summary; ``output`` is None where no result was written."""
-    there = written and outcome["status"] in {"good", "look", "failed"}
+    there = written and outcome["status"] in VERDICTS
     return {"project": chosen.project, "output": chosen.output if there else None, **outcome}
 
 

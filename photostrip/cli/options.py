@@ -36,6 +36,7 @@ Width = Annotated[
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", envvar="PHOTOSTRIP_QUIET", help="Print the verdict only.")]
 Silent = Annotated[bool, typer.Option("--quiet", "-q", envvar="PHOTOSTRIP_QUIET", help="Say nothing but errors.")]
+Strict = Annotated[bool, typer.Option("--strict", help="End with exit code 1 unless the verdict is GOOD.")]
 Verbose = Annotated[
     bool,
     typer.Option("--verbose", "-v", envvar="PHOTOSTRIP_VERBOSE", help="Print long tables whole, and what is done."),

@@ -1,4 +1,4 @@
-"""The verdict on a result: good, worth a look, or a failed tolerance; and what to look at, worst first.
+"""The verdict on a result: good, not verified, worth a look, or failed; and what to look at, worst first.
 
 It is made from the finished document, so that a saved result has the same verdict; its limits stand first.
 """
@@ -9,7 +9,9 @@ from itertools import groupby
 from operator import itemgetter
 from typing import TYPE_CHECKING
 
+from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE
 from photostrip.notes import before
+from photostrip.result.verification import verification_of
 from photostrip.statistics import chi2_quantile
 
 if TYPE_CHECKING:
@@ -17,7 +19,7 @@ if TYPE_CHECKING:
 
     from photostrip.result.numbers import Document
 
-GOOD, LOOK, FAILED = "good", "look", "failed"
+VERDICTS = GOOD, UNVERIFIED, LOOK, FAILED = "good", "unverified", "look", "failed"
 
 SIGMA0_RATIO = 1.5  # of sigma0 to the stated standard deviation
 PAIR_RATIO = 1.5  # of a pair's sigma0 to that of the project, when chance does not explain it
@@ -47,14 +49,20 @@ def verdict_of(document: Document) -> Document:
         *_rejected(document),
         *_notes(document),
     ]
-    status = FAILED if failed else LOOK if look_at else GOOD
-    return {"status": status, "accuracy": accuracy(document["summary"]), "look_at": look_at}
+    verification = verification_of(document)
+    status = FAILED if failed else LOOK if look_at else GOOD if verification["verified"] else UNVERIFIED
+    return {"status": status, "accuracy": accuracy(document["summary"]), **verification, "look_at": look_at}
+
+
+def exit_code(status: str, *, strict: bool) -> int:
+    """Exit code of a result: 1 when a tolerance is not kept; with `strict` of every verdict but good."""
+    return EXIT_TOLERANCE if status == FAILED or (strict and status != GOOD) else EXIT_DONE
 
 
 def accuracy(summary: Document) -> str:
     """Say in one sentence how good the points are, and from what that is known."""
     scale = "model" if summary.get("model_scale") else "photo"
-    for role, words in (("check", "check points, which took no part"), ("control", "control points; no check points")):
+    for role, words in (("check", "check points, which took no part"), ("control", "control points")):
         plan, height = summary[role]["plan"], summary[role]["height"]
         if plan["count"] or height["count"]:
             parts = [

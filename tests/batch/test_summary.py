@@ -53,7 +53,7 @@ FAULTY = failure("faulty", InputError([Fault("no <such> photo & \x01", "photo", 
 
 def test_every_status_has_an_exit_code_and_a_place_in_the_order() -> None:
     assert set(ORDER) == set(EXIT_CODES)
-    assert [EXIT_CODES[status] for status in ORDER] == [70, 70, 70, 3, 2, 2, 1, 0, 0, 0]
+    assert [EXIT_CODES[status] for status in ORDER] == [70, 70, 70, 3, 2, 2, 1, 0, 0, 0, 0]
 
 
 def test_counts_in_words() -> None:

@@ -78,6 +78,21 @@ def test_quiet_prints_the_verdict(project: Path, tmp_path: Path, capsys: pytest.
     assert len(out.splitlines()) < 5
 
 
+def test_strict_refuses_what_nothing_verifies(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Without check points every number looks as good as before: a job that asks for more must hear of it."""
+    project = write_project(tmp_path, spec("projected", 2))
+    assert run(capsys, "run", project, "--strict", "--quiet")[0] == 0
+    control = tmp_path / "control.csv"
+    lines = control.read_text(encoding="utf-8").splitlines(keepends=True)
+    control.write_text("".join(line for line in lines if ",check" not in line), encoding="utf-8")
+    for options, code in (["--quiet"], 0), (["--strict", "--quiet"], 1):
+        found, out, _ = run(capsys, "run", project, "-o", tmp_path / "out", *options)
+        assert (found, out.split(":")[0]) == (code, "UNVERIFIED")
+    assert run(capsys, "report", tmp_path / "out")[0] == 0
+    assert run(capsys, "report", tmp_path / "out", "--strict")[0] == 1
+    assert run(capsys, "run", project, "--strict", "--compare-methods")[0] == 2
+
+
 @pytest.mark.slow
 def test_json_is_the_content_of_result_json(project: Path, result: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for quiet in ([], ["--quiet"]):

@@ -643,7 +643,7 @@ def test_a_tolerance_that_cannot_be_tested_is_not_kept() -> None:
     ]
     assert document["status"] == "failed"
     assert "cannot be tested" in document["verdict"]["look_at"][0]
-    assert "no check points" in document["verdict"]["accuracy"]
+    assert document["verdict"]["verified"] is False
 
 
 def test_every_tolerance_has_a_value() -> None:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from photostrip.cli.options import Assignments, Quiet, Verbose, Width
+from photostrip.cli.options import Assignments, Quiet, Strict, Verbose, Width
 from photostrip.cli.stdout import BatchFormat
 
 
@@ -41,6 +41,7 @@ def batch(  # noqa: PLR0913, PLR0917 (an argument for each option)
     ] = BatchFormat.TEXT,
     width: Width = None,
     depfile: Annotated[Path | None, typer.Option(metavar="FILE", help="Write a rule for make.")] = None,
+    strict: Strict = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> int:
@@ -74,5 +75,6 @@ def batch(  # noqa: PLR0913, PLR0917 (an argument for each option)
         limits=limits,
         force=force,
         depfile=depfile,
+        strict=strict,
     )
     return run_batch(options, form, width, quiet=quiet, verbose=verbose)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from photostrip.cli.options import Quiet, Verbose, Width
+from photostrip.cli.options import Quiet, Strict, Verbose, Width
 from photostrip.cli.stdout import Format, form_of, print_result, report_text
 
 HTML = ".html"
@@ -22,18 +22,20 @@ def report(
         Format | None, typer.Option("--format", envvar="PHOTOSTRIP_FORMAT", help="How the report is printed.")
     ] = None,
     width: Width = None,
+    strict: Strict = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
-) -> None:
+) -> int:
     """Print the accuracy report of a saved result again.
 
     It is the report that `photostrip run` printed. FILE may end in .txt, .md, .html or .json. The exit code does not
-    depend on the tolerances: the report of a failed result is a report.
+    depend on the verdict: the report of a failed result is a report. With --strict it is 1 unless the verdict is GOOD.
     """
-    from photostrip.errors import faults_instead
+    from photostrip.errors import EXIT_DONE, faults_instead
     from photostrip.formats.output.result_json import read_result
     from photostrip.formats.text.writing import write_text
     from photostrip.report import require_complete
+    from photostrip.result.verdict import exit_code
 
     file = str(result / "result.json" if result.is_dir() else result)
     document = read_result(file)
@@ -48,3 +50,4 @@ def report(
             write_text(output, to_html(document, everything=verbose))
         else:
             write_text(output, report_text(document, form or form_of(output), width, quiet=quiet, verbose=verbose))
+    return exit_code(document["status"], strict=True) if strict else EXIT_DONE

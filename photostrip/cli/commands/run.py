@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from photostrip.cli.options import Assignments, Quiet, Shape, Verbose, Width
+from photostrip.cli.options import Assignments, Quiet, Shape, Strict, Verbose, Width
 from photostrip.cli.stdout import Format, form_of, print_result, trace_text
 
 
@@ -31,6 +31,7 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
         bool, typer.Option("--compare-methods", help="Adjust in every way there is, side by side at check points.")
     ] = False,
     html: Annotated[bool, typer.Option("--html", help="Write report.html into DIR, too.")] = False,
+    strict: Strict = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> int:
@@ -38,19 +39,19 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
 
     The report goes to stdout. With -o, DIR gets result.json with everything, the tables points.csv, photos.csv,
     residuals.csv, parallaxes.csv and rejected.csv, and project.resolved.yaml. The exit code is 1 when a tolerance of
-    the project is not kept. A bundle adjustment adds reliability.csv. With --compare-methods and -o, each method gets a
-    folder of its own in DIR.
+    the project is not kept, with --strict also when the verdict is LOOK or UNVERIFIED. A bundle adjustment adds
+    reliability.csv. With --compare-methods and -o, each method gets a folder of its own in DIR.
     """
     from photostrip.cli.failures import failures_as
     from photostrip.cli.stderr import Messages
-    from photostrip.errors import EXIT_DONE, EXIT_TOLERANCE
     from photostrip.formats.output.result_files import result_files
     from photostrip.formats.text.writing import make_rule, write_files, write_text
     from photostrip.project.loading import adjust_project, load_project
     from photostrip.report.page.progress import progress
     from photostrip.result.document import document_of
+    from photostrip.result.verdict import exit_code
 
-    _refuse_contradictions(output, depfile=depfile, trace=trace, methods=methods, html=html)
+    _refuse_contradictions(output, depfile=depfile, trace=trace, methods=methods, html=html, strict=strict)
     messages = Messages(quiet=quiet, verbose=verbose)
     if methods:
         from photostrip.cli.jobs.method_comparison import compare_methods
@@ -79,11 +80,11 @@ def run(  # noqa: PLR0913, PLR0917 (an argument for each option)
             write_files(output, files)
             messages.say(f"wrote {len(files)} files to {output}")
     print_result(document, form, width, quiet=quiet, verbose=verbose)
-    return EXIT_TOLERANCE if document["status"] == "failed" else EXIT_DONE
+    return exit_code(document["status"], strict=strict)
 
 
 def _refuse_contradictions(
-    output: Path | None, *, depfile: Path | None, trace: Path | None, methods: bool, html: bool
+    output: Path | None, *, depfile: Path | None, trace: Path | None, methods: bool, html: bool, strict: bool
 ) -> None:
     """Refuse options that make no sense together, before anything is computed."""
     if output is None and depfile is not None:
@@ -95,3 +96,5 @@ def _refuse_contradictions(
     if methods and (depfile is not None or trace is not None):
         message = "a comparison of methods has no --depfile and no --trace"
         raise typer.BadParameter(message, param_hint="--compare-methods")
+    if methods and strict:
+        raise typer.BadParameter("a comparison of methods has no verdict: --strict asks for one", param_hint="--strict")

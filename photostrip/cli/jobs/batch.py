@@ -49,6 +49,7 @@ class BatchOptions:
     limits: Limits
     force: bool
     depfile: Path | None
+    strict: bool
 
 
 def cores() -> int:
@@ -69,7 +70,7 @@ def run_batch(options: BatchOptions, form: BatchFormat, width: int | None, *, qu
             if options.output is not None:
                 folder = stack.enter_context(opened(options.output, options.overrides))
         table = stack.enter_context(batch_table(sys.stderr, len(projects), quiet=quiet))
-        run = Run(projects, options.overrides, folder, force=options.force)
+        run = Run(projects, options.overrides, folder, force=options.force, strict=options.strict)
         trouble: list[PhotostripError] = []
         try:
             with executor_of(options, len(projects), table) as executor:

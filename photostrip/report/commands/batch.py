@@ -27,8 +27,20 @@ COLUMNS = (
 ROWS = 60  # projects that are shown; more stand in summary.csv
 MESSAGES = 3  # of one project that are shown
 # How bad each status is, and the style in which it is shown.
-ORDER = ("crashed", "timeout", "memory", "weak", "faulty", "unwritten", "failed", "not run", "look", "good")
-STYLES = {"good": "good", "look": "look", "not run": "look"}
+ORDER = (
+    "crashed",
+    "timeout",
+    "memory",
+    "weak",
+    "faulty",
+    "unwritten",
+    "failed",
+    "not run",
+    "look",
+    "unverified",
+    "good",
+)
+STYLES = {"good": "good", "unverified": "look", "look": "look", "not run": "look"}
 
 
 def batch_sections(outcomes: Sequence[Document], *, quiet: bool = False, everything: bool = False) -> list[Section]:
@@ -108,4 +120,8 @@ def _case(outcome: Document) -> Case:
     if not outcome["exit_code"]:
         return Case(name)
     message, details = outcome["messages"][0], "\n".join(outcome["messages"])
-    return Case(name, message, details) if status == "failed" else Case(name, details=details, error=message)
+    return (
+        Case(name, message, details)
+        if status in {"failed", "look", "unverified"}
+        else Case(name, details=details, error=message)
+    )

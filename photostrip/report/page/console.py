@@ -26,6 +26,7 @@ STYLES = {
     "note": "dim",
     "good": "bold green",
     "look": "bold yellow",
+    "unverified": "bold yellow",
     "failed": "bold red",
 }
 

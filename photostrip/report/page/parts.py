@@ -40,7 +40,7 @@ class Words:
     """A paragraph."""
 
     text: str
-    style: str = ""  # ``"good"``, ``"look"``, ``"failed"`` or empty
+    style: str = ""  # ``"good"``, ``"unverified"``, ``"look"``, ``"failed"`` or empty
     mark: str = ""  # what stands before it: a number or a bullet; lines after the first are indented below the text
 
 

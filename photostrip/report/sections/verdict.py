@@ -10,6 +10,7 @@ from photostrip.report.page.tables import number, tabulated, words
 
 HEADLINES = {
     "good": "GOOD: nothing calls for a second look.",
+    "unverified": "UNVERIFIED: nothing calls for a second look, but {unverified}.",
     "look": "LOOK at {number} before you use this:",
     "failed": "FAILED: {failed}.",
 }
@@ -25,13 +26,17 @@ def headline(document: Document) -> str:
     wrong = sum(each["severity"] == "error" and not each["accepted"] for each in document.get("findings", []))
     if wrong:
         reasons.append(f"the data contradict themselves, {counted(wrong, 'finding')}")
-    return HEADLINES[document["status"]].format(number=number, failed="; ".join(reasons))
+    unverified = document["verdict"].get("verification", "")  # results of older versions have none
+    return HEADLINES[document["status"]].format(number=number, failed="; ".join(reasons), unverified=unverified)
 
 
 def accuracy(document: Document) -> Words:
     """Return the sentence on what is left at the check points, or at the control."""
-    text = document["verdict"]["accuracy"]
-    return Words(f"{text[0].upper()}{text[1:]}.")
+    verdict = document["verdict"]
+    texts = [verdict["accuracy"]]
+    if document["status"] != "unverified" and not verdict.get("verified", True):
+        texts.append(verdict["verification"])
+    return Words(" ".join(f"{text[0].upper()}{text[1:]}." for text in texts))
 
 
 def verdict_section(document: Document, *, everything: bool = False) -> Section:

@@ -54,6 +54,20 @@ def test_every_project_gets_the_result_that_run_gives(here: Path, capsys: pytest
     assert {path.name for path in (here / "out").iterdir()} == {"s1", "s2", "s3", ".batch.lock", *SUMMARIES}
 
 
+def test_strict_asks_more_of_the_same_results(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    control = here / "strips" / "s2" / "control.csv"
+    lines = control.read_text(encoding="utf-8").splitlines(keepends=True)
+    control.write_text("".join(line for line in lines if ",check" not in line), encoding="utf-8")
+    assert main(["batch", "strips", "-o", "out"]) == 0
+    assert "3 projects: 1 unverified, 2 good" in capsys.readouterr().out
+    assert main(["batch", "strips", "-o", "out", "--strict"]) == 1
+    captured = capsys.readouterr()
+    assert "0 computed, 3 unchanged" in captured.err
+    assert "s2/project.yaml: unverified\n- no point verifies the result: hold some given points back" in captured.out
+    junit = (here / "out" / "junit.xml").read_text(encoding="utf-8")
+    assert junit.count("<failure") == 1
+
+
 def test_a_failure_ends_no_other_project(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     spoil(here / "strips" / "s2")
     assert main(["batch", "strips", "-o", "out", "-j", "1"]) == 2
