@@ -6,7 +6,7 @@ Source: [001] eq. 153 for Earth curvature in the frames; see docs/frames.md.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from photostrip.geodesy.frame_spec import GROUND_AXES, FrameSpec
 from photostrip.geodesy.tying import tie_frames
@@ -14,13 +14,24 @@ from photostrip.notes import Note
 from photostrip.pipeline.refusals import refuse_curvature_twice
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
 
     from photostrip.geodesy.ground_frame import GroundFrame
     from photostrip.pipeline.inputs import Inputs, Settings
 
 CAMERAS = ("camera_positions", "orientations")  # keys of what may be given of cameras
+
+
+class TiedFrames(NamedTuple):
+    """Frames that loading has tied, to find out whether that can be done: a run needs not do it again."""
+
+    frames: Mapping[FrameSpec, GroundFrame]  # by what the project says about each
+    output: GroundFrame
+
+    def serve(self, specs: Sequence[FrameSpec], output: FrameSpec) -> bool:
+        """Whether frames are among these, and tied to the same output."""
+        return self.output.spec == output and self.frames.keys() >= set(specs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,10 +44,13 @@ class GroundFrames:
     orientations: GroundFrame | None = None  # of the given orientations
 
 
-def tie_ground_frames(inputs: Inputs, settings: Settings, directory: Path | None) -> GroundFrames:
+def tie_ground_frames(
+    inputs: Inputs, settings: Settings, directory: Path | None, known: TiedFrames | None = None
+) -> GroundFrames:
     """Tie the frames of control, output, camera positions and orientations together.
 
-    With curvature by eq. 153 all share the control's centre of gravity as origin.
+    With curvature by eq. 153 all share the control's centre of gravity as origin; its radius belongs to the frames, so
+    that those of loading, which know none, do not serve.
     """
     radius = settings.absolute.earth_radius if settings.absolute.earth_curvature == "model" else None
     refuse_curvature_twice(inputs, settings)
@@ -52,7 +66,10 @@ def tie_ground_frames(inputs: Inputs, settings: Settings, directory: Path | None
     output = None if inputs.output is None else replace(inputs.output, curvature_radius=radius)
     if not specs and output is not None:
         specs, named = [output], {"output": output}
-    tied, target = tie_frames(specs, output, directory=directory, keys=list(named))
+    if specs and known is not None and known.serve(specs, output or specs[0]):
+        tied, target = [known.frames[spec] for spec in specs], known.output
+    else:
+        tied, target = tie_frames(specs, output, directory=directory, keys=list(named))
     plan = inputs.control.use[:, 0] & ~inputs.control.check
     if radius is not None and plan.any():
         origin = inputs.control.enu[plan, :2].mean(axis=0)

@@ -23,15 +23,18 @@ from photostrip.pipeline.strips.forming import form_strips
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from photostrip.pipeline.frames import GroundFrames
+    from photostrip.pipeline.frames import GroundFrames, TiedFrames
     from photostrip.pipeline.image_coordinates import PhotoCoordinates
     from photostrip.pipeline.inputs import Inputs, Settings
 
 
-def triangulate(inputs: Inputs, settings: Settings, *, directory: Path | None = None) -> Result:
+def triangulate(
+    inputs: Inputs, settings: Settings, *, directory: Path | None = None, tied: TiedFrames | None = None
+) -> Result:
     """Take a project through the whole strip method.
 
     directory: the project file's directory, where grids named by the frames are looked for first.
+    tied: frames of these inputs that have been tied already; those of other inputs are not used.
     Raises InputError when the settings or frames contradict each other or the control is left-handed.
     Raises GeometryError when a pair, a junction or the absolute orientation cannot be determined.
 
@@ -40,7 +43,7 @@ def triangulate(inputs: Inputs, settings: Settings, *, directory: Path | None = 
     ground = photo = None
     try:
         require_runnable(inputs, settings)
-        ground = tie_ground_frames(inputs, settings, directory)
+        ground = tie_ground_frames(inputs, settings, directory, tied)
         require_whole(inputs, ground.control)
         # 1 interior orientation
         photo = orient_interior(inputs, settings)

@@ -12,6 +12,7 @@ from photostrip.formats.text.source import current, seen_from
 from photostrip.geodesy.crs import grid_names
 from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline import Inputs, ModelStrip, Settings, triangulate
+from photostrip.pipeline.frames import TiedFrames
 from photostrip.points import PhotoPoints
 from photostrip.project import conversion
 from photostrip.project.hints import hints
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
 
     from photostrip.camera import Camera
     from photostrip.errors import Fault
+    from photostrip.formats.text.findings import Findings
     from photostrip.notes import Finding, Note
     from photostrip.pipeline import MeasuredModels, Result
 
@@ -56,6 +58,7 @@ class Project:
     # others PROJ looks elsewhere
     grids: tuple[str, ...]
     grid_folder: Path
+    tied: TiedFrames | None  # the ground frames, tied; None where there are none
 
     @property
     def directory(self) -> Path:
@@ -100,7 +103,7 @@ class Project:
 def adjust_project(project: Project) -> Result:
     """Adjust a project; what is refused has its place in the project file."""
     with project.places():
-        return triangulate(project.inputs, project.settings, directory=project.grid_folder)
+        return triangulate(project.inputs, project.settings, directory=project.grid_folder, tied=project.tied)
 
 
 def load_project(path: Path, overrides: Sequence[str] = ()) -> Project:
@@ -114,7 +117,8 @@ def load_project(path: Path, overrides: Sequence[str] = ()) -> Project:
     placed_models = {} if tables.models is None else check_models(root, tables.models, findings)
     source = current()
     grid_folder = source.grids if source is not None and source.grids is not None else path.parent
-    findings.add(*_check_certificates(root), *_check_frames(root, grid_folder))
+    findings.add(*_check_certificates(root))
+    tied = _tied_frames(root, grid_folder, findings)
     project = completed(reading.complete(checked), root, reading.file)
     inputs, notes = _inputs(project, tables, root, placed_models)
     specs = (*inputs.frames, *(() if inputs.output is None else (inputs.output,)))
@@ -130,6 +134,7 @@ def load_project(path: Path, overrides: Sequence[str] = ()) -> Project:
         tables=tables,
         grids=grids,
         grid_folder=grid_folder,
+        tied=tied,
     )
 
 
@@ -155,8 +160,8 @@ def _check_certificates(root: Node) -> Iterator[Fault]:
             yield from (at_own_key(fault, root, "cameras", name) for fault in error.faults)
 
 
-def _check_frames(root: Node, directory: Path) -> Iterator[Fault]:
-    """Tie the ground frames together once, to find out whether that can be done."""
+def _tied_frames(root: Node, directory: Path, findings: Findings) -> TiedFrames | None:
+    """Tie the ground frames together; what forbids it is a fault of the project."""
     blocks: list[tuple[str, type[GivenList], Node | None]] = [
         (f"control[{i}]", Control, each) for i, each in enumerate(root.list_at("control"))
     ]
@@ -166,12 +171,14 @@ def _check_frames(root: Node, directory: Path) -> Iterator[Fault]:
     specs = {name: conversion.frame_spec(each) for name, each in given.items() if each is not None}
     output = valid_section(Output, root.find("output"))
     if not specs or len(specs) != len(given) or output is None:
-        return  # the schema says what is wrong with them
+        return None  # the schema says what is wrong with them
     try:
         target = conversion.output_spec(output, next(iter(specs.values())))
-        tie_frames(list(specs.values()), target, directory=directory, keys=list(specs))
+        tied, result = tie_frames(list(specs.values()), target, directory=directory, keys=list(specs))
     except InputError as error:
-        yield from (at_own_key(fault, root) for fault in error.faults)
+        findings.add(*(at_own_key(fault, root) for fault in error.faults))
+        return None
+    return TiedFrames(dict(zip(specs.values(), tied, strict=True)), result)
 
 
 def _inputs(
