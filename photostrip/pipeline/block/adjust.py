@@ -20,6 +20,7 @@ from photostrip.triangulation.bundle.quality.correlations import correlations
 from photostrip.triangulation.bundle.selection import restarted, selected, supported
 from photostrip.triangulation.bundle.solve import solve
 from photostrip.triangulation.gross_errors.rays import snooping
+from photostrip.triangulation.gross_errors.rays.common_errors import taken_up
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -60,11 +61,15 @@ def adjust_block(
     except GeometryError as error:
         _name_undetermined(block, error)
         raise
+    asked = block.problem.common_names()
+    for shared in screened.common:
+        block = replace(block, problem=taken_up(block.problem, shared))
     sigma0 = reliability.sigma0_test(screened.solution)
     estimated = _Estimated(block, screened)
     if settings.bundle.variance_components:
         estimated = _with_components(block, screened, settings)
     bundle = _bundle(inputs, settings, start, estimated, sigma0)
+    _refuse_inseparable(bundle.correlations, set(asked))
     adjusted = block_result.adjusted_strips(inputs, observations, ground.output, bundle)
     return adjusted if settings.precision else replace(adjusted, precision=None)
 
@@ -144,7 +149,7 @@ def _with_components(block: BlockProblem, screened: ScreenedBundle, settings: Se
     before = {(each.kind, each.row): each for each in screened.rejections}
     log = tuple(each for each in screened.rejections if each not in final.rejections)
     again = tuple(each for each in final.rejections if (each.kind, each.row) not in before)
-    return _Estimated(block, replace(final, rejections=(*log, *again)), found)
+    return _Estimated(block, replace(final, rejections=(*log, *again), common=screened.common), found)
 
 
 def _bundle(
@@ -155,7 +160,6 @@ def _bundle(
     problem, solution, precision = screened.problem, screened.solution, screened.precision
     parameters = self_calibration.parameters_of(problem, solution, precision)
     correlations = _correlations(solution, precision)
-    _refuse_inseparable(correlations, set(problem.common_names()))
     unit = solution.sigma0 if settings.bundle.test == "tau" and solution.redundancy > 0 else 1.0
     single = [strip for strip in inputs.strips if len(strip.photos) == 1]
     rows = start.rows_of([strip.photos[0] for strip in single]).tolist()

@@ -201,7 +201,7 @@ def _measured(
         axes=axes,
         sigma=sigma,
         lever=lever,
-        group=group if positions.correction != NO_CORRECTION else np.full(len(photo), -1),
+        group=group,
         time=time - mean[group],
         offset_sigma=wanted,
         drift_sigma=drift,

@@ -36,6 +36,7 @@ KINDS: dict[str, Kind] = {
     "P205": Kind("perspective centre at another height", WARNING),
     "P206": Kind("base of another length", WARNING),
     "P207": Kind("base in another direction", WARNING),
+    "P208": Kind("camera positions that share an error", WARNING),
     "P301": Kind("one id for two points", WARNING),
     "P302": Kind("two ids for one point", WARNING),
     "P401": Kind("control axes exchanged or left-handed", ERROR),

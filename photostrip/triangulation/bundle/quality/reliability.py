@@ -121,6 +121,11 @@ class Sigma0Test:
         """Whether sigma0 lies between its limits."""
         return self.lower <= self.sigma0 <= self.upper
 
+    @property
+    def too_large(self) -> bool:
+        """Whether sigma0 lies above its limits."""
+        return self.sigma0 > self.upper
+
 
 def sigma0_test(solution: BundleSolution) -> Sigma0Test:
     """Test sigma0 against 1: chi-square, both sides."""

@@ -25,6 +25,7 @@ from photostrip.triangulation.bundle.quality.cofactors import JointCofactors, co
 from photostrip.triangulation.bundle.quality.self_calibration import image_shift
 from photostrip.triangulation.bundle.selection import Selection, restarted, selected, supported
 from photostrip.triangulation.bundle.solve import solve
+from photostrip.triangulation.gross_errors.rays.common_errors import CommonError, find_common_error, taken_up
 from photostrip.triangulation.gross_errors.rays.point_decisions import (
     SEVERAL_RAYS,
     Decision,
@@ -44,6 +45,9 @@ if TYPE_CHECKING:
     from photostrip.triangulation.bundle.observations.problem import BundleProblem
     from photostrip.triangulation.bundle.settings import BundleSettings
     from photostrip.triangulation.bundle.solution import BundleSolution, Cofactors
+
+
+MOST_COMMON_TRIALS = 5  # larger errors of single coordinates do not hide a common one from more
 
 
 def _limit(problem: BundleProblem, solution: BundleSolution, settings: BundleSettings) -> Limit:
@@ -69,6 +73,7 @@ class ScreenedBundle:
     limit: Limit  # what its residuals are tested against
     rejections: tuple[Rejection, ...] = ()  # what was taken out, in order; re-admitted ones are marked
     rounds: int = 1
+    common: tuple[CommonError, ...] = ()  # what groups of observations share, taken up as unknowns
 
     @classmethod
     def of(
@@ -115,7 +120,8 @@ def screen_bundle(
     done = search.clean(chosen)
     while (more := search.fitting(done)) is not None:  # a point comes back once only
         done = search.clean(more)
-    return replace(done, rejections=tuple(search.log(done, begin)), rounds=search.rounds)
+    log = tuple(search.log(done, begin))
+    return replace(done, rejections=log, rounds=search.rounds, common=tuple(search.common))
 
 
 class _Search:
@@ -132,6 +138,8 @@ class _Search:
         self.latest: dict[int, Rejection] = {}  # what was last said of rays outside
         self.back: set[int] = set()  # points that came back; what must go again stays out
         self.rounds = 0
+        self.common: list[CommonError] = []
+        self.common_trials = MOST_COMMON_TRIALS
 
     def rays_of(self, point: int) -> Numbers:
         """Rows of the rays of a point, in the order of the photos."""
@@ -163,13 +171,30 @@ class _Search:
     def clean(self, selection: Selection) -> ScreenedBundle:
         """Test and take out until nothing is beyond the limit."""
         done = self.adjust(selection)
-        while worst := self._worst(done):
+        while (worst := self._worst(done)) or reliability.sigma0_test(done.solution).too_large:
+            if (not worst or worst[0].kind != reliability.IMAGE) and self._take_up_common(done, *worst):
+                done = self.adjust(supported(self.problem, selection))
+                continue
+            if not worst:
+                break
             for each in worst:
                 axis = 0 if each.kind == reliability.IMAGE else each.axes[0]
                 self.out[each.kind, each.row, axis] = each
                 selection = selection.without(each.kind, each.row, axis)
             done = self.adjust(supported(self.problem, selection))
         return done
+
+    def _take_up_common(self, done: ScreenedBundle, worst: Rejection | None = None) -> bool:
+        """Take up what a group of observations shares, where that explains more than the worst given coordinate."""
+        self.common_trials -= 1
+        if self.common_trials < 0:
+            return False
+        found = find_common_error(self.problem, done.selection, done.solution, done.limit, worst)
+        if found is None:
+            return False
+        self.common.append(found)
+        self.problem = taken_up(self.problem, found)
+        return True
 
     def _worst(self, done: ScreenedBundle) -> list[Rejection]:
         """Return the worst rays of every neighbourhood, or the worst given coordinate where that is worse."""

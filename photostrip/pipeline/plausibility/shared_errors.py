@@ -1,0 +1,100 @@
+"""What a bundle adjustment took up as common to all camera positions, or to all photos of a camera."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.triangulation.bundle.observations.given_orientations import drift_columns
+from photostrip.triangulation.gross_errors.rays.common_errors import ALL, DISTANCE, DRIFT
+from photostrip.triangulation.plausibility import found
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from photostrip.arrays import Floats
+    from photostrip.notes import Finding
+    from photostrip.pipeline.inputs import Inputs
+    from photostrip.pipeline.results import Bundle
+    from photostrip.triangulation.bundle.quality.self_calibration import Parameter
+    from photostrip.triangulation.gross_errors.rays.common_errors import CommonError
+
+SHOWN_SIGMAS = 4.0  # standard deviations from which a group, or a camera, is named
+KEY = "camera_positions.correction"
+
+
+def of_bundle(bundle: Bundle, inputs: Inputs) -> Iterator[Finding]:
+    """Name what a group of observations shares (P105, P208)."""
+    shared = bundle.screened.common
+    if any(each.kind == DISTANCE for each in shared):
+        yield from (_distance(each, inputs) for each in bundle.parameters if _is_distance(each))
+    of_positions = [each for each in shared if each.kind != DISTANCE]
+    if of_positions:
+        yield from _positions(bundle, inputs, of_positions[-1])
+
+
+def _is_distance(each: Parameter) -> bool:
+    return each.name == "principal_distance" and abs(each.value) > SHOWN_SIGMAS * each.sigma
+
+
+def _distance(parameter: Parameter, inputs: Inputs) -> Finding:
+    given = next(each.camera.principal_distance for each in inputs.strips if each.camera.name == parameter.camera)
+    would_fit = given + parameter.value
+    message = (
+        f"control and camera positions go with the photos of camera {parameter.camera} at a principal distance of "
+        f"{would_fit:.2f} mm (standard deviation {parameter.sigma:.2g} mm); {given:g} mm are given. The adjustment "
+        "went on with the one that fits"
+    )
+    evidence = {"principal_distance_mm": given, "would_fit_mm": would_fit, "standard_deviation_mm": parameter.sigma}
+    fix = "take it from the certificate; if that agrees with what is given, name it in `self_calibration`"
+    key = f"cameras.{parameter.camera}.principal_distance"
+    strips = tuple(each.id for each in inputs.strips if each.camera.name == parameter.camera)
+    return found("P105", message, fix, evidence, strips=strips, key=key)
+
+
+def _positions(bundle: Bundle, inputs: Inputs, error: CommonError) -> Iterator[Finding]:
+    problem, solution, precision = bundle.screened.problem, bundle.screened.solution, bundle.screened.precision
+    given = problem.positions
+    calibrated = len(solution.common) - int((given.offset_sigma > 0).sum() + (given.drift_sigma > 0).sum())
+    sigma = np.sqrt(np.diag(precision.common)) * bundle.unit
+    for group, (offset, drift) in enumerate(zip(*drift_columns(given, calibrated), strict=True)):
+        columns = np.concatenate([offset, drift])
+        columns = columns[columns >= 0]
+        if not (np.abs(solution.common[columns]) > SHOWN_SIGMAS * sigma[columns]).any():
+            continue
+        # unknowns are what has to be added to what is given
+        off, drifted = (-np.where(each >= 0, solution.common[each], 0.0) for each in (offset, drift))
+        length = float(np.ptp(given.time[given.group == group]))
+        yield _finding(bundle, inputs, error, group, off, drifted * length if error.kind == DRIFT else None)
+
+
+def _finding(
+    bundle: Bundle, inputs: Inputs, error: CommonError, group: int, offset: Floats, drift: Floats | None
+) -> Finding:
+    problem = bundle.screened.problem
+    rows = np.flatnonzero(problem.positions.group == group)
+    axes = problem.position_axes
+    whose = "the camera positions" if error.of == ALL else f"the camera positions of strip {problem.group_ids[group]}"
+    message = f"{whose} all lie {_steps(offset, axes)} from where control and photos put them"
+    evidence = {f"offset_{axis}_m": float(each) for axis, each in zip(axes, offset, strict=True)}
+    correction = "offset"
+    if drift is not None:
+        message += f", and drift by {_steps(drift, axes)} from the first to the last"
+        evidence |= {f"drift_{axis}_m": float(each) for axis, each in zip(axes, drift, strict=True)}
+        correction = "drift"
+    message += f"; the adjustment went on as with `correction: {correction}`"
+    if error.rival:
+        message += ". A wrong principal distance would explain it nearly as well"
+    fix = (
+        "look at the datum, the kind of height and the lever arm of the positions, and at the crs of the control; what "
+        f"cannot be put right is taken up by `correction: {correction}`"
+    )
+    if error.of == ALL and len(inputs.strips) > 1:
+        fix += " with `group: block`"
+    photos = tuple(dict.fromkeys(problem.photo_name(int(each)) for each in problem.positions.photo[rows]))
+    return found("P208", message, fix, evidence, photos=photos, key=KEY)
+
+
+def _steps(step: Floats, axes: tuple[str, str, str]) -> str:
+    return ", ".join(f"{each:+.2f} m {axis}" for each, axis in zip(step, axes, strict=True))

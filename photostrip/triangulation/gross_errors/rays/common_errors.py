@@ -1,0 +1,146 @@
+"""Errors that a whole group of observations shares, tested before single given coordinates are taken out.
+
+Camera positions in another datum than the control, or of an antenna whose arm is not stated, contradict the control one
+by one; so does control in photos of another principal distance. Taken out one by one, good control and good positions
+go. A common error is one hypothesis of few parameters: it is taken up as unknowns when with it the sum of squares falls
+by more, in units of what chance reaches, than it does without the worst given coordinate, and without the whole point
+or position to which that belongs.
+
+Source: derived, see docs/sources.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photostrip.errors import GeometryError
+from photostrip.statistics import chi2_quantile
+from photostrip.triangulation.bundle.observations.problem import CALIBRATION
+from photostrip.triangulation.bundle.selection import Selection, selected
+from photostrip.triangulation.bundle.solve import solve
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from photostrip.rejection import Rejection
+    from photostrip.triangulation.bundle.observations.problem import BundleProblem
+    from photostrip.triangulation.bundle.solution import BundleSolution
+    from photostrip.triangulation.gross_errors.rays.point_decisions import Limit
+
+OFFSET, DRIFT, DISTANCE = "offset", "drift", "principal distance"
+ALL = "all"  # positions of all groups share one error
+EACH = "each"  # those of every group, or every camera, have one of their own
+
+
+@dataclass(frozen=True)
+class CommonError:
+    """What a group of observations shares beside the truth."""
+
+    kind: str  # ``OFFSET`` or ``DRIFT`` (which has an offset too) of camera positions, or ``DISTANCE`` of cameras
+    of: str  # ``ALL`` or ``EACH``
+    rival: str = ""  # kind of another error that explains nearly as much
+
+
+def taken_up(problem: BundleProblem, error: CommonError) -> BundleProblem:
+    """Give a problem the unknowns of a common error."""
+    positions, cameras = problem.positions, problem.cameras
+    if error.kind == DISTANCE:
+        sigma = np.zeros((len(cameras.focal), len(CALIBRATION))) if cameras.sigma is None else cameras.sigma.copy()
+        sigma[:, CALIBRATION.index("c")] = np.inf
+        return replace(problem, cameras=replace(cameras, sigma=sigma))
+    group = np.where(positions.group >= 0, 0 if error.of == ALL else positions.group, -1)
+    count = 1 if error.of == ALL else len(positions.offset_sigma)
+    members = np.zeros((count, 3), np.intp)
+    np.add.at(members, group[group >= 0], np.isfinite(positions.sigma[group >= 0]))
+    drift = np.where((members > 1) & (error.kind == DRIFT), np.inf, 0.0)
+    changed = replace(positions, group=group, offset_sigma=np.where(members > 0, np.inf, 0.0), drift_sigma=drift)
+    return replace(problem, positions=changed, group_ids=("of the block",) if error.of == ALL else problem.group_ids)
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """An adjustment with the unknowns of a common error."""
+
+    error: CommonError
+    unknowns: int
+    chi_square: float
+    sigma0: float
+
+
+def find_common_error(
+    problem: BundleProblem, selection: Selection, solution: BundleSolution, limit: Limit, worst: Rejection | None = None
+) -> CommonError | None:
+    """Find the common error that explains more than the worst given coordinate does; None when there is none.
+
+    Of several, one with more unknowns, or of another kind, must explain more than chance adds to it.
+    """
+    trials = list(_trials(problem, selection))
+    if not trials:
+        return None
+    least = min(each.sigma0 for each in trials)
+    unit = 1.0 if limit.unit == 1.0 or not least > 1.0 else least  # the common error itself makes sigma0 large
+
+    def by_chance(unknowns: int) -> float:
+        return chi2_quantile(1 - limit.alpha, max(unknowns, 1)) * unit**2
+
+    found, most, unknowns = None, 0.0, 0
+    for each in trials:
+        fall, error = solution.chi_square - each.chi_square, each.error
+        if found is not None and error.kind == DISTANCE and abs(fall - most) < by_chance(abs(each.unknowns - unknowns)):
+            found = replace(found, rival=error.kind)
+        elif fall > most + by_chance(each.unknowns - unknowns):
+            found, most, unknowns = error, fall, each.unknowns
+    if found is None or worst is None:
+        return found
+    without = _whole_row(selection, worst)
+    share = (worst.value * limit.unit / (limit.value * unit)) ** 2
+    if (alone := _solved(problem, without)) is not None:
+        fall = solution.chi_square - alone.chi_square
+        share = max(share, fall / by_chance(_given(selection) - _given(without)))
+    return found if most / by_chance(unknowns) > share else None
+
+
+def _trials(problem: BundleProblem, selection: Selection) -> Iterator[_Trial]:
+    known = len(problem.common_names())
+    for error in _conceivable(problem):
+        tried = taken_up(problem, error)
+        after = _solved(tried, selection)
+        if after is not None:
+            unknowns = len(tried.common_names()) - known
+            yield _Trial(error=error, unknowns=unknowns, chi_square=after.chi_square, sigma0=after.sigma0)
+
+
+def _solved(problem: BundleProblem, selection: Selection) -> BundleSolution | None:
+    try:
+        return solve(selected(problem, selection), rough=True)
+    except GeometryError:
+        return None
+
+
+def _conceivable(problem: BundleProblem) -> Iterator[CommonError]:
+    """Errors that may be shared, those of fewest unknowns first."""
+    positions = problem.positions
+    several = len(np.unique(positions.group[positions.group >= 0])) > 1
+    if (positions.group >= 0).any() and not positions.drift_sigma.any():
+        if not positions.offset_sigma.any():
+            if several:
+                yield CommonError(OFFSET, ALL)
+            yield CommonError(OFFSET, EACH)
+        yield CommonError(DRIFT, EACH)
+    given = len(problem.control) + len(problem.positions) > 0
+    if given and (problem.cameras.sigma is None or not problem.cameras.sigma[:, CALIBRATION.index("c")].any()):
+        yield CommonError(DISTANCE, EACH)
+
+
+def _whole_row(selection: Selection, worst: Rejection) -> Selection:
+    """Leave the whole point or position of a coordinate out."""
+    for axis in range(3):
+        selection = selection.without(worst.kind, worst.row, axis)
+    return selection
+
+
+def _given(selection: Selection) -> int:
+    return int(selection.control.sum() + selection.positions.sum() + selection.attitudes.sum())

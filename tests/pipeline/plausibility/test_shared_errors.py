@@ -1,0 +1,124 @@
+"""What all camera positions share, or all photos of a camera, is named as such and costs no good observation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from photostrip.formats.output.simulation import inputs_of, settings_of
+from photostrip.pipeline import triangulate
+from photostrip.pipeline.inputs import CameraPositions
+from photostrip.simulate import Control, Flight, Spec
+from photostrip.simulate.simulation import simulate
+from photostrip.simulate.spec import Gnss
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from photostrip.pipeline.results import Result
+    from photostrip.simulate.simulation import Simulation
+
+
+def adjusted(
+    *, strips: int = 2, shift: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0), distance: float = 1.0, seed: int = 7
+) -> tuple[Simulation, Result]:
+    """Adjust a block whose control stands at both ends, with measured camera positions that are shifted."""
+    flight = Flight(photos=10, strips=strips)
+    simulation = simulate(Spec(seed=seed, flight=flight, control=Control(bands=2), gnss=Gnss()))
+    inputs, photos = inputs_of(simulation), simulation.truth.photo_ids
+    assert simulation.gnss is not None
+    shape = len(photos), 3
+    inputs = replace(
+        inputs,
+        strips=tuple(
+            replace(each, camera=replace(each.camera, principal_distance=each.camera.principal_distance * distance))
+            for each in inputs.strips
+        ),
+        positions=CameraPositions(
+            photos=photos,
+            frame=inputs.frames[0],
+            enu=simulation.gnss + np.asarray(shift, float),
+            use=np.ones(shape, bool),
+            sigma=np.tile((0.10, 0.10, 0.15), (len(photos), 1)),
+            time=np.full(len(photos), np.nan),
+        ),
+    )
+    return simulation, triangulate(inputs, replace(settings_of(simulation), adjustment="bundle"))
+
+
+def rms(simulation: Simulation, result: Result) -> float:
+    """Root mean square distance of the adjusted points from their true places, metres."""
+    truth = dict(zip(simulation.truth.points.ids, simulation.truth.points.xyz, strict=True))
+    names = result.refined.observations.point_ids
+    rows = [row for row, number in enumerate(result.points.number.tolist()) if names[number] in truth]
+    off = [result.points.cartesian[row] - truth[names[int(result.points.number[row])]] for row in rows]
+    return float(np.sqrt((np.array(off) ** 2).sum(axis=1).mean()))
+
+
+def lost(result: Result) -> list[str]:
+    """Kinds of the given coordinates that were taken out."""
+    assert result.bundle is not None
+    return [each.kind for each in result.bundle.screened.rejections if each.kind != "image" and not each.readmitted]
+
+
+@pytest.mark.parametrize("shift", [(10.0, 0.0, 0.0), (7.0, -7.0, 0.0), (0.0, 0.0, 10.0)])
+@pytest.mark.parametrize("strips", [1, 2])
+def test_a_common_offset_of_the_positions_is_named_and_taken_up(strips: int, shift: tuple[float, float, float]) -> None:
+    """Tested one by one, 12 control coordinates and 23 positions went, and points were 7 to 10 m off."""
+    simulation, result = adjusted(strips=strips, shift=shift)
+    (finding,) = result.findings
+    assert finding.code == "P208"
+    assert finding.key == "camera_positions.correction"
+    assert "`correction: offset`" in finding.message
+    assert [finding.evidence[f"offset_{axis}_m"] for axis in ("east", "north", "up")] == pytest.approx(shift, abs=0.6)
+    assert lost(result) == []
+    assert rms(simulation, result) < 0.4
+
+
+def test_one_strip_of_several_is_named_alone() -> None:
+    """Only the second strip is off."""
+    shift = np.repeat([[0.0] * 3, [4.0, 4.0, 0.0]], 10, axis=0)
+    _, result = adjusted(shift=shift)
+    (finding,) = result.findings
+    assert finding.code == "P208"
+    assert "of strip B " in finding.message
+    assert set(finding.photos) == set(result.inputs.strips[1].photos)
+
+
+def test_a_drift_of_the_positions_is_named() -> None:
+    """Half a metre from photo to photo."""
+    _, result = adjusted(strips=1, shift=np.arange(10)[:, None] * np.array([0.5, 0.0, 0.2]))
+    (finding,) = result.findings
+    assert "`correction: drift`" in finding.message
+    assert finding.evidence["drift_east_m"] == pytest.approx(4.5, abs=0.3)
+    assert lost(result) == []
+
+
+def test_a_principal_distance_off_by_a_percent_is_named() -> None:
+    """Positions and control tell it from a common height."""
+    simulation, result = adjusted(distance=1.01)
+    (finding,) = result.findings
+    assert finding.code == "P105"
+    assert finding.evidence["would_fit_mm"] == pytest.approx(153.0, abs=0.05)
+    assert rms(simulation, result) < 0.4
+
+
+def test_single_wrong_positions_stay_single() -> None:
+    """Two positions that are off take no offset of all with them."""
+    shift = np.zeros((20, 3))
+    shift[2, 0], shift[13, 2] = 30.0, -20.0
+    _, result = adjusted(shift=shift)
+    assert lost(result) == ["position", "position"]
+    assert result.bundle is not None
+    assert result.bundle.screened.common == ()
+
+
+def test_sound_positions_share_nothing() -> None:
+    """Nothing is taken up where nothing is wrong."""
+    _, result = adjusted()
+    assert result.findings == ()
+    assert result.bundle is not None
+    assert result.bundle.screened.common == ()
