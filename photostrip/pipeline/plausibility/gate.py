@@ -14,7 +14,7 @@ import numpy as np
 from photostrip.errors import GeometryError, InputError
 from photostrip.geodesy.tying import tie_frames
 from photostrip.pipeline.image_coordinates import PhotoCoordinates
-from photostrip.pipeline.plausibility import evidence, given_cameras, given_control, shared_errors
+from photostrip.pipeline.plausibility import evidence, given_cameras, given_control
 from photostrip.pipeline.plausibility.given_control import GivenControl
 from photostrip.pipeline.plausibility.image_evidence import of_images
 from photostrip.points import locate
@@ -70,6 +70,8 @@ def of_result(result: Result, directory: Path | None = None) -> tuple[Finding, .
     findings += given_cameras.centers(inputs, points, images.strips, directory)
     findings += _of_rotations(result, formed, directory)
     if result.bundle is not None:
+        from photostrip.pipeline.plausibility import shared_errors  # a strip needs nothing of a bundle
+
         findings += shared_errors.of_bundle(result.bundle, inputs)
     return accepted(findings, settings.accept)
 
